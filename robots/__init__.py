@@ -1,0 +1,50 @@
+"""What a robot is, and where its files come from.
+
+Importing this package loads neither a simulator nor torch, and touches no file or network.
+"""
+
+from robots.descriptor import (
+    ActionNumber,
+    ActionSplit,
+    CameraMount,
+    Fingers,
+    GripperMaterial,
+    Home,
+    JointGroup,
+    RobotDescriptor,
+)
+from robots.errors import (
+    ActionError,
+    AssetError,
+    DescriptorError,
+    LayoutError,
+    MissingPackageError,
+    RobotLayoutsError,
+    SimulationError,
+    TaskError,
+    UnknownNameError,
+)
+from robots.locator import UrdfLocator
+from robots.registry import RobotRegistry
+
+__all__ = [
+    "ActionError",
+    "ActionNumber",
+    "ActionSplit",
+    "AssetError",
+    "CameraMount",
+    "DescriptorError",
+    "Fingers",
+    "GripperMaterial",
+    "Home",
+    "JointGroup",
+    "LayoutError",
+    "MissingPackageError",
+    "RobotDescriptor",
+    "RobotLayoutsError",
+    "RobotRegistry",
+    "SimulationError",
+    "TaskError",
+    "UnknownNameError",
+    "UrdfLocator",
+]

@@ -1,0 +1,86 @@
+"""The one family of errors that the whole library raises."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class RobotLayoutsError(Exception):
+    """Base of every error raised on purpose by this library."""
+
+    def __str__(self) -> str:
+        """Return the message as written (``KeyError`` would show its repr)."""
+        return str(self.args[0]) if self.args else ""
+
+
+class UnknownNameError(RobotLayoutsError, KeyError):
+    """A name that is not in a catalogue; the message names the closest match and the choices."""
+
+    def __init__(self, kind: str, name: object, choices: Iterable[str], hint: str = "") -> None:
+        """Compose the message.
+
+        Args:
+            kind: What was looked up, in the singular (``"robot"``).
+            name: The name that was not found.
+            choices: Every name that would have been accepted.
+            hint: A last sentence, such as how to add a name.
+        """
+        self.kind, self.name, self.choices = kind, name, tuple(choices)
+        super().__init__(unknown_name_message(kind, name, self.choices, hint))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle by message, so that worker processes can send the error home."""
+        return (_rebuild_unknown_name, (self.args[0], self.kind, self.name, self.choices))
+
+
+class DescriptorError(RobotLayoutsError, ValueError):
+    """A robot descriptor that contradicts itself or the URDF it describes."""
+
+
+class LayoutError(RobotLayoutsError, ValueError):
+    """A layout that cannot be built: duplicate names, bad poses, unknown keyframes."""
+
+
+class ActionError(RobotLayoutsError, ValueError):
+    """An action of the wrong shape or type, or with numbers that are not finite."""
+
+
+class AssetError(RobotLayoutsError, OSError):
+    """Robot files that could not be found or did not match the manifest."""
+
+
+class SimulationError(RobotLayoutsError, RuntimeError):
+    """A world that cannot be built or stepped as asked."""
+
+
+class TaskError(RobotLayoutsError, ValueError):
+    """A task asked for something that it does not offer (a mode, a field, a robot)."""
+
+
+class MissingPackageError(RobotLayoutsError, ImportError):
+    """An optional package that the call needs is not installed; the message names the command."""
+
+
+def closest_match(name: object, choices: Iterable[str]) -> str | None:
+    """Return the choice most like ``name`` (ignoring case), or None if nothing is close."""
+    by_lower = {choice.lower(): choice for choice in choices}
+    found = difflib.get_close_matches(str(name).lower(), by_lower, n=1, cutoff=0.5)
+    return by_lower[found[0]] if found else None
+
+
+def unknown_name_message(kind: str, name: object, choices: Iterable[str], hint: str = "") -> str:
+    """Say that ``name`` is not a ``kind``, the closest match, and all choices."""
+    choices = tuple(choices)
+    match = closest_match(name, choices)
+    suggestion = f" Did you mean {match!r}?" if match else ""
+    listing = ", ".join(choices) if choices else "none"
+    return f"unknown {kind} {name!r}.{suggestion} Choices: {listing}.{' ' + hint if hint else ''}"
+
+
+def _rebuild_unknown_name(
+    message: str, kind: str, name: object, choices: tuple[str, ...]
+) -> UnknownNameError:
+    error = UnknownNameError(kind, name, choices)
+    error.args = (message,)
+    return error
