@@ -23,6 +23,8 @@ from robots.errors import (
     SimulationError,
     TaskError,
     UnknownNameError,
+    closest_match,
+    unknown_name_message,
 )
 from robots.locator import UrdfLocator
 from robots.registry import RobotRegistry
@@ -47,4 +49,6 @@ __all__ = [
     "TaskError",
     "UnknownNameError",
     "UrdfLocator",
+    "closest_match",
+    "unknown_name_message",
 ]

@@ -358,6 +358,12 @@ class RobotDescriptor:
         return self.action_split.joints
 
     @property
+    def arm_joints(self) -> tuple[str, ...]:
+        """Joints of every group that is not called ``gripper``."""
+        groups = self.action_split.groups.items()
+        return tuple(j for name, group in groups if name != "gripper" for j in group.joints)
+
+    @property
     def dof(self) -> int:
         """Number of driven joints; a Panda has 9, as both fingers count."""
         return len(self.joints)

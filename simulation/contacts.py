@@ -1,0 +1,90 @@
+"""Contact forces between pairs, and what counts as a grasp."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from robots import Fingers
+from simulation.world import World
+
+
+def pairwise_forces(
+    world: World, robot: str, links: Sequence[str], body: str
+) -> NDArray[np.float32]:
+    """Return the contact force of a body on each of some links, summed over their contacts.
+
+    PhysX refreshes contacts only in a step: after a teleport they are still those of the last one.
+
+    Args:
+        world: The world.
+        robot: Robot name.
+        links: Link names, L of them.
+        body: Body name.
+
+    Returns:
+        Forces in the world frame, shape (L, 3) (N).
+    """
+    other = world.body(body).component
+    sought = [world.robots[robot].link(link) for link in links]
+    impulses = np.zeros((len(sought), 3))
+    for contact in world.system.get_contacts():
+        first, second = contact.bodies
+        if first is other:
+            link, sign = second, -1
+        elif second is other:
+            link, sign = first, 1
+        else:
+            continue
+        if link in sought:
+            total = np.sum([point.impulse for point in contact.points], axis=0)
+            impulses[sought.index(link)] += total * sign  # an impulse acts on the first body
+    return impulses.astype(np.float32) / np.float32(world.physics.timestep)
+
+
+def grasped(fingers: Fingers, forces: Tensor, poses: Sequence[Tensor]) -> Tensor:
+    """Tell from contact forces whether two fingers hold a body.
+
+    Args:
+        fingers: Which way they open, and the thresholds.
+        forces: Force of the body on each finger, shape (N, 2, 3) (N, world frame).
+        poses: Pose of each finger link, each (N, 7).
+
+    Returns:
+        Shape (N,), bool.
+    """
+    held = torch.ones(len(forces), dtype=torch.bool)
+    if not forces.any():
+        return ~held
+    for i, (pose, sign) in enumerate(zip(poses, fingers.opening_signs, strict=True)):
+        force = forces[:, i]
+        angle = torch.rad2deg(_angle_between(sign * _y_axis(pose[:, 3:]), force))
+        strong = torch.linalg.vector_norm(force, dim=1) >= fingers.min_force
+        held &= strong & (angle <= fingers.max_angle)
+    return held
+
+
+def _y_axis(quaternion: Tensor) -> Tensor:
+    """Second column of the rotation matrix of wxyz quaternions (N, 4), shape (N, 3)."""
+    w, x, y, z = quaternion.unbind(-1)
+    scale = 2.0 / (quaternion * quaternion).sum(-1)
+    return torch.stack(
+        (scale * (x * y - z * w), 1 - scale * (x * x + z * z), scale * (y * z + x * w)), -1
+    )
+
+
+def _angle_between(a: Tensor, b: Tensor) -> Tensor:
+    """Angle between vectors (N, 3), shape (N,) (rad)."""
+    cosine = torch.einsum("ij,ij->i", _unit(a), _unit(b))
+    return torch.arccos(torch.clip(cosine, -1, 1))
+
+
+def _unit(vector: Tensor) -> Tensor:
+    """Vectors (N, 3) scaled to length 1; shorter ones than 1e-6 stay as they are."""
+    norm = torch.linalg.vector_norm(vector, dim=1)
+    norm = 1 / torch.where(norm < 1e-6, 1.0, norm)
+    return torch.multiply(vector, norm[:, None])

@@ -1,0 +1,152 @@
+"""A robot in a world: its articulation, links and joints, built from its descriptor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import sapien
+import sapien.physx as physx
+from sapien.wrapper.urdf_loader import URDFLoader
+
+from layouts import Placement
+from robots import DescriptorError, RobotDescriptor, UnknownNameError
+
+
+class _PhysicsOnlyLoader(URDFLoader):
+    """A URDF loader that drops visuals while parsing, so that no render device is needed."""
+
+    def _build_link(self, link: Any, link_builder: Any) -> None:
+        link.visuals = []
+        super()._build_link(link, link_builder)
+
+
+class SimulatedRobot:
+    """One robot of one world.
+
+    Attributes:
+        name: Its name in the layout.
+        descriptor: What it is.
+        articulation: SAPIEN's articulation.
+        links: Link by name.
+        joints: Active joints, in SAPIEN's order, which is the order of qpos and qvel.
+        driven: Active joints in the order of the descriptor's joints.
+        active_index: For each joint of the descriptor, its place in qpos.
+    """
+
+    def __init__(
+        self, scene: sapien.Scene, name: str, placement: Placement, *, visuals: bool
+    ) -> None:
+        """Load the URDF into ``scene``, stand it at its placement and set its drives.
+
+        Raises:
+            AssetError: If its files cannot be found.
+            DescriptorError: If the descriptor names joints or links that the URDF lacks.
+        """
+        descriptor = placement.robot
+        self.name, self.descriptor = name, descriptor
+        self.base_pose = sapien.Pose(
+            list(placement.base_position), list(placement.base_quaternion)
+        )
+        self.articulation = _load(scene, descriptor, self.base_pose, visuals=visuals)
+        self.links = {link.name: link for link in self.articulation.links}
+        self.joints: list[Any] = list(self.articulation.active_joints)
+        self.active_index = _active_index(descriptor, [joint.name for joint in self.joints])
+        self.driven = [self.joints[i] for i in self.active_index]
+        self._set_drives()
+        for link in self.links.values():
+            link.disable_gravity = True
+
+    def link(self, name: str) -> Any:
+        """Return a link by name.
+
+        Raises:
+            UnknownNameError: If the robot has no such link.
+        """
+        if name not in self.links:
+            raise UnknownNameError(f"link of {self.descriptor.name}", name, self.links)
+        return self.links[name]
+
+    def reset(self, qpos: Sequence[float] | np.ndarray) -> None:
+        """Stand at the base pose with joint positions ``qpos``, all velocities and forces zero.
+
+        Args:
+            qpos: Positions in the order of the descriptor's joints, shape (dof,) (rad, m).
+        """
+        still = np.zeros(len(self.joints), np.float32)
+        active = np.zeros(len(self.joints))
+        active[self.active_index] = qpos
+        self.articulation.set_qpos(active)
+        self.articulation.set_qvel(still)
+        self.articulation.set_qf(still)
+        # The literal pose, never one that was read back: reading rounds, and moves the links.
+        self.articulation.set_root_pose(self.base_pose)
+
+    def restore(self, row: np.ndarray) -> None:
+        """Take over a state row.
+
+        Args:
+            row: Root pose (m, wxyz), linear (m/s) and angular velocity (rad/s), qpos and qvel in
+                SAPIEN's joint order; shape (13 + 2 · dof,).
+        """
+        dof = len(self.joints)
+        self.articulation.set_root_pose(sapien.Pose(row[:3], row[3:7]))
+        self.articulation.set_root_linear_velocity(row[7:10])
+        self.articulation.set_root_angular_velocity(row[10:13])
+        self.articulation.set_qpos(row[13 : 13 + dof])
+        self.articulation.set_qvel(row[13 + dof :])
+
+    def stop(self) -> None:
+        """Zero every velocity and force, leaving positions alone."""
+        still = np.zeros(len(self.joints), np.float32)
+        self.articulation.set_qvel(still)
+        self.articulation.set_root_linear_velocity(still[:3])
+        self.articulation.set_root_angular_velocity(still[:3])
+        self.articulation.set_qf(still)
+
+    def _set_drives(self) -> None:
+        joints = iter(self.driven)
+        for group in self.descriptor.action_split.groups.values():
+            for _ in group.joints:
+                joint = next(joints)
+                joint.set_drive_properties(
+                    group.stiffness, group.damping, group.force_limit, "force"
+                )
+                joint.set_friction(group.friction)
+
+
+def _load(
+    scene: sapien.Scene, descriptor: RobotDescriptor, pose: sapien.Pose, *, visuals: bool
+) -> physx.PhysxArticulation:
+    loader = URDFLoader() if visuals else _PhysicsOnlyLoader()
+    loader.set_scene(scene)
+    loader.fix_root_link = True
+    material = descriptor.gripper_material
+    for link in material.links if material else ():
+        loader.set_link_material(
+            link, material.static_friction, material.dynamic_friction, material.restitution
+        )
+        loader.set_link_patch_radius(link, material.patch_radius)
+        loader.set_link_min_patch_radius(link, material.patch_radius)
+    urdf = descriptor.urdf.locate(pictures=visuals)
+    builder = loader.load_file_as_articulation_builder(str(urdf))
+    builder.set_initial_pose(pose)
+    articulation = builder.build()
+    articulation.set_root_pose(pose)
+    return articulation
+
+
+def _active_index(descriptor: RobotDescriptor, active: list[str]) -> list[int]:
+    missing = [joint for joint in descriptor.joints if joint not in active]
+    if missing:
+        raise DescriptorError(
+            f"{descriptor.name}: its URDF has no active joints {missing}; it has {active}"
+        )
+    undriven = [joint for joint in active if joint not in descriptor.joints]
+    if undriven:
+        raise DescriptorError(
+            f"{descriptor.name}: joints {undriven} of its URDF are in no joint group;"
+            " every active joint needs a drive"
+        )
+    return [active.index(joint) for joint in descriptor.joints]

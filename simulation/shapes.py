@@ -1,0 +1,173 @@
+"""Shapes that bodies are made of: data, and the one place that turns it into SAPIEN records."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import sapien
+import sapien.physx as physx
+
+from robots.descriptor import IDENTITY, Quaternion, Vector3
+from simulation.physics import Friction
+
+Color = tuple[float, float, float, float]  # red, green, blue, alpha in 0 … 1
+
+GREY: Color = (0.7, 0.7, 0.7, 1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shape:
+    """What all shapes share.
+
+    Attributes:
+        position: Centre in the body's frame (m).
+        quaternion: Orientation in the body's frame, wxyz.
+        friction: Contact material; None takes the world's.
+        density: Density (kg/m³).
+        color: Colour when drawn.
+        collides: Whether it takes part in contacts.
+        visible: Whether it is drawn.
+    """
+
+    position: Vector3 = (0.0, 0.0, 0.0)
+    quaternion: Quaternion = IDENTITY
+    friction: Friction | None = None
+    density: float = 1000.0
+    color: Color = GREY
+    collides: bool = True
+    visible: bool = True
+
+
+@dataclass(frozen=True)
+class Box(Shape):
+    """A box.
+
+    Attributes:
+        half_size: Half its extents along x, y, z (m).
+    """
+
+    half_size: Vector3
+
+
+@dataclass(frozen=True)
+class Sphere(Shape):
+    """A sphere.
+
+    Attributes:
+        radius: Radius (m).
+    """
+
+    radius: float
+
+
+@dataclass(frozen=True)
+class Cylinder(Shape):
+    """A cylinder along its own x axis.
+
+    Attributes:
+        radius: Radius (m).
+        half_length: Half its length (m).
+    """
+
+    radius: float
+    half_length: float
+
+
+@dataclass(frozen=True)
+class Capsule(Shape):
+    """A capsule along its own x axis.
+
+    Attributes:
+        radius: Radius (m).
+        half_length: Half the length of its straight part (m).
+    """
+
+    radius: float
+    half_length: float
+
+
+@dataclass(frozen=True)
+class Plane(Shape):
+    """An infinite plane; its own +x axis is the outward normal."""
+
+
+@dataclass(frozen=True)
+class Mesh(Shape):
+    """A mesh file; its convex hull collides.
+
+    Attributes:
+        file: Mesh file.
+        scale: Scale along x, y, z.
+    """
+
+    file: Path
+    scale: Vector3 = (1.0, 1.0, 1.0)
+
+
+def add_shape(builder: Any, shape: Shape, *, visuals: bool) -> None:
+    """Add a shape to a SAPIEN actor builder, for contacts and (if asked) for pictures."""
+    pose = sapien.Pose(list(shape.position), list(shape.quaternion))
+    if shape.collides:
+        _add_collision(builder, shape, pose)
+    if visuals and shape.visible:
+        _add_visual(builder, shape, pose)
+
+
+def _add_collision(builder: Any, shape: Shape, pose: sapien.Pose) -> None:
+    material = (
+        None
+        if shape.friction is None
+        else physx.PhysxMaterial(
+            static_friction=shape.friction.static,
+            dynamic_friction=shape.friction.dynamic,
+            restitution=shape.friction.restitution,
+        )
+    )
+    common: dict[str, Any] = {"pose": pose, "material": material}
+    match shape:
+        case Plane():
+            builder.add_plane_collision(**common)
+            return
+        case Box():
+            add, sizes = builder.add_box_collision, {"half_size": list(shape.half_size)}
+        case Sphere():
+            add, sizes = builder.add_sphere_collision, {"radius": shape.radius}
+        case Cylinder():
+            add, sizes = builder.add_cylinder_collision, _round_sizes(shape)
+        case Capsule():
+            add, sizes = builder.add_capsule_collision, _round_sizes(shape)
+        case Mesh():
+            add = builder.add_convex_collision_from_file
+            sizes = {"filename": str(shape.file), "scale": list(shape.scale)}
+        case _:
+            raise TypeError(f"no collision for {type(shape).__name__}")
+    add(density=shape.density, **common, **sizes)
+
+
+def _add_visual(builder: Any, shape: Shape, pose: sapien.Pose) -> None:
+    from sapien.render import RenderMaterial
+
+    material = RenderMaterial(base_color=list(shape.color))
+    match shape:
+        case Plane():
+            builder.add_plane_visual(pose=pose, scale=[50.0, 50.0, 50.0], material=material)
+        case Box():
+            builder.add_box_visual(pose=pose, half_size=list(shape.half_size), material=material)
+        case Sphere():
+            builder.add_sphere_visual(pose=pose, radius=shape.radius, material=material)
+        case Cylinder():
+            builder.add_cylinder_visual(pose=pose, material=material, **_round_sizes(shape))
+        case Capsule():
+            builder.add_capsule_visual(pose=pose, material=material, **_round_sizes(shape))
+        case Mesh():
+            builder.add_visual_from_file(
+                filename=str(shape.file), pose=pose, scale=list(shape.scale), material=material
+            )
+        case _:
+            raise TypeError(f"no picture for {type(shape).__name__}")
+
+
+def _round_sizes(shape: Cylinder | Capsule) -> dict[str, float]:
+    return {"radius": shape.radius, "half_length": shape.half_length}

@@ -1,0 +1,171 @@
+"""One environment's world: a SAPIEN scene with a layout's robots and a task's bodies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import sapien
+import sapien.physx as physx
+
+from layouts import Layout
+from robots import SimulationError, UnknownNameError
+from robots.descriptor import IDENTITY, Quaternion, Vector3
+from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, apply
+from simulation.robot import SimulatedRobot
+from simulation.shapes import Shape, add_shape
+
+BodyKind = Literal["dynamic", "kinematic", "static"]
+
+
+@dataclass(frozen=True)
+class SimulatedBody:
+    """A body that a task put into the world.
+
+    Attributes:
+        name: Its name, also in the state dict.
+        entity: SAPIEN's entity.
+        component: Its physics component.
+        kind: Whether physics, only the task, or nothing moves it.
+        start_pose: Pose it was built at.
+        anchored: Whether every reset puts it back to ``start_pose``.
+    """
+
+    name: str
+    entity: sapien.Entity
+    component: Any
+    kind: BodyKind
+    start_pose: sapien.Pose
+    anchored: bool
+
+
+class World:
+    """Robots first, in the layout's order, then bodies in the order in which they are added.
+
+    The order of dynamic bodies decides the order in which PhysX solves contacts, so it is part of
+    what a task declares.
+
+    Attributes:
+        layout: Which robots stand where.
+        physics: Settings the world was built with.
+        scene: SAPIEN's scene.
+        system: Its physics system.
+        robots: Robot by name in the layout.
+        bodies: Body by name.
+    """
+
+    def __init__(
+        self, layout: Layout, physics: PhysicsSettings | None = None, *, visuals: bool = False
+    ) -> None:
+        """Build the robots of a layout.
+
+        Args:
+            layout: Which robots stand where.
+            physics: Solver settings; None keeps SAPIEN's own defaults.
+            visuals: Whether to build what pictures need (a Vulkan driver must be present).
+
+        Raises:
+            AssetError: If a robot's files cannot be found.
+        """
+        self.layout = layout
+        self.physics = SAPIEN_DEFAULTS if physics is None else physics
+        self.visuals = visuals
+        apply(self.physics)
+        self.system = physx.PhysxCpuSystem()
+        systems: list[Any] = [self.system]
+        if visuals:
+            from sapien.render import RenderSystem
+
+            systems.append(RenderSystem())
+        self.scene = sapien.Scene(systems)
+        self.system.timestep = self.physics.timestep
+        self.robots = {
+            name: SimulatedRobot(self.scene, name, placement, visuals=visuals)
+            for name, placement in layout.items()
+        }
+        self.bodies: dict[str, SimulatedBody] = {}
+
+    def add(
+        self,
+        name: str,
+        *shapes: Shape,
+        kind: BodyKind = "dynamic",
+        position: Vector3 = (0.0, 0.0, 0.0),
+        quaternion: Quaternion = IDENTITY,
+        anchored: bool = False,
+    ) -> SimulatedBody:
+        """Add a body made of shapes.
+
+        Args:
+            name: A name no other body of this world has.
+            shapes: Its shapes, in the body's frame.
+            kind: ``"dynamic"`` moves by physics, ``"kinematic"`` by the task, ``"static"`` never.
+            position: Where it is built (m, world).
+            quaternion: How it is turned, wxyz.
+            anchored: Whether every reset puts it back there.
+
+        Raises:
+            SimulationError: If the name is taken.
+        """
+        if name in self.bodies:
+            raise SimulationError(f"this world already has a body called {name!r}")
+        builder = self.scene.create_actor_builder()
+        for shape in shapes:
+            add_shape(builder, shape, visuals=self.visuals)
+        builder.set_physx_body_type(kind)
+        pose = sapien.Pose(list(position), list(quaternion))
+        builder.set_initial_pose(pose)
+        entity = builder.build(name)
+        component = entity.find_component_by_type(
+            physx.PhysxRigidStaticComponent if kind == "static" else physx.PhysxRigidDynamicComponent
+        )
+        body = SimulatedBody(name, entity, component, kind, pose, anchored)
+        self.bodies[name] = body
+        return body
+
+    def body(self, name: str) -> SimulatedBody:
+        """Return a body by name.
+
+        Raises:
+            UnknownNameError: If the world has no such body.
+        """
+        if name not in self.bodies:
+            raise UnknownNameError("body of this world", name, self.bodies)
+        return self.bodies[name]
+
+    def settle(self) -> None:
+        """End the build: put everything that can move at its start pose once more, as native does."""
+        for body in self.bodies.values():
+            if body.kind != "static":
+                body.entity.set_pose(body.start_pose)
+        for robot in self.robots.values():
+            robot.articulation.set_root_pose(robot.base_pose)
+
+    def clear(self) -> None:
+        """Begin a reset: zero every velocity and force, and put anchored bodies back.
+
+        PhysX keeps its contact caches: a reset world remembers, a rebuilt one does not.
+        """
+        for body in self.bodies.values():
+            if body.kind == "dynamic":
+                body.component.set_linear_velocity([0.0, 0.0, 0.0])
+                body.component.set_angular_velocity([0.0, 0.0, 0.0])
+        for robot in self.robots.values():
+            robot.stop()
+        for body in self.bodies.values():
+            if body.anchored:
+                body.entity.set_pose(body.start_pose)
+
+    def set_pose(self, name: str, position: Any, quaternion: Any = IDENTITY) -> None:
+        """Move a body.
+
+        Args:
+            name: Body name.
+            position: Three numbers (m, world).
+            quaternion: Four numbers, wxyz.
+        """
+        self.body(name).entity.set_pose(sapien.Pose(_floats(position), _floats(quaternion)))
+
+
+def _floats(values: Any) -> list[float]:
+    return values.tolist() if hasattr(values, "tolist") else [float(x) for x in values]

@@ -1,0 +1,88 @@
+"""PickCube: grasp a cube and hold it at a goal."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from layouts import single
+from simulation import Box, PhysicsSettings, Sphere, State, World, add_table
+from tasks.randomness import EpisodeRandom
+from tasks.registry import register_task
+from tasks.task import Info, MultiRobotTask
+
+# mani_skill 3.0.1, envs/tasks/tabletop/pick_cube.py and pick_cube_cfgs.py (m)
+CUBE_HALF_SIZE = 0.02
+GOAL_RADIUS = 0.025
+SPAWN_HALF_SIZE = 0.1
+MAX_GOAL_HEIGHT = 0.3
+STATIC_SPEED = 0.2  # rad/s
+
+
+@register_task("PickCube-v1", "maniskill.pick_cube_native")
+class PickCube(MultiRobotTask):
+    """Grasp a cube from the table and hold it still at a goal in the air.
+
+    Cube and goal are drawn from a square of 0.2 m around the origin, the goal up to 0.3 m above
+    the cube. Success: the cube is within 2.5 cm of the goal and the arm is static.
+    """
+
+    layout = single({"arm": "panda"})
+    physics = PhysicsSettings()
+    max_episode_steps = 50
+    max_reward = 5
+
+    def build(self, world: World) -> None:
+        """Add the table, the cube and the goal."""
+        add_table(world)
+        world.add(
+            "cube",
+            Box(half_size=(CUBE_HALF_SIZE,) * 3, color=(1, 0, 0, 1)),
+            position=(0.0, 0.0, CUBE_HALF_SIZE),
+        )
+        world.add(
+            "goal_site",
+            Sphere(radius=GOAL_RADIUS, color=(0, 1, 0, 1), collides=False),
+            kind="kinematic",
+        )
+
+    def sample(self, world: World, rng: EpisodeRandom) -> None:
+        """Lay the cube on the table and the goal above it."""
+        x, y = (rng.uniform(1, 2) * (SPAWN_HALF_SIZE * 2) - SPAWN_HALF_SIZE)[0].tolist()
+        world.set_pose("cube", (x, y, CUBE_HALF_SIZE), rng.yaw_quaternion())
+        x, y = (rng.uniform(1, 2) * (SPAWN_HALF_SIZE * 2) - SPAWN_HALF_SIZE)[0].tolist()
+        z = rng.uniform(1) * MAX_GOAL_HEIGHT + CUBE_HALF_SIZE
+        world.set_pose("goal_site", (x, y, z.item()))
+
+    def evaluate(self, state: State) -> dict[str, Tensor]:
+        """Success: placed and static."""
+        placed = state.distance("cube", "goal_site") <= GOAL_RADIUS
+        static = state.is_static("arm", STATIC_SPEED)
+        return {
+            "success": placed & static,
+            "is_obj_placed": placed,
+            "is_robot_static": static,
+            "is_grasped": state.is_grasping("arm", "cube"),
+        }
+
+    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+        """Grasp, TCP, goal and cube."""
+        cube, goal = state.position("cube"), state.position("goal_site")
+        return {
+            "is_grasped": info["is_grasped"],
+            "tcp_pose": state.tcp_pose("arm"),
+            "goal_pos": goal,
+            "obj_pose": state.pose("cube"),
+            "tcp_to_obj_pos": cube - state.tcp_position("arm"),
+            "obj_to_goal_pos": goal - cube,
+        }
+
+    def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+        """Reach (1), grasp (1), place (1), hold still (1); 5 on success."""
+        reward = 1 - torch.tanh(5 * state.tcp_distance("arm", "cube"))
+        reward = reward + info["is_grasped"]
+        place = 1 - torch.tanh(5 * state.distance("cube", "goal_site"))
+        reward = reward + place * info["is_grasped"]
+        speed = torch.linalg.vector_norm(state.arm_qvel("arm"), dim=1)
+        reward = reward + (1 - torch.tanh(5 * speed)) * info["is_obj_placed"]
+        return torch.where(info["success"], 5.0, reward)

@@ -1,0 +1,142 @@
+"""Which tasks there are, by id, and how they are made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from layouts import Layout
+from layouts.layout import RobotLike
+from robots import TaskError, UnknownNameError
+
+if TYPE_CHECKING:
+    from tasks.task import MultiRobotTask
+
+# One line per task, sorted by id: id -> module:class, then its other names.
+CATALOGUE = {
+    "PickCube-v1": ("tasks.pick_cube:PickCube", "maniskill.pick_cube_native"),
+    "PushT-v1": ("tasks.push_t:PushT", "maniskill.push_t_native"),
+    "TwoRobotPickCube-v1": (
+        "tasks.two_robot_pick_cube:TwoRobotPickCube",
+        "maniskill.two_robot_pick_cube_native",
+    ),
+}
+
+_registered: dict[str, type[MultiRobotTask]] = {}  # lower-case name -> class
+_listed: list[str] = []  # first name of each registered task
+
+TaskClass = TypeVar("TaskClass", bound="type[MultiRobotTask]")
+
+
+def register_task(*names: str) -> Callable[[TaskClass], TaskClass]:
+    """Make a task class known by names; the first one is its id. For use as a decorator.
+
+    Raises:
+        TaskError: If no name is given or a name is taken by another class.
+    """
+    if not names:
+        raise TaskError("register_task needs at least one name, the task's id")
+
+    def register(cls: TaskClass) -> TaskClass:
+        for name in names:
+            owner = _registered.get(name.lower())
+            if owner is not None and _home(owner) != _home(cls):
+                raise TaskError(f"the name {name!r} is already taken by {owner.__name__}")
+            target = _built_in(name)
+            if target is not None and target != _home(cls):
+                raise TaskError(f"the name {name!r} is already taken by {target}")
+        _registered.update({name.lower(): cls for name in names})
+        if names[0] not in _listed and names[0] not in CATALOGUE:
+            _listed.append(names[0])
+        cls.task_id = names[0]
+        return cls
+
+    return register
+
+
+def list_tasks() -> tuple[str, ...]:
+    """Return every task id, sorted."""
+    return tuple(sorted({*CATALOGUE, *_listed}))
+
+
+def get_task_class(name: str) -> type[MultiRobotTask]:
+    """Return the class of a task by id or other name, ignoring case.
+
+    Raises:
+        UnknownNameError: If no task has that name (also a ``KeyError``).
+    """
+    key = str(name).lower()
+    if key not in _registered and (target := _built_in(name)):
+        import_module(target.partition(":")[0])  # registers itself
+    if key not in _registered:
+        raise UnknownNameError("task", name, _all_names())
+    return _registered[key]
+
+
+def make(
+    task_id: str,
+    num_envs: int = 1,
+    robots: RobotLike | Mapping[str, RobotLike] | None = None,
+    layout: Layout | None = None,
+    obs_mode: str = "state",
+    reward_mode: str | None = None,
+    **fields: Any,
+) -> MultiRobotTask:
+    """Make a task.
+
+    Args:
+        task_id: Its id or another of its names.
+        num_envs: Number of environments in this process.
+        robots: Other robots for some places: a mapping place → robot, or one robot for a task
+            with one place.
+        layout: Another layout with the task's places.
+        obs_mode: ``"state"``, ``"state_dict"`` or ``"none"``.
+        reward_mode: One of the task's reward modes; None takes native's default.
+        fields: Other fields of `tasks.Scenario`.
+
+    Raises:
+        UnknownNameError: If the task, a place, a robot or a field is unknown.
+        TaskError: If the task cannot be made like that.
+        AssetError: If robot files cannot be found.
+    """
+    cls = get_task_class(task_id)
+    scenario = cls.scenario
+    if layout is not None:
+        scenario.layout = layout
+    if robots is not None:
+        scenario.layout = _replace_robots(scenario.layout, robots)
+    chosen = {"num_envs": num_envs, "obs_mode": obs_mode, "reward_mode": reward_mode, **fields}
+    for name, value in chosen.items():
+        setattr(scenario, name, value)
+    return cls(scenario)
+
+
+def _replace_robots(layout: Layout, robots: RobotLike | Mapping[str, RobotLike]) -> Layout:
+    if isinstance(robots, Mapping):
+        return layout.replace_robots(**robots)
+    if len(layout) != 1:
+        raise TaskError(
+            f"robots={robots!r} does not say which place it takes; the places are {list(layout)},"
+            f" for example robots={{{next(iter(layout))!r}: {robots!r}}}"
+        )
+    return layout.replace_robots(**{next(iter(layout)): robots})
+
+
+def _built_in(name: str) -> str | None:
+    for task_id, (target, *others) in CATALOGUE.items():
+        if str(name).lower() in (task_id.lower(), *(other.lower() for other in others)):
+            return target
+    return None
+
+
+def _home(cls: type) -> str:
+    return f"{cls.__module__}:{cls.__qualname__}"
+
+
+def _all_names() -> list[str]:
+    others = [name for _, *names in CATALOGUE.values() for name in names]
+    registered = [name for name in _registered if name not in map(str.lower, [*CATALOGUE, *others])]
+    listed = [name for name in _listed if name.lower() in registered]
+    rest = [name for name in registered if name not in map(str.lower, listed)]
+    return [*CATALOGUE, *others, *listed, *rest]

@@ -1,0 +1,380 @@
+"""The batched task: N worlds of one layout with resets, observations, rewards and success."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+import torch
+from gymnasium.spaces import Box
+from torch import Tensor
+
+from layouts import Layout
+from robots import SimulationError, TaskError, unknown_name_message
+from simulation import PhysicsSettings, Simulation, State, World
+from tasks.actions import ActionReader
+from tasks.native_format import (
+    StateDict,
+    observation_keys,
+    read_state_dict,
+    write_state_dict,
+)
+from tasks.randomness import EpisodeRandom
+from tasks.scenario import Scenario
+
+FIRST_SEED = 2022  # native seeds environment i with 2022 + i when it is made
+DENSE_MODES = ("normalized_dense", "dense", "sparse", "none")
+SPARSE_MODES = ("sparse", "none")
+
+Info = dict[str, Any]
+
+
+class _FreshScenario:
+    """``cls.scenario``: a new scenario at every access, made from the class's own attributes."""
+
+    def __get__(self, instance: MultiRobotTask | None, owner: type[MultiRobotTask]) -> Scenario:
+        if instance is not None:
+            return instance.made_from
+        return Scenario(layout=owner.layout, physics=owner.physics)
+
+
+class MultiRobotTask:
+    """Something to achieve, for one robot or many; subclasses say what.
+
+    A subclass sets ``layout`` and ``max_episode_steps``, adds its bodies in `build`, places them
+    in `sample` and tells success in `evaluate`. It may say more in `observe` and `dense_reward`.
+
+    Attributes:
+        task_id: The task's id.
+        layout: Default layout.
+        physics: Solver settings; None keeps SAPIEN's own defaults.
+        max_episode_steps: Control steps until an episode is truncated.
+        reward_modes: Reward modes, the default first.
+        max_reward: What ``normalized_dense`` divides the dense reward by.
+        shared_joint_noise: Whether all robots get the same joint noise at a reset.
+        viewpoint: Camera position and target of `render` (m, world).
+        num_envs: Number of environments N.
+        single_action_space: Action of one environment, (A,) in [-1, 1].
+        action_space: Actions of all environments, (N, A).
+        action_split: Robot name → slice of the flat action, in declared order.
+        made_from: The scenario it was made from.
+    """
+
+    task_id: ClassVar[str] = ""
+    scenario: ClassVar[Any] = _FreshScenario()
+    layout: Layout
+    physics: ClassVar[PhysicsSettings | None] = None
+    max_episode_steps: ClassVar[int]
+    reward_modes: ClassVar[tuple[str, ...]] = ()
+    max_reward: ClassVar[float] = 1.0
+    shared_joint_noise: ClassVar[bool] = False
+    viewpoint: ClassVar[tuple[tuple[float, float, float], tuple[float, float, float]]] = (
+        (0.6, 0.7, 0.6),
+        (0.0, 0.0, 0.35),
+    )
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        """Offer dense modes exactly if the subclass computes a dense reward."""
+        super().__init_subclass__(**kwargs)
+        if "reward_modes" not in cls.__dict__:
+            dense = cls.dense_reward is not MultiRobotTask.dense_reward
+            cls.reward_modes = DENSE_MODES if dense else SPARSE_MODES
+
+    # -- what a task says --------------------------------------------------------------------
+
+    def build(self, world: World) -> None:
+        """Add the task's bodies to a world; the robots stand already."""
+        raise NotImplementedError
+
+    def sample(self, world: World, rng: EpisodeRandom) -> None:
+        """Place the task's bodies for a new episode; the robots are placed already."""
+        raise NotImplementedError
+
+    def evaluate(self, state: State) -> dict[str, Tensor]:
+        """Return ``success`` (N,) bool and whatever else describes the state."""
+        raise NotImplementedError
+
+    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+        """Return named parts of the observation, each (N, k) or (N,), after the robots' own."""
+        return {}
+
+    def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+        """Return the dense reward, (N,)."""
+        raise NotImplementedError
+
+    def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
+        """Remember what later steps compare with; called after ``env_ids`` were reset."""
+
+    def reset_robots(self, world: World, rng: EpisodeRandom) -> None:
+        """Stand every robot at its placement, with joint noise."""
+        shared = None
+        if self.shared_joint_noise:
+            largest = max(len(robot.joints) for robot in world.robots.values())
+            deviation = max(p.qpos_noise for p in world.layout.values())
+            shared = rng.normal(deviation, largest)
+        for name, placement in world.layout.items():
+            dof = placement.robot.dof
+            noise = rng.normal(placement.qpos_noise, dof) if shared is None else shared[:dof]
+            groups = placement.robot.action_split.groups.values()
+            noisy = [group.reset_noise for group in groups for _ in group.joints]
+            qpos = np.array(placement.start_qpos)
+            world.robots[name].reset(np.where(noisy, noise + qpos, qpos))
+
+    # -- making and closing ------------------------------------------------------------------
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Build the worlds and reset them with native's first seeds.
+
+        Args:
+            scenario: How to make it; `tasks.make` and ``cls.scenario`` give one to start from.
+
+        Raises:
+            TaskError: If the scenario asks for what the task does not offer.
+            AssetError: If robot files cannot be found.
+        """
+        scenario.check(self.reward_modes)
+        if list(scenario.layout) != list(type(self).layout):
+            raise TaskError(
+                f"{type(self).__name__} has the places {list(type(self).layout)};"
+                f" the layout has {list(scenario.layout)}"
+            )
+        self.made_from = scenario
+        self.layout = scenario.layout
+        self.num_envs = scenario.num_envs
+        self.obs_mode = scenario.obs_mode
+        self.reward_mode = scenario.reward_mode or self.reward_modes[0]
+        self.action_split = self.layout.action_split
+        size = self.layout.action_dim
+        self.single_action_space = Box(-1.0, 1.0, (size,), np.float32)
+        self.action_space = Box(-1.0, 1.0, (self.num_envs, size), np.float32)
+        self._reader = ActionReader(self.layout, self.num_envs)
+        self._observation_keys = observation_keys(self.layout)
+        self._rngs = [EpisodeRandom(FIRST_SEED + i) for i in range(self.num_envs)]
+        self._elapsed = torch.zeros(self.num_envs, dtype=torch.int32)
+        self._simulation: Simulation | None = Simulation(
+            self.layout,
+            lambda world, _: self.build(world),
+            self.num_envs,
+            scenario.physics,
+            control_frequency=scenario.control_frequency,
+            visuals=scenario.render_mode is not None,
+        )
+        self._camera: Any = None
+        obs, _ = self._begin(list(range(self.num_envs)), reconfigured=True)
+        self.observation_slices = self._slices() if self.obs_mode == "state" else {}
+        if isinstance(obs, Tensor):
+            shape = (obs.shape[1],)
+            self.single_observation_space = Box(-np.inf, np.inf, shape, np.float32)
+            self.observation_space = Box(-np.inf, np.inf, (self.num_envs, *shape), np.float32)
+
+    @property
+    def simulation(self) -> Simulation:
+        """The worlds.
+
+        Raises:
+            SimulationError: If the task was closed.
+        """
+        if self._simulation is None:
+            raise SimulationError(f"this {type(self).__name__} is closed; make a new one")
+        return self._simulation
+
+    def close(self) -> None:
+        """Let the worlds go; closing twice is allowed."""
+        self._simulation = None
+        self._camera = None
+
+    # -- episodes ----------------------------------------------------------------------------
+
+    def reset(
+        self,
+        seed: int | Sequence[int] | None = None,
+        options: Mapping[str, Any] | None = None,
+        env_ids: Sequence[int] | None = None,
+    ) -> tuple[Any, Info]:
+        """Begin new episodes.
+
+        Args:
+            seed: ``k`` seeds environment i with k + i; a list gives each of ``env_ids`` its own;
+                None lets the random streams run on.
+            options: ``{"reconfigure": True}`` rebuilds the worlds, so that nothing of their
+                past is left in PhysX.
+            env_ids: Which environments; all if None. The others go on as they are.
+
+        Returns:
+            Observation and info of all environments.
+
+        Raises:
+            TaskError: If an argument makes no sense; nothing is reset then.
+        """
+        ids = self._checked_ids(env_ids)
+        seeds = self._checked_seeds(seed, ids)
+        reconfigure = self._checked_options(options)
+        self.simulation.touched()
+        for i, own_seed in zip(ids, seeds, strict=True):
+            if own_seed is not None:
+                self._rngs[i].restart(own_seed)
+            elif reconfigure:
+                self._rngs[i].reseed_for_rebuild()
+        if reconfigure:
+            self.simulation.rebuild(ids)
+        return self._begin(ids, reconfigured=reconfigure)
+
+    def step(self, action: Any) -> tuple[Any, Tensor, Tensor, Tensor, Info]:
+        """Advance every environment by one control step.
+
+        There is no automatic reset, and stepping past truncation is allowed.
+
+        Args:
+            action: (N, A) tensor or array in the order of ``action_split``, or a mapping
+                robot name → (N, a); numbers beyond [-1, 1] are clipped.
+
+        Returns:
+            Observation, reward (N,) float32, terminated (N,), truncated (N,), info. An
+            environment terminates when it succeeds.
+
+        Raises:
+            ActionError: If the action has a wrong shape, type or number; nothing moves then.
+        """
+        flat = self._reader.read(action)
+        self.simulation.step(flat, self._state.joint_positions)
+        self._elapsed += 1
+        state = self._state = self.simulation.read()
+        info = self._info(state)
+        obs = self._observation(state, info)
+        reward = self._reward(state, torch.from_numpy(flat), info)
+        truncated = self._elapsed >= self.max_episode_steps
+        return obs, reward, info["success"].clone(), truncated, info
+
+    def get_state_dict(self) -> StateDict:
+        """Return all poses and velocities under native's keys; see `native_format`."""
+        return read_state_dict(self.simulation, self._state)
+
+    def set_state_dict(
+        self, state: Mapping[str, Mapping[str, Any]], env_ids: Sequence[int] | None = None
+    ) -> None:
+        """Put environments into a state, row by row.
+
+        Args:
+            state: What `get_state_dict` returns, with one row per environment set.
+            env_ids: Which environments; all if None.
+
+        Raises:
+            TaskError: If a key or a shape is wrong; nothing is changed then.
+        """
+        write_state_dict(self.simulation, state, self._checked_ids(env_ids))
+        self._state = self.simulation.read()
+
+    def render(self) -> np.ndarray:
+        """Return a picture of every environment, (N, 512, 512, 3) uint8.
+
+        Raises:
+            TaskError: If the task was not made with ``render_mode="rgb_array"``.
+        """
+        if self.made_from.render_mode is None:
+            raise TaskError("this task draws no pictures; make it with render_mode='rgb_array'")
+        if self._camera is None:
+            from simulation.rendering import Cameras
+
+            self._camera = Cameras(self.simulation, *self.viewpoint)
+        return self._camera.take()
+
+    # -- inside ------------------------------------------------------------------------------
+
+    def _begin(self, ids: list[int], *, reconfigured: bool) -> tuple[Any, Info]:
+        for i in ids:
+            world = self.simulation.worlds[i]
+            world.clear()
+            self.reset_robots(world, self._rngs[i])
+            self.sample(world, self._rngs[i])
+        if reconfigured:
+            self._camera = None
+        self._elapsed[ids] = 0
+        state = self._state = self.simulation.read()
+        self.begin_episodes(state, ids)
+        info = self._info(state)
+        obs = self._observation(state, info)
+        info["reconfigure"] = reconfigured
+        return obs, info
+
+    def _info(self, state: State) -> Info:
+        return {"elapsed_steps": self._elapsed.clone(), **self.evaluate(state)}
+
+    def _observation(self, state: State, info: Info) -> Any:
+        if self.obs_mode == "none":
+            return {}
+        extra = self.observe(state, info)
+        if self.obs_mode == "state_dict":
+            return {"agent": self._proprioception(state), "extra": extra}
+        parts = [part for name in self.layout for part in (state.qpos(name), state.qvel(name))]
+        parts.extend(x if x.ndim == 2 else x[:, None] for x in extra.values())
+        return torch.cat(parts, 1)
+
+    def _proprioception(self, state: State) -> dict[str, Any]:
+        parts: dict[str, Any] = {}
+        for name, key in self._observation_keys.items():
+            own = {"qpos": state.qpos(name), "qvel": state.qvel(name)}
+            parts.update(own if key is None else {key: own})
+        return parts
+
+    def _reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+        match self.reward_mode:
+            case "normalized_dense":
+                return self.dense_reward(state, action, info) / self.max_reward
+            case "dense":
+                return self.dense_reward(state, action, info)
+            case "sparse":
+                return info["success"].float()
+            case _:
+                return torch.zeros(self.num_envs)
+
+    def _slices(self) -> dict[str, slice]:
+        state, sizes = self._state, dict[str, int]()
+        for name in self.layout:
+            sizes[f"{name}.qpos"] = sizes[f"{name}.qvel"] = state.qpos(name).shape[1]
+        extra = self.observe(state, self._info(state))
+        sizes.update({key: x.shape[1] if x.ndim == 2 else 1 for key, x in extra.items()})
+        slices, start = dict[str, slice](), 0
+        for name, size in sizes.items():
+            slices[name] = slice(start, start + size)
+            start += size
+        return slices
+
+    def _checked_ids(self, env_ids: Sequence[int] | None) -> list[int]:
+        if env_ids is None:
+            return list(range(self.num_envs))
+        try:
+            ids = [operator.index(i) for i in env_ids]
+        except TypeError:
+            raise TaskError(f"env_ids is {env_ids!r}; it takes a sequence of integers") from None
+        wrong = [i for i in ids if not 0 <= i < self.num_envs]
+        if wrong or len(set(ids)) != len(ids):
+            raise TaskError(
+                f"env_ids {ids} must be different numbers from 0 to {self.num_envs - 1}"
+            )
+        return ids
+
+    def _checked_seeds(
+        self, seed: int | Sequence[int] | None, ids: list[int]
+    ) -> list[int | None]:
+        if seed is None:
+            return [None] * len(ids)
+        try:
+            if isinstance(seed, Sequence | np.ndarray | Tensor) and np.ndim(seed) == 1:
+                seeds = [operator.index(s) for s in seed]
+            else:
+                seeds = [operator.index(seed) + i for i in ids]  # type: ignore[arg-type]
+        except TypeError:
+            raise TaskError(f"seed is {seed!r}; it takes an integer or a list of them") from None
+        if len(seeds) != len(ids):
+            raise TaskError(f"{len(seeds)} seeds for {len(ids)} environments")
+        if not all(0 <= s < 2**32 for s in seeds):
+            raise TaskError(f"seeds {seeds} must lie from 0 to 2**32 - 1")
+        return list(seeds)
+
+    def _checked_options(self, options: Mapping[str, Any] | None) -> bool:
+        for key in options or {}:
+            if key != "reconfigure":
+                raise TaskError(unknown_name_message("reset option", key, ("reconfigure",)))
+        return bool((options or {}).get("reconfigure", False))
