@@ -1,4 +1,4 @@
-"""What a robot is: files, joint groups, gripper, keyframes. Data that validates itself, nothing else."""
+"""What a robot is: files, joint groups, gripper, keyframes; data that checks itself, no more."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import NoReturn, Protocol
 
 from robots.errors import DescriptorError, UnknownNameError
 
@@ -20,7 +21,7 @@ IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 class UrdfSource(Protocol):
     """Where a URDF comes from; see `robots.locator.UrdfLocator`."""
 
-    def locate(self, *, pictures: bool = False) -> Any:
+    def locate(self, *, pictures: bool = False) -> Path:
         """Return the path of a complete, checked URDF on this machine."""
         ...
 
@@ -212,9 +213,8 @@ class ActionNumber:
     def __str__(self) -> str:
         """Return one readable line."""
         sign = "+" if self.relative else ""
-        return (
-            f"{self.index:>2}  {self.name:<24} {self.lower:{sign}g} … {self.upper:{sign}g} {self.unit}"
-        )
+        values = f"{self.lower:{sign}g} … {self.upper:{sign}g} {self.unit}"
+        return f"{self.index:>2}  {self.name:<24} {values}"
 
 
 @dataclass(frozen=True)
@@ -312,7 +312,7 @@ class RobotDescriptor:
         keyframes: Named joint positions, in the order of ``joints`` (rad, m).
         source: Where the numbers of this descriptor come from.
         reach: Largest distance of the TCP from the base axis (m).
-        tcp_position_links: Links whose mean origin is the TCP position; ``tcp_link`` alone if empty.
+        tcp_position_links: Links whose mean origin is the TCP position; ``tcp_link`` if empty.
         gripper_material: Contact material of the fingers, if it has any.
         fingers: The links that grasp, if it has any.
         cameras: Cameras on its links.
@@ -413,7 +413,8 @@ class _Frozen(dict[str, tuple[float, ...]]):
     def __reduce__(self) -> tuple[object, ...]:
         return (_Frozen, (dict(self),))
 
-    def _refuse(self, *_: object, **__: object) -> Any:
+    def _refuse(self, *_: object, **__: object) -> NoReturn:
         raise TypeError("keyframes are frozen; use dataclasses.replace to change them")
 
-    __setitem__ = __delitem__ = pop = update = clear = setdefault = popitem = _refuse
+    __setitem__ = __delitem__ = __ior__ = pop = clear = popitem = _refuse
+    update = setdefault = _refuse  # pyright: ignore[reportAssignmentType]

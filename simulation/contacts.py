@@ -15,23 +15,22 @@ from simulation.world import World
 
 def pairwise_forces(
     world: World, robot: str, links: Sequence[str], body: str
-) -> NDArray[np.float32]:
-    """Return the contact force of a body on each of some links, summed over their contacts.
+) -> dict[str, NDArray[np.float32]]:
+    """Return the contact force of a body on each link that it touches, summed over contacts.
 
     PhysX refreshes contacts only in a step: after a teleport they are still those of the last one.
 
     Args:
         world: The world.
         robot: Robot name.
-        links: Link names, L of them.
+        links: Names of the links asked about.
         body: Body name.
 
     Returns:
-        Forces in the world frame, shape (L, 3) (N).
+        Force by link name, shape (3,) (N, world frame); links without contact are left out.
     """
     other = world.body(body).component
-    sought = [world.robots[robot].link(link) for link in links]
-    impulses = np.zeros((len(sought), 3))
+    impulses: dict[str, NDArray[np.float64]] = {}
     for contact in world.system.get_contacts():
         first, second = contact.bodies
         if first is other:
@@ -40,10 +39,13 @@ def pairwise_forces(
             link, sign = first, 1
         else:
             continue
-        if link in sought:
-            total = np.sum([point.impulse for point in contact.points], axis=0)
-            impulses[sought.index(link)] += total * sign  # an impulse acts on the first body
-    return impulses.astype(np.float32) / np.float32(world.physics.timestep)
+        name = link.name
+        if name in links and link is world.robots[robot].link(name):
+            # An impulse acts on the first body; native adds them up in float64.
+            total = np.sum([point.impulse for point in contact.points], axis=0) * sign
+            impulses[name] = impulses.get(name, np.zeros(3)) + total
+    timestep = np.float32(world.physics.timestep)
+    return {name: impulse.astype(np.float32) / timestep for name, impulse in impulses.items()}
 
 
 def grasped(fingers: Fingers, forces: Tensor, poses: Sequence[Tensor]) -> Tensor:
@@ -58,8 +60,6 @@ def grasped(fingers: Fingers, forces: Tensor, poses: Sequence[Tensor]) -> Tensor
         Shape (N,), bool.
     """
     held = torch.ones(len(forces), dtype=torch.bool)
-    if not forces.any():
-        return ~held
     for i, (pose, sign) in enumerate(zip(poses, fingers.opening_signs, strict=True)):
         force = forces[:, i]
         angle = torch.rad2deg(_angle_between(sign * _y_axis(pose[:, 3:]), force))

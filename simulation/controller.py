@@ -42,11 +42,11 @@ class JointPositionController:
             joints_before += len(robot.joints)
         low, high = np.array(ranges, np.float32).T
         half = np.float32(0.5)
-        self._centre: Floats = half * (high + low)
-        self._half_range: Floats = half * (high - low)
         self._source = np.array(source)
+        self._centre: Floats = (half * (high + low))[self._source]
+        self._half_range: Floats = (half * (high - low))[self._source]
         self._relative = np.array(relative)
-        self._active = np.array(active)
+        self._active = slice(None) if active == sorted(active) else np.array(active)
         self._setters: list[list[Any]] = [
             [joint.set_drive_target for robot in world.robots.values() for joint in robot.driven]
             for world in worlds
@@ -62,9 +62,10 @@ class JointPositionController:
         Returns:
             Targets in the order of the robots' driven joints, shape (N, dof) (rad, m).
         """
-        scaled = self._centre + self._half_range * np.clip(action, -1, 1)
-        target = scaled[:, self._source]
-        return np.where(self._relative, qpos[:, self._active] + target, target)
+        clipped = np.minimum(np.maximum(action, -1), 1).take(self._source, 1)
+        target = self._centre + self._half_range * clipped
+        np.add(qpos[:, self._active], target, out=target, where=self._relative)
+        return target
 
     def drive(self, targets: Floats, index: int) -> None:
         """Write one world's drive targets to its joints.

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from layouts import Layout
-from robots import RobotDescriptor, UnknownNameError
+from robots import RobotDescriptor
 from simulation.controller import JointPositionController
 from simulation.physics import PhysicsSettings
+from simulation.readout import ReadoutIndex
 from simulation.state import State
 from simulation.world import World
 
@@ -23,7 +25,7 @@ class Simulation:
         worlds: The worlds.
         substeps: Physics steps per control step.
         stamp: Counts every change, so that a stale `State` can tell that it is stale.
-        index: Where each entity and joint stands in a read-out.
+        index: Where each frame and joint stands in a read-out.
     """
 
     def __init__(
@@ -78,6 +80,22 @@ class Simulation:
                 step()
         self.stamp += 1
 
+    def timed_step(self, action: NDArray[np.float32]) -> float:
+        """Advance like `step` and return the time that physics alone took (s).
+
+        The floor that any task's step is measured against.
+        """
+        targets = self._controller.targets(action, self.read().joint_positions)
+        seconds = 0.0
+        for i, world in enumerate(self.worlds):
+            self._controller.drive(targets, i)
+            start = perf_counter()
+            for _ in range(self.substeps):
+                world.system.step()
+            seconds += perf_counter() - start
+        self.stamp += 1
+        return seconds
+
     def read(self) -> State:
         """Return what all worlds look like now."""
         return State(self)
@@ -96,57 +114,3 @@ class Simulation:
         self.index = ReadoutIndex(self.worlds[0])
         self._controller = JointPositionController(self.layout, self.worlds)
         self.stamp += 1
-
-
-class ReadoutIndex:
-    """Where each entity and joint stands in a read-out; the same in every world of a batch.
-
-    Attributes:
-        entities: Number of entities of a world.
-        dof: Number of joints of all robots of a world.
-        bodies: Place of each body among the entities.
-        joint_slices: Place of each robot's joints, in layout order.
-        arm_joints: For each robot, the joints that are not its gripper's.
-    """
-
-    def __init__(self, world: World) -> None:
-        """Index one world."""
-        place = {entity: i for i, entity in enumerate(world.scene.entities)}
-        self.entities = len(place)
-        self.bodies = {name: place[body.entity] for name, body in world.bodies.items()}
-        self._links = {
-            name: {link: place[component.entity] for link, component in robot.links.items()}
-            for name, robot in world.robots.items()
-        }
-        self._slices: dict[str, slice] = {}
-        self.arm_joints: dict[str, slice | list[int]] = {}
-        self.dof = 0
-        for name, robot in world.robots.items():
-            self._slices[name] = slice(self.dof, self.dof + len(robot.joints))
-            self.dof += len(robot.joints)
-            self.arm_joints[name] = _as_slice(
-                sorted(
-                    robot.active_index[robot.descriptor.joints.index(joint)]
-                    for joint in robot.descriptor.arm_joints
-                )
-            )
-        self.joint_slices = tuple(self._slices.values())
-
-    def link(self, robot: str, link: str) -> int:
-        """Return the place of a link among the entities."""
-        if robot not in self._links:
-            raise UnknownNameError("robot of this layout", robot, self._links)
-        if link not in self._links[robot]:
-            raise UnknownNameError(f"link of {robot}", link, self._links[robot])
-        return self._links[robot][link]
-
-    def joint_slice(self, robot: str) -> slice:
-        """Return the place of a robot's joints."""
-        if robot not in self._slices:
-            raise UnknownNameError("robot of this layout", robot, self._slices)
-        return self._slices[robot]
-
-
-def _as_slice(indices: list[int]) -> slice | list[int]:
-    contiguous = indices == list(range(indices[0], indices[0] + len(indices)))
-    return slice(indices[0], indices[-1] + 1) if contiguous else indices

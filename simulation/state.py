@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from functools import wraps
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 import torch
 from torch import Tensor
+from torch.linalg import vector_norm
 
 from robots import SimulationError, UnknownNameError
 from simulation.contacts import grasped, pairwise_forces
@@ -15,196 +17,249 @@ from simulation.contacts import grasped, pairwise_forces
 if TYPE_CHECKING:
     from simulation.simulation import Simulation
 
+_Arguments = ParamSpec("_Arguments")
+_Value = TypeVar("_Value")
+
+
+def _remembered(
+    compute: Callable[Concatenate[State, _Arguments], _Value],
+) -> Callable[Concatenate[State, _Arguments], _Value]:
+    """Compute once per state and arguments: rewards ask for what success was told from."""
+    name = compute.__name__
+
+    @wraps(compute)
+    def look_up(self: State, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Value:
+        key = (name, args)
+        found = self._memo.get(key)
+        if found is None:
+            found = self._memo[key] = compute(self, *args, **kwargs)
+        return found
+
+    return look_up
+
 
 class State:
     """A read-out of N worlds right after a step or a reset.
 
     Poses and joints are read at once; velocities and contacts on first use, which must be before
     the simulation moves on. Poses are position (m) and quaternion (wxyz), in the world frame.
-    Tensors are float32 and never change afterwards.
+    Tensors are float32, and share memory with the state: copy one before changing it.
 
     Attributes:
         num_envs: Number of worlds N.
+        joint_positions: Joint positions of all robots, in layout order, (N, dof) (rad, m).
     """
+
+    __slots__ = (
+        "_block",
+        "_distances",
+        "_index",
+        "_joint_velocities",
+        "_memo",
+        "_offsets",
+        "_poses",
+        "_simulation",
+        "_stamp",
+        "joint_positions",
+        "num_envs",
+    )
 
     def __init__(self, simulation: Simulation) -> None:
         """Read poses and joints of every world."""
         self._simulation = simulation
         self._stamp = simulation.stamp
-        self._memo: dict[object, Tensor] = {}
-        self.num_envs = len(simulation.worlds)
-        index = simulation.index
-        poses = np.empty((self.num_envs, index.entities, 7), np.float32)
-        joints = np.empty((self.num_envs, 2, index.dof), np.float32)
+        self._index = index = simulation.index
+        self._memo: dict[Any, Any] = {}
+        self._offsets: tuple[Tensor, ...] = ()
+        self._distances: tuple[Tensor, ...] = ()
+        self.num_envs = count = len(simulation.worlds)
+        self._poses = poses = np.empty((index.frames, count, 7), np.float32)
+        self.joint_positions = qpos = np.empty((count, index.dof), np.float32)
+        self._joint_velocities = qvel = np.empty((count, index.dof), np.float32)
+        entities = poses[: index.entities]
         for i, world in enumerate(simulation.worlds):
             packed = np.frombuffer(world.scene.pack_poses(), np.float32).reshape(-1, 7)
-            poses[i, :, :3] = packed[:, 4:]  # SAPIEN packs the quaternion first
-            poses[i, :, 3:] = packed[:, :4]
-            for robot, part in zip(world.robots.values(), index.joint_slices, strict=True):
-                joints[i, 0, part] = robot.articulation.qpos
-                joints[i, 1, part] = robot.articulation.qvel
-        self.joint_positions = joints[:, 0]
-        self._poses = torch.from_numpy(poses)
-        self._joints = torch.from_numpy(joints)
+            entities[:, i, :3] = packed[:, 4:]  # SAPIEN packs the quaternion first
+            entities[:, i, 3:] = packed[:, :4]
+            for articulation, part in zip(world.articulations, index.joint_slices, strict=True):
+                qpos[i, part] = articulation.qpos
+                qvel[i, part] = articulation.qvel
+        for frame, orientation, points in index.mean_frames:
+            poses[frame, :, :3] = sum(poses[point, :, :3] for point in points) / len(points)
+            poses[frame, :, 3:] = poses[orientation, :, 3:]
 
     # -- bodies ------------------------------------------------------------------------------
 
+    @_remembered
     def pose(self, body: str) -> Tensor:
         """Pose of a body, shape (N, 7)."""
-        return self._once(("pose", body), lambda: self._poses[:, self._entity(body)])
+        return torch.from_numpy(self._poses[self._index.body(body)])
 
+    @_remembered
     def position(self, body: str) -> Tensor:
         """Position of a body, shape (N, 3) (m)."""
-        return self._once(("position", body), lambda: self.pose(body)[:, :3])
+        return torch.from_numpy(self._poses[self._index.body(body), :, :3])
 
+    @_remembered
     def quaternion(self, body: str) -> Tensor:
         """Orientation of a body, wxyz, shape (N, 4)."""
-        return self._once(("quaternion", body), lambda: self.pose(body)[:, 3:])
+        return torch.from_numpy(self._poses[self._index.body(body), :, 3:])
 
+    @_remembered
     def linear_velocity(self, body: str) -> Tensor:
         """Linear velocity of a body in the world frame, shape (N, 3) (m/s)."""
-        return self._once(
-            ("linear", body), lambda: self._velocity(body, lambda c: c.linear_velocity)
-        )
+        return self._velocity(body, "linear_velocity")
 
+    @_remembered
     def angular_velocity(self, body: str) -> Tensor:
         """Angular velocity of a body in the world frame, shape (N, 3) (rad/s)."""
-        return self._once(
-            ("angular", body), lambda: self._velocity(body, lambda c: c.angular_velocity)
-        )
+        return self._velocity(body, "angular_velocity")
 
     # -- robots ------------------------------------------------------------------------------
 
+    @_remembered
     def qpos(self, robot: str) -> Tensor:
         """Joint positions of a robot in SAPIEN's joint order, shape (N, dof) (rad, m)."""
-        return self._once(("qpos", robot), lambda: self._joints[:, 0, self._joint_slice(robot)])
+        return torch.from_numpy(self.joint_positions[:, self._index.joints(robot)])
 
+    @_remembered
     def qvel(self, robot: str) -> Tensor:
         """Joint velocities of a robot in SAPIEN's joint order, shape (N, dof) (rad/s, m/s)."""
-        return self._once(("qvel", robot), lambda: self._joints[:, 1, self._joint_slice(robot)])
+        return torch.from_numpy(self._joint_velocities[:, self._index.joints(robot)])
 
+    @_remembered
     def arm_qvel(self, robot: str) -> Tensor:
         """Joint velocities of a robot without its gripper, shape (N, arm joints) (rad/s)."""
-        return self._once(
-            ("arm_qvel", robot),
-            lambda: self.qvel(robot)[:, self._simulation.index.arm_joints[robot]],
-        )
+        return torch.from_numpy(self._joint_velocities[:, self._index.arm_joints(robot)])
 
+    @_remembered
     def link_pose(self, robot: str, link: str) -> Tensor:
         """Pose of a link, shape (N, 7)."""
-        return self._once(
-            ("link", robot, link),
-            lambda: self._poses[:, self._simulation.index.link(robot, link)],
-        )
+        return torch.from_numpy(self._poses[self._index.link(robot, link)])
 
+    @_remembered
     def link_position(self, robot: str, link: str) -> Tensor:
         """Position of a link, shape (N, 3) (m)."""
-        return self._once(
-            ("link_position", robot, link), lambda: self.link_pose(robot, link)[:, :3]
-        )
+        return torch.from_numpy(self._poses[self._index.link(robot, link), :, :3])
 
+    @_remembered
     def tcp_pose(self, robot: str) -> Tensor:
         """Pose of a robot's tool centre point, shape (N, 7)."""
-        return self._once(("tcp", robot), lambda: self._tcp_pose(robot))
+        return torch.from_numpy(self._poses[self._index.tcp(robot)])
 
+    @_remembered
     def tcp_position(self, robot: str) -> Tensor:
         """Position of a robot's tool centre point, shape (N, 3) (m)."""
-        return self._once(("tcp_position", robot), lambda: self.tcp_pose(robot)[:, :3])
+        return torch.from_numpy(self._poses[self._index.tcp(robot), :, :3])
 
-    def finger_positions(self, robot: str) -> tuple[Tensor, Tensor] | None:
-        """Positions of a robot's two finger links, each (N, 3) (m), or None if it has none."""
-        fingers = self._simulation.descriptor(robot).fingers
+    def finger_heights(self, robot: str) -> tuple[Tensor, Tensor] | None:
+        """Height of a robot's two finger links, each (N,) (m), or None if it has none."""
+        fingers = self._index.fingers(robot)
         if fingers is None:
             return None
-        first, second = fingers.links
-        return self.link_position(robot, first), self.link_position(robot, second)
+        first, second = (self._poses[self._index.link(robot, f), :, 2] for f in fingers.links)
+        return torch.from_numpy(first), torch.from_numpy(second)
 
+    def finger_gap(self, robot: str) -> Tensor:
+        """Distance between the origins of a robot's two finger links, shape (N,) (m).
+
+        Raises:
+            SimulationError: If the robot has no fingers.
+        """
+        fingers = self._index.fingers(robot)
+        if fingers is None:
+            raise SimulationError(f"robot {robot!r} has no fingers")
+        first, second = (self._index.link(robot, link) for link in fingers.links)
+        return self._distance(second, first)
+
+    @_remembered
+    def arm_speed(self, robot: str) -> Tensor:
+        """Euclidean norm of the arm's joint velocities, shape (N,) (rad/s)."""
+        return vector_norm(self.arm_qvel(robot), dim=1)
+
+    @_remembered
     def is_static(self, robot: str, threshold: float = 0.2) -> Tensor:
         """Whether no arm joint is faster than ``threshold`` (rad/s), shape (N,) bool."""
-        return self.arm_qvel(robot).abs().amax(1) <= threshold
+        speeds = np.abs(self._joint_velocities[:, self._index.arm_joints(robot)])
+        return torch.from_numpy(np.maximum.reduce(speeds, 1) <= np.float32(threshold))
 
     # -- contacts ----------------------------------------------------------------------------
 
+    @_remembered
     def contact_force(self, robot: str, link: str, body: str) -> Tensor:
         """Sum of the contact forces of a body on a link, shape (N, 3) (N, world frame)."""
-        return self._once(
-            ("force", robot, link, body), lambda: self._contact_forces(robot, (link,), body)[:, 0]
-        )
+        forces = self._contact_forces(robot, (link,), body)
+        return torch.zeros(self.num_envs, 3) if forces is None else forces[:, 0]
 
+    @_remembered
     def is_grasping(self, robot: str, body: str) -> Tensor:
         """Whether a robot's two fingers hold a body, shape (N,) bool; see `robots.Fingers`."""
-        return self._once(("grasp", robot, body), lambda: self._is_grasping(robot, body))
+        fingers = self._index.fingers(robot)
+        if fingers is None:
+            return torch.zeros(self.num_envs, dtype=torch.bool)
+        forces = self._contact_forces(robot, fingers.links, body)
+        if forces is None:
+            return torch.zeros(self.num_envs, dtype=torch.bool)
+        return grasped(fingers, forces, [self.link_pose(robot, link) for link in fingers.links])
 
     # -- distances ---------------------------------------------------------------------------
 
-    def distance(self, a: str, b: str) -> Tensor:
-        """Distance between the origins of two bodies, shape (N,) (m)."""
-        return self._once(
-            ("distance", a, b),
-            lambda: torch.linalg.vector_norm(self.position(b) - self.position(a), dim=1),
-        )
+    def offset(self, start: str, end: str) -> Tensor:
+        """Way from one body's origin to another's, shape (N, 3) (m, world frame)."""
+        return self._offset(self._index.body(start), self._index.body(end))
 
-    def planar_distance(self, a: str, b: str) -> Tensor:
+    def distance(self, start: str, end: str) -> Tensor:
+        """Distance between the origins of two bodies, shape (N,) (m)."""
+        return self._distance(self._index.body(start), self._index.body(end))
+
+    @_remembered
+    def planar_distance(self, start: str, end: str) -> Tensor:
         """Distance between the origins of two bodies seen from above, shape (N,) (m)."""
-        return self._once(
-            ("planar_distance", a, b),
-            lambda: torch.linalg.vector_norm((self.position(b) - self.position(a))[:, :2], dim=1),
-        )
+        return vector_norm(self.offset(start, end)[:, :2], dim=1)
+
+    def tcp_offset(self, robot: str, body: str) -> Tensor:
+        """Way from a robot's tool centre point to a body's origin, shape (N, 3) (m, world)."""
+        return self._offset(self._index.tcp(robot), self._index.body(body))
 
     def tcp_distance(self, robot: str, body: str) -> Tensor:
         """Distance from a robot's tool centre point to a body's origin, shape (N,) (m)."""
-        return self._once(
-            ("tcp_distance", robot, body),
-            lambda: torch.linalg.vector_norm(
-                self.position(body) - self.tcp_position(robot), dim=1
-            ),
-        )
+        return self._distance(self._index.tcp(robot), self._index.body(body))
 
     # -- inside ------------------------------------------------------------------------------
 
-    def _once(self, key: object, compute: Callable[[], Tensor]) -> Tensor:
-        found = self._memo.get(key)
-        if found is None:
-            found = self._memo[key] = compute()
-        return found
+    def _offset(self, start: int, end: int) -> Tensor:
+        place = self._index.pairs.place(start, end)
+        if place >= len(self._offsets):
+            starts, ends = self._index.pairs.columns
+            ways = self._poses.take(ends, 0) - self._poses.take(starts, 0)
+            self._block = torch.from_numpy(ways[:, :, :3])
+            self._offsets = self._block.unbind()
+        return self._offsets[place]
 
-    def _entity(self, body: str) -> int:
-        bodies = self._simulation.index.bodies
-        if body not in bodies:
-            raise UnknownNameError("body of this world", body, bodies)
-        return bodies[body]
+    def _distance(self, start: int, end: int) -> Tensor:
+        place = self._index.pairs.place(start, end)
+        if place >= len(self._distances):
+            self._offset(start, end)
+            self._distances = vector_norm(self._block, dim=2).unbind()
+        return self._distances[place]
 
-    def _joint_slice(self, robot: str) -> slice:
-        return self._simulation.index.joint_slice(robot)
-
-    def _tcp_pose(self, robot: str) -> Tensor:
-        descriptor = self._simulation.descriptor(robot)
-        frame = self.link_pose(robot, descriptor.tcp_link)
-        if not descriptor.tcp_position_links:
-            return frame
-        points = [self.link_position(robot, link) for link in descriptor.tcp_position_links]
-        return torch.cat([sum(points[1:], points[0]) / len(points), frame[:, 3:]], 1)
-
-    def _velocity(self, body: str, read: Callable[..., np.ndarray]) -> Tensor:
+    def _velocity(self, body: str, which: str) -> Tensor:
         self._expect_current()
         bodies = [world.body(body) for world in self._simulation.worlds]
         if bodies[0].kind != "dynamic":
             return torch.zeros(self.num_envs, 3)
-        return torch.from_numpy(np.stack([read(found.component) for found in bodies]))
+        return torch.from_numpy(np.stack([getattr(found.component, which) for found in bodies]))
 
-    def _contact_forces(self, robot: str, links: tuple[str, ...], body: str) -> Tensor:
+    def _contact_forces(self, robot: str, links: tuple[str, ...], body: str) -> Tensor | None:
+        """Forces of a body on some links, (N, L, 3), or None if nothing touches anywhere."""
         self._expect_current()
-        forces = [
-            pairwise_forces(world, robot, links, body) for world in self._simulation.worlds
-        ]
-        return torch.from_numpy(np.stack(forces))
-
-    def _is_grasping(self, robot: str, body: str) -> Tensor:
-        fingers = self._simulation.descriptor(robot).fingers
-        if fingers is None:
-            return torch.zeros(self.num_envs, dtype=torch.bool)
-        forces = self._contact_forces(robot, fingers.links, body)
-        return grasped(fingers, forces, [self.link_pose(robot, link) for link in fingers.links])
+        forces: np.ndarray | None = None
+        for i, world in enumerate(self._simulation.worlds):
+            for link, force in pairwise_forces(world, robot, links, body).items():
+                if forces is None:
+                    forces = np.zeros((self.num_envs, len(links), 3), np.float32)
+                forces[i, links.index(link)] = force
+        return None if forces is None else torch.from_numpy(forces)
 
     def _expect_current(self) -> None:
         if self._stamp != self._simulation.stamp:

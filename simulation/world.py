@@ -51,6 +51,7 @@ class World:
         scene: SAPIEN's scene.
         system: Its physics system.
         robots: Robot by name in the layout.
+        articulations: The robots' articulations, in layout order.
         bodies: Body by name.
     """
 
@@ -83,6 +84,7 @@ class World:
             name: SimulatedRobot(self.scene, name, placement, visuals=visuals)
             for name, placement in layout.items()
         }
+        self.articulations = [robot.articulation for robot in self.robots.values()]
         self.bodies: dict[str, SimulatedBody] = {}
 
     def add(

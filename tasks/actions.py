@@ -32,11 +32,11 @@ class ActionReader:
         Raises:
             ActionError: If its shape, type or a number is wrong; says which robot's.
         """
-        if isinstance(action, Mapping):
+        if type(action) is not torch.Tensor and isinstance(action, Mapping):
             flat = self._join(action)
         else:
             flat = self._array(action, self._width, "the action")
-        if not np.isfinite(flat).all():
+        if not np.logical_and.reduce(np.isfinite(flat), axis=None):
             self._refuse_number(flat)
         return flat
 
@@ -57,7 +57,7 @@ class ActionReader:
 
     def _array(self, value: Any, width: int, what: str) -> NDArray[np.float32]:
         if isinstance(value, torch.Tensor):
-            array = value.detach().cpu().numpy()
+            array = value.numpy(force=True)
         else:
             try:
                 array = np.asarray(value)

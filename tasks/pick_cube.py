@@ -9,6 +9,7 @@ from layouts import single
 from simulation import Box, PhysicsSettings, Sphere, State, World, add_table
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
+from tasks.shaping import closeness
 from tasks.task import Info, MultiRobotTask
 
 # mani_skill 3.0.1, envs/tasks/tabletop/pick_cube.py and pick_cube_cfgs.py (m)
@@ -67,22 +68,25 @@ class PickCube(MultiRobotTask):
 
     def observe(self, state: State, info: Info) -> dict[str, Tensor]:
         """Grasp, TCP, goal and cube."""
-        cube, goal = state.position("cube"), state.position("goal_site")
         return {
             "is_grasped": info["is_grasped"],
             "tcp_pose": state.tcp_pose("arm"),
-            "goal_pos": goal,
+            "goal_pos": state.position("goal_site"),
             "obj_pose": state.pose("cube"),
-            "tcp_to_obj_pos": cube - state.tcp_position("arm"),
-            "obj_to_goal_pos": goal - cube,
+            "tcp_to_obj_pos": state.tcp_offset("arm", "cube"),
+            "obj_to_goal_pos": state.offset("cube", "goal_site"),
         }
 
     def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
         """Reach (1), grasp (1), place (1), hold still (1); 5 on success."""
-        reward = 1 - torch.tanh(5 * state.tcp_distance("arm", "cube"))
-        reward = reward + info["is_grasped"]
-        place = 1 - torch.tanh(5 * state.distance("cube", "goal_site"))
-        reward = reward + place * info["is_grasped"]
-        speed = torch.linalg.vector_norm(state.arm_qvel("arm"), dim=1)
-        reward = reward + (1 - torch.tanh(5 * speed)) * info["is_obj_placed"]
-        return torch.where(info["success"], 5.0, reward)
+        reach, place, still = closeness(
+            state.tcp_distance("arm", "cube"),
+            state.distance("cube", "goal_site"),
+            state.arm_speed("arm"),
+        )
+        grasped, placed = info["is_grasped"].float(), info["is_obj_placed"].float()
+        reward = reach + grasped + place * grasped + still * placed
+        return torch.where(info["success"], _DONE, reward)
+
+
+_DONE = torch.tensor(5.0)

@@ -152,7 +152,8 @@ class MultiRobotTask:
         self._reader = ActionReader(self.layout, self.num_envs)
         self._observation_keys = observation_keys(self.layout)
         self._rngs = [EpisodeRandom(FIRST_SEED + i) for i in range(self.num_envs)]
-        self._elapsed = torch.zeros(self.num_envs, dtype=torch.int32)
+        self._max_reward = torch.tensor(float(self.max_reward))
+        self._elapsed = np.zeros(self.num_envs, np.int32)
         self._simulation: Simulation | None = Simulation(
             self.layout,
             lambda world, _: self.build(world),
@@ -244,7 +245,7 @@ class MultiRobotTask:
         info = self._info(state)
         obs = self._observation(state, info)
         reward = self._reward(state, torch.from_numpy(flat), info)
-        truncated = self._elapsed >= self.max_episode_steps
+        truncated = torch.from_numpy(self._elapsed >= self.max_episode_steps)
         return obs, reward, info["success"].clone(), truncated, info
 
     def get_state_dict(self) -> StateDict:
@@ -299,29 +300,31 @@ class MultiRobotTask:
         return obs, info
 
     def _info(self, state: State) -> Info:
-        return {"elapsed_steps": self._elapsed.clone(), **self.evaluate(state)}
+        elapsed = torch.from_numpy(self._elapsed.copy())
+        return {"elapsed_steps": elapsed, **self.evaluate(state)}
 
     def _observation(self, state: State, info: Info) -> Any:
         if self.obs_mode == "none":
             return {}
         extra = self.observe(state, info)
         if self.obs_mode == "state_dict":
-            return {"agent": self._proprioception(state), "extra": extra}
+            own = {key: x.clone() for key, x in extra.items()}
+            return {"agent": self._proprioception(state), "extra": own}
         parts = [part for name in self.layout for part in (state.qpos(name), state.qvel(name))]
-        parts.extend(x if x.ndim == 2 else x[:, None] for x in extra.values())
+        parts.extend(_as_columns(part) for part in extra.values())
         return torch.cat(parts, 1)
 
     def _proprioception(self, state: State) -> dict[str, Any]:
         parts: dict[str, Any] = {}
         for name, key in self._observation_keys.items():
-            own = {"qpos": state.qpos(name), "qvel": state.qvel(name)}
+            own = {"qpos": state.qpos(name).clone(), "qvel": state.qvel(name).clone()}
             parts.update(own if key is None else {key: own})
         return parts
 
     def _reward(self, state: State, action: Tensor, info: Info) -> Tensor:
         match self.reward_mode:
             case "normalized_dense":
-                return self.dense_reward(state, action, info) / self.max_reward
+                return self.dense_reward(state, action, info) / self._max_reward
             case "dense":
                 return self.dense_reward(state, action, info)
             case "sparse":
@@ -378,3 +381,10 @@ class MultiRobotTask:
             if key != "reconfigure":
                 raise TaskError(unknown_name_message("reset option", key, ("reconfigure",)))
         return bool((options or {}).get("reconfigure", False))
+
+
+def _as_columns(part: Tensor) -> Tensor:
+    """Make a part of an observation float32 of shape (N, k); mixed types are slow to join."""
+    if part.dtype is not torch.float32:
+        part = part.float()
+    return part if part.ndim == 2 else part.unsqueeze(1)

@@ -11,14 +11,13 @@ from layouts import face_to_face
 from simulation import Box, PhysicsSettings, Sphere, State, World, add_table
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
+from tasks.shaping import closeness
 from tasks.task import Info, MultiRobotTask
 
 # mani_skill 3.0.1, envs/tasks/tabletop/two_robot_pick_cube.py (m)
 CUBE_HALF_SIZE = 0.02
 GOAL_RADIUS = 0.025
 STATIC_SPEED = 0.2  # rad/s
-OPEN_FINGER_GAP = 0.07
-LEFT_ARM_RETREAT = -0.2  # y the left TCP should retreat to
 
 
 @register_task("TwoRobotPickCube-v1", "maniskill.two_robot_pick_cube_native")
@@ -80,60 +79,53 @@ class TwoRobotPickCube(MultiRobotTask):
 
     def observe(self, state: State, info: Info) -> dict[str, Tensor]:
         """Both TCPs, the cube, and the ways between them."""
-        cube = state.position("cube")
         return {
             "left_arm_tcp": state.tcp_pose("left"),
             "right_arm_tcp": state.tcp_pose("right"),
             "cube_pose": state.pose("cube"),
-            "left_arm_tcp_to_cube_pos": cube - state.tcp_position("left"),
-            "right_arm_tcp_to_cube_pos": cube - state.tcp_position("right"),
-            "cube_to_goal_pos": state.position("goal_site") - cube,
+            "left_arm_tcp_to_cube_pos": state.tcp_offset("left", "cube"),
+            "right_arm_tcp_to_cube_pos": state.tcp_offset("right", "cube"),
+            "cube_to_goal_pos": state.offset("cube", "goal_site"),
         }
 
     def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
         """Bring (2), take over (8), carry (12), place (19), hold still (21 on success)."""
         cube_y = state.position("cube")[:, 1]
-        reach = _closeness(state.tcp_distance("left", "cube"))
-        across = _closeness((0.05 - cube_y).clamp(min=0))
-        reward = (reach + across) / 2
-
-        is_grasped = state.is_grasping("right", "cube")
-        take_over = (
-            _closeness(state.tcp_distance("right", "cube"))
-            + self._finger_readiness(state)
-            + _closeness((state.tcp_position("left")[:, 1] - LEFT_ARM_RETREAT).abs())
-            + 2 * is_grasped
+        to_goal = state.tcp_distance("right", "goal_site")
+        reach, across, take, retreat, carry, right_still, left_still, *fingers = closeness(
+            state.tcp_distance("left", "cube"),
+            (_SIDE_Y - cube_y).clamp(min=0),
+            state.tcp_distance("right", "cube"),
+            (state.tcp_position("left")[:, 1] - _RETREAT_Y).abs(),
+            to_goal,
+            state.arm_speed("right"),
+            state.arm_speed("left"),
+            *_finger_errors(state),
         )
-        reward = torch.where(cube_y >= 0.0, 2 + take_over, reward)
+        grasped = state.is_grasping("right", "cube")
+        strayed = torch.linalg.vector_norm(state.qpos("left") - self._left_start, dim=1)
+        stage_1 = (reach + across) * _HALF
+        ready = (fingers[0] + fingers[1]) * _HALF if fingers else 0.0
+        stage_2 = take + ready + retreat + _TWO * grasped.float()
+        stage_3 = _TWO * carry + (_ONE - torch.tanh(strayed))
+        stage_5 = (right_still + left_still) * _HALF
 
-        to_goal = torch.linalg.vector_norm(
-            state.position("goal_site") - state.tcp_position("right"), dim=1
-        )
-        left_strayed = torch.linalg.vector_norm(state.qpos("left") - self._left_start, dim=1)
-        carry = 2 * _closeness(to_goal) + (1 - torch.tanh(left_strayed))
-        reward = torch.where(is_grasped, 8 + carry, reward)
-        reward = torch.where((to_goal < 0.25) & is_grasped, 12 + 2 * carry, reward)
-
-        still = (self._stillness(state, "right") + self._stillness(state, "left")) / 2
-        reward = torch.where(info["is_obj_placed"], 19 + still, reward)
-        return torch.where(info["success"], 21.0, reward)
-
-    @staticmethod
-    def _stillness(state: State, robot: str) -> Tensor:
-        return _closeness(torch.linalg.vector_norm(state.arm_qvel(robot), dim=1))
-
-    @staticmethod
-    def _finger_readiness(state: State) -> Tensor:
-        """How level and open the right fingers are, (N,) in 0 … 1; 0 for a robot without any."""
-        fingers = state.finger_positions("right")
-        if fingers is None:
-            return torch.zeros(state.num_envs)
-        first, second = fingers
-        gap = torch.linalg.vector_norm(first - second, dim=1)
-        level = _closeness((first[:, 2] - second[:, 2]).abs())
-        return (level + _closeness((gap - OPEN_FINGER_GAP).abs())) / 2
+        reward = torch.where(cube_y >= _ZERO, _FROM_2 + stage_2, stage_1)
+        reward = torch.where(grasped, _FROM_3 + stage_3, reward)
+        reward = torch.where((to_goal < _NEAR) & grasped, _FROM_4 + _TWO * stage_3, reward)
+        reward = torch.where(info["is_obj_placed"], _FROM_5 + stage_5, reward)
+        return torch.where(info["success"], _DONE, reward)
 
 
-def _closeness(distance: Tensor) -> Tensor:
-    """1 at distance 0, falling to 0 within about half a metre."""
-    return 1 - torch.tanh(5 * distance)
+# Tensors, because arithmetic with Python numbers costs twice as much per call.
+_ZERO, _HALF, _ONE, _TWO = torch.tensor([0.0, 0.5, 1.0, 2.0])
+_FROM_2, _FROM_3, _FROM_4, _FROM_5, _DONE = torch.tensor([2.0, 8.0, 12.0, 19.0, 21.0])  # rewards
+_SIDE_Y, _RETREAT_Y, _NEAR, _FINGER_GAP = torch.tensor([0.05, -0.2, 0.25, 0.07])  # m
+
+
+def _finger_errors(state: State) -> tuple[Tensor, ...]:
+    """How far the right fingers are from level and from open, (N,) each (m); none, no errors."""
+    heights = state.finger_heights("right")
+    if heights is None:
+        return ()
+    return (heights[0] - heights[1]).abs(), (state.finger_gap("right") - _FINGER_GAP).abs()
