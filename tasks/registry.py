@@ -40,12 +40,10 @@ def register_task(*names: str) -> Callable[[TaskClass], TaskClass]:
 
     def register(cls: TaskClass) -> TaskClass:
         for name in names:
-            owner = _registered.get(name.lower())
-            if owner is not None and _home(owner) != _home(cls):
-                raise TaskError(f"the name {name!r} is already taken by {owner.__name__}")
-            target = _built_in(name)
-            if target is not None and target != _home(cls):
-                raise TaskError(f"the name {name!r} is already taken by {target}")
+            registered = _registered.get(name.lower())
+            owner = _built_in(name) if registered is None else _home(registered)
+            if owner not in (None, _home(cls)):
+                raise TaskError(f"the name {name!r} is already taken by {owner}")
         _registered.update({name.lower(): cls for name in names})
         if names[0] not in _listed and names[0] not in CATALOGUE:
             _listed.append(names[0])

@@ -1,0 +1,57 @@
+# Every target installs what it needs into .venv, and is quick when that is done already.
+
+PYTHON ?= python3
+VENV := .venv
+RUN := $(VENV)/bin/python
+
+.PHONY: help demo test test-all check bench clean
+.NOTPARALLEL:
+
+help:
+	@echo "make demo      two robots hand a cube over, ten times"
+	@echo "make test      the tests"
+	@echo "make test-all  the tests, those that take minutes included"
+	@echo "make check     lint, format, types, and which room imports which"
+	@echo "make bench     speed of a step beside native ManiSkill"
+	@echo "make clean     remove .venv"
+
+demo: $(VENV)/.demo
+	$(RUN) -m rollouts demo $(ARGS)
+
+# One thread a process: the tests share the cores among processes, and results stay the same.
+test: $(VENV)/.test
+	OMP_NUM_THREADS=1 $(RUN) -m pytest -n auto --maxprocesses 8 $(ARGS)
+
+test-all: $(VENV)/.test
+	OMP_NUM_THREADS=1 $(RUN) -m pytest -n auto --maxprocesses 8 -m "long or not long" $(ARGS)
+
+check: $(VENV)/.check
+	$(RUN) -m ruff check .
+	$(RUN) -m ruff format --check .
+	$(RUN) -m pyright --pythonpath $(RUN)
+	$(VENV)/bin/lint-imports
+
+bench: $(VENV)/.test
+	OMP_NUM_THREADS=1 $(RUN) -m parity.bench $(ARGS)
+
+clean:
+	rm -rf $(VENV)
+
+# An installation that was cut short leaves .unfinished behind and is made anew.
+define install
+	@if [ -e $(VENV)/.unfinished ]; then rm -rf $(VENV); fi
+	@echo "Installing robot-layouts[$(1)] into $(VENV) (the first time takes some minutes)."
+	@test -x $(VENV)/bin/pip || $(PYTHON) -m venv $(VENV)
+	@touch $(VENV)/.unfinished
+	@$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[$(1)]'
+	@rm $(VENV)/.unfinished && touch $@
+endef
+
+$(VENV)/.demo: pyproject.toml constraints.txt
+	$(call install,demo)
+
+$(VENV)/.test: pyproject.toml constraints.txt
+	$(call install,test)
+
+$(VENV)/.check: pyproject.toml constraints.txt
+	$(call install,check)

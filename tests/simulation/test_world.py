@@ -1,0 +1,199 @@
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from layouts import Layout, Placement, face_to_face, side_by_side, single
+from robots import DescriptorError, RobotRegistry, SimulationError, UnknownNameError
+from robots.descriptor import ActionSplit
+from simulation import Box, PhysicsSettings, Simulation, Sphere, World, add_table
+from simulation.controller import JointPositionController
+from simulation.shapes import Capsule, Cylinder
+
+HALF = 0.02
+
+
+def with_cube(world: World, _: int = 0) -> None:
+    add_table(world)
+    world.add("cube", Box(half_size=(HALF,) * 3), position=(0.0, 0.0, HALF))
+
+
+def stand(simulation: Simulation) -> None:
+    for world in simulation.worlds:
+        for name, placement in world.layout.items():
+            world.robots[name].reset(placement.start_qpos)
+    simulation.touched()
+
+
+def test_names_are_unique_and_unknown_ones_are_refused():
+    world = World(single({"arm": "panda"}))
+    world.add("cube", Box(half_size=(HALF,) * 3))
+    with pytest.raises(SimulationError, match="already has a body called 'cube'"):
+        world.add("cube", Sphere(radius=HALF))
+    with pytest.raises(UnknownNameError, match="Did you mean 'cube'"):
+        world.set_pose("cub", (0, 0, 0))
+    with pytest.raises(UnknownNameError, match="link of panda 'panda_hnd'. Did you mean 'panda_hand'"):
+        world.robots["arm"].link("panda_hnd")
+
+
+@pytest.mark.parametrize(
+    ("shape", "volume"),
+    [
+        (Box(half_size=(0.01, 0.02, 0.03)), 8 * 0.01 * 0.02 * 0.03),
+        (Sphere(radius=0.02), 4 / 3 * math.pi * 0.02**3),
+        (Capsule(radius=0.02, half_length=0.03), math.pi * 0.02**2 * (0.06 + 4 / 3 * 0.02)),
+    ],
+)
+def test_mass_comes_from_density(shape: Box | Sphere | Capsule, volume: float):
+    world = World(single({"arm": "panda"}))
+    for density in (1000.0, 500.0):
+        body = world.add(f"at {density}", dataclasses.replace(shape, density=density))
+        assert body.component.mass == pytest.approx(density * volume, rel=1e-4)
+
+
+def test_a_cylinder_lies_along_its_x_axis():
+    world = World(single({"arm": "panda"}))
+    body = world.add("rod", Cylinder(radius=0.01, half_length=0.1))
+    low, high = body.component.compute_global_aabb_tight()
+    assert high - low == pytest.approx([0.2, 0.02, 0.02], abs=1e-3)
+
+
+def test_robots_stand_where_the_layout_says():
+    layout = face_to_face({"left": "panda", "right": "panda_stick"}, spacing=1.5)
+    simulation = Simulation(layout, with_cube, 2, PhysicsSettings())
+    stand(simulation)
+    state = simulation.read()
+    for name, y in (("left", -0.75), ("right", 0.75)):
+        base = state.link_position(name, "panda_link0")
+        assert torch.allclose(base, torch.tensor([0.0, y, 0.0]), atol=1e-6)
+        reach = state.tcp_position(name) - base
+        assert (reach[:, 1] * -y > 0.4).all(), "each arm reaches towards the other"
+
+
+def test_each_robot_of_three_is_driven_and_seen_alone():
+    names = ("first", "second", "third")
+    layout = side_by_side(dict.fromkeys(names, "panda"), spacing=1.0)
+    simulation = Simulation(layout, with_cube, 1, PhysicsSettings())
+    for moved in names:
+        stand(simulation)
+        before = simulation.read()
+        action = np.zeros((1, layout.action_dim), np.float32)
+        action[:, layout.action_split[moved]] = 0.5
+        for _ in range(5):
+            simulation.step(action, simulation.read().joint_positions)
+        after = simulation.read()
+        for name in names:
+            change = (after.qpos(name) - before.qpos(name))[:, :7].abs().amax()
+            assert (change > 0.05) == (name == moved), (moved, name, change)
+
+
+def test_grasp_and_forces():
+    simulation = Simulation(single({"arm": "panda"}), with_cube, 2, PhysicsSettings())
+    stand(simulation)
+    tcp = simulation.read().tcp_position("arm")[0]
+    held = simulation.worlds[0]
+    held.set_pose("cube", tcp)
+    for body in held.bodies.values():
+        if body.kind == "dynamic":
+            body.component.disable_gravity = True
+    action = np.zeros((2, 8), np.float32)
+    action[:, 7] = -1.0  # close
+    for _ in range(20):
+        simulation.step(action, simulation.read().joint_positions)
+    state = simulation.read()
+    assert state.is_grasping("arm", "cube").tolist() == [True, False]
+    left = state.contact_force("arm", "panda_leftfinger", "cube")
+    right = state.contact_force("arm", "panda_rightfinger", "cube")
+    assert left[0].norm() > 0.5
+    assert torch.allclose(left[0], -right[0], atol=0.3 * left[0].norm().item())
+    assert left[1].norm() == 0
+
+
+def test_a_robot_without_fingers_never_grasps():
+    simulation = Simulation(single({"arm": "panda_stick"}), with_cube, 1)
+    assert not simulation.read().is_grasping("arm", "cube").any()
+    assert simulation.read().finger_heights("arm") is None
+    with pytest.raises(SimulationError, match="has no fingers"):
+        simulation.read().finger_gap("arm")
+
+
+def test_targets_follow_the_action_split():
+    layout = face_to_face({"left": "panda", "right": "panda_stick"}, spacing=1.5)
+    controller = JointPositionController(layout, [World(layout)])
+    qpos = np.arange(16, dtype=np.float32)[None]
+    action = np.zeros((1, 15), np.float32)
+    action[0, 0], action[0, 7], action[0, 8] = 1.0, -5.0, 0.5
+    targets = controller.targets(action, qpos)[0]
+    assert targets[0] == np.float32(0.1)
+    assert targets[7] == targets[8] == pytest.approx(-0.01, abs=1e-8), "both fingers, clipped"
+    assert targets[9] == np.float32(9) + np.float32(0.05)
+    assert np.array_equal(targets[10:], qpos[0, 10:])
+
+
+def test_joints_in_another_order_are_mapped_by_name():
+    panda = RobotRegistry.load("panda")
+    arm = panda.action_split.groups["arm"]
+    backwards = dataclasses.replace(arm, joints=arm.joints[::-1])
+    robot = dataclasses.replace(
+        panda,
+        action_split=panda.action_split.replace(arm=backwards),
+        keyframes={k: (*v[6::-1], *v[7:]) for k, v in panda.keyframes.items()},
+    )
+    action = np.array([[1, 0, 0, 0, 0, 0, 0, 0]], np.float32)
+    moved = []
+    for descriptor, number in ((panda, action), (robot, action[:, [6, 5, 4, 3, 2, 1, 0, 7]])):
+        simulation = Simulation(single({"arm": descriptor}), with_cube, 1, PhysicsSettings())
+        stand(simulation)
+        simulation.step(number, simulation.read().joint_positions)
+        moved.append(simulation.read().qpos("arm"))
+    assert torch.equal(*moved)
+    assert moved[0][0, 0] > 0.01
+
+
+def test_a_descriptor_that_contradicts_its_urdf_is_refused():
+    panda = RobotRegistry.load("panda")
+    arm = panda.action_split.groups["arm"]
+    only_arm = dataclasses.replace(
+        panda, action_split=ActionSplit(arm=arm), keyframes={"rest": panda.keyframe("rest")[:7]}
+    )
+    with pytest.raises(DescriptorError, match="panda_finger_joint1.*in no joint group"):
+        World(single({"arm": only_arm}))
+    ghost = dataclasses.replace(arm, joints=(*arm.joints[:6], "ghost"))
+    with pytest.raises(DescriptorError, match=r"has no active joints \['ghost'\]"):
+        World(
+            single({"arm": dataclasses.replace(panda, action_split=panda.action_split.replace(arm=ghost))})
+        )
+
+
+def test_a_rebuilt_world_has_no_past():
+    simulation = Simulation(single({"arm": "panda"}), with_cube, 2, PhysicsSettings())
+    stand(simulation)
+    simulation.step(np.zeros((2, 8), np.float32), simulation.read().joint_positions)
+    assert simulation.worlds[1].system.get_contacts()
+    kept = simulation.worlds[0]
+    simulation.rebuild([1])
+    assert simulation.worlds[0] is kept
+    assert not simulation.worlds[1].system.get_contacts()
+
+
+def test_anchored_bodies_return_and_velocities_vanish():
+    world = World(single({"arm": "panda"}), PhysicsSettings())
+    with_cube(world)
+    world.settle()
+    world.set_pose("table-workspace", (0.0, 0.0, -3.0))
+    world.body("cube").component.set_linear_velocity([1.0, 2.0, 3.0])
+    world.robots["arm"].articulation.set_qvel(np.ones(9, np.float32))
+    world.clear()
+    assert world.body("table-workspace").entity.pose.p == pytest.approx([-0.12, 0, -0.9196429])
+    assert not world.body("cube").component.linear_velocity.any()
+    assert not world.robots["arm"].articulation.qvel.any()
+
+
+def test_several_placements_of_one_robot_are_separate_articulations():
+    layout = Layout(
+        {f"r{i}": Placement("panda", (0.0, float(i), 0.0), (1, 0, 0, 0), "rest") for i in range(4)}
+    )
+    world = World(layout)
+    assert len({id(a) for a in world.articulations}) == 4

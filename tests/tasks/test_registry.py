@@ -1,0 +1,179 @@
+import copy
+import pickle
+
+import pytest
+import torch
+from torch import Tensor
+
+import tasks
+from layouts import single
+from robots import TaskError, UnknownNameError
+from simulation import Friction, PhysicsSettings, State, World
+
+
+@pytest.mark.parametrize("task_id", tasks.list_tasks())
+def test_every_task_has_its_id_and_its_native_name(task_id: str):
+    cls = tasks.get_task_class(task_id)
+    assert cls.task_id == task_id
+    assert tasks.get_task_class(task_id.lower()) is cls
+    snake = "".join(f"_{c.lower()}" if c.isupper() else c for c in task_id[:-3]).lstrip("_")
+    assert tasks.get_task_class(f"maniskill.{snake}_native") is cls
+    assert tasks.get_task_class(f"ManiSkill.{snake.upper()}_native") is cls
+
+
+@pytest.mark.parametrize("task_id", tasks.list_tasks())
+def test_every_task_says_what_it_is(task_id: str):
+    cls = tasks.get_task_class(task_id)
+    assert cls.__doc__
+    assert "Success" in cls.__doc__
+    assert cls.max_episode_steps > 0
+    assert cls.physics is not None
+
+
+def test_the_list_is_sorted():
+    assert list(tasks.list_tasks()) == sorted(tasks.list_tasks())
+
+
+def test_a_wrong_name_gets_its_closest_match():
+    with pytest.raises(KeyError, match="unknown task 'PickCub-v1'. Did you mean 'PickCube-v1'"):
+        tasks.make("PickCub-v1")
+
+
+def test_a_scenario_is_fresh_at_every_access():
+    cls = tasks.get_task_class("PickCube-v1")
+    cls.scenario.num_envs = 7
+    assert cls.scenario.num_envs == 1
+    assert cls.scenario is not cls.scenario
+
+
+def test_the_metasim_road():
+    cls = tasks.get_task_class("maniskill.pick_cube_native")
+    scenario = copy.deepcopy(cls.scenario)
+    scenario.num_envs = 1
+    scenario.headless = True
+    scenario.cameras = []
+    scenario.simulator = "sapien3"
+    env = cls(scenario)
+    assert env.reset(seed=0)[0].shape == (1, 42)
+    assert env.scenario is scenario
+
+
+def test_an_unknown_field_raises():
+    scenario = tasks.get_task_class("PickCube-v1").scenario
+    with pytest.raises(AttributeError, match="Did you mean 'num_envs'"):
+        scenario.num_env = 3
+    with pytest.raises(KeyError, match="scenario field 'num_environments'"):
+        tasks.make("PickCube-v1", num_environments=3)
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"num_envs": 0}, "num_envs is 0"),
+        ({"num_envs": 1.5}, "num_envs is 1.5"),
+        ({"obs_mode": "rgb"}, "obs_mode 'rgb' is not offered; choices: 'state', 'state_dict'"),
+        ({"reward_mode": "dens"}, "reward_mode 'dens' is not offered.*'dense'"),
+        ({"control_mode": "pd_ee_pose"}, "control_mode 'pd_ee_pose' is not offered"),
+        ({"simulator": "mujoco"}, "simulator 'mujoco' is not offered; choices: 'sapien3'"),
+        ({"headless": False}, "headless=False is not offered"),
+        ({"cameras": ["base"]}, "cameras are not offered"),
+        ({"physics": 3}, "physics is a int"),
+        ({"layout": single({"hand": "panda"})}, r"places \['arm'\]; the layout has \['hand'\]"),
+    ],
+)
+def test_what_a_task_does_not_offer_is_said(fields: dict[str, object], message: str):
+    with pytest.raises(TaskError, match=message):
+        tasks.make("PickCube-v1", **fields)
+
+
+def test_robots_can_be_swapped():
+    env = tasks.make("TwoRobotPickCube-v1", robots={"right": "panda_stick"})
+    assert env.action_split == {"left": slice(0, 8), "right": slice(8, 15)}
+    for mode in env.reward_modes:
+        other = tasks.make("TwoRobotPickCube-v1", robots={"right": "panda_stick"}, reward_mode=mode)
+        obs, reward, terminated, truncated, _ = other.step(torch.zeros(1, 15))
+        assert torch.isfinite(obs).all()
+        assert torch.isfinite(reward).all()
+        assert not terminated
+        assert not truncated
+
+
+def test_one_place_takes_a_bare_name_and_two_do_not():
+    assert tasks.make("PickCube-v1", robots="panda_wristcam").layout["arm"].robot.name == (
+        "panda_wristcam"
+    )
+    with pytest.raises(TaskError, match=r"the places are \['left', 'right'\]"):
+        tasks.make("TwoRobotPickCube-v1", robots="panda")
+    with pytest.raises(UnknownNameError, match="robot of this layout 'middle'"):
+        tasks.make("TwoRobotPickCube-v1", robots={"middle": "panda"})
+    with pytest.raises(UnknownNameError, match="Did you mean 'panda'"):
+        tasks.make("PickCube-v1", robots="pnda")
+
+
+def test_a_robot_without_the_keyframe_is_refused():
+    with pytest.raises(UnknownNameError, match="keyframe of panda 'push_start'"):
+        tasks.make("PushT-v1", robots="panda")
+
+
+class Still(tasks.MultiRobotTask):
+    """A task with nothing in it. Success: never."""
+
+    layout = single({"arm": "panda"})
+    max_episode_steps = 3
+
+    def build(self, world: World) -> None:
+        """Add nothing."""
+
+    def sample(self, world: World, rng: tasks.EpisodeRandom) -> None:
+        """Place nothing."""
+
+    def evaluate(self, state: State) -> dict[str, Tensor]:
+        """Never succeed."""
+        return {"success": torch.zeros(state.num_envs, dtype=torch.bool)}
+
+
+def test_a_user_can_declare_a_task():
+    tasks.register_task("Still-v0", "test.still")(Still)
+    env = tasks.make("test.STILL", num_envs=2)
+    assert "Still-v0" in tasks.list_tasks()
+    assert env.reward_modes == ("sparse", "none")
+    assert env.made_from.physics is None
+    obs, info = env.reset(seed=0)
+    assert obs.shape == (2, 18)
+    assert set(info) == {"elapsed_steps", "success", "reconfigure"}
+    truncations = [env.step(torch.zeros(2, 8))[3].tolist() for _ in range(4)]
+    assert truncations == [[False] * 2, [False] * 2, [True] * 2, [True] * 2]
+
+
+def test_a_name_that_is_taken_is_refused():
+    with pytest.raises(TaskError, match="'PickCube-v1' is already taken by tasks.pick_cube:PickCube"):
+        tasks.register_task("PickCube-v1")(Still)
+    with pytest.raises(TaskError, match="needs at least one name"):
+        tasks.register_task()
+
+
+def test_without_physics_sapiens_own_defaults_hold_whatever_was_built_before():
+    import sapien.physx as physx
+
+    def shape_of(scenario: tasks.Scenario):
+        link = Still(scenario).simulation.worlds[0].robots["arm"].link("panda_link1")
+        return link.collision_shapes[0]
+
+    tasks.make("PickCube-v1")  # writes ManiSkill's settings into the process
+    scenario = Still.scenario
+    assert scenario.physics is None
+    default = shape_of(scenario)
+    assert default.contact_offset == physx.PhysxShapeConfig().contact_offset
+    assert default.physical_material.restitution == pytest.approx(0.1)
+    scenario.physics = PhysicsSettings(contact_offset=0.03, friction=Friction(0.5, 0.4, 0.2))
+    chosen = shape_of(scenario)
+    assert chosen.contact_offset == pytest.approx(0.03)
+    assert chosen.physical_material.static_friction == pytest.approx(0.5)
+
+
+def test_errors_and_scenarios_travel_between_processes():
+    with pytest.raises(UnknownNameError) as caught:
+        tasks.get_task_class("Pick")
+    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+    scenario = tasks.get_task_class("TwoRobotPickCube-v1").scenario
+    assert pickle.loads(pickle.dumps(scenario)) == scenario
