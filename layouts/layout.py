@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
 
+from layouts.description import describe
 from robots import LayoutError, RobotDescriptor, RobotRegistry, UnknownNameError
 from robots.descriptor import Quaternion, Vector3
 
@@ -154,6 +157,10 @@ class Layout(Mapping[str, Placement]):
         """Show names and robots in order."""
         return f"Layout({', '.join(f'{n}={p.robot.name}' for n, p in self.items())})"
 
+    def __str__(self) -> str:
+        """Show a table: name, robot, action numbers, base pose, keyframe and reach of each."""
+        return describe(self)
+
     @property
     def action_split(self) -> dict[str, slice]:
         """The slice of the flat action that each robot takes, in declared order."""
@@ -188,6 +195,31 @@ class Layout(Mapping[str, Placement]):
                 for name, placement in self.items()
             }
         )
+
+    def preview(
+        self,
+        path: str | PathLike[str],
+        *,
+        table: tuple[float, float, float, float] | None = None,
+    ) -> Path:
+        """Save a picture of the layout from above: bases, headings, reach and its overlap.
+
+        Needs matplotlib, but neither robot files nor a graphics driver.
+
+        Args:
+            path: Where to save; the ending chooses the format (.png, .pdf or .svg).
+            table: Outline of a table, as x_min, y_min, x_max, y_max (m).
+
+        Returns:
+            The path of the picture.
+
+        Raises:
+            LayoutError: If the ending names no supported format, or the table is no rectangle.
+            MissingPackageError: If matplotlib is not installed.
+        """
+        from layouts.preview import preview
+
+        return preview(self, path, table)
 
 
 def load_robot(robot: RobotLike) -> RobotDescriptor:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from layouts.layout import Layout, Placement, RobotLike, load_robot
 from robots import LayoutError
@@ -71,6 +71,14 @@ def face_to_face(
             for side, (name, robot) in zip((-1, 1), robots.items(), strict=True)
         }
     )
+
+
+# Every preset, by the name it has on the command line.
+PRESETS: Mapping[str, Callable[..., Layout]] = {
+    "single": single,
+    "side_by_side": side_by_side,
+    "face_to_face": face_to_face,
+}
 
 
 def yaw_quaternion(yaw: float) -> Quaternion:

@@ -44,7 +44,7 @@ def pairwise_forces(
             # An impulse acts on the first body; native adds them up in float64.
             total = np.sum([point.impulse for point in contact.points], axis=0) * sign
             impulses[name] = impulses.get(name, np.zeros(3)) + total
-    timestep = np.float32(world.physics.timestep)
+    timestep = np.array(world.physics.timestep, np.float32)
     return {name: impulse.astype(np.float32) / timestep for name, impulse in impulses.items()}
 
 

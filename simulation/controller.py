@@ -14,6 +14,10 @@ from simulation.world import World
 Floats = NDArray[np.float32]
 
 
+_LOWEST: Floats = np.array([-1.0], np.float32)  # arrays, which NumPy need not convert
+_HIGHEST: Floats = np.array([1.0], np.float32)
+
+
 class JointPositionController:
     """Turns flat actions into drive targets for every joint of every robot.
 
@@ -62,7 +66,7 @@ class JointPositionController:
         Returns:
             Targets in the order of the robots' driven joints, shape (N, dof) (rad, m).
         """
-        clipped = np.minimum(np.maximum(action, -1), 1).take(self._source, 1)
+        clipped = np.minimum(np.maximum(action, _LOWEST), _HIGHEST).take(self._source, 1)
         target = self._centre + self._half_range * clipped
         np.add(qpos[:, self._active], target, out=target, where=self._relative)
         return target

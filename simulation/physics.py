@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import sapien.physx as physx
 
@@ -81,8 +82,9 @@ def apply(settings: PhysicsSettings) -> None:
         solver_velocity_iterations=settings.velocity_iterations,
         sleep_threshold=settings.sleep_threshold,
     )
+    gravity: Any = settings.gravity  # SAPIEN takes any sequence
     physx.set_scene_config(
-        gravity=list(settings.gravity),
+        gravity=gravity,
         bounce_threshold=settings.bounce_threshold,
         enable_pcm=settings.persistent_contacts,
         enable_tgs=settings.temporal_gauss_seidel,

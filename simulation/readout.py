@@ -1,4 +1,4 @@
-"""Where each frame and joint of a world stands in a read-out; the same in every world of a batch."""
+"""Where each frame and joint of a world stands in a read-out."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Place = TypeVar("Place")
 
 
 class ReadoutIndex:
-    """Places of bodies, links, tool centre points and joints.
+    """Places of bodies, links, tool centre points and joints, the same in a batch's every world.
 
     A frame is anything with a pose: SAPIEN's entities in their own order, then the tool centre
     points that lie between links.

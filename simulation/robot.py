@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import sapien
-import sapien.physx as physx
 from sapien.wrapper.urdf_loader import URDFLoader
 
 from layouts import Placement
@@ -46,10 +45,8 @@ class SimulatedRobot:
         """
         descriptor = placement.robot
         self.name, self.descriptor = name, descriptor
-        self.base_pose = sapien.Pose(
-            list(placement.base_position), list(placement.base_quaternion)
-        )
-        self.articulation = _load(scene, descriptor, self.base_pose, visuals=visuals)
+        self.base_pose = sapien.Pose(list(placement.base_position), list(placement.base_quaternion))
+        self.articulation: Any = _load(scene, descriptor, self.base_pose, visuals=visuals)
         self.links = {link.name: link for link in self.articulation.links}
         self.joints: list[Any] = list(self.articulation.active_joints)
         self.active_index = _active_index(descriptor, [joint.name for joint in self.joints])
@@ -91,7 +88,7 @@ class SimulatedRobot:
                 SAPIEN's joint order; shape (13 + 2 · dof,).
         """
         dof = len(self.joints)
-        self.articulation.set_root_pose(sapien.Pose(row[:3], row[3:7]))
+        self.articulation.set_root_pose(sapien.Pose(row[:3].tolist(), row[3:7].tolist()))
         self.articulation.set_root_linear_velocity(row[7:10])
         self.articulation.set_root_angular_velocity(row[10:13])
         self.articulation.set_qpos(row[13 : 13 + dof])
@@ -118,17 +115,16 @@ class SimulatedRobot:
 
 def _load(
     scene: sapien.Scene, descriptor: RobotDescriptor, pose: sapien.Pose, *, visuals: bool
-) -> physx.PhysxArticulation:
-    loader = URDFLoader() if visuals else _PhysicsOnlyLoader()
+) -> Any:
+    loader: Any = URDFLoader() if visuals else _PhysicsOnlyLoader()
     loader.set_scene(scene)
     loader.fix_root_link = True
-    material = descriptor.gripper_material
-    for link in material.links if material else ():
-        loader.set_link_material(
-            link, material.static_friction, material.dynamic_friction, material.restitution
-        )
-        loader.set_link_patch_radius(link, material.patch_radius)
-        loader.set_link_min_patch_radius(link, material.patch_radius)
+    if material := descriptor.gripper_material:
+        friction = material.static_friction, material.dynamic_friction, material.restitution
+        for link in material.links:
+            loader.set_link_material(link, *friction)
+            loader.set_link_patch_radius(link, material.patch_radius)
+            loader.set_link_min_patch_radius(link, material.patch_radius)
     urdf = descriptor.urdf.locate(pictures=visuals)
     builder = loader.load_file_as_articulation_builder(str(urdf))
     builder.set_initial_pose(pose)

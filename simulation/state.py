@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 from torch.linalg import vector_norm
 
-from robots import SimulationError, UnknownNameError
+from robots import SimulationError
 from simulation.contacts import grasped, pairwise_forces
 
 if TYPE_CHECKING:
@@ -30,9 +30,9 @@ def _remembered(
     @wraps(compute)
     def look_up(self: State, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Value:
         key = (name, args)
-        found = self._memo.get(key)
+        found = self.memo.get(key)
         if found is None:
-            found = self._memo[key] = compute(self, *args, **kwargs)
+            found = self.memo[key] = compute(self, *args, **kwargs)
         return found
 
     return look_up
@@ -48,6 +48,7 @@ class State:
     Attributes:
         num_envs: Number of worlds N.
         joint_positions: Joint positions of all robots, in layout order, (N, dof) (rad, m).
+        memo: What was computed from it already.
     """
 
     __slots__ = (
@@ -55,12 +56,12 @@ class State:
         "_distances",
         "_index",
         "_joint_velocities",
-        "_memo",
         "_offsets",
         "_poses",
         "_simulation",
         "_stamp",
         "joint_positions",
+        "memo",
         "num_envs",
     )
 
@@ -69,7 +70,7 @@ class State:
         self._simulation = simulation
         self._stamp = simulation.stamp
         self._index = index = simulation.index
-        self._memo: dict[Any, Any] = {}
+        self.memo: dict[Any, Any] = {}
         self._offsets: tuple[Tensor, ...] = ()
         self._distances: tuple[Tensor, ...] = ()
         self.num_envs = count = len(simulation.worlds)

@@ -67,6 +67,7 @@ class World:
 
         Raises:
             AssetError: If a robot's files cannot be found.
+            SimulationError: If pictures are wanted and there is no Vulkan driver.
         """
         self.layout = layout
         self.physics = SAPIEN_DEFAULTS if physics is None else physics
@@ -75,9 +76,7 @@ class World:
         self.system = physx.PhysxCpuSystem()
         systems: list[Any] = [self.system]
         if visuals:
-            from sapien.render import RenderSystem
-
-            systems.append(RenderSystem())
+            systems.append(_render_system())
         self.scene = sapien.Scene(systems)
         self.system.timestep = self.physics.timestep
         self.robots = {
@@ -119,7 +118,9 @@ class World:
         builder.set_initial_pose(pose)
         entity = builder.build(name)
         component = entity.find_component_by_type(
-            physx.PhysxRigidStaticComponent if kind == "static" else physx.PhysxRigidDynamicComponent
+            physx.PhysxRigidStaticComponent
+            if kind == "static"
+            else physx.PhysxRigidDynamicComponent
         )
         body = SimulatedBody(name, entity, component, kind, pose, anchored)
         self.bodies[name] = body
@@ -136,7 +137,7 @@ class World:
         return self.bodies[name]
 
     def settle(self) -> None:
-        """End the build: put everything that can move at its start pose once more, as native does."""
+        """End the build: set every start pose once more, as native does."""
         for body in self.bodies.values():
             if body.kind != "static":
                 body.entity.set_pose(body.start_pose)
@@ -171,3 +172,15 @@ class World:
 
 def _floats(values: Any) -> list[float]:
     return values.tolist() if hasattr(values, "tolist") else [float(x) for x in values]
+
+
+def _render_system() -> Any:
+    from sapien.render import RenderSystem
+
+    try:
+        return RenderSystem()
+    except RuntimeError as error:
+        raise SimulationError(
+            f"pictures need a Vulkan driver, and none works here ({error}); without pictures"
+            " (render_mode=None) everything else works"
+        ) from error

@@ -57,13 +57,13 @@ class ActionReader:
 
     def _array(self, value: Any, width: int, what: str) -> NDArray[np.float32]:
         if isinstance(value, torch.Tensor):
-            array = value.numpy(force=True)
+            array = value.numpy(force=value.requires_grad or value.device.type != "cpu")
         else:
             try:
                 array = np.asarray(value)
             except ValueError as error:
                 raise ActionError(f"{what} is not an array of numbers: {error}") from None
-        if array.dtype.kind != "f":
+        if array.dtype != np.float32 and array.dtype.kind != "f":
             raise ActionError(f"{what} has dtype {array.dtype}; it must be floating (float32)")
         if array.ndim == 1 and self._num_envs == 1:
             array = array[None]

@@ -95,9 +95,7 @@ def _checked_rows(
 ) -> dict[str, dict[str, np.ndarray]]:
     widths = {
         "actors": {
-            name: 13
-            for name, body in simulation.worlds[0].bodies.items()
-            if body.kind != "static"
+            name: 13 for name, body in simulation.worlds[0].bodies.items() if body.kind != "static"
         },
         "articulations": {
             key: 13 + 2 * len(simulation.worlds[0].robots[name].joints)

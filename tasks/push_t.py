@@ -92,7 +92,9 @@ class PushT(MultiRobotTask):
         yaw = (cos(GOAL_YAW / 2), 0.0, 0.0, sin(GOAL_YAW / 2))
         world.set_pose("goal_Tee", (*GOAL_XY, 1e-3), yaw)
         offsets = [rng.uniform(1) * size + SPAWN_OFFSET for size in SPAWN_SIZE]
-        x, y = (start + offset.item() for start, offset in zip((_GOAL_X, _GOAL_Y), offsets, strict=True))
+        x, y = (
+            start + offset.item() for start, offset in zip((_GOAL_X, _GOAL_Y), offsets, strict=True)
+        )
         half_angle = rng.uniform(1) * (2 * pi) / 2
         turn = (half_angle.cos().item(), 0.0, 0.0, half_angle.sin().item())
         world.set_pose("Tee", (x, y, HALF_THICKNESS + 1e-3), turn)
@@ -100,10 +102,9 @@ class PushT(MultiRobotTask):
 
     def evaluate(self, state: State) -> dict[str, Tensor]:
         """Success: the T covers its outline."""
-        success = torch.zeros(self.num_envs, dtype=torch.bool)
-        near = state.planar_distance("goal_Tee", "Tee") < FARTHEST_COVERED
-        if near.any():
-            for i in near.nonzero()[:, 0].tolist():
+        success = state.planar_distance("goal_Tee", "Tee") < _FARTHEST_COVERED
+        if success.any():
+            for i in success.nonzero()[:, 0].tolist():
                 success[i] = _cover(state.pose("Tee")[i]) >= COVERED
         return {"success": success}
 
@@ -122,15 +123,15 @@ class PushT(MultiRobotTask):
             state.planar_distance("goal_Tee", "Tee"), state.tcp_distance("arm", "Tee")
         )
         # ((turned + 1) / 2)² / 2: halving is exact, so it may be done at once.
-        turn = (turned + _ONE).square() * _EIGHTH
-        reward = turn + placed.square() * _HALF + reach.sqrt() / _TWENTY
+        turn = (turned + _ONE).square_().mul_(_EIGHTH)
+        reward = turn.add_(placed.square().mul_(_HALF)).add_(reach.sqrt().div_(_TWENTY))
         return torch.where(info["success"], _DONE, reward)
 
 
 def _yaw(quaternion: Tensor) -> Tensor:
     """Angle about z in [0, 2π] of wxyz quaternions (N, 4) that turn about z only, (N,) (rad)."""
-    w, z = quaternion[:, 0], quaternion[:, 3]
-    return 2 * torch.where(z < _ZERO, -w, w).acos()
+    w, z = quaternion[:, ::3].unbind(1)
+    return _TWO * torch.where(z < _ZERO, -w, w).acos()
 
 
 def _planar_transform(yaw: Tensor, x: float, y: float) -> Tensor:
@@ -159,7 +160,8 @@ def _pixel_centres() -> Tensor:
 
 
 # Tensors, because arithmetic with Python numbers costs twice as much per call.
-_ZERO, _EIGHTH, _HALF, _ONE, _TWENTY = torch.tensor([0.0, 1 / 8, 1 / 2, 1.0, 20.0])
+_ZERO, _EIGHTH, _HALF, _ONE, _TWO, _TWENTY = torch.tensor([0.0, 1 / 8, 1 / 2, 1.0, 2.0, 20.0])
+_FARTHEST_COVERED = torch.tensor(FARTHEST_COVERED)
 _DONE = torch.tensor(3.0)
 _GOAL_YAW = torch.tensor(GOAL_YAW)
 _GOAL_X, _GOAL_Y = torch.tensor(GOAL_XY).tolist()  # as float32 rounds them

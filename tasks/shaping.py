@@ -15,5 +15,4 @@ def closeness(*distances: Tensor) -> tuple[Tensor, ...]:
     Args:
         distances: Tensors of one shape; taken together, since calls cost more than numbers.
     """
-    stacked = torch.stack(distances)
-    return torch.sub(_ONE, torch.tanh(torch.mul(_FIVE, stacked))).unbind()
+    return torch.sub(_ONE, torch.stack(distances).mul_(_FIVE).tanh_()).unbind()

@@ -358,9 +358,7 @@ class MultiRobotTask:
             )
         return ids
 
-    def _checked_seeds(
-        self, seed: int | Sequence[int] | None, ids: list[int]
-    ) -> list[int | None]:
+    def _checked_seeds(self, seed: int | Sequence[int] | None, ids: list[int]) -> list[int | None]:
         if seed is None:
             return [None] * len(ids)
         try:

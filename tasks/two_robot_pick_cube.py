@@ -8,7 +8,8 @@ import torch
 from torch import Tensor
 
 from layouts import face_to_face
-from simulation import Box, PhysicsSettings, Sphere, State, World, add_table
+from simulation import PhysicsSettings, State, World, add_table
+from tasks.props import add_cube, add_goal
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness
@@ -38,16 +39,8 @@ class TwoRobotPickCube(MultiRobotTask):
     def build(self, world: World) -> None:
         """Add the table, the cube and the goal."""
         add_table(world)
-        world.add(
-            "cube",
-            Box(half_size=(CUBE_HALF_SIZE,) * 3, color=(1, 0, 0, 1)),
-            position=(0.0, 0.0, CUBE_HALF_SIZE),
-        )
-        world.add(
-            "goal_site",
-            Sphere(radius=GOAL_RADIUS, color=(0, 1, 0, 1), collides=False),
-            kind="kinematic",
-        )
+        add_cube(world, "cube", CUBE_HALF_SIZE, position=(0.0, 0.0, CUBE_HALF_SIZE))
+        add_goal(world, GOAL_RADIUS)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the cube on the left and the goal on the right."""

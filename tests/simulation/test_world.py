@@ -34,7 +34,9 @@ def test_names_are_unique_and_unknown_ones_are_refused():
         world.add("cube", Sphere(radius=HALF))
     with pytest.raises(UnknownNameError, match="Did you mean 'cube'"):
         world.set_pose("cub", (0, 0, 0))
-    with pytest.raises(UnknownNameError, match="link of panda 'panda_hnd'. Did you mean 'panda_hand'"):
+    with pytest.raises(
+        UnknownNameError, match="link of panda 'panda_hnd'. Did you mean 'panda_hand'"
+    ):
         world.robots["arm"].link("panda_hnd")
 
 
@@ -163,7 +165,13 @@ def test_a_descriptor_that_contradicts_its_urdf_is_refused():
     ghost = dataclasses.replace(arm, joints=(*arm.joints[:6], "ghost"))
     with pytest.raises(DescriptorError, match=r"has no active joints \['ghost'\]"):
         World(
-            single({"arm": dataclasses.replace(panda, action_split=panda.action_split.replace(arm=ghost))})
+            single(
+                {
+                    "arm": dataclasses.replace(
+                        panda, action_split=panda.action_split.replace(arm=ghost)
+                    )
+                }
+            )
         )
 
 

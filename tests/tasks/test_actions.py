@@ -42,7 +42,10 @@ def test_a_tensor_that_requires_grad_is_read():
 @pytest.mark.parametrize(
     ("action", "message"),
     [
-        (np.zeros((1, 16)), r"shape \(1, 16\); it must be \(1, 15\).*15 = 8 \(left\) \+ 7 \(right\)"),
+        (
+            np.zeros((1, 16)),
+            r"shape \(1, 16\); it must be \(1, 15\).*15 = 8 \(left\) \+ 7 \(right\)",
+        ),
         (np.zeros((1, 15), int), "dtype int64; it must be floating"),
         (np.zeros((1, 15), bool), "dtype bool"),
         ([[0.0], [0.0, 1.0]], "not an array of numbers"),
@@ -73,7 +76,9 @@ def test_an_unknown_robot_gets_its_closest_match():
 def test_a_number_that_is_not_finite_is_named(bad: float, column: int, words: str):
     action = np.zeros((4, 15), np.float32)
     action[3, column] = bad
-    with pytest.raises(ActionError, match=f"action number {column} is .* in environment 3.*{words}"):
+    with pytest.raises(
+        ActionError, match=f"action number {column} is .* in environment 3.*{words}"
+    ):
         ActionReader(TWO, 4).read(action)
 
 

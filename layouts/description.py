@@ -1,0 +1,67 @@
+"""A layout as a table of text: who stands where, and which action numbers are whose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from layouts.orientation import yaw_degrees
+
+if TYPE_CHECKING:
+    from layouts.layout import Layout, Placement
+
+COLUMNS = ("#", "name", "robot", "action", "base x, y, z (m)", "facing", "keyframe", "reach (m)")
+
+
+def describe(layout: Layout) -> str:
+    """Return a headline and one line per robot, in action order.
+
+    "facing" is the turn about z from the world's +x (degrees), or the wxyz quaternion of a base
+    that is tilted.
+    """
+    rows = [
+        (
+            str(number),
+            name,
+            placement.robot.name,
+            action_text(layout.action_split[name]),
+            ", ".join(decimal(x) for x in placement.base_position),
+            facing_text(placement),
+            placement.start_keyframe,
+            f"{placement.robot.reach:g}",
+        )
+        for number, (name, placement) in enumerate(layout.items(), start=1)
+    ]
+    return "\n".join([headline(layout), *_aligned([COLUMNS, *rows])])
+
+
+def headline(layout: Layout) -> str:
+    """Return how many robots and action numbers a layout has, in words."""
+    robots = "1 robot" if len(layout) == 1 else f"{len(layout)} robots"
+    return f"{robots}, {layout.action_dim} action numbers"
+
+
+def action_text(numbers: slice) -> str:
+    """Return a robot's slice of the flat action as it is written in code: ``0:8``."""
+    return f"{numbers.start}:{numbers.stop}"
+
+
+def facing_text(placement: Placement) -> str:
+    """Return the turn of an upright base in degrees, or the wxyz quaternion of a tilted one."""
+    yaw = yaw_degrees(placement.base_quaternion)
+    if yaw is None:
+        return f"wxyz {', '.join(decimal(x) for x in placement.base_quaternion)}"
+    return f"{decimal(yaw, digits=1)}°"
+
+
+def decimal(value: float, digits: int = 3) -> str:
+    """Round to ``digits`` decimals and drop trailing zeros; there is no minus zero."""
+    return f"{round(value, digits) + 0.0:g}"
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    return [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]

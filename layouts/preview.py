@@ -1,0 +1,300 @@
+"""A layout as a picture from above: bases, headings, reach, and where reaches overlap."""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from layouts.description import action_text, decimal, facing_text, headline
+from layouts.orientation import forward, yaw_degrees
+from robots import LayoutError, MissingPackageError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from layouts.layout import Layout, Placement
+
+Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)
+
+SUPPORTED = (".png", ".pdf", ".svg")
+
+# Okabe and Ito's colours, told apart with any kind of colour vision, darkest first.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+INK, FAINT, TABLE = "#2B2B2B", "#8A8A8A", "#EFE6D8"
+
+WIDTH = 8.0  # inches; 1200 pixels
+DOTS_PER_INCH = 150
+LEFT, RIGHT, ABOVE, BELOW = 0.75, 0.25, 0.5, 0.7  # around the plan (inches)
+MARGIN = 0.06  # free space on each side of the robots, in shares of the plan's larger side
+HEADING = 0.085  # length of the arrows, in the same shares
+PLAN_HEIGHTS = (3.5, 6.5)  # smallest and largest height of the plan (inches)
+ROW_HEIGHT = 0.3  # of the list under the plan (inches)
+TILE = 241  # grid points per side, from which the overlap is drawn
+
+
+def preview(layout: Layout, path: str | os.PathLike[str], table: Rectangle | None = None) -> Path:
+    """Draw a layout from above and save the picture, whole or not at all.
+
+    Neither robot files nor a graphics driver are needed.
+
+    Args:
+        layout: What to draw.
+        path: Where to save; the ending chooses the format (.png, .pdf or .svg).
+        table: Outline of a table, as x_min, y_min, x_max, y_max (m).
+
+    Returns:
+        The path of the picture.
+
+    Raises:
+        LayoutError: If the ending names no supported format, or the table is no rectangle.
+        MissingPackageError: If matplotlib is not installed.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in SUPPORTED:
+        raise LayoutError(
+            f"cannot save a preview as {target.name!r}; the name must end in"
+            f" {', '.join(SUPPORTED[:-1])} or {SUPPORTED[-1]}"
+        )
+    if table is not None and not (
+        all(math.isfinite(x) for x in table) and table[0] < table[2] and table[1] < table[3]
+    ):
+        raise LayoutError(f"table is {table}; it must be x_min, y_min, x_max, y_max (m)")
+    _save(draw(layout, table), target)
+    return target
+
+
+def draw(layout: Layout, table: Rectangle | None = None) -> Figure:
+    """Return the figure that `preview` saves.
+
+    Args:
+        layout: What to draw.
+        table: Outline of a table, as x_min, y_min, x_max, y_max (m).
+
+    Raises:
+        MissingPackageError: If matplotlib is not installed.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise MissingPackageError(
+            "a preview needs matplotlib: pip install 'robot-layouts[preview]'"
+        ) from error
+
+    bounds = _bounds(layout, table)
+    plan_width = WIDTH - LEFT - RIGHT
+    plan_height = plan_width * (bounds[3] - bounds[1]) / (bounds[2] - bounds[0])
+    plan_height = min(max(plan_height, PLAN_HEIGHTS[0]), PLAN_HEIGHTS[1])
+    list_height = ROW_HEIGHT * (len(layout) + 1.5)
+    height = ABOVE + plan_height + BELOW + list_height
+
+    figure = Figure(figsize=(WIDTH, height), dpi=DOTS_PER_INCH, facecolor="white")
+    bottom = (BELOW + list_height) / height
+    plan = figure.add_axes((LEFT / WIDTH, bottom, plan_width / WIDTH, plan_height / height))
+    _draw_plan(plan, layout, _stretched(bounds, plan_width / plan_height), table)
+    _draw_list(figure.add_axes((0.0, 0.0, 1.0, list_height / height)), layout)
+    return figure
+
+
+def _bounds(layout: Layout, table: Rectangle | None) -> Rectangle:
+    """Return the outline of everything drawn, with a margin (m)."""
+    boxes: list[Rectangle] = [] if table is None else [table]
+    for placement in layout.values():
+        x, y, _ = placement.base_position
+        reach = placement.robot.reach
+        boxes.append((x - reach, y - reach, x + reach, y + reach))
+    x_min, y_min = (min(box[i] for box in boxes) for i in (0, 1))
+    x_max, y_max = (max(box[i] for box in boxes) for i in (2, 3))
+    margin = MARGIN * max(x_max - x_min, y_max - y_min)
+    return (x_min - margin, y_min - margin, x_max + margin, y_max + margin)
+
+
+def _stretched(bounds: Rectangle, aspect: float) -> Rectangle:
+    """Widen or heighten bounds (m) about their centre until width / height is ``aspect``."""
+    x_min, y_min, x_max, y_max = bounds
+    width, height = x_max - x_min, y_max - y_min
+    more_width = max(aspect * height - width, 0) / 2
+    more_height = max(width / aspect - height, 0) / 2
+    return (x_min - more_width, y_min - more_height, x_max + more_width, y_max + more_height)
+
+
+def _draw_plan(plan: Axes, layout: Layout, bounds: Rectangle, table: Rectangle | None) -> None:
+    from matplotlib.patches import Rectangle as RectanglePatch
+
+    if table is not None:
+        plan.add_patch(
+            RectanglePatch(
+                (table[0], table[1]),
+                table[2] - table[0],
+                table[3] - table[1],
+                facecolor=TABLE,
+                edgecolor="#C9B99B",
+                zorder=0.5,
+            )
+        )
+    if _draw_overlap(plan, layout, bounds):
+        plan.set_title("grey: within reach of two or more", loc="right", color=FAINT, fontsize=10)
+    arrow = HEADING * max(bounds[2] - bounds[0], bounds[3] - bounds[1])
+    for index, (name, placement) in enumerate(layout.items()):
+        _draw_robot(plan, index, name, placement, arrow)
+    plan.set_title(headline(layout), loc="left", color=INK, fontsize=13, fontweight="bold")
+    plan.set_xlabel("x (m)", color=INK)
+    plan.set_ylabel("y (m)", color=INK)
+    plan.set_xlim(bounds[0], bounds[2])
+    plan.set_ylim(bounds[1], bounds[3])
+    plan.set_aspect("equal")
+    plan.grid(color="#DDDDDD", linewidth=0.6)
+    plan.set_axisbelow(True)
+    plan.tick_params(colors=INK, labelsize=9, length=0)
+    for spine in plan.spines.values():
+        spine.set_color("#BBBBBB")
+
+
+def _draw_overlap(plan: Axes, layout: Layout, bounds: Rectangle) -> bool:
+    """Shade what at least two robots reach, darker where more do; return whether any is."""
+    x, y = np.meshgrid(
+        np.linspace(bounds[0], bounds[2], TILE), np.linspace(bounds[1], bounds[3], TILE)
+    )
+    inside = np.sort(
+        [
+            p.robot.reach - np.hypot(x - p.base_position[0], y - p.base_position[1])
+            for p in layout.values()
+        ],
+        axis=0,
+    )
+    # The k-th largest margin is positive exactly where k robots or more reach.
+    shared = [margin for margin in inside[:-1] if margin.max() > 0]
+    for margin in shared:
+        plan.contourf(x, y, margin, levels=[0, np.inf], colors=[INK], alpha=0.13, zorder=0.8)
+    return bool(shared)
+
+
+def _draw_robot(plan: Axes, index: int, name: str, placement: Placement, arrow: float) -> None:
+    """Draw reach, heading (an arrow of the given length in m), base and name."""
+    from matplotlib.patches import Circle
+
+    colour = COLOURS[index % len(COLOURS)]
+    x, y, _ = placement.base_position
+    reach = placement.robot.reach
+    ahead_x, ahead_y, _ = forward(placement.base_quaternion)
+    plan.add_patch(Circle((x, y), reach, facecolor=colour, alpha=0.07, edgecolor="none", zorder=1))
+    plan.add_patch(Circle((x, y), reach, fill=False, edgecolor=colour, linewidth=1.6, zorder=2))
+    if math.hypot(ahead_x, ahead_y) > 0.1:  # a base that faces up or down has no heading
+        plan.annotate(
+            "",
+            xy=(x + arrow * ahead_x, y + arrow * ahead_y),
+            xytext=(x, y),
+            arrowprops={
+                "arrowstyle": "-|>",
+                "color": colour,
+                "linewidth": 2.6,
+                "mutation_scale": 18,
+                "shrinkA": 0,
+                "shrinkB": 0,
+            },
+            zorder=3,
+        )
+    _draw_base(plan, x, y, index)
+    _write_name(plan, (x, y), (-ahead_x, -ahead_y), name)
+
+
+def _draw_base(axes: Axes, x: float, y: float, index: int) -> None:
+    """Draw a numbered disc, the same in the plan and in the list."""
+    colour = COLOURS[index % len(COLOURS)]
+    axes.plot(
+        x,
+        y,
+        "o",
+        markersize=16,
+        color="white",
+        markeredgecolor=colour,
+        markeredgewidth=2.6,
+        zorder=4,
+    )
+    axes.text(
+        x,
+        y,
+        str(index + 1),
+        color=INK,
+        fontsize=9.5,
+        fontweight="bold",
+        ha="center",
+        va="center_baseline",
+        zorder=5,
+    )
+
+
+def _write_name(
+    plan: Axes, base: tuple[float, float], behind: tuple[float, float], name: str
+) -> None:
+    """Write a robot's name behind its back, where its arm is least."""
+    from matplotlib.patheffects import withStroke
+
+    length = math.hypot(*behind)
+    x, y = (0.0, -1.0) if length <= 0.1 else (behind[0] / length, behind[1] / length)
+    plan.annotate(
+        name,
+        xy=base,
+        xytext=(14 * x, 14 * y),
+        textcoords="offset points",
+        color=INK,
+        fontsize=12,
+        fontweight="bold",
+        path_effects=[withStroke(linewidth=3, foreground="white", alpha=0.8)],
+        ha="right" if x < -0.5 else "left" if x > 0.5 else "center",
+        va="top" if y < -0.5 else "bottom" if y > 0.5 else "center",
+        zorder=6,
+    )
+
+
+def _draw_list(listing: Axes, layout: Layout) -> None:
+    """List name, robot, action numbers and pose of every robot under the plan."""
+    columns = (0.12, 0.265, 0.46, 0.56, 0.76, 0.89)
+    heads = ("name", "robot", "action", "base x, y, z (m)", "facing", "reach (m)")
+    listing.set_xlim(0, 1)
+    listing.set_ylim(len(layout) + 0.9, -0.6)
+    listing.axis("off")
+    _write_row(listing, 0, columns, heads, FAINT)
+    for index, (name, placement) in enumerate(layout.items()):
+        row = index + 1
+        _draw_base(listing, 0.085, row, index)
+        cells = (
+            _shortened(name, 15),
+            _shortened(placement.robot.name, 21),
+            action_text(layout.action_split[name]),
+            ", ".join(decimal(x) for x in placement.base_position),
+            "tilted" if yaw_degrees(placement.base_quaternion) is None else facing_text(placement),
+            decimal(placement.robot.reach),
+        )
+        _write_row(listing, row, columns, cells, INK)
+
+
+def _write_row(
+    listing: Axes, row: int, columns: Sequence[float], cells: Sequence[str], colour: str
+) -> None:
+    for x, cell in zip(columns, cells, strict=True):
+        listing.text(x, row, cell, color=colour, fontsize=10.5, va="center_baseline")
+
+
+def _shortened(text: str, length: int) -> str:
+    return text if len(text) <= length else f"{text[: length - 1]}…"
+
+
+def _save(figure: Figure, target: Path) -> None:
+    """Write beside the target first, so that nobody sees half a picture."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    handle, unfinished = tempfile.mkstemp(suffix=target.suffix, dir=target.parent)
+    os.close(handle)
+    try:
+        figure.savefig(unfinished, format=target.suffix[1:].lower())
+        os.chmod(unfinished, 0o644)
+        os.replace(unfinished, target)
+    except BaseException:
+        os.unlink(unfinished)
+        raise

@@ -1,0 +1,84 @@
+"""One thread per test process, and the rule for tests that compare with native ManiSkill.
+
+A test marked ``native`` needs the ``parity`` extra and a Vulkan driver. Where either is missing it
+is skipped and the summary says why; with ``ROBOT_LAYOUTS_REQUIRE_NATIVE=1`` (as in CI) a skip is a
+failure, and so is a run in which no such test passed.
+"""
+
+import functools
+import importlib.util
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # read when torch is imported
+
+REQUIRED = os.environ.get("ROBOT_LAYOUTS_REQUIRE_NATIVE") == "1"
+
+
+@functools.cache
+def native_problem() -> str | None:
+    """Say why native ManiSkill cannot run here, or None if it can."""
+    if importlib.util.find_spec("mani_skill") is None:
+        return "mani_skill is not installed; pip install 'robot-layouts[parity]'"
+    probe = [sys.executable, "-c", "import sapien; sapien.render.RenderSystem()"]
+    done = subprocess.run(probe, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        last_line = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        return f"native ManiSkill needs a Vulkan driver: {last_line}"
+    return None
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if item.get_closest_marker("native") and (problem := native_problem()):
+        pytest.skip(problem)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
+    report = yield
+    if REQUIRED and report.skipped and item.get_closest_marker("native"):
+        _turn_skip_into_failure(report)
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector: pytest.Collector) -> Iterator[None]:
+    report = yield
+    if REQUIRED and report.skipped and "mani_skill" in str(report.longrepr):
+        _turn_skip_into_failure(report)
+    return report
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    passed, skipped = (
+        sum(_is_native(report) for report in terminalreporter.stats.get(outcome, []))
+        for outcome in ("passed", "skipped")
+    )
+    if passed or skipped or REQUIRED:
+        terminalreporter.write_line(f"native comparison: {passed} passed, {skipped} skipped")
+    if REQUIRED and not passed:
+        terminalreporter.write_line("native comparison: required, but no test of it passed")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    if not REQUIRED or hasattr(session.config, "workerinput"):
+        return
+    reporter = session.config.pluginmanager.get_plugin("terminalreporter")
+    passed = reporter.stats.get("passed", []) if reporter else []
+    if not any(_is_native(report) for report in passed):
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def _is_native(report: pytest.TestReport | pytest.CollectReport) -> bool:
+    return isinstance(report, pytest.TestReport) and "native" in report.keywords
+
+
+def _turn_skip_into_failure(report: pytest.TestReport | pytest.CollectReport) -> None:
+    reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr
+    report.outcome = "failed"
+    report.longrepr = f"the native comparison is required here, but: {reason}"

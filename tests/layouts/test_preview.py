@@ -1,0 +1,174 @@
+"""The top view: a whole picture with something drawn at each robot's place."""
+
+import math
+import sys
+
+import numpy as np
+import pytest
+
+from layouts import Layout, Placement, face_to_face, side_by_side, single, yaw_quaternion
+from layouts.preview import DOTS_PER_INCH, SUPPORTED, WIDTH, draw
+from robots import LayoutError, MissingPackageError
+
+
+def ring(count, radius=0.9):
+    """Place robots on a circle, facing its centre."""
+    robots = ("panda", "panda_stick", "panda_wristcam")
+    angles = [2 * math.pi * i / count for i in range(count)]
+    return Layout(
+        {
+            f"arm_{i}": Placement(
+                robots[i % len(robots)],
+                position=(radius * math.cos(angle), radius * math.sin(angle), 0.0),
+                quaternion=yaw_quaternion(angle + math.pi),
+            )
+            for i, angle in enumerate(angles)
+        }
+    )
+
+
+LAYOUTS = {
+    "one": single({"arm": "panda"}),
+    "two": face_to_face({"left": "panda_wristcam", "right": "panda_stick"}, spacing=1.5),
+    "three": side_by_side({"a": "panda", "b": "panda_stick", "c": "panda"}, spacing=0.7),
+    "six": ring(6),
+    "many": ring(13),
+    "upwards": Layout({"arm": Placement("panda", quaternion=(0.5**0.5, 0, -(0.5**0.5), 0))}),
+}
+
+
+def pixels(layout):
+    """Draw a layout; return the image, and the pixel (row, column) of each robot's base."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure = draw(layout)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    image = np.asarray(canvas.buffer_rgba())[..., :3].astype(int)
+    plan = figure.axes[0]
+    places = {
+        name: plan.transData.transform(placement.base_position[:2])
+        for name, placement in layout.items()
+    }
+    return image, {name: (len(image) - round(y), round(x)) for name, (x, y) in places.items()}
+
+
+def texts(figure):
+    return [text.get_text() for axes in figure.axes for text in axes.texts]
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_every_robot_is_drawn_at_its_place(name):
+    image, places = pixels(LAYOUTS[name])
+    for row, column in places.values():
+        around = image[row - 20 : row + 20, column - 20 : column + 20]
+        colourful = around.max(axis=-1) - around.min(axis=-1) > 80
+        assert colourful.mean() > 0.05
+    assert (image[:10] == 255).all()
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_names_robots_and_action_numbers_are_written(name):
+    layout = LAYOUTS[name]
+    written = texts(draw(layout))
+    for place, placement in layout.items():
+        part = layout.action_split[place]
+        assert place in written
+        assert placement.robot.name in written
+        assert f"{part.start}:{part.stop}" in written
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_reach_circles_lie_inside_the_plan_and_metres_are_square(name):
+    layout = LAYOUTS[name]
+    figure = draw(layout)
+    figure.canvas.draw()
+    plan = figure.axes[0]
+    (x_min, x_max), (y_min, y_max) = plan.get_xlim(), plan.get_ylim()
+    for placement in layout.values():
+        x, y, _ = placement.base_position
+        reach = placement.robot.reach
+        assert x_min < x - reach < x + reach < x_max
+        assert y_min < y - reach < y + reach < y_max
+    box = plan.get_window_extent()
+    assert box.width / (x_max - x_min) == pytest.approx(box.height / (y_max - y_min), rel=1e-6)
+
+
+def test_overlap_is_darker_than_what_one_robot_reaches():
+    near = face_to_face({"left": "panda", "right": "panda"}, spacing=1.2)
+    figure = draw(near)
+    image, _ = pixels(near)
+    in_overlap, in_one = (
+        image[len(image) - round(y), round(x)].sum()
+        for x, y in figure.axes[0].transData.transform([(0.1, 0.1), (0.1, 1.1)])
+    )
+    assert in_overlap < in_one - 30
+
+
+def test_robots_that_share_nothing_have_no_overlap_note():
+    far, near = (
+        draw(face_to_face({"left": "panda", "right": "panda"}, spacing=spacing)).axes[0]
+        for spacing in (3.0, 1.5)
+    )
+    assert far.get_title(loc="right") == ""
+    assert near.get_title(loc="right") == "grey: within reach of two or more"
+
+
+@pytest.mark.parametrize("name", ["one", "two", "six"])
+def test_a_png_of_the_promised_width(name, tmp_path):
+    from matplotlib.image import imread
+
+    path = LAYOUTS[name].preview(tmp_path / "new_folder" / "cell.png")
+    image = imread(path)
+    assert image.shape[1] == WIDTH * DOTS_PER_INCH
+    assert image.shape[0] > 0.6 * image.shape[1]
+    assert [file.name for file in path.parent.iterdir()] == ["cell.png"]
+
+
+@pytest.mark.parametrize(("suffix", "start"), [(".pdf", b"%PDF"), (".svg", b"<?xml")])
+def test_other_formats(suffix, start, tmp_path):
+    path = LAYOUTS["two"].preview(str(tmp_path / f"cell{suffix}"))
+    assert path.read_bytes().startswith(start)
+    assert {suffix} < set(SUPPORTED)
+
+
+def test_the_table_is_drawn_under_the_robots(tmp_path):
+    plain = draw(LAYOUTS["two"])
+    with_table = draw(LAYOUTS["two"], table=(-0.7, -1.2, 0.5, 1.2))
+    assert len(with_table.axes[0].patches) == len(plain.axes[0].patches) + 1
+
+
+@pytest.mark.parametrize("table", [(0, 0, 0, 1), (1, 0, 0, 1), (0, 0, math.nan, 1)])
+def test_a_table_that_is_no_rectangle(table, tmp_path):
+    with pytest.raises(LayoutError, match="it must be x_min, y_min, x_max, y_max"):
+        LAYOUTS["two"].preview(tmp_path / "cell.png", table=table)
+
+
+@pytest.mark.parametrize("name", ["cell.jpg", "cell", "cell.png.txt"])
+def test_an_unsupported_ending_names_the_supported_ones(name, tmp_path):
+    with pytest.raises(LayoutError, match=rf"'{name}'; the name must end in .png, .pdf or .svg"):
+        LAYOUTS["two"].preview(tmp_path / name)
+    assert not any(tmp_path.iterdir())
+
+
+def test_without_matplotlib_the_error_names_the_command(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    with pytest.raises(MissingPackageError, match=r"pip install 'robot-layouts\[preview\]'"):
+        LAYOUTS["two"].preview(tmp_path / "cell.png")
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_failed_save_keeps_the_old_picture(monkeypatch, tmp_path):
+    from matplotlib.figure import Figure
+
+    path = tmp_path / "cell.png"
+    path.write_text("old")
+
+    def fail(*_, **__):
+        raise OSError("disk full")
+
+    monkeypatch.setattr(Figure, "savefig", fail)
+    with pytest.raises(OSError, match="disk full"):
+        LAYOUTS["two"].preview(path)
+    assert path.read_text() == "old"
+    assert [file.name for file in tmp_path.iterdir()] == ["cell.png"]

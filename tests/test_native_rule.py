@@ -1,0 +1,72 @@
+"""The rule of ``conftest.py``: where native cannot run, its tests skip, or fail if required."""
+
+from pathlib import Path
+
+import pytest
+
+pytest_plugins = ["pytester"]
+
+NATIVE_TEST = "import pytest\n@pytest.mark.native\ndef test_native(): {}\n"
+
+
+RULE = (Path(__file__).parent / "conftest.py").read_text()
+NATIVE_RUNS = "\ndef native_problem(): return None\n"  # wherever these tests themselves run
+
+
+@pytest.fixture
+def run(pytester, monkeypatch):
+    """Run a one-test file under a copy of the rule; return the result of that pytest."""
+    pytester.makeini("[pytest]\nmarkers = native")
+
+    def run(source, *, required, vulkan=True):
+        pytester.makeconftest(RULE + NATIVE_RUNS if vulkan else RULE)
+        monkeypatch.setenv("ROBOT_LAYOUTS_REQUIRE_NATIVE", "1" if required else "0")
+        for variable in ("VK_DRIVER_FILES", "VK_ICD_FILENAMES"):
+            monkeypatch.setenv(variable, "nowhere.json")
+        pytester.makepyfile(source)
+        return pytester.runpytest_subprocess("-p", "no:cacheprovider", "-rs")
+
+    return run
+
+
+def test_without_vulkan_it_is_skipped_and_says_why(run):
+    result = run(NATIVE_TEST.format("assert False"), required=False, vulkan=False)
+    assert result.ret == pytest.ExitCode.OK
+    result.stdout.fnmatch_lines(["native comparison: 0 passed, 1 skipped"])
+    result.stdout.re_match_lines([r"SKIPPED.*(needs a Vulkan driver|mani_skill is not installed)"])
+
+
+def test_without_vulkan_it_fails_if_required(run):
+    result = run(NATIVE_TEST.format("pass"), required=True, vulkan=False)
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    result.stdout.fnmatch_lines(["*native comparison is required here, but: *"])
+
+
+@pytest.mark.parametrize("how", ["pytest.skip('later')", "pytest.importorskip('no_such_package')"])
+def test_a_skip_inside_the_test_fails_if_required(run, how):
+    pass_first = "import pytest\n@pytest.mark.native\ndef test_other(): pass\n"
+    result = run(pass_first + NATIVE_TEST.format(how), required=True)
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+
+
+def test_a_module_skipped_for_want_of_mani_skill_fails_if_required(run):
+    source = "import pytest\npytest.skip('could not import mani_skill', allow_module_level=True)"
+    assert run(source, required=False).ret == pytest.ExitCode.NO_TESTS_COLLECTED
+    assert run(source, required=True).ret not in (
+        pytest.ExitCode.OK,
+        pytest.ExitCode.NO_TESTS_COLLECTED,
+    )
+
+
+def test_no_native_test_at_all_fails_if_required(run):
+    source = "def test_something_else(): pass"
+    assert run(source, required=False).ret == pytest.ExitCode.OK
+    result = run(source, required=True)
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    result.stdout.fnmatch_lines(["native comparison: required, but no test of it passed"])
+
+
+def test_a_native_test_that_passes_is_counted(run):
+    result = run(NATIVE_TEST.format("pass"), required=True)
+    assert result.ret == pytest.ExitCode.OK
+    result.stdout.fnmatch_lines(["native comparison: 1 passed, 0 skipped"])

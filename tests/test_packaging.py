@@ -1,0 +1,148 @@
+"""The distribution: what the wheel carries, what it depends on, and what is never committed."""
+
+import ast
+import re
+import subprocess
+import sys
+import zipfile
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+ROOT = Path(__file__).parent.parent
+ROOMS = ("robots", "layouts", "simulation", "tasks", "rollouts", "parity")
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+ROBOT_FILES = (".urdf", ".srdf", ".stl", ".obj", ".dae", ".glb", ".gltf", ".ply")
+RECORDINGS = (".h5", ".hdf5", ".png", ".jpg", ".mp4", ".npz", ".parquet")
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wheel")
+    build = [sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory"]
+    subprocess.run([*build, str(folder)], cwd=ROOT, check=True, capture_output=True)
+    (file,) = folder.glob("*.whl")
+    with zipfile.ZipFile(file) as archive:
+        yield archive
+
+
+@pytest.fixture(scope="module")
+def files():
+    """Everything that is committed, or would be."""
+    command = ["git", "-c", "safe.directory=*", "ls-files", "-co", "--exclude-standard"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        pytest.skip(f"not a git checkout: {done.stderr.strip()}")
+    return [ROOT / name for name in done.stdout.splitlines() if (ROOT / name).is_file()]
+
+
+class TestWheel:
+    def test_carries_every_module_of_every_room(self, wheel):
+        modules = {path.relative_to(ROOT).as_posix() for room in ROOMS for path in modules_of(room)}
+        assert modules <= {*wheel.namelist()}
+
+    @pytest.mark.parametrize("room", ROOMS)
+    def test_is_typed(self, wheel, room):
+        assert f"{room}/py.typed" in wheel.namelist()
+
+    def test_carries_the_asset_manifest_unchanged(self, wheel):
+        manifest = (ROOT / "assets_cache" / "manifest.json").read_bytes()
+        assert wheel.read("robots/manifest.json") == manifest
+
+    def test_carries_no_robot_file_and_nothing_outside_the_rooms(self, wheel):
+        for name in wheel.namelist():
+            assert not name.lower().endswith(ROBOT_FILES)
+            assert name.split("/")[0] in ROOMS or ".dist-info/" in name
+
+
+class TestRepository:
+    def test_no_robot_file_or_recording_is_committed(self, files):
+        assert len(files) > 20
+        assert not [f.name for f in files if f.name.lower().endswith(ROBOT_FILES + RECORDINGS)]
+
+    @pytest.mark.parametrize(
+        ("what", "pattern"),
+        [
+            ("a path of one machine", r"(?<![\w.:/])/(?:work|root|home/\w+|Users/\w+)/\w"),
+            ("a package registry", r"\b(?:pypi|npmjs|pythonhosted|debian)\.(?:org|com)\b"),
+        ],
+    )
+    def test_no_file_names(self, files, what, pattern):
+        found = {
+            f"{file.relative_to(ROOT)}: {match.group()}"
+            for file in files
+            for match in re.finditer(pattern, file.read_text(errors="ignore"))
+        }
+        assert not found, f"these files name {what}"
+
+
+class TestDependencies:
+    def test_the_rooms_import_what_is_declared(self):
+        declared = names_of(PROJECT["dependencies"])
+        for extra in ("preview", "video", "parity"):
+            declared |= names_of(PROJECT["optional-dependencies"][extra])
+        used = {module for room in ROOMS for module in imports_of(room, everywhere=True)}
+        assert distributions(used) <= declared
+
+    @pytest.mark.parametrize("room", ["robots", "layouts", "simulation", "tasks", "rollouts"])
+    def test_importing_a_room_needs_no_extra(self, room):
+        assert distributions(imports_of(room, everywhere=False)) <= names_of(
+            PROJECT["dependencies"]
+        )
+
+    def test_every_core_dependency_is_used(self):
+        used = {module for room in ROOMS for module in imports_of(room, everywhere=True)}
+        assert names_of(PROJECT["dependencies"]) <= distributions(used)
+
+    def test_every_direct_dependency_has_a_tested_version(self):
+        extras = PROJECT["optional-dependencies"].values()
+        direct = names_of(PROJECT["dependencies"]).union(*map(names_of, extras))
+        constraints = (ROOT / "constraints.txt").read_text().splitlines()
+        tested = names_of(line for line in constraints if not line.startswith("#"))
+        assert direct - {"robot_layouts"} <= tested
+
+
+def modules_of(room):
+    return sorted((ROOT / room).rglob("*.py"))
+
+
+def imports_of(room, *, everywhere):
+    """Third-party packages that a room imports: at import time, or also inside functions."""
+    found = set()
+    for path in modules_of(room):
+        tree = ast.parse(path.read_text())
+        for node in ast.walk(tree) if everywhere else at_import_time(tree):
+            if isinstance(node, ast.Import):
+                found |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+                found.add(node.module.split(".")[0])
+    return found - {*ROOMS} - sys.stdlib_module_names
+
+
+def at_import_time(node):
+    """Walk what runs when a module is imported: no function bodies, no type-checking blocks."""
+    for child in ast.iter_child_nodes(node):
+        typing_only = isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)
+        if not typing_only and not isinstance(child, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            yield child
+            yield from at_import_time(child)
+
+
+def distributions(modules):
+    providers = metadata.packages_distributions()
+    return {normal(name) for module in modules for name in providers.get(module, [module])}
+
+
+def names_of(requirements):
+    return {normal(re.match(r"[\w.-]+", requirement).group()) for requirement in requirements}
+
+
+def normal(name):
+    return re.sub(r"[-_.]+", "_", name).lower()
