@@ -53,6 +53,7 @@ class World:
         robots: Robot by name in the layout.
         articulations: The robots' articulations, in layout order.
         bodies: Body by name.
+        design: Geometry drawn for the coming episodes, if the task draws any.
     """
 
     def __init__(
@@ -85,6 +86,7 @@ class World:
         }
         self.articulations = [robot.articulation for robot in self.robots.values()]
         self.bodies: dict[str, SimulatedBody] = {}
+        self.design: Any = None
 
     def add(
         self,

@@ -30,15 +30,21 @@ class EpisodeRandom:
     def restart(self, seed: int) -> None:
         """Start both streams anew, as an explicit seed does."""
         self._seeds = np.random.RandomState(seed)
-        self.numpy = np.random.RandomState(seed)
+        self._seed = seed
+        self.restart_numpy()
         self.torch.manual_seed(seed)
+
+    def restart_numpy(self) -> None:
+        """Start the numpy stream anew, as native does after a build has drawn from it."""
+        self.numpy = np.random.RandomState(self._seed)
 
     def reseed_for_rebuild(self) -> None:
         """Give the numpy stream the next seed of a third stream, as native does at a rebuild.
 
         The torch stream runs on.
         """
-        self.numpy = np.random.RandomState(int(self._seeds.randint(2**31)))
+        self._seed = int(self._seeds.randint(2**31))
+        self.restart_numpy()
 
     def uniform(self, *shape: int) -> Tensor:
         """Draw float32 numbers in [0, 1) from the torch stream."""

@@ -54,6 +54,7 @@ class MultiRobotTask:
         reward_modes: Reward modes, the default first.
         max_reward: What ``normalized_dense`` divides the dense reward by.
         shared_joint_noise: Whether all robots get the same joint noise at a reset.
+        rebuilds: Whether every reset builds the worlds anew, with a new `design`.
         viewpoint: Camera position and target of `render` (m, world).
         num_envs: Number of environments N.
         single_action_space: Action of one environment, (A,) in [-1, 1].
@@ -70,6 +71,7 @@ class MultiRobotTask:
     reward_modes: ClassVar[tuple[str, ...]] = ()
     max_reward: ClassVar[float] = 1.0
     shared_joint_noise: ClassVar[bool] = False
+    rebuilds: ClassVar[bool] = False
     viewpoint: ClassVar[tuple[tuple[float, float, float], tuple[float, float, float]]] = (
         (0.6, 0.7, 0.6),
         (0.0, 0.0, 0.35),
@@ -83,6 +85,10 @@ class MultiRobotTask:
             cls.reward_modes = DENSE_MODES if dense else SPARSE_MODES
 
     # -- what a task says --------------------------------------------------------------------
+
+    def design(self, rng: EpisodeRandom) -> Any:
+        """Draw the geometry of one environment; `build` finds it as ``world.design``."""
+        return None
 
     def build(self, world: World) -> None:
         """Add the task's bodies to a world; the robots stand already."""
@@ -156,7 +162,7 @@ class MultiRobotTask:
         self._elapsed = np.zeros(self.num_envs, np.int32)
         self._simulation: Simulation | None = Simulation(
             self.layout,
-            lambda world, _: self.build(world),
+            self._build_world,
             self.num_envs,
             scenario.physics,
             control_frequency=scenario.control_frequency,
@@ -211,7 +217,7 @@ class MultiRobotTask:
         """
         ids = self._checked_ids(env_ids)
         seeds = self._checked_seeds(seed, ids)
-        reconfigure = self._checked_options(options)
+        reconfigure = self._checked_options(options) or self.rebuilds
         self.simulation.touched()
         for i, own_seed in zip(ids, seeds, strict=True):
             if own_seed is not None:
@@ -282,6 +288,12 @@ class MultiRobotTask:
         return self._camera.take()
 
     # -- inside ------------------------------------------------------------------------------
+
+    def _build_world(self, world: World, index: int) -> None:
+        rng = self._rngs[index]
+        world.design = self.design(rng)
+        self.build(world)
+        rng.restart_numpy()
 
     def _begin(self, ids: list[int], *, reconfigured: bool) -> tuple[Any, Info]:
         for i in ids:
