@@ -99,20 +99,23 @@ class FramePairs:
     subtraction and one norm over all pairs.
 
     Attributes:
-        columns: First and second frame of every pair, each (K,).
+        starts: First frame of every pair, (K,).
+        ends: Second frame of every pair, (K,).
+        planar: Numbers of the pairs whose distance is seen from above.
     """
 
     def __init__(self) -> None:
         """Start without pairs."""
-        self._places: dict[tuple[int, int], int] = {}
-        self.columns = np.empty((2, 0), np.intp)
+        self._places: dict[tuple[int, int, bool], int] = {}
+        self.starts = self.ends = self.planar = np.empty(0, np.intp)
 
-    def place(self, start: int, end: int) -> int:
+    def place(self, start: int, end: int, *, planar: bool) -> int:
         """Return the number of a pair, adding it if it is new."""
-        found = self._places.get((start, end))
+        found = self._places.get((start, end, planar))
         if found is None:
-            found = self._places[start, end] = len(self._places)
-            self.columns = np.array(list(self._places), np.intp).T
+            found = self._places[start, end, planar] = len(self._places)
+            self.starts, self.ends, planar_flags = np.array(list(self._places), np.intp).T
+            self.planar = np.flatnonzero(planar_flags)
         return found
 
 

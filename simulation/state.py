@@ -17,6 +17,7 @@ from simulation.contacts import grasped, pairwise_forces
 if TYPE_CHECKING:
     from simulation.simulation import Simulation
 
+_NOTHING = torch.empty(0)
 _Arguments = ParamSpec("_Arguments")
 _Value = TypeVar("_Value")
 
@@ -52,7 +53,6 @@ class State:
     """
 
     __slots__ = (
-        "_block",
         "_distances",
         "_index",
         "_joint_velocities",
@@ -71,7 +71,7 @@ class State:
         self._stamp = simulation.stamp
         self._index = index = simulation.index
         self.memo: dict[Any, Any] = {}
-        self._offsets: tuple[Tensor, ...] = ()
+        self._offsets = _NOTHING
         self._distances: tuple[Tensor, ...] = ()
         self.num_envs = count = len(simulation.worlds)
         self._poses = poses = np.empty((index.frames, count, 7), np.float32)
@@ -197,10 +197,10 @@ class State:
         """Whether a robot's two fingers hold a body, shape (N,) bool; see `robots.Fingers`."""
         fingers = self._index.fingers(robot)
         if fingers is None:
-            return torch.zeros(self.num_envs, dtype=torch.bool)
+            return torch.from_numpy(np.zeros(self.num_envs, bool))
         forces = self._contact_forces(robot, fingers.links, body)
         if forces is None:
-            return torch.zeros(self.num_envs, dtype=torch.bool)
+            return torch.from_numpy(np.zeros(self.num_envs, bool))
         return grasped(fingers, forces, [self.link_pose(robot, link) for link in fingers.links])
 
     # -- distances ---------------------------------------------------------------------------
@@ -213,10 +213,9 @@ class State:
         """Distance between the origins of two bodies, shape (N,) (m)."""
         return self._distance(self._index.body(start), self._index.body(end))
 
-    @_remembered
     def planar_distance(self, start: str, end: str) -> Tensor:
         """Distance between the origins of two bodies seen from above, shape (N,) (m)."""
-        return vector_norm(self.offset(start, end)[:, :2], dim=1)
+        return self._distance(self._index.body(start), self._index.body(end), planar=True)
 
     def tcp_offset(self, robot: str, body: str) -> Tensor:
         """Way from a robot's tool centre point to a body's origin, shape (N, 3) (m, world)."""
@@ -229,20 +228,23 @@ class State:
     # -- inside ------------------------------------------------------------------------------
 
     def _offset(self, start: int, end: int) -> Tensor:
-        place = self._index.pairs.place(start, end)
-        if place >= len(self._offsets):
-            starts, ends = self._index.pairs.columns
-            ways = self._poses.take(ends, 0) - self._poses.take(starts, 0)
-            self._block = torch.from_numpy(ways[:, :, :3])
-            self._offsets = self._block.unbind()
-        return self._offsets[place]
+        place = self._index.pairs.place(start, end, planar=False)
+        return self._all_offsets(place)[place]
 
-    def _distance(self, start: int, end: int) -> Tensor:
-        place = self._index.pairs.place(start, end)
+    def _distance(self, start: int, end: int, *, planar: bool = False) -> Tensor:
+        place = self._index.pairs.place(start, end, planar=planar)
         if place >= len(self._distances):
-            self._offset(start, end)
-            self._distances = vector_norm(self._block, dim=2).unbind()
+            self._distances = vector_norm(self._all_offsets(place), dim=2).unbind()
         return self._distances[place]
+
+    def _all_offsets(self, place: int) -> Tensor:
+        """Offsets of all pairs that were ever asked for, (K, N, 3), at least up to ``place``."""
+        if place >= len(self._offsets):
+            pairs = self._index.pairs
+            ways = self._poses.take(pairs.ends, 0) - self._poses.take(pairs.starts, 0)
+            ways[pairs.planar, :, 2] = 0.0  # exact: a zero adds nothing to a norm
+            self._offsets = torch.from_numpy(ways[:, :, :3])
+        return self._offsets
 
     def _velocity(self, body: str, which: str) -> Tensor:
         self._expect_current()

@@ -50,7 +50,7 @@ class PickCube(MultiRobotTask):
 
     def evaluate(self, state: State) -> dict[str, Tensor]:
         """Success: placed and static."""
-        placed = state.distance("cube", "goal_site") <= GOAL_RADIUS
+        placed = state.distance("cube", "goal_site") <= _GOAL_RADIUS
         static = state.is_static("arm", STATIC_SPEED)
         return {
             "success": placed & static,
@@ -82,4 +82,4 @@ class PickCube(MultiRobotTask):
         return torch.where(info["success"], _DONE, reward)
 
 
-_DONE = torch.tensor(5.0)
+_GOAL_RADIUS, _DONE = torch.tensor([GOAL_RADIUS, 5.0])  # m, reward

@@ -62,7 +62,7 @@ class TwoRobotPickCube(MultiRobotTask):
 
     def evaluate(self, state: State) -> dict[str, Tensor]:
         """Success: placed, and the right arm static."""
-        placed = state.distance("cube", "goal_site") <= GOAL_RADIUS
+        placed = state.distance("cube", "goal_site") <= _GOAL_RADIUS
         static = state.is_static("right", STATIC_SPEED)
         return {
             "success": placed & static,
@@ -113,6 +113,7 @@ class TwoRobotPickCube(MultiRobotTask):
 # Tensors, because arithmetic with Python numbers costs twice as much per call.
 _ZERO, _HALF, _ONE, _TWO = torch.tensor([0.0, 0.5, 1.0, 2.0])
 _FROM_2, _FROM_3, _FROM_4, _FROM_5, _DONE = torch.tensor([2.0, 8.0, 12.0, 19.0, 21.0])  # rewards
+_GOAL_RADIUS = torch.tensor(GOAL_RADIUS)
 _SIDE_Y, _RETREAT_Y, _NEAR, _FINGER_GAP = torch.tensor([0.05, -0.2, 0.25, 0.07])  # m
 
 
