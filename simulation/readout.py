@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TypeVar
 
 import numpy as np
@@ -11,6 +10,19 @@ from robots import Fingers, UnknownNameError
 from simulation.world import World
 
 Place = TypeVar("Place")
+
+
+class Places(dict[str, Place]):
+    """A dict that says which names there are when one is missing."""
+
+    def __init__(self, kind: str) -> None:
+        """Take what the names are names of, in the singular."""
+        super().__init__()
+        self.kind = kind
+
+    def __missing__(self, name: str) -> Place:
+        """Refuse an unknown name."""
+        raise UnknownNameError(self.kind, name, self)
 
 
 class ReadoutIndex:
@@ -24,7 +36,11 @@ class ReadoutIndex:
         frames: Number of frames.
         dof: Number of joints of all robots.
         bodies: Frame of each body.
-        joint_slices: Joints of each robot, in layout order.
+        links: Frame of each robot's links.
+        tcps: Frame of each robot's tool centre point.
+        joints: Places of each robot's joints, in layout order.
+        arm_joints: Places of each robot's joints that are not its gripper's.
+        fingers: Each robot's grasping links.
         mean_frames: For each frame that lies between links: itself, the frame that orients it,
             and the frames whose mean is its origin.
         pairs: Pairs of frames whose distance was asked for.
@@ -34,59 +50,35 @@ class ReadoutIndex:
         """Index one world."""
         place = {entity: i for i, entity in enumerate(world.scene.entities)}
         self.entities = self.frames = len(place)
-        self.bodies = {name: place[body.entity] for name, body in world.bodies.items()}
-        self._links = {
-            name: {link: place[component.entity] for link, component in robot.links.items()}
-            for name, robot in world.robots.items()
-        }
         self.dof = 0
-        self._joints: dict[str, slice] = {}
-        self._arm_joints: dict[str, slice | list[int]] = {}
-        self._tcps: dict[str, int] = {}
-        self._fingers = {name: robot.descriptor.fingers for name, robot in world.robots.items()}
+        self.bodies = Places[int]("body of this world")
+        self.links = Places[Places[int]](_ROBOT)
+        self.tcps = Places[int](_ROBOT)
+        self.joints = Places[slice](_ROBOT)
+        self.arm_joints = Places["slice | list[int]"](_ROBOT)
+        self.fingers = Places["Fingers | None"](_ROBOT)
         self.mean_frames: list[tuple[int, int, list[int]]] = []
+        self.pairs = FramePairs()
+        self.bodies.update({name: place[body.entity] for name, body in world.bodies.items()})
         for name, robot in world.robots.items():
             descriptor = robot.descriptor
+            links = self.links[name] = Places[int](f"link of {name}")
+            links.update({link: place[part.entity] for link, part in robot.links.items()})
             driven = zip(descriptor.joints, robot.active_index, strict=True)
-            self._arm_joints[name] = _as_slice(
+            self.arm_joints[name] = _as_slice(
                 sorted(self.dof + i for joint, i in driven if joint in descriptor.arm_joints)
             )
-            self._joints[name] = slice(self.dof, self.dof + len(robot.joints))
+            self.joints[name] = slice(self.dof, self.dof + len(robot.joints))
             self.dof += len(robot.joints)
-            self._tcps[name] = self._tcp_frame(name, world)
-        self.joint_slices = tuple(self._joints.values())
-        self.pairs = FramePairs()
-
-    def body(self, name: str) -> int:
-        """Return the frame of a body."""
-        return _look_up("body of this world", name, self.bodies)
-
-    def link(self, robot: str, link: str) -> int:
-        """Return the frame of a link."""
-        return _look_up(f"link of {robot}", link, _look_up(_ROBOT, robot, self._links))
-
-    def tcp(self, robot: str) -> int:
-        """Return the frame of a robot's tool centre point."""
-        return _look_up(_ROBOT, robot, self._tcps)
-
-    def fingers(self, robot: str) -> Fingers | None:
-        """Return the links with which a robot grasps."""
-        return _look_up(_ROBOT, robot, self._fingers)
-
-    def joints(self, robot: str) -> slice:
-        """Return the places of a robot's joints."""
-        return _look_up(_ROBOT, robot, self._joints)
-
-    def arm_joints(self, robot: str) -> slice | list[int]:
-        """Return the places of a robot's joints that are not its gripper's."""
-        return _look_up(_ROBOT, robot, self._arm_joints)
+            self.fingers[name] = descriptor.fingers
+            self.tcps[name] = self._tcp_frame(name, world)
 
     def _tcp_frame(self, name: str, world: World) -> int:
         descriptor = world.robots[name].descriptor
-        orientation = self.link(name, descriptor.tcp_link)
+        orientation = self.links[name][descriptor.tcp_link]
         if not descriptor.tcp_position_links:
             return orientation
-        points = [self.link(name, link) for link in descriptor.tcp_position_links]
+        points = [self.links[name][link] for link in descriptor.tcp_position_links]
         self.mean_frames.append((self.frames, orientation, points))
         self.frames += 1
         return self.frames - 1
@@ -120,13 +112,6 @@ class FramePairs:
 
 
 _ROBOT = "robot of this layout"
-
-
-def _look_up(kind: str, name: str, places: Mapping[str, Place]) -> Place:
-    try:
-        return places[name]
-    except KeyError:
-        raise UnknownNameError(kind, name, places) from None
 
 
 def _as_slice(indices: list[int]) -> slice | list[int]:

@@ -25,7 +25,10 @@ _Value = TypeVar("_Value")
 def _remembered(
     compute: Callable[Concatenate[State, _Arguments], _Value],
 ) -> Callable[Concatenate[State, _Arguments], _Value]:
-    """Compute once per state and arguments: rewards ask for what success was told from."""
+    """Compute once per state and arguments: rewards ask for what success was told from.
+
+    Views of what was read cost less than a look-up and are not remembered.
+    """
     name = compute.__name__
 
     @wraps(compute)
@@ -82,7 +85,7 @@ class State:
             packed = np.frombuffer(world.scene.pack_poses(), np.float32).reshape(-1, 7)
             entities[:, i, :3] = packed[:, 4:]  # SAPIEN packs the quaternion first
             entities[:, i, 3:] = packed[:, :4]
-            for articulation, part in zip(world.articulations, index.joint_slices, strict=True):
+            for articulation, part in zip(world.articulations, index.joints.values(), strict=True):
                 qpos[i, part] = articulation.qpos
                 qvel[i, part] = articulation.qvel
         for frame, orientation, points in index.mean_frames:
@@ -91,20 +94,17 @@ class State:
 
     # -- bodies ------------------------------------------------------------------------------
 
-    @_remembered
     def pose(self, body: str) -> Tensor:
         """Pose of a body, shape (N, 7)."""
-        return torch.from_numpy(self._poses[self._index.body(body)])
+        return torch.from_numpy(self._poses[self._index.bodies[body]])
 
-    @_remembered
     def position(self, body: str) -> Tensor:
         """Position of a body, shape (N, 3) (m)."""
-        return torch.from_numpy(self._poses[self._index.body(body), :, :3])
+        return torch.from_numpy(self._poses[self._index.bodies[body], :, :3])
 
-    @_remembered
     def quaternion(self, body: str) -> Tensor:
         """Orientation of a body, wxyz, shape (N, 4)."""
-        return torch.from_numpy(self._poses[self._index.body(body), :, 3:])
+        return torch.from_numpy(self._poses[self._index.bodies[body], :, 3:])
 
     @_remembered
     def linear_velocity(self, body: str) -> Tensor:
@@ -118,47 +118,40 @@ class State:
 
     # -- robots ------------------------------------------------------------------------------
 
-    @_remembered
     def qpos(self, robot: str) -> Tensor:
         """Joint positions of a robot in SAPIEN's joint order, shape (N, dof) (rad, m)."""
-        return torch.from_numpy(self.joint_positions[:, self._index.joints(robot)])
+        return torch.from_numpy(self.joint_positions[:, self._index.joints[robot]])
 
-    @_remembered
     def qvel(self, robot: str) -> Tensor:
         """Joint velocities of a robot in SAPIEN's joint order, shape (N, dof) (rad/s, m/s)."""
-        return torch.from_numpy(self._joint_velocities[:, self._index.joints(robot)])
+        return torch.from_numpy(self._joint_velocities[:, self._index.joints[robot]])
 
-    @_remembered
     def arm_qvel(self, robot: str) -> Tensor:
         """Joint velocities of a robot without its gripper, shape (N, arm joints) (rad/s)."""
-        return torch.from_numpy(self._joint_velocities[:, self._index.arm_joints(robot)])
+        return torch.from_numpy(self._joint_velocities[:, self._index.arm_joints[robot]])
 
-    @_remembered
     def link_pose(self, robot: str, link: str) -> Tensor:
         """Pose of a link, shape (N, 7)."""
-        return torch.from_numpy(self._poses[self._index.link(robot, link)])
+        return torch.from_numpy(self._poses[self._index.links[robot][link]])
 
-    @_remembered
     def link_position(self, robot: str, link: str) -> Tensor:
         """Position of a link, shape (N, 3) (m)."""
-        return torch.from_numpy(self._poses[self._index.link(robot, link), :, :3])
+        return torch.from_numpy(self._poses[self._index.links[robot][link], :, :3])
 
-    @_remembered
     def tcp_pose(self, robot: str) -> Tensor:
         """Pose of a robot's tool centre point, shape (N, 7)."""
-        return torch.from_numpy(self._poses[self._index.tcp(robot)])
+        return torch.from_numpy(self._poses[self._index.tcps[robot]])
 
-    @_remembered
     def tcp_position(self, robot: str) -> Tensor:
         """Position of a robot's tool centre point, shape (N, 3) (m)."""
-        return torch.from_numpy(self._poses[self._index.tcp(robot), :, :3])
+        return torch.from_numpy(self._poses[self._index.tcps[robot], :, :3])
 
     def finger_heights(self, robot: str) -> tuple[Tensor, Tensor] | None:
         """Height of a robot's two finger links, each (N,) (m), or None if it has none."""
-        fingers = self._index.fingers(robot)
+        fingers = self._index.fingers[robot]
         if fingers is None:
             return None
-        first, second = (self._poses[self._index.link(robot, f), :, 2] for f in fingers.links)
+        first, second = (self._poses[self._index.links[robot][f], :, 2] for f in fingers.links)
         return torch.from_numpy(first), torch.from_numpy(second)
 
     def finger_gap(self, robot: str) -> Tensor:
@@ -167,10 +160,10 @@ class State:
         Raises:
             SimulationError: If the robot has no fingers.
         """
-        fingers = self._index.fingers(robot)
+        fingers = self._index.fingers[robot]
         if fingers is None:
             raise SimulationError(f"robot {robot!r} has no fingers")
-        first, second = (self._index.link(robot, link) for link in fingers.links)
+        first, second = (self._index.links[robot][link] for link in fingers.links)
         return self._distance(second, first)
 
     @_remembered
@@ -181,7 +174,7 @@ class State:
     @_remembered
     def is_static(self, robot: str, threshold: float = 0.2) -> Tensor:
         """Whether no arm joint is faster than ``threshold`` (rad/s), shape (N,) bool."""
-        speeds = np.abs(self._joint_velocities[:, self._index.arm_joints(robot)])
+        speeds = np.abs(self._joint_velocities[:, self._index.arm_joints[robot]])
         return torch.from_numpy(np.maximum.reduce(speeds, 1) <= np.float32(threshold))
 
     # -- contacts ----------------------------------------------------------------------------
@@ -195,7 +188,7 @@ class State:
     @_remembered
     def is_grasping(self, robot: str, body: str) -> Tensor:
         """Whether a robot's two fingers hold a body, shape (N,) bool; see `robots.Fingers`."""
-        fingers = self._index.fingers(robot)
+        fingers = self._index.fingers[robot]
         if fingers is None:
             return torch.from_numpy(np.zeros(self.num_envs, bool))
         forces = self._contact_forces(robot, fingers.links, body)
@@ -207,23 +200,23 @@ class State:
 
     def offset(self, start: str, end: str) -> Tensor:
         """Way from one body's origin to another's, shape (N, 3) (m, world frame)."""
-        return self._offset(self._index.body(start), self._index.body(end))
+        return self._offset(self._index.bodies[start], self._index.bodies[end])
 
     def distance(self, start: str, end: str) -> Tensor:
         """Distance between the origins of two bodies, shape (N,) (m)."""
-        return self._distance(self._index.body(start), self._index.body(end))
+        return self._distance(self._index.bodies[start], self._index.bodies[end])
 
     def planar_distance(self, start: str, end: str) -> Tensor:
         """Distance between the origins of two bodies seen from above, shape (N,) (m)."""
-        return self._distance(self._index.body(start), self._index.body(end), planar=True)
+        return self._distance(self._index.bodies[start], self._index.bodies[end], planar=True)
 
     def tcp_offset(self, robot: str, body: str) -> Tensor:
         """Way from a robot's tool centre point to a body's origin, shape (N, 3) (m, world)."""
-        return self._offset(self._index.tcp(robot), self._index.body(body))
+        return self._offset(self._index.tcps[robot], self._index.bodies[body])
 
     def tcp_distance(self, robot: str, body: str) -> Tensor:
         """Distance from a robot's tool centre point to a body's origin, shape (N,) (m)."""
-        return self._distance(self._index.tcp(robot), self._index.body(body))
+        return self._distance(self._index.tcps[robot], self._index.bodies[body])
 
     # -- inside ------------------------------------------------------------------------------
 

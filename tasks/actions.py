@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,7 @@ class ActionReader:
             flat = self._join(action)
         else:
             flat = self._array(action, self._width, "the action")
-        if not np.logical_and.reduce(np.isfinite(flat), axis=None):
+        if not isfinite(np.add.reduce(flat, None, np.float64)):  # cannot overflow
             self._refuse_number(flat)
         return flat
 
@@ -72,7 +73,7 @@ class ActionReader:
                 f"{what} has shape {array.shape}; it must be {(self._num_envs, width)}:"
                 f" {self._num_envs} environment(s), {self._describe(width)}"
             )
-        return array.astype(np.float32, copy=False)
+        return array if array.dtype == np.float32 else array.astype(np.float32)
 
     def _describe(self, width: int) -> str:
         if width != self._width or len(self._split) == 1:
