@@ -47,6 +47,7 @@ class JointPositionController:
         low, high = np.array(ranges, np.float32).T
         half = np.float32(0.5)
         self._source = np.array(source)
+        self._one_to_one = source == list(range(len(ranges)))
         self._centre: Floats = (half * (high + low))[self._source]
         self._half_range: Floats = (half * (high - low))[self._source]
         self._relative = np.array(relative)
@@ -66,8 +67,9 @@ class JointPositionController:
         Returns:
             Targets in the order of the robots' driven joints, shape (N, dof) (rad, m).
         """
-        clipped = np.minimum(np.maximum(action, _LOWEST), _HIGHEST).take(self._source, 1)
-        target = self._centre + self._half_range * clipped
+        clipped = np.minimum(np.maximum(action, _LOWEST), _HIGHEST)
+        driving = clipped if self._one_to_one else clipped.take(self._source, 1)
+        target = self._centre + self._half_range * driving
         np.add(qpos[:, self._active], target, out=target, where=self._relative)
         return target
 

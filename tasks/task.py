@@ -157,6 +157,7 @@ class MultiRobotTask:
         self.action_space = Box(-1.0, 1.0, (self.num_envs, size), np.float32)
         self._reader = ActionReader(self.layout, self.num_envs)
         self._observation_keys = observation_keys(self.layout)
+        self._robots = tuple(self.layout)
         self._rngs = [EpisodeRandom(FIRST_SEED + i) for i in range(self.num_envs)]
         self._max_reward = torch.tensor(float(self.max_reward))
         self._elapsed = np.zeros(self.num_envs, np.int32)
@@ -322,7 +323,7 @@ class MultiRobotTask:
         if self.obs_mode == "state_dict":
             own = {key: x.clone() for key, x in extra.items()}
             return {"agent": self._proprioception(state), "extra": own}
-        parts = [part for name in self.layout for part in (state.qpos(name), state.qvel(name))]
+        parts = [part for name in self._robots for part in (state.qpos(name), state.qvel(name))]
         parts.extend(_as_columns(part) for part in extra.values())
         return torch.cat(parts, 1)
 
