@@ -1,0 +1,1 @@
+"""Many episodes: experts that solve tasks, playing them, recording them."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import sapien
@@ -12,6 +13,7 @@ from robots import SimulationError
 from simulation.world import World
 
 Floats = NDArray[np.float64]
+Numbers = Sequence[float] | NDArray[np.floating[Any]]
 
 _MAX_ITERATIONS = 200  # converges in 40 … 80 where a solution exists
 _STEP = 0.3  # of the way to the linearised solution, per iteration
@@ -48,7 +50,7 @@ class InverseKinematics:
             )
         self.joints = descriptor.arm_joints
         self._base = simulated.base_pose
-        self._model = simulated.articulation.create_pinocchio_model()
+        self._model: Any = simulated.articulation.create_pinocchio_model()
         self._tcp = simulated.articulation.links.index(simulated.link(descriptor.tcp_link))
         names = [joint.name for joint in simulated.joints]
         self._arm = np.array([names.index(joint) for joint in self.joints])
@@ -59,9 +61,7 @@ class InverseKinematics:
         keyframes[:, simulated.active_index] = list(descriptor.keyframes.values())
         self._keyframes = keyframes
 
-    def solve(
-        self, position: Sequence[float], quaternion: Sequence[float], start_qpos: Sequence[float]
-    ) -> Floats | None:
+    def solve(self, position: Numbers, quaternion: Numbers, start_qpos: Numbers) -> Floats | None:
         """Return arm joints that bring the TCP to a pose, or None if none were found.
 
         Tries from where the robot is, from its keyframes, and from the same few places around
@@ -78,9 +78,9 @@ class InverseKinematics:
             Positions in the order of ``joints``, shape (arm joints,) (rad).
         """
         target = self._base.inv() * sapien.Pose(list(position), list(quaternion))
-        start_qpos = np.asarray(start_qpos, float)
+        all_joints = np.asarray(start_qpos, float)
         found: list[Floats] = []
-        for start in self._starts(start_qpos):
+        for start in self._starts(all_joints):
             qpos, converged, _ = self._model.compute_inverse_kinematics(
                 self._tcp,
                 target,
@@ -94,10 +94,10 @@ class InverseKinematics:
             arm = self._within_limits(qpos[self._arm])
             if converged and arm is not None:
                 found.append(arm)
-        now = start_qpos[self._arm]
+        now = all_joints[self._arm]
         return min(found, key=lambda arm: np.abs(arm - now).max(), default=None)
 
-    def forward(self, arm_qpos: Sequence[float]) -> tuple[Floats, Floats]:
+    def forward(self, arm_qpos: Numbers) -> tuple[Floats, Floats]:
         """Return where arm joints bring the TCP: position (3,) (m) and quaternion (4,) wxyz, world.
 
         Args:

@@ -1,4 +1,4 @@
-"""Pictures of worlds: one camera and the same lights for each, and whether this machine can draw."""
+"""Pictures of worlds, all lit alike, and whether this machine can draw any."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ NEAR, FAR = 0.01, 100.0  # m
 
 # Light: red, green, blue; directions point away from the lamp.
 SKY = (0.5, 0.53, 0.58)
-SUN = ((-0.2, -0.1, -1.0), (1.6, 1.5, 1.4))
-FILL = ((0.7, 0.5, -0.5), (0.45, 0.48, 0.55))
+SUN_DIRECTION, SUN = (-0.2, -0.1, -1.0), (1.6, 1.5, 1.4)
+FILL_DIRECTION, FILL = (0.7, 0.5, -0.5), (0.45, 0.48, 0.55)
 SHADOW_HALF_WIDTH = 3.0  # of the square in which things cast shadows (m)
 SHADOW_DEPTH = 50.0  # above and below the origin; what lies outside is drawn dark (m)
 SHADOW_PIXELS = 2048
@@ -67,14 +67,18 @@ class _Studio:
         self._scene = sapien.Scene([world.scene.render_system])
         self._scene.set_ambient_light(list(SKY))
         self._scene.add_directional_light(
-            *map(list, SUN),
+            list(SUN_DIRECTION),
+            list(SUN),
             shadow=True,
             shadow_scale=SHADOW_HALF_WIDTH,
             shadow_near=-SHADOW_DEPTH,
             shadow_far=SHADOW_DEPTH,
             shadow_map_size=SHADOW_PIXELS,
         )
-        self._scene.add_directional_light(*map(list, FILL))
+        self._scene.add_directional_light(list(FILL_DIRECTION), list(FILL))
+        # Process-wide, bound when a camera is made; others in this process may have changed them.
+        sapien.render.set_camera_shader_dir("default")
+        sapien.render.set_picture_format("Color", "r32g32b32a32sfloat")
         self._camera: Any = self._scene.add_camera("view", SIZE, SIZE, FIELD_OF_VIEW, NEAR, FAR)
 
     def take(self, pose: sapien.Pose) -> NDArray[np.uint8]:

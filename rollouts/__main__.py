@@ -1,0 +1,55 @@
+"""`python -m rollouts demo`: an expert plays a task, and a recording of it is left behind."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from robots import RobotLayoutsError, UnknownNameError
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Args:
+        arguments: Words after ``python -m rollouts``; by default those of this process.
+
+    Returns:
+        0 if all went well, 1 if not, 2 if the command makes no sense.
+    """
+    options = _parser().parse_args(arguments)
+    from rich.console import Console
+
+    from rollouts.demo import DemoOptions, run_demo
+
+    chosen = DemoOptions(options.task, options.seeds, options.out, video=not options.no_video)
+    try:
+        return 0 if run_demo(chosen, Console()) else 1
+    except RobotLayoutsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2 if isinstance(error, UnknownNameError) else 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m rollouts", description=__doc__)
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    demo = commands.add_parser("demo", help="let an expert play a task, ten seeds by default")
+    add = demo.add_argument
+    add("--task", default="TwoRobotPickCube-v1", help="task id (default %(default)s)")
+    add("--seeds", type=_count, default=10, metavar="N", help="play seeds 0 to N - 1 (default 10)")
+    add("--out", type=Path, default=Path("runs/demo"), metavar="DIR", help="default %(default)s")
+    add("--no-video", action="store_true", help="make no video")
+    return parser
+
+
+def _count(text: str) -> int:
+    count = int(text)
+    if count < 1:
+        raise argparse.ArgumentTypeError(f"{count} is not a number of seeds; it must be 1 or more")
+    return count
+
+
+if __name__ == "__main__":
+    sys.exit(main())

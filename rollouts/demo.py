@@ -1,0 +1,160 @@
+"""The demo: finds the robot files, lets an expert play a task, and leaves a recording of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import mean
+
+import torch
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+import tasks
+from layouts import Layout
+from robots import AssetError, MissingPackageError, RecordingError
+from rollouts.episode import Episode, play
+from rollouts.experts import find_expert
+from rollouts.recorder import Recorder
+from rollouts.video import film, video_problem
+from tasks import MultiRobotTask
+
+ENOUGH = 0.9  # share of episodes that must succeed
+FILMED_EPISODES, FILMING_SECONDS = 4, 60.0
+
+
+@dataclass(frozen=True)
+class DemoOptions:
+    """What the demo plays and where it leaves its files.
+
+    Attributes:
+        task: Task id.
+        seeds: How many seeds to play, from 0.
+        out: Folder for the recording, the picture and the video.
+        video: Whether to make a video.
+    """
+
+    task: str = "TwoRobotPickCube-v1"
+    seeds: int = 10
+    out: Path = Path("runs/demo")
+    video: bool = True
+
+
+def run_demo(options: DemoOptions, console: Console) -> bool:
+    """Run the demo.
+
+    Args:
+        options: What to play.
+        console: Where to print.
+
+    Returns:
+        Whether at least nine of ten episodes succeeded.
+
+    Raises:
+        UnknownNameError: If there is no such task.
+        TaskError: If the task has no expert.
+        AssetError: If the robot files that physics needs cannot be had.
+        RecordingError: If ``out`` cannot be written.
+    """
+    torch.set_num_threads(1)  # the tensors are small: threads would only wait for each other
+    expert = find_expert(options.task)
+    layout = tasks.get_task_class(options.task).layout
+    console.print(f"[bold]{options.task}[/], {options.seeds} seeds", highlight=False)
+    _find_files(layout, console)
+    film_why_not = _pictures_problem(layout) if options.video else "not asked for"
+    task = tasks.make(options.task, obs_mode="state")
+    _show_layout(layout, options.out, console)
+
+    episodes: list[Episode] = []
+    recording = options.out / "trajectory.h5"
+    with Recorder(recording, task, overwrite=True) as recorder, _live(console) as live:
+        line = live.add_task("")
+        for seed in range(options.seeds):
+            live.update(line, description=f"seed {seed}: planning")
+            actions = expert(task, seed)
+            live.update(line, description=f"seed {seed}: playing {len(actions)} steps")
+            episodes.append(play(task, seed, actions))
+            recorder.add(episodes[-1])
+            live.console.print(_episode_line(episodes[-1]), highlight=False)
+    _report(episodes, console)
+    console.print(f"episodes  {recording}, {recorder.json_path.name}", highlight=False)
+    if film_why_not is None:
+        _film(options, episodes, console)
+    else:
+        console.print(f"no video: {film_why_not}", highlight=False, soft_wrap=True)
+    return sum(episode.solved for episode in episodes) >= ENOUGH * len(episodes)
+
+
+def _find_files(layout: Layout, console: Console) -> None:
+    for robot in {placement.robot.name: placement.robot for placement in layout.values()}.values():
+        console.print(f"robot files of {robot.name}: {robot.urdf.locate()}", soft_wrap=True)
+
+
+def _pictures_problem(layout: Layout) -> str | None:
+    """Say why no video can be made, or fetch what the robots look like and return None."""
+    problem = video_problem()
+    if problem is not None:
+        return problem
+    try:
+        for placement in layout.values():
+            placement.robot.urdf.locate(pictures=True)
+    except AssetError as error:
+        return f"the robots' visual meshes cannot be had: {str(error).splitlines()[0]}"
+    return None
+
+
+def _show_layout(layout: Layout, out: Path, console: Console) -> None:
+    console.print(str(layout), highlight=False, markup=False, soft_wrap=True)
+    split = ", ".join(f"{n} = [{p.start}:{p.stop}]" for n, p in layout.action_split.items())
+    console.print(f"action split: {split}", highlight=False, markup=False)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(f"cannot write to {out}: {error.strerror}") from error
+    try:
+        console.print(f"seen from above  {layout.preview(out / 'layout.png')}", highlight=False)
+    except MissingPackageError as error:
+        console.print(f"no picture of the layout: {error}", highlight=False, soft_wrap=True)
+
+
+def _live(console: Console) -> Progress:
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    return Progress(*columns, console=console, transient=True)
+
+
+def _episode_line(episode: Episode) -> str:
+    outcome = "[green]success[/]" if episode.solved else "[red]failure[/]"
+    return f"seed {episode.seed:>3}  {outcome}  {len(episode.actions):>3} steps"
+
+
+def _report(episodes: Sequence[Episode], console: Console) -> None:
+    solved = [episode for episode in episodes if episode.solved]
+    steps = sum(len(episode.actions) for episode in episodes)
+    rate = steps / sum(episode.seconds for episode in episodes)
+    line = f"[bold]{len(solved)} of {len(episodes)} succeeded[/]"
+    if solved:
+        line += f" in {mean(len(episode.actions) for episode in solved):.1f} steps on average"
+    console.print(line, highlight=False)
+    console.print(
+        f"{rate:.0f} steps per second while playing (one environment's step with observation,"
+        " reward and success; planning, recording and resets not counted)",
+        highlight=False,
+        soft_wrap=True,
+    )
+
+
+def _film(options: DemoOptions, episodes: Sequence[Episode], console: Console) -> None:
+    path = options.out / "video.mp4"
+    task: MultiRobotTask = tasks.make(options.task, render_mode="rgb_array")
+    with _live(console) as live:
+        line = live.add_task("video")
+        shown = film(
+            task,
+            episodes[:FILMED_EPISODES],
+            path,
+            seconds=FILMING_SECONDS,
+            progress=lambda frame, total: live.update(line, description=f"video {frame}/{total}"),
+        )
+    which = "the first episode" if shown == 1 else f"the first {shown} episodes"
+    console.print(f"video     {path}, {which}", highlight=False)

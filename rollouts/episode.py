@@ -1,0 +1,108 @@
+"""Plays actions through a task and keeps everything that happened."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from robots import TaskError
+from tasks import MultiRobotTask
+
+States = dict[str, dict[str, NDArray[np.float32]]]
+
+REBUILT: dict[str, Any] = {"reconfigure": True}  # reset option: nothing of the past stays in PhysX
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One episode of T steps.
+
+    Attributes:
+        seed: Seed of its reset, which rebuilt the world.
+        actions: Shape (T, A).
+        states: State dict of `MultiRobotTask.get_state_dict`, each entry (T + 1, k), the first
+            row being the state after the reset.
+        rewards: Shape (T,).
+        success: Shape (T,).
+        terminated: Shape (T,).
+        truncated: Shape (T,).
+        seconds: Time that the steps took, without reading the states (s).
+    """
+
+    seed: int
+    actions: NDArray[np.float32]
+    states: States
+    rewards: NDArray[np.float32]
+    success: NDArray[np.bool_]
+    terminated: NDArray[np.bool_]
+    truncated: NDArray[np.bool_]
+    seconds: float
+
+    @property
+    def solved(self) -> bool:
+        """Whether the last step ended in success."""
+        return bool(self.success[-1])
+
+
+def play(
+    task: MultiRobotTask,
+    seed: int,
+    actions: NDArray[np.float32],
+    watch: Callable[[], None] = lambda: None,
+) -> Episode:
+    """Play actions in a freshly built world.
+
+    Args:
+        task: A task with one environment.
+        seed: Seed of the reset.
+        actions: Shape (T, A) with T of 1 or more.
+        watch: Called after the reset and after every step.
+
+    Raises:
+        TaskError: If the task has several environments, or there are no actions.
+        ActionError: If an action has the wrong shape or numbers that are not finite.
+    """
+    if task.num_envs != 1:
+        raise TaskError(f"an episode is played in 1 environment; the task has {task.num_envs}")
+    if not len(actions):
+        raise TaskError("an episode needs at least one action")
+    task.reset(seed, options=REBUILT)
+    states, outcomes, seconds = [task.get_state_dict()], list[tuple[Tensor, ...]](), 0.0
+    watch()
+    for action in actions:
+        start = perf_counter()
+        _, reward, terminated, truncated, info = task.step(action)
+        seconds += perf_counter() - start
+        outcomes.append((reward, info["success"], terminated, truncated))
+        states.append(task.get_state_dict())
+        watch()
+    rewards, success, terminated, truncated = (
+        torch.cat(column).numpy() for column in zip(*outcomes, strict=True)
+    )
+    return Episode(
+        seed=seed,
+        actions=np.asarray(actions, np.float32),
+        states=_stack(states),
+        rewards=rewards,
+        success=success,
+        terminated=terminated,
+        truncated=truncated,
+        seconds=seconds,
+    )
+
+
+def _stack(states: list[dict[str, Any]]) -> States:
+    return {
+        group: {
+            name: np.concatenate([state[group][name].numpy() for state in states])
+            for name in entries
+        }
+        for group, entries in states[0].items()
+    }

@@ -1,0 +1,70 @@
+"""Rotations that grasps are made of; quaternions are wxyz, angles rad, lengths m."""
+
+from __future__ import annotations
+
+from math import cos, hypot, pi, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def multiply(a: Floats, b: Floats) -> Floats:
+    """Return the rotation ``b`` followed by ``a``, (4,)."""
+    w, x, y, z = a
+    left = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
+    return left @ b
+
+
+def rotate(quaternion: Floats, vector: Floats) -> Floats:
+    """Return a vector (3,) turned by a rotation."""
+    return multiply(multiply(quaternion, np.array([0.0, *vector])), inverse(quaternion))[1:]
+
+
+def inverse(quaternion: Floats) -> Floats:
+    """Return the rotation that undoes another, (4,)."""
+    return quaternion * (1.0, -1.0, -1.0, -1.0)
+
+
+def turn(axis: str, angle: float) -> Floats:
+    """Return the rotation by ``angle`` about ``"x"``, ``"y"`` or ``"z"``, (4,)."""
+    quaternion = np.array([cos(angle / 2), 0.0, 0.0, 0.0])
+    quaternion["xyz".index(axis) + 1] = sin(angle / 2)
+    return quaternion
+
+
+def yaw_of(quaternion: Floats) -> float:
+    """Return the heading of a body's own x axis, seen from above."""
+    x, y, _ = rotate(quaternion, np.array([1.0, 0.0, 0.0]))
+    return float(np.arctan2(y, x))
+
+
+def heading(origin: Floats, target: Floats) -> float:
+    """Return the direction from one point to another, seen from above, as an angle from +x."""
+    x, y = (target - origin)[:2]
+    return float(np.arctan2(y, x))
+
+
+def planar_distance(a: Floats, b: Floats) -> float:
+    """Return the distance of two points seen from above."""
+    return hypot(*(a - b)[:2])
+
+
+def nearest_quarter_turn(angle: float) -> float:
+    """Return the angle of the same square in (-π/4, π/4]: what a cube's yaw amounts to."""
+    return angle - round(angle / (pi / 2)) * (pi / 2)
+
+
+def gripper_facing(direction: float, tilt: float) -> Floats:
+    """Return the orientation of a gripper that reaches down and forward, (4,).
+
+    The gripper's own z axis is its approach, its y axis the way its fingers open, which stays
+    level.
+
+    Args:
+        direction: Heading in which it leans.
+        tilt: Angle between its approach and straight down; π/2 reaches forward level.
+    """
+    down = turn("x", pi)
+    return multiply(multiply(turn("z", direction), down), turn("y", tilt))

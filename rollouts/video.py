@@ -1,0 +1,120 @@
+"""Films episodes: plays them once more in worlds that can be drawn, and writes an mp4."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from layouts import Layout
+from robots import MissingPackageError, RecordingError
+from robots.descriptor import Vector3
+from rollouts.episode import Episode, play
+from simulation.rendering import Cameras, vulkan_problem
+from tasks import MultiRobotTask
+
+STILL_FRAMES = 12  # of the last picture of an episode, before the next begins
+INSTALL = "pip install 'robot-layouts[video]'"
+
+
+def video_problem() -> str | None:
+    """Say in a few words why no video can be made here, or return None."""
+    missing = [name for name in ("imageio", "imageio_ffmpeg") if find_spec(name) is None]
+    if missing:
+        return f"{' and '.join(missing)} not installed; {INSTALL}"
+    return vulkan_problem()
+
+
+def film(
+    task: MultiRobotTask,
+    episodes: Sequence[Episode],
+    path: Path,
+    *,
+    seconds: float = float("inf"),
+    progress: Callable[[int, int], None] = lambda frame, total: None,
+) -> int:
+    """Write a video of episodes, one after the other, at the speed at which they happen.
+
+    Args:
+        task: Made with ``render_mode="rgb_array"``, with one environment.
+        episodes: What to show; at least one.
+        path: The mp4 file; it appears when it is whole.
+        seconds: Time after which no further episode is begun if it would end later (s).
+        progress: Called after each frame with its number in the episode and the episode's frames.
+
+    Returns:
+        How many of the episodes, counted from the first, it shows.
+
+    Raises:
+        MissingPackageError: If imageio is not installed.
+        RecordingError: If the file cannot be written.
+    """
+    eye, target = overview(task.layout) or task.viewpoint
+    start, shown = perf_counter(), 0
+    partial = path.with_name(f"{path.stem}.{os.getpid()}.partial{path.suffix}")
+    try:
+        with _writer(partial, task.made_from.control_frequency) as writer:
+            for episode in episodes:
+                if shown and (perf_counter() - start) * (shown + 1) / shown > seconds:
+                    break
+                _film_one(task, episode, (eye, target), writer, progress)
+                shown += 1
+        os.replace(partial, path)
+    except OSError as error:
+        raise RecordingError(f"cannot write {path}: {error}") from error
+    finally:
+        partial.unlink(missing_ok=True)
+    return shown
+
+
+def overview(layout: Layout) -> tuple[Vector3, Vector3] | None:
+    """Return camera and target (m, world) that show robots from the side, the first on the left.
+
+    None for a single robot, which has no side.
+    """
+    if len(layout) == 1:
+        return None
+    bases = np.array([placement.base_position for placement in layout.values()])
+    along = bases[-1] - bases[0]
+    span = float(np.linalg.norm(along[:2]))
+    if span == 0:
+        return None
+    aside = np.array([along[1], -along[0], 0.0]) / span
+    middle = bases.mean(0)
+    eye = middle + span * aside + [0.0, 0.0, 0.42 * span]
+    target = middle + [0.0, 0.0, 0.16 * span]
+    return tuple(eye.tolist()), tuple(target.tolist())
+
+
+def _film_one(
+    task: MultiRobotTask,
+    episode: Episode,
+    view: tuple[Vector3, Vector3],
+    writer: Any,
+    progress: Callable[[int, int], None],
+) -> None:
+    frames = 0
+
+    def watch() -> None:
+        nonlocal frames
+        frames += 1
+        picture = Cameras(task.simulation, *view).take()[0]
+        last = frames == len(episode.actions) + 1
+        for _ in range(1 + STILL_FRAMES * last):
+            writer.append_data(picture)
+        progress(frames, len(episode.actions) + 1)
+
+    play(task, episode.seed, episode.actions, watch)
+
+
+def _writer(path: Path, frames_per_second: float) -> Any:
+    try:
+        import imageio.v2 as imageio
+    except ImportError:
+        raise MissingPackageError(f"videos need imageio: {INSTALL}") from None
+    return imageio.get_writer(path, fps=frames_per_second, quality=8, macro_block_size=16)

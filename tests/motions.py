@@ -1,0 +1,146 @@
+"""Scripted motions that grasp, carry and push, as actions: contact that random actions never make.
+
+They only need to touch things, not to solve the task. Each is planned by playing it once in an
+environment of ours.
+"""
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from math import atan2, cos, pi, sin
+
+import numpy as np
+
+import tasks
+from parity.episodes import Episode
+from simulation.kinematics import InverseKinematics
+
+OPEN, CLOSED = 1.0, -1.0
+STEP = 0.1  # rad that an arm's action of 1 asks for
+
+
+class Puppeteer:
+    """Plays an environment by target poses and writes down the actions."""
+
+    def __init__(self, task_id: str, seed: int) -> None:
+        self.env = tasks.make(task_id)
+        self.env.reset(seed=seed)
+        self.world = self.env.simulation.worlds[0]
+        self.seed = seed
+        self.actions: list[np.ndarray] = []
+
+    def episode(self) -> Episode:
+        return Episode(self.seed, np.array(self.actions))
+
+    def move(
+        self,
+        steps: int,
+        grip: float,
+        targets: Mapping[str, tuple[Sequence[float], Sequence[float]]],
+    ) -> None:
+        """Move TCPs towards poses (m, wxyz) for some steps.
+
+        Other robots keep their joints, and so does one that cannot reach its pose.
+        """
+        goals = {}
+        for robot, placement in self.env.layout.items():
+            qpos = self.world.robots[robot].articulation.qpos
+            goals[robot] = qpos[: len(placement.robot.arm_joints)]
+            if robot in targets:
+                solution = InverseKinematics(self.world, robot).solve(*targets[robot], qpos)
+                goals[robot] = goals[robot] if solution is None else solution
+        for _ in range(steps):
+            action = np.full(self.env.layout.action_dim, OPEN, np.float32)
+            for robot, part in self.env.action_split.items():
+                qpos = self.world.robots[robot].articulation.qpos
+                delta = (goals[robot] - qpos[: len(goals[robot])]) / STEP
+                action[part][: len(delta)] = np.clip(delta, -1, 1)
+                if robot in targets:
+                    action[part][len(delta) :] = grip
+            self.play(action)
+
+    def shake(self, robot: str, steps: int, grip: float) -> None:
+        """Move one arm at random, the gripper as it is."""
+        rng = np.random.default_rng(self.seed)
+        for _ in range(steps):
+            action = np.full(self.env.layout.action_dim, OPEN, np.float32)
+            for name, part in self.env.action_split.items():
+                arm = len(self.env.layout[name].robot.arm_joints)
+                action[part][:arm] = rng.uniform(-1, 1, arm) if name == robot else 0
+                if name == robot:
+                    action[part][arm:] = grip
+            self.play(action)
+
+    def play(self, action: np.ndarray) -> None:
+        self.actions.append(action)
+        self.env.step(action)
+
+    def place(self, body: str) -> tuple[np.ndarray, float]:
+        """Position (m) and yaw (rad) of a body."""
+        pose = self.world.body(body).entity.pose
+        return np.array(pose.p), 2 * atan2(pose.q[3], pose.q[0])
+
+
+def downwards(yaw: float) -> tuple[float, ...]:
+    """Orientation (wxyz) of a hand that points down, turned by a yaw (rad)."""
+    return (0.0, cos(yaw / 2), sin(yaw / 2), 0.0)
+
+
+def nearest_quarter(yaw: float, to: float) -> float:
+    """The yaw that looks the same on a cube and is nearest to another (rad)."""
+    return to + (yaw - to + pi / 4) % (pi / 2) - pi / 4
+
+
+def grasp_and_shake(
+    puppeteer: Puppeteer, robot: str, yaw_at_rest: float, approach: int = 14
+) -> None:
+    """Grasp the cube from above, lift it, shake it, and end with it in the hand."""
+    (x, y, z), yaw = puppeteer.place("cube")
+    hand = downwards(nearest_quarter(yaw, yaw_at_rest))
+    puppeteer.move(approach, OPEN, {robot: ((x, y, z + 0.08), hand)})
+    puppeteer.move(8, OPEN, {robot: ((x, y, z), hand)})
+    puppeteer.move(5, CLOSED, {robot: ((x, y, z), hand)})
+    puppeteer.move(10, CLOSED, {robot: ((x, y, z + 0.12), hand)})
+    puppeteer.shake(robot, 10, CLOSED)
+
+
+def pick_cube(puppeteer: Puppeteer) -> None:
+    """Grasp, lift, shake, hold."""
+    grasp_and_shake(puppeteer, "arm", 0.0)
+
+
+def two_robot_pick_cube(puppeteer: Puppeteer) -> None:
+    """The left arm lays the cube down in the middle, the right one takes it up."""
+    grasp_and_shake(puppeteer, "left", pi / 2)
+    hand = downwards(pi / 2)
+    puppeteer.move(24, CLOSED, {"left": ((0.0, 0.03, 0.1), hand)})
+    puppeteer.move(8, CLOSED, {"left": ((0.0, 0.03, 0.03), hand)})
+    puppeteer.move(3, OPEN, {"left": ((0.0, 0.03, 0.03), hand)})
+    puppeteer.move(12, OPEN, {"left": ((0.0, -0.2, 0.3), hand)})
+    grasp_and_shake(puppeteer, "right", -pi / 2, approach=20)
+
+
+def push_t(puppeteer: Puppeteer) -> None:
+    """Drive the stick through the T, twice, from two sides."""
+    hand = downwards(0.0)
+    for angle in (0.3, 2.2):
+        (x, y, _), _ = puppeteer.place("Tee")
+        dx, dy = cos(angle), sin(angle)
+        puppeteer.move(12, OPEN, {"arm": ((x - 0.17 * dx, y - 0.17 * dy, 0.12), hand)})
+        puppeteer.move(6, OPEN, {"arm": ((x - 0.17 * dx, y - 0.17 * dy, 0.02), hand)})
+        puppeteer.move(14, OPEN, {"arm": ((x + 0.08 * dx, y + 0.08 * dy, 0.02), hand)})
+        puppeteer.move(4, OPEN, {"arm": ((x + 0.08 * dx, y + 0.08 * dy, 0.12), hand)})
+
+
+MOTIONS: dict[str, Callable[[Puppeteer], None]] = {
+    "PickCube-v1": pick_cube,
+    "PushT-v1": push_t,
+    "TwoRobotPickCube-v1": two_robot_pick_cube,
+}
+
+
+@functools.cache
+def touching_episode(task_id: str, seed: int) -> Episode:
+    """Return the scripted motion of a task, planned for a seed."""
+    puppeteer = Puppeteer(task_id, seed)
+    MOTIONS[task_id](puppeteer)
+    return puppeteer.episode()

@@ -1,0 +1,57 @@
+"""Pairs of native and our environments that tests share, because making them takes a second."""
+
+import functools
+import gc
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import pytest
+
+import tasks
+from parity.comparison import EpisodeResult, History, compare
+from parity.episodes import Episode
+from parity.sides import NativeSide, OurSide
+
+TASKS = tasks.list_tasks()
+NATIVE = [
+    pytest.mark.native,
+    pytest.mark.filterwarnings("ignore:__array_wrap__:DeprecationWarning"),  # mani_skill's own
+]
+
+
+class Pair(NamedTuple):
+    """Both sides of a comparison, always reset and stepped alike."""
+
+    native: NativeSide
+    ours: OurSide
+
+    def forget(self) -> None:
+        """Rebuild every world, so that neither side remembers what an earlier test did."""
+        everything = range(self.native.num_envs)
+        for side in self:
+            side.reset([0] * self.native.num_envs, everything, rebuild=True)
+
+    def play(self, episodes: Sequence[Episode], history: History = "fresh") -> list[EpisodeResult]:
+        """Compare episodes, from a common past."""
+        self.forget()
+        return list(compare(self.native, self.ours, episodes, history=history))
+
+
+@functools.cache
+def pair(task_id: str, reward_mode: str | None = None, num_envs: int = 1) -> Pair:
+    """Return the pair of this process for a task."""
+    ours = tasks.make(task_id, num_envs=num_envs, reward_mode=reward_mode)
+    native = NativeSide(task_id, reward_mode, num_envs)
+    gc.freeze()  # native collects garbage at every rebuild: 0.2 s, unless told what stays
+    return Pair(native, OurSide(ours))
+
+
+def against_native(task_id: str, ours: tasks.MultiRobotTask) -> Pair:
+    """Return a pair of the shared native environment and another environment of ours."""
+    return Pair(pair(task_id).native, OurSide(ours))
+
+
+def complaints(results: Sequence[EpisodeResult]) -> list[str]:
+    """Say where episodes differ; nothing if they are equal."""
+    assert results, "no episode was played"
+    return [f"seed {r.seed} differs {r.first_difference}" for r in results if not r.equal]

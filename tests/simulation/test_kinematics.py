@@ -1,0 +1,139 @@
+"""Inverse kinematics leads where it was asked to, for every robot, or says that it cannot."""
+
+import functools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from layouts import Layout, Placement
+from robots import RobotRegistry, SimulationError, UnknownNameError
+from simulation import World
+from simulation.kinematics import InverseKinematics
+
+ROBOTS = RobotRegistry.names()
+BASE = Placement("panda", position=(0.3, -0.4, 0.1), quaternion=(0.8, 0.0, 0.0, 0.6))
+
+
+@functools.cache
+def world_of(robot: str) -> World:
+    """Make a world with one robot that neither stands at the origin nor faces along x."""
+    placement = Placement(RobotRegistry.load(robot), BASE.position, BASE.quaternion)
+    return World(Layout({"arm": placement}))
+
+
+def rest(robot: str) -> np.ndarray:
+    """All joints of a keyframe, in SAPIEN's order."""
+    simulated = world_of(robot).robots["arm"]
+    qpos = np.zeros(len(simulated.joints))
+    qpos[simulated.active_index] = world_of(robot).layout["arm"].start_qpos
+    return qpos
+
+
+def reference(robot: str, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """TCP pose as the physics engine has it."""
+    simulated = world_of(robot).robots["arm"]
+    simulated.articulation.set_qpos(qpos)
+    pose = simulated.links[simulated.descriptor.tcp_link].entity_pose
+    return np.array(pose.p), np.array(pose.q)
+
+
+def with_arm(robot: str, qpos: np.ndarray, arm: np.ndarray) -> np.ndarray:
+    simulated = world_of(robot).robots["arm"]
+    moved = qpos.copy()
+    names = [joint.name for joint in simulated.joints]
+    moved[[names.index(joint) for joint in simulated.descriptor.arm_joints]] = arm
+    return moved
+
+
+def limits(robot: str, joints: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+    named = {joint.name: joint.limits[0] for joint in world_of(robot).robots["arm"].joints}
+    low, high = np.array([named[joint] for joint in joints]).T
+    return low, high
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_solution_reaches_the_request_within_the_limits(robot, seed):
+    kinematics, start = InverseKinematics(world_of(robot), "arm"), rest(robot)
+    low, high = limits(robot, kinematics.joints)
+    rng = np.random.default_rng(seed)
+    wish = start.copy()
+    arm = np.clip(
+        [start[i] for i in range(len(kinematics.joints))]
+        + rng.normal(0, 0.4, len(kinematics.joints)),
+        low,
+        high,
+    )
+    position, quaternion = reference(robot, with_arm(robot, wish, arm))
+
+    solution = kinematics.solve(position, quaternion, start)
+
+    assert solution is not None
+    assert solution.shape == (len(kinematics.joints),)
+    assert (solution >= low).all()
+    assert (solution <= high).all()
+    reached, turned = reference(robot, with_arm(robot, start, solution))
+    np.testing.assert_allclose(reached, position, atol=1e-3)
+    assert abs(turned @ quaternion) == pytest.approx(1, abs=1e-6)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_forward_agrees_with_the_physics_engine(robot):
+    kinematics = InverseKinematics(world_of(robot), "arm")
+    arm = np.array(world_of(robot).layout["arm"].start_qpos[: len(kinematics.joints)]) + 0.1
+    position, quaternion = kinematics.forward(arm)
+    expected, turned = reference(robot, with_arm(robot, rest(robot), arm))
+    np.testing.assert_allclose(position, expected, atol=1e-6)
+    assert abs(quaternion @ turned) == pytest.approx(1, abs=1e-6)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_what_is_out_of_reach_has_no_solution(robot):
+    kinematics = InverseKinematics(world_of(robot), "arm")
+    assert kinematics.solve((1.8, -0.4, 0.2), (0.0, 1.0, 0.0, 0.0), rest(robot)) is None
+
+
+def test_a_solution_never_passes_a_joint_limit():
+    """This pose is natural with joint 6 at 4.4 rad, but that joint ends at 3.75."""
+    kinematics, start = InverseKinematics(world_of("panda"), "arm"), rest("panda")
+    arm = np.array([0.0, 1.0, 0.0, -0.6, 0.0, 4.4, 0.0])
+    position, quaternion = kinematics.forward(arm)
+    solution = kinematics.solve(position, quaternion, start)
+    low, high = limits("panda", kinematics.joints)
+    assert solution is None or ((solution >= low) & (solution <= high)).all()
+
+
+def test_the_nearest_of_several_solutions_is_taken():
+    """Where the robot already is needs no motion, however many other solutions there are."""
+    kinematics, start = InverseKinematics(world_of("panda"), "arm"), rest("panda")
+    position, quaternion = reference("panda", start)
+    solution = kinematics.solve(position, quaternion, start)
+    np.testing.assert_allclose(solution, start[:7], atol=1e-3)
+
+
+def test_the_same_request_has_the_same_answer():
+    request = (0.4, -0.1, 0.4), (0.0, 1.0, 0.0, 0.0), rest("panda")
+    first, second = (InverseKinematics(world_of("panda"), "arm").solve(*request) for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+
+
+def test_a_tcp_between_links_is_refused(monkeypatch):
+    world = World(Layout({"arm": Placement("panda")}))
+    descriptor = world.layout["arm"].robot
+    object.__setattr__(world.layout["arm"], "robot", _between_fingers(descriptor))
+    with pytest.raises(SimulationError, match="mean of panda_leftfinger, panda_rightfinger"):
+        InverseKinematics(world, "arm")
+
+
+def test_an_unknown_robot_is_named():
+    with pytest.raises(UnknownNameError, match="unknown robot of this layout 'arn'.*'arm'"):
+        InverseKinematics(world_of("panda"), "arn")
+
+
+def _between_fingers(descriptor):
+    from dataclasses import replace
+
+    return replace(descriptor, tcp_position_links=("panda_leftfinger", "panda_rightfinger"))

@@ -1,0 +1,168 @@
+"""Pictures show the world, looking changes nothing, and physics needs no graphics at all."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import sapien
+import torch
+
+import tasks
+from robots import SimulationError, TaskError
+from simulation.rendering import Cameras, look_at, vulkan_problem
+
+TASK = "TwoRobotPickCube-v1"
+NO_DRIVER = {"VK_DRIVER_FILES": "/nowhere.json", "VK_ICD_FILENAMES": "/nowhere.json"}
+
+
+@pytest.fixture(scope="module")
+def drawn() -> tasks.MultiRobotTask:
+    if problem := vulkan_problem():
+        pytest.skip(problem)
+    return tasks.make(TASK, num_envs=2, render_mode="rgb_array")
+
+
+def red_pixels(picture: np.ndarray) -> np.ndarray:
+    red, green, blue = picture.astype(int).transpose(2, 0, 1)
+    return np.argwhere((red > 150) & (green < 80) & (blue < 80))
+
+
+def test_every_environment_has_its_picture(drawn):
+    drawn.reset(seed=3)
+    pictures = drawn.render()
+    assert pictures.shape == (2, 512, 512, 3)
+    assert pictures.dtype == np.uint8
+    assert all(picture.std() > 20 for picture in pictures)
+    assert all(len(red_pixels(picture)) > 20 for picture in pictures)
+    assert not np.array_equal(*pictures)
+
+
+def test_the_cube_is_seen_where_it_is(drawn):
+    drawn.reset(seed=3)
+    camera = Cameras(drawn.simulation, (1.2, 0.0, 0.5), (0.0, 0.0, 0.02))
+    columns = []
+    for y in (-0.2, 0.2):
+        drawn.simulation.worlds[0].set_pose("cube", (0.3, y, 0.02))
+        columns.append(red_pixels(camera.take()[0])[:, 1].mean())
+    assert columns[0] < 200  # left of the middle, as seen from +x
+    assert columns[1] > 312
+
+
+def test_another_camera_adds_no_light(drawn):
+    drawn.reset(seed=3)
+    first = drawn.render()
+    for _ in range(4):
+        Cameras(drawn.simulation, (0.0, 0.0, 2.0), (0.0, 0.0, 0.0)).take()
+    np.testing.assert_array_equal(drawn.render(), first)
+
+
+def test_a_rebuilt_world_is_drawn_alike(drawn):
+    drawn.reset(seed=3)
+    first = drawn.render()
+    drawn.reset(seed=3, options={"reconfigure": True})
+    np.testing.assert_array_equal(drawn.render(), first)
+
+
+def test_what_others_set_for_their_cameras_does_not_matter(drawn):
+    """Native ManiSkill, for one, chooses other shaders and formats for the whole process."""
+    drawn.reset(seed=3, options={"reconfigure": True})
+    first = drawn.render()
+    sapien.render.set_camera_shader_dir("minimal")
+    sapien.render.set_picture_format("Color", "r8g8b8a8unorm")
+    drawn.reset(seed=3, options={"reconfigure": True})
+    np.testing.assert_array_equal(drawn.render(), first)
+
+
+def test_physics_is_the_same_with_and_without_pictures(drawn):
+    plain = tasks.make(TASK, num_envs=2)
+    actions = np.random.default_rng(0).uniform(-1, 1, (30, 2, 16)).astype(np.float32)
+    for task in (drawn, plain):
+        task.reset(seed=5, options={"reconfigure": True})
+    for i, action in enumerate(actions):
+        ours, theirs = drawn.step(action), plain.step(action)
+        assert torch.equal(ours[0], theirs[0]), f"step {i}"
+        if i % 10 == 0:
+            drawn.render()
+    for group, entries in plain.get_state_dict().items():
+        for name, row in entries.items():
+            assert torch.equal(row, drawn.get_state_dict()[group][name]), name
+
+
+def test_worlds_without_visuals_are_refused():
+    plain = tasks.make(TASK)
+    with pytest.raises(SimulationError, match="visuals=True"):
+        Cameras(plain.simulation, (1.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+    with pytest.raises(TaskError, match="render_mode='rgb_array'"):
+        plain.render()
+
+
+@pytest.mark.parametrize(
+    ("eye", "target"),
+    [((1.4, 0.8, 0.75), (0.0, 0.1, 0.1)), ((0.0, 0.0, 2.0), (0.0, 0.0, 0.0))],
+    ids=["aside", "from above"],
+)
+def test_a_camera_looks_at_its_target(eye, target):
+    matrix = look_at(eye, target).to_transformation_matrix()
+    towards = np.subtract(target, eye) / np.linalg.norm(np.subtract(target, eye))
+    np.testing.assert_allclose(matrix[:3, 0], towards, atol=1e-6)
+    np.testing.assert_allclose(matrix[:3, 3], eye, atol=1e-6)
+    assert np.linalg.det(matrix[:3, :3]) == pytest.approx(1, abs=1e-5)
+    assert abs(matrix[2, 1]) < 1e-6  # the picture's horizon is level
+
+
+def test_a_camera_cannot_look_at_itself():
+    with pytest.raises(SimulationError, match="cannot look at the point where it is"):
+        look_at((1.0, 0.0, 1.0), (1.0, 0.0, 1.0))
+
+
+def run_without_driver(code: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, **NO_DRIVER},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+
+
+def test_every_task_runs_without_a_driver():
+    done = run_without_driver(
+        "import tasks, torch\n"
+        "for name in tasks.list_tasks():\n"
+        "    task = tasks.make(name)\n"
+        "    task.reset(seed=0, options={'reconfigure': True})\n"
+        "    for _ in range(3):\n"
+        "        obs, *_ = task.step(torch.zeros(1, task.layout.action_dim))\n"
+        "    print(name, bool(obs.isfinite().all()))\n"
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines() == [f"{name} True" for name in tasks.list_tasks()]
+
+
+def test_without_a_driver_one_is_told_why_there_are_no_pictures():
+    done = run_without_driver(
+        "from simulation.rendering import vulkan_problem\n"
+        "print(vulkan_problem())\n"
+        "import tasks\n"
+        "tasks.make('PickCube-v1', render_mode='rgb_array')\n"
+    )
+    assert done.stdout.startswith("no usable Vulkan driver ("), done.stdout + done.stderr
+    assert len(done.stdout.splitlines()) == 1
+    assert "SimulationError: pictures need a Vulkan driver" in done.stderr
+
+
+def test_a_driver_that_does_not_answer_is_a_problem(monkeypatch):
+    def hang(*args: object, timeout: float, **options: object) -> None:
+        raise subprocess.TimeoutExpired("probe", timeout)
+
+    monkeypatch.setattr(subprocess, "run", hang)
+    assert "did not answer within 60 s" in (vulkan_problem.__wrapped__() or "")
+
+
+def test_a_driver_that_ends_the_process_is_a_problem(monkeypatch):
+    done = subprocess.CompletedProcess("probe", -6, stdout="", stderr="")
+    monkeypatch.setattr(subprocess, "run", lambda *args, **options: done)
+    assert "ended with code -6" in (vulkan_problem.__wrapped__() or "")
