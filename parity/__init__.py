@@ -1,0 +1,4 @@
+"""Proof against native ManiSkill: both in one process, in lock-step, compared exactly.
+
+The only room that imports mani_skill, and only when a native environment is made.
+"""

@@ -162,9 +162,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         bar = progress.add_task("timing", total=len(task_ids) * (args.blocks + 1))
         for task_id in task_ids:
             progress.update(bar, description=f"timing {task_id}")
-            results.append(
-                measure(task_id, args.blocks, args.batch, lambda: progress.advance(bar))
-            )
+            results.append(measure(task_id, args.blocks, args.batch, lambda: progress.advance(bar)))
     Console(width=120).print(table(results))
     if args.json:
         args.json.write_text(json.dumps([asdict(r) for r in results], indent=1))

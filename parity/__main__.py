@@ -1,0 +1,32 @@
+"""``python -m parity COMMAND``: the comparisons with native ManiSkill."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from robots import unknown_name_message
+
+# Command -> the module whose ``main(argv)`` runs it, and what it does.
+COMMANDS = {
+    "compare": ("parity.compare", "step tasks beside native and compare every bit"),
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command; returns its exit code, 2 if there is no such command."""
+    command, *rest = list(sys.argv[1:] if argv is None else argv) or ["--help"]
+    if command in ("-h", "--help"):
+        print(f"usage: python -m parity {{{','.join(COMMANDS)}}} ...\n")
+        for name, (_, description) in COMMANDS.items():
+            print(f"  {name:<10} {description}")
+        return 0
+    if command not in COMMANDS:
+        print(f"error: {unknown_name_message('command', command, COMMANDS)}", file=sys.stderr)
+        return 2
+    return import_module(COMMANDS[command][0]).main(rest)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,146 @@
+"""``python -m parity compare``: play tasks beside native ManiSkill and compare every bit."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from itertools import product
+from pathlib import Path
+
+import torch
+from rich.console import Console
+
+import tasks
+from parity.comparison import HISTORIES
+from parity.episodes import Episode, find_demonstrations, load_episodes, random_episodes
+from parity.progress import LiveLine
+from parity.report import document, sentences, table
+from parity.runs import Run, play
+from robots import RobotLayoutsError, TaskError, closest_match
+from tasks import MultiRobotTask
+
+TABLE_WIDTH = 150  # columns that a table may take; a narrower terminal wraps it
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the command's argument parser."""
+    arguments = argparse.ArgumentParser(
+        prog="python -m parity compare",
+        description="Step tasks beside the native ManiSkill environments that they clone, with the"
+        " same seeds and actions, and compare observations, states, rewards and info exactly.",
+        epilog="Exit code: 0 if every difference is exactly zero, 1 if not, 2 for bad usage.",
+    )
+    add = arguments.add_argument
+    which = arguments.add_mutually_exclusive_group(required=True)
+    which.add_argument("--task", action="append", metavar="TASK", help="task id; may be repeated")
+    which.add_argument("--all", action="store_true", help="every task")
+    add("--seeds", type=int, default=10, metavar="N", help="reset seeds 0 … N-1 (10)")
+    add("--steps", type=int, default=100, metavar="N", help="steps of a random episode (100)")
+    add("--actions", type=Path, metavar="FILE", help="play this .h5 or .npz file instead")
+    add("--demos", type=Path, metavar="DIR", help="play the demonstrations below DIR as well")
+    add(
+        "--history",
+        nargs="+",
+        choices=HISTORIES,
+        default=["fresh"],
+        help="fresh rebuilds both scenes before every episode, reused only resets them (fresh)",
+    )
+    add("--reward-mode", nargs="+", metavar="MODE", help="reward modes, or 'all' (the default one)")
+    add("--num-envs", type=int, default=1, metavar="N", help="environments that play at once (1)")
+    add("--json", type=Path, metavar="FILE", help="write the results to FILE")
+    return arguments
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Returns:
+        0 if everything is equal, 1 if not, 2 if it could not be compared.
+    """
+    args = parser().parse_args(argv)
+    try:
+        return _compare(args)
+    except RobotLayoutsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+
+
+def _compare(args: argparse.Namespace) -> int:
+    _check(args)
+    torch.set_num_threads(1)  # the tensors are small
+    runs = plan(args)
+    with LiveLine(sum(run.steps for run in runs)) as line:
+        results = play(
+            runs, lambda run, count: line.advance(count, f"{run.task} {run.source} {run.history}")
+        )
+    console = Console()
+    console.width = max(console.width, TABLE_WIDTH)
+    console.print(table(results))
+    for sentence in sentences(results):
+        console.print(sentence, markup=False, highlight=False, soft_wrap=True)
+    if args.json:
+        _write(args.json, json.dumps(document(results), indent=1) + "\n")
+    return 0 if all(result.equal for result in results) else 1
+
+
+def plan(args: argparse.Namespace) -> list[Run]:
+    """Return the runs that the arguments ask for, with every file read and every name checked."""
+    classes = [tasks.get_task_class(name) for name in args.task or tasks.list_tasks()]
+    demonstrations = find_demonstrations(args.demos) if args.demos else {}
+    runs: list[Run] = []
+    for cls in classes:
+        modes = _reward_modes(cls, args.reward_mode)
+        for source, episodes in _sources(cls, args, demonstrations.get(cls.task_id, [])):
+            for history, mode in product(args.history, modes):
+                runs.append(Run(cls.task_id, source, tuple(episodes), history, mode, args.num_envs))
+    return runs
+
+
+def _sources(
+    cls: type[MultiRobotTask], args: argparse.Namespace, demonstrations: Sequence[Path]
+) -> list[tuple[str, list[Episode]]]:
+    width = cls.layout.action_dim
+    if args.actions:
+        return [(args.actions.name, load_episodes(args.actions, cls.task_id, width))]
+    random = ("random", random_episodes(range(args.seeds), args.steps, width))
+    recorded = [
+        (f"{path.parent.name}/{path.name.split('.')[0]}", load_episodes(path, cls.task_id, width))
+        for path in demonstrations
+    ]
+    return [random, *recorded]
+
+
+def _reward_modes(cls: type[MultiRobotTask], asked: Sequence[str] | None) -> tuple[str, ...]:
+    if asked is None:
+        return cls.reward_modes[:1]
+    if "all" in asked:
+        return cls.reward_modes
+    for mode in asked:
+        if mode not in cls.reward_modes:
+            match = closest_match(mode, cls.reward_modes)
+            raise TaskError(
+                f"{cls.task_id} has no reward mode {mode!r}."
+                + (f" Did you mean {match!r}?" if match else "")
+                + f" Choices: {', '.join(cls.reward_modes)}, all."
+            )
+    return tuple(dict.fromkeys(asked))
+
+
+def _check(args: argparse.Namespace) -> None:
+    for name in ("seeds", "steps", "num_envs"):
+        if getattr(args, name) < 1:
+            option = name.replace("_", "-")
+            raise TaskError(f"--{option} is {getattr(args, name)}; it must be 1 or more")
+    if args.actions and (args.all or len(args.task) > 1 or args.demos):
+        raise TaskError("--actions holds the episodes of one task: give one --task, no --demos")
+    if args.json and not args.json.absolute().parent.is_dir():
+        raise TaskError(f"--json {args.json}: there is no folder {args.json.absolute().parent}")
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text)
+    except OSError as error:
+        raise RobotLayoutsError(f"cannot write {path}: {error.strerror}") from error

@@ -1,0 +1,129 @@
+"""Makes the native ManiSkill environment that a task clones, and speaks its action format."""
+
+from __future__ import annotations
+
+import logging
+import warnings
+from collections.abc import Generator
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots import MissingPackageError, SimulationError, TaskError, closest_match
+
+INSTALL = "pip install 'robot-layouts[parity]'"
+
+_LOGGER = "mani_skill "  # spelled like this by mani_skill itself
+_VULKAN_WORDS = ("vk::", "vulkan", "rendering device")
+
+
+def make_native(task_id: str, reward_mode: str | None = None) -> Any:
+    """Make the native environment of a task: one environment, state observations, CPU physics.
+
+    Args:
+        task_id: ManiSkill's id, for example ``"PickCube-v1"``.
+        reward_mode: One of the task's reward modes; None takes native's default.
+
+    Raises:
+        MissingPackageError: If mani_skill, or a package that it needs, is not installed.
+        SimulationError: If there is no Vulkan driver, without which native builds no scene.
+        TaskError: If mani_skill has no such task or the task no such reward mode.
+    """
+    with _quiet():
+        gym = _import_native()
+        _expect_task(task_id, reward_mode)
+        chosen = {} if reward_mode is None else {"reward_mode": reward_mode}
+        try:
+            return gym.make(
+                task_id,
+                obs_mode="state",
+                control_mode="pd_joint_delta_pos",
+                sim_backend="physx_cpu",
+                render_backend="cpu",
+                **chosen,
+            ).unwrapped
+        except RuntimeError as error:
+            if not any(word in str(error).lower() for word in _VULKAN_WORDS):
+                raise
+            raise SimulationError(
+                f"native ManiSkill builds no scene without a Vulkan driver, and none works here"
+                f" ({error}). A software driver serves: Mesa's lavapipe 24.3 or newer (on Debian,"
+                " mesa-vulkan-drivers)"
+            ) from error
+
+
+def native_agents(env: Any) -> list[Any]:
+    """Return the robots of a native environment, in native's order."""
+    return list(getattr(env.agent, "agents", None) or [env.agent])
+
+
+def native_action_dim(env: Any) -> int:
+    """Return how many numbers the flat action of all robots has."""
+    return sum(agent.single_action_space.shape[0] for agent in native_agents(env))
+
+
+def native_action(env: Any, flat: NDArray[np.float32]) -> Any:
+    """Return a flat action, shape (A,), as native takes it: by robot if there are several.
+
+    Raises:
+        TaskError: If it has not as many numbers as the robots take.
+    """
+    if flat.shape != (native_action_dim(env),):
+        raise TaskError(
+            f"the action has shape {flat.shape}; native takes {native_action_dim(env)} numbers"
+        )
+    if not hasattr(env.agent, "agents"):
+        return flat
+    by_robot: dict[str, NDArray[np.float32]] = {}
+    start = 0
+    for number, agent in enumerate(native_agents(env)):
+        stop = start + agent.single_action_space.shape[0]
+        by_robot[f"{agent.uid}-{number}"] = flat[start:stop]
+        start = stop
+    return by_robot
+
+
+def _import_native() -> Any:
+    try:
+        import gymnasium
+
+        import_module("mani_skill.envs")  # registers native's tasks
+    except ImportError as error:
+        package = (error.name or "mani_skill").partition(".")[0]
+        raise MissingPackageError(
+            f"comparing with native ManiSkill needs {package}, which cannot be imported"
+            f" ({error}); install it with: {INSTALL}"
+        ) from error
+    return gymnasium
+
+
+def _expect_task(task_id: str, reward_mode: str | None) -> None:
+    from mani_skill.utils.registration import REGISTERED_ENVS
+
+    if task_id not in REGISTERED_ENVS:
+        match = closest_match(task_id, REGISTERED_ENVS)
+        raise TaskError(
+            f"native ManiSkill has no task {task_id!r}, so there is nothing to compare it with."
+            + (f" Its closest is {match!r}." if match else "")
+        )
+    modes = REGISTERED_ENVS[task_id].cls.SUPPORTED_REWARD_MODES
+    if reward_mode not in (None, *modes):
+        raise TaskError(
+            f"native's {task_id} has no reward mode {reward_mode!r}; it has {', '.join(modes)}"
+        )
+
+
+@contextmanager
+def _quiet() -> Generator[None]:
+    """Hold back what mani_skill says while it is imported and builds."""
+    logger = logging.getLogger(_LOGGER)
+    before, logger.disabled = logger.disabled, True
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logger.disabled = before

@@ -1,0 +1,79 @@
+"""Each environment of a batch is a native environment with its own seed."""
+
+import numpy as np
+import pytest
+
+from parity.comparison import HISTORIES
+from parity.episodes import Episode, random_episodes
+from parity.snapshot import differing, select
+from tests.motions import touching_episode
+from tests.native import NATIVE, TASKS, Pair, complaints, pair
+
+pytestmark = NATIVE
+
+NUM_ENVS = 8
+
+
+def step_and_compare(both: Pair, rng: np.random.Generator, steps: int) -> None:
+    for _ in range(steps):
+        actions = rng.uniform(-1.5, 1.5, (NUM_ENVS, both.ours.action_dim)).astype(np.float32)
+        native, ours = (side.step(actions) for side in both)
+        assert differing(native, ours) == []
+
+
+@pytest.mark.parametrize("history", HISTORIES)
+@pytest.mark.parametrize("task_id", TASKS)
+def test_random_and_scripted_episodes_side_by_side(task_id, history):
+    both = pair(task_id, num_envs=NUM_ENVS)
+    scripted = [Episode(i, touching_episode(task_id, i).actions[:60]) for i in (0, 1)]
+    random = random_episodes(range(2, 2 * NUM_ENVS), 25, both.ours.action_dim)
+    results = both.play([*scripted[:1], *random, *scripted[1:]], history)
+    assert len(results) == 2 * NUM_ENVS
+    assert complaints(results) == []
+
+
+@pytest.mark.parametrize("task_id", TASKS)
+def test_one_seed_counts_up(task_id):
+    both = pair(task_id, num_envs=NUM_ENVS)
+    both.forget()
+    native = both.native.reset(range(70, 70 + NUM_ENVS), range(NUM_ENVS), rebuild=False)
+    obs, _ = both.ours.env.reset(seed=70)
+    np.testing.assert_array_equal(obs.numpy(), native["observation", "observation"])
+
+
+@pytest.mark.parametrize("task_id", TASKS)
+def test_partial_resets_midway(task_id):
+    both = pair(task_id, num_envs=NUM_ENVS)
+    both.forget()
+    rng = np.random.default_rng(0)
+    step_and_compare(both, rng, 15)
+    for env_ids, rebuild in (((1, 4, 5), False), ((0, 4), True), ((6,), False)):
+        before = both.ours.env.get_state_dict()
+        seeds = [100 + 10 * i for i in env_ids]
+        native, ours = (side.reset(seeds, env_ids, rebuild=rebuild) for side in both)
+        assert differing(native, ours) == []
+        expect_untouched(both, before, [i for i in range(NUM_ENVS) if i not in env_ids])
+        step_and_compare(both, rng, 10)
+
+
+def expect_untouched(both: Pair, before: dict, env_ids: list[int]) -> None:
+    after = both.ours.env.get_state_dict()
+    for group, entries in before.items():
+        for name, rows in entries.items():
+            np.testing.assert_array_equal(after[group][name][env_ids], rows[env_ids])
+
+
+@pytest.mark.parametrize("task_id", TASKS)
+def test_last_batch_may_be_smaller(task_id):
+    both = pair(task_id, num_envs=NUM_ENVS)
+    episodes = random_episodes(range(NUM_ENVS + 2), 5, both.ours.action_dim)
+    assert complaints(both.play(episodes)) == []
+
+
+def test_rows_belong_to_their_own_environment():
+    """A batch whose rows were shuffled is noticed."""
+    both = pair("PickCube-v1", num_envs=NUM_ENVS)
+    both.forget()
+    both_rows = [side.reset(range(NUM_ENVS), range(NUM_ENVS), rebuild=False) for side in both]
+    shuffled = select(both_rows[1], [1, 0, *range(2, NUM_ENVS)])
+    assert ("observation", "observation") in differing(both_rows[0], shuffled)

@@ -1,0 +1,70 @@
+"""Episodes of every task are native's to the last bit: random actions, and scripted contact."""
+
+import pytest
+
+import tasks
+from parity.comparison import HISTORIES
+from parity.episodes import random_episodes
+from tests.motions import MOTIONS, touching_episode
+from tests.native import NATIVE, TASKS, complaints, pair
+
+pytestmark = NATIVE
+
+SEEDS = (0, 1, 2)
+
+
+def other_modes():
+    """Every task with each of its reward modes but the first, which other tests use."""
+    return [(t, mode) for t in TASKS for mode in tasks.get_task_class(t).reward_modes[1:]]
+
+
+@pytest.mark.parametrize("history", HISTORIES)
+@pytest.mark.parametrize("task_id", TASKS)
+def test_random_and_over_range_actions(task_id, history):
+    both = pair(task_id)
+    episodes = random_episodes(SEEDS, 60, both.ours.action_dim)
+    assert abs(episodes[0].actions).max() > 2, "no action beyond the range"
+    assert complaints(both.play(episodes, history)) == []
+
+
+@pytest.mark.parametrize(("task_id", "mode"), other_modes())
+def test_reward_modes(task_id, mode):
+    both = pair(task_id, mode)
+    episodes = [touching_episode(task_id, 0), *random_episodes([1], 30, both.ours.action_dim)]
+    assert complaints(both.play(episodes, "reused")) == []
+
+
+def test_reward_modes_are_natives():
+    for task_id in TASKS:
+        modes = pair(task_id).native.envs[0].SUPPORTED_REWARD_MODES
+        assert tasks.get_task_class(task_id).reward_modes == modes
+
+
+@pytest.mark.parametrize("history", HISTORIES)
+@pytest.mark.parametrize("task_id", TASKS)
+def test_scripted_contact(task_id, history):
+    results = pair(task_id).play([touching_episode(task_id, seed) for seed in SEEDS], history)
+    assert complaints(results) == []
+    assert all(result.contact_steps >= 5 for result in results), "hardly anything was touched"
+
+
+def test_every_task_has_a_scripted_motion():
+    assert set(MOTIONS) == set(TASKS)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("history", HISTORIES)
+@pytest.mark.parametrize("task_id", TASKS)
+def test_twenty_long_random_episodes(task_id, history):
+    both = pair(task_id)
+    episodes = random_episodes(range(20), 200, both.ours.action_dim)
+    assert complaints(both.play(episodes, history)) == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("history", HISTORIES)
+@pytest.mark.parametrize("task_id", TASKS)
+def test_twenty_scripted_contacts(task_id, history):
+    results = pair(task_id).play([touching_episode(task_id, seed) for seed in range(20)], history)
+    assert complaints(results) == []
+    assert sum(result.contact_steps >= 5 for result in results) >= 15, "hardly anything was touched"

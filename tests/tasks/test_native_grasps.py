@@ -1,0 +1,78 @@
+"""Grasps and what PhysX remembers of them are native's at every step and every reset."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from parity.native import native_action, native_agents
+from parity.snapshot import differing
+from tests.motions import touching_episode
+from tests.native import NATIVE, TASKS, Pair, pair
+
+pytestmark = NATIVE
+
+GRASPING_TASKS = [task_id for task_id in TASKS if "PickCube" in task_id]
+
+
+def grasps(both: Pair) -> tuple[list[bool], list[bool]]:
+    """Whether each robot holds the cube: in native, in ours."""
+    env = both.native.envs[0]
+    state = both.ours.env.simulation.read()
+    return (
+        [bool(agent.is_grasping(env.cube)) for agent in native_agents(env)],
+        [bool(state.is_grasping(robot, "cube")) for robot in both.ours.env.layout],
+    )
+
+
+def play(both: Pair, task_id: str, seed: int, *, rebuild: bool) -> Iterator[list[bool]]:
+    """Play a scripted episode, expect equal grasps at every step, and yield them."""
+    episode = touching_episode(task_id, seed)
+    for side in both:
+        side.reset([seed], [0], rebuild=rebuild)
+    native, ours = grasps(both)
+    assert ours == native, "after the reset"
+    yield native
+    for step, action in enumerate(episode.actions):
+        both.native.envs[0].step(native_action(both.native.envs[0], action))
+        both.ours.env.step(action)
+        native, ours = grasps(both)
+        assert ours == native, f"after step {step}"
+        yield native
+
+
+@pytest.mark.parametrize("rebuild", [True, False], ids=["fresh", "reused"])
+@pytest.mark.parametrize("task_id", GRASPING_TASKS)
+def test_grasps_at_every_step(task_id, rebuild):
+    both = pair(task_id)
+    both.forget()
+    for seed in (0, 1, 2):
+        held = np.array(list(play(both, task_id, seed, rebuild=rebuild)))
+        assert (held.sum(axis=0) >= 10).all(), "a robot grasped for less than ten steps"
+
+
+@pytest.mark.parametrize("task_id", GRASPING_TASKS)
+def test_stale_contacts_at_a_reset(task_id):
+    """Contacts outlive a reset until the next step, so a cube may count as held in no hand."""
+    both = pair(task_id)
+    both.forget()
+    stale = False
+    for seed in (0, 1, 2):
+        held = list(play(both, task_id, seed, rebuild=False))
+        stale |= any(held[0])
+        assert any(held[-1]), "the episode should end with the cube in a hand"
+    assert stale, "no grasp outlived a reset, so nothing was tested"
+
+
+@pytest.mark.parametrize("task_id", TASKS)
+def test_reset_after_contact(task_id):
+    """Everything that a reset returns is equal right after contact, evaluation included."""
+    both = pair(task_id)
+    both.forget()
+    for seed in (0, 1, 2):
+        episode = touching_episode(task_id, seed)
+        for action in episode.actions:
+            for side in both:
+                side.step(action[None])
+        native, ours = (side.reset([seed], [0], rebuild=False) for side in both)
+        assert differing(native, ours) == []
