@@ -51,18 +51,19 @@ class ReadoutIndex:
         place = {entity: i for i, entity in enumerate(world.scene.entities)}
         self.entities = self.frames = len(place)
         self.dof = 0
-        self.bodies = Places[int]("body of this world")
-        self.links = Places[Places[int]](_ROBOT)
-        self.tcps = Places[int](_ROBOT)
-        self.joints = Places[slice](_ROBOT)
-        self.arm_joints = Places["slice | list[int]"](_ROBOT)
-        self.fingers = Places["Fingers | None"](_ROBOT)
+        self.bodies: Places[int] = Places("body of this world")
+        self.links: Places[Places[int]] = Places(_ROBOT)
+        self.tcps: Places[int] = Places(_ROBOT)
+        self.joints: Places[slice] = Places(_ROBOT)
+        self.arm_joints: Places[slice | list[int]] = Places(_ROBOT)
+        self.fingers: Places[Fingers | None] = Places(_ROBOT)
         self.mean_frames: list[tuple[int, int, list[int]]] = []
         self.pairs = FramePairs()
         self.bodies.update({name: place[body.entity] for name, body in world.bodies.items()})
         for name, robot in world.robots.items():
             descriptor = robot.descriptor
-            links = self.links[name] = Places[int](f"link of {name}")
+            links: Places[int] = Places(f"link of {name}")
+            self.links[name] = links
             links.update({link: place[part.entity] for link, part in robot.links.items()})
             driven = zip(descriptor.joints, robot.active_index, strict=True)
             self.arm_joints[name] = _as_slice(

@@ -11,7 +11,7 @@ from parity.comparison import EpisodeResult, compare
 from parity.episodes import Episode, random_episodes
 from parity.sides import NativeSide, OurSide
 from robots import RobotDescriptor, RobotRegistry
-from simulation import World
+from simulation import State, World
 from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, against_native, complaints, pair
 
@@ -120,7 +120,10 @@ def _forgets_to_stop(world: World) -> None:
 
 
 def test_a_threshold(monkeypatch):
-    monkeypatch.setattr("tasks.pick_cube.STATIC_SPEED", 0.25)
+    is_static = State.is_static
+    monkeypatch.setattr(
+        State, "is_static", lambda s, robot, speed: is_static(s, robot, 1.25 * speed)
+    )
     both = against_native("PickCube-v1", tasks.make("PickCube-v1"))
     results = both.play([touching_episode("PickCube-v1", seed) for seed in range(3)])
     found = [result for result in results if not result.equal]
