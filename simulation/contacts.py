@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from robots import Fingers
+from simulation.rotations import rotation_matrix
 from simulation.world import World
 
 
@@ -62,19 +63,10 @@ def grasped(fingers: Fingers, forces: Tensor, poses: Sequence[Tensor]) -> Tensor
     held = torch.ones(len(forces), dtype=torch.bool)
     for i, (pose, sign) in enumerate(zip(poses, fingers.opening_signs, strict=True)):
         force = forces[:, i]
-        angle = torch.rad2deg(_angle_between(sign * _y_axis(pose[:, 3:]), force))
+        angle = torch.rad2deg(_angle_between(sign * rotation_matrix(pose[:, 3:])[:, :, 1], force))
         strong = torch.linalg.vector_norm(force, dim=1) >= fingers.min_force
         held &= strong & (angle <= fingers.max_angle)
     return held
-
-
-def _y_axis(quaternion: Tensor) -> Tensor:
-    """Second column of the rotation matrix of wxyz quaternions (N, 4), shape (N, 3)."""
-    w, x, y, z = quaternion.unbind(-1)
-    scale = 2.0 / (quaternion * quaternion).sum(-1)
-    return torch.stack(
-        (scale * (x * y - z * w), 1 - scale * (x * x + z * z), scale * (y * z + x * w)), -1
-    )
 
 
 def _angle_between(a: Tensor, b: Tensor) -> Tensor:

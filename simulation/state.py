@@ -13,6 +13,7 @@ from torch.linalg import vector_norm
 
 from robots import SimulationError
 from simulation.contacts import grasped, pairwise_forces
+from simulation.rotations import last_euler_angle, rotation_matrix
 
 if TYPE_CHECKING:
     from simulation.simulation import Simulation
@@ -105,6 +106,16 @@ class State:
     def quaternion(self, body: str) -> Tensor:
         """Orientation of a body, wxyz, shape (N, 4)."""
         return torch.from_numpy(self._poses[self._index.bodies[body], :, 3:])
+
+    @_remembered
+    def rotation(self, body: str) -> Tensor:
+        """Rotation matrix of a body, shape (N, 3, 3); its columns are the body's axes."""
+        return rotation_matrix(self.quaternion(body))
+
+    @_remembered
+    def last_euler_angle(self, body: str) -> Tensor:
+        """Angle about z of a body turned about its own x, then y, then z, shape (N,) (rad)."""
+        return last_euler_angle(self.rotation(body))
 
     @_remembered
     def linear_velocity(self, body: str) -> Tensor:

@@ -54,13 +54,17 @@ class EpisodeRandom:
         """Draw ``count`` numbers of mean 0 from the numpy stream (unit of ``std``)."""
         return self.numpy.normal(0, std, count)
 
-    def yaw_quaternion(self) -> Tensor:
-        """Draw a rotation about z by an angle in [0, 2π), as a wxyz quaternion (4,), w ≥ 0.
+    def yaw_quaternion(self, low: float = 0.0, high: float = 2 * np.pi) -> Tensor:
+        """Draw a rotation about z by an angle in [low, high), as a wxyz quaternion (4,), w ≥ 0.
 
         Follows the operations of native's ``random_quaternions(lock_x=True, lock_y=True)``: it
         draws three angles, uses the last, and reads the quaternion off the rotation matrix.
+
+        Args:
+            low: Smallest angle (rad).
+            high: Largest angle (rad).
         """
-        angle = self.uniform(1, 3)[0, 2] * (np.pi * 2)
+        angle = self.uniform(1, 3)[0, 2] * (high - low) + low
         cos, sin = torch.cos(angle), torch.sin(angle)
         w_squared, z_squared = 1.0 + cos + cos + 1.0, 1.0 - cos - cos + 1.0
         w, z = torch.sqrt(w_squared), torch.sqrt(z_squared)

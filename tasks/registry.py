@@ -15,8 +15,16 @@ if TYPE_CHECKING:
 
 # One line per task, sorted by id: id -> module:class, then its other names.
 CATALOGUE = {
+    "LiftPegUpright-v1": (
+        "tasks.lift_peg_upright:LiftPegUpright",
+        "maniskill.lift_peg_upright_native",
+    ),
     "PickCube-v1": ("tasks.pick_cube:PickCube", "maniskill.pick_cube_native"),
+    "PokeCube-v1": ("tasks.poke_cube:PokeCube", "maniskill.poke_cube_native"),
+    "PullCube-v1": ("tasks.pull_cube:PullCube", "maniskill.pull_cube_native"),
+    "PushCube-v1": ("tasks.push_cube:PushCube", "maniskill.push_cube_native"),
     "PushT-v1": ("tasks.push_t:PushT", "maniskill.push_t_native"),
+    "RollBall-v1": ("tasks.roll_ball:RollBall", "maniskill.roll_ball_native"),
     "TwoRobotPickCube-v1": (
         "tasks.two_robot_pick_cube:TwoRobotPickCube",
         "maniskill.two_robot_pick_cube_native",
