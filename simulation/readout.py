@@ -42,6 +42,8 @@ class ReadoutIndex:
         self.dof = 0
         self._joints: dict[str, slice] = {}
         self._arm_joints: dict[str, slice | list[int]] = {}
+        self._grippers: dict[str, tuple[list[int], np.float32]] = {}
+        self._bases: dict[str, int] = {}
         self._tcps: dict[str, int] = {}
         self._fingers = {name: robot.descriptor.fingers for name, robot in world.robots.items()}
         self.mean_frames: list[tuple[int, int, list[int]]] = []
@@ -51,6 +53,8 @@ class ReadoutIndex:
             self._arm_joints[name] = _as_slice(
                 sorted(self.dof + i for joint, i in driven if joint in descriptor.arm_joints)
             )
+            self._grippers[name] = self._gripper(name, world)
+            self._bases[name] = place[robot.articulation.links[0].entity]
             self._joints[name] = slice(self.dof, self.dof + len(robot.joints))
             self.dof += len(robot.joints)
             self._tcps[name] = self._tcp_frame(name, world)
@@ -69,6 +73,10 @@ class ReadoutIndex:
         """Return the frame of a robot's tool centre point."""
         return _look_up(_ROBOT, robot, self._tcps)
 
+    def base(self, robot: str) -> int:
+        """Return the frame of a robot's root link."""
+        return _look_up(_ROBOT, robot, self._bases)
+
     def fingers(self, robot: str) -> Fingers | None:
         """Return the links with which a robot grasps."""
         return _look_up(_ROBOT, robot, self._fingers)
@@ -80,6 +88,19 @@ class ReadoutIndex:
     def arm_joints(self, robot: str) -> slice | list[int]:
         """Return the places of a robot's joints that are not its gripper's."""
         return _look_up(_ROBOT, robot, self._arm_joints)
+
+    def gripper(self, robot: str) -> tuple[list[int], np.float32]:
+        """Return the places of a robot's gripper joints and the sum of their upper limits (m)."""
+        return _look_up(_ROBOT, robot, self._grippers)
+
+    def _gripper(self, name: str, world: World) -> tuple[list[int], np.float32]:
+        robot = world.robots[name]
+        joints = {
+            self.dof + i: joint.limits[0, 1]
+            for i, joint in enumerate(robot.joints)
+            if joint.name not in robot.descriptor.arm_joints
+        }
+        return list(joints), np.float32(sum(joints.values()))
 
     def _tcp_frame(self, name: str, world: World) -> int:
         descriptor = world.robots[name].descriptor

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -54,13 +56,17 @@ class EpisodeRandom:
         """Draw ``count`` numbers of mean 0 from the numpy stream (unit of ``std``)."""
         return self.numpy.normal(0, std, count)
 
-    def yaw_quaternion(self) -> Tensor:
-        """Draw a rotation about z by an angle in [0, 2π), as a wxyz quaternion (4,), w ≥ 0.
+    def yaw_quaternion(self, low: float = 0.0, high: float = 2 * np.pi) -> Tensor:
+        """Draw a rotation about z by an angle in [low, high), as a wxyz quaternion (4,), w ≥ 0.
 
         Follows the operations of native's ``random_quaternions(lock_x=True, lock_y=True)``: it
         draws three angles, uses the last, and reads the quaternion off the rotation matrix.
+
+        Args:
+            low: Smallest angle (rad).
+            high: Largest angle (rad).
         """
-        angle = self.uniform(1, 3)[0, 2] * (np.pi * 2)
+        angle = self.uniform(1, 3)[0, 2] * (high - low) + low
         cos, sin = torch.cos(angle), torch.sin(angle)
         w_squared, z_squared = 1.0 + cos + cos + 1.0, 1.0 - cos - cos + 1.0
         w, z = torch.sqrt(w_squared), torch.sqrt(z_squared)
@@ -70,3 +76,34 @@ class EpisodeRandom:
         else:
             quaternion = torch.stack((sin + sin, zero, zero, z**2)) / (2.0 * z)
         return -quaternion if quaternion[0] < 0 else quaternion
+
+    def points_apart(
+        self, count: int, low: Sequence[float], high: Sequence[float], distance: Tensor
+    ) -> Tensor:
+        """Draw points in a rectangle, each drawn again until it is far enough from those before.
+
+        Follows native's ``UniformPlacementSampler`` with 100 trials: a point that never finds
+        room is the origin.
+
+        Args:
+            count: Number of points.
+            low: Smallest coordinates, shape (2,) (m).
+            high: Largest coordinates, shape (2,) (m).
+            distance: How far two points must be apart, shape () (m).
+
+        Returns:
+            Shape (count, 2) (m).
+        """
+        start = torch.tensor(low)
+        size = torch.tensor(high) - start
+        points = torch.zeros(count, 2)
+        for i in range(count):
+            for _ in range(_TRIALS):
+                point = self.uniform(1, 2) * size + start
+                if (torch.linalg.vector_norm(point - points[:i], dim=-1) > distance).all():
+                    points[i] = point[0]
+                    break
+        return points
+
+
+_TRIALS = 100  # mani_skill 3.0.1, envs/utils/randomization/samplers.py, as its tasks call it

@@ -16,10 +16,18 @@ if TYPE_CHECKING:
 # One line per task, sorted by id: id -> module:class, then its other names.
 CATALOGUE = {
     "PickCube-v1": ("tasks.pick_cube:PickCube", "maniskill.pick_cube_native"),
+    "PlaceSphere-v1": ("tasks.place_sphere:PlaceSphere", "maniskill.place_sphere_native"),
+    "PullCubeTool-v1": ("tasks.pull_cube_tool:PullCubeTool", "maniskill.pull_cube_tool_native"),
     "PushT-v1": ("tasks.push_t:PushT", "maniskill.push_t_native"),
+    "StackCube-v1": ("tasks.stack_cube:StackCube", "maniskill.stack_cube_native"),
+    "StackPyramid-v1": ("tasks.stack_pyramid:StackPyramid", "maniskill.stack_pyramid_native"),
     "TwoRobotPickCube-v1": (
         "tasks.two_robot_pick_cube:TwoRobotPickCube",
         "maniskill.two_robot_pick_cube_native",
+    ),
+    "TwoRobotStackCube-v1": (
+        "tasks.two_robot_stack_cube:TwoRobotStackCube",
+        "maniskill.two_robot_stack_cube_native",
     ),
 }
 
