@@ -41,6 +41,8 @@ class ReadoutIndex:
         joints: Places of each robot's joints, in layout order.
         arm_joints: Places of each robot's joints that are not its gripper's.
         fingers: Each robot's grasping links.
+        grippers: Places of each robot's gripper joints, and the sum of their upper limits (m).
+        bases: Frame of each robot's root link.
         mean_frames: For each frame that lies between links: itself, the frame that orients it,
             and the frames whose mean is its origin.
         pairs: Pairs of frames whose distance was asked for.
@@ -57,6 +59,8 @@ class ReadoutIndex:
         self.joints: Places[slice] = Places(_ROBOT)
         self.arm_joints: Places[slice | list[int]] = Places(_ROBOT)
         self.fingers: Places[Fingers | None] = Places(_ROBOT)
+        self.grippers: Places[tuple[list[int], np.float32]] = Places(_ROBOT)
+        self.bases: Places[int] = Places(_ROBOT)
         self.mean_frames: list[tuple[int, int, list[int]]] = []
         self.pairs = FramePairs()
         self.bodies.update({name: place[body.entity] for name, body in world.bodies.items()})
@@ -69,10 +73,21 @@ class ReadoutIndex:
             self.arm_joints[name] = _as_slice(
                 sorted(self.dof + i for joint, i in driven if joint in descriptor.arm_joints)
             )
+            self.grippers[name] = self._gripper(name, world)
+            self.bases[name] = place[robot.articulation.links[0].entity]
             self.joints[name] = slice(self.dof, self.dof + len(robot.joints))
             self.dof += len(robot.joints)
             self.fingers[name] = descriptor.fingers
             self.tcps[name] = self._tcp_frame(name, world)
+
+    def _gripper(self, name: str, world: World) -> tuple[list[int], np.float32]:
+        robot = world.robots[name]
+        joints = {
+            self.dof + i: joint.limits[0, 1]
+            for i, joint in enumerate(robot.joints)
+            if joint.name not in robot.descriptor.arm_joints
+        }
+        return list(joints), np.float32(sum(joints.values()))
 
     def _tcp_frame(self, name: str, world: World) -> int:
         descriptor = world.robots[name].descriptor

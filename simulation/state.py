@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
@@ -34,7 +35,7 @@ def _remembered(
 
     @wraps(compute)
     def look_up(self: State, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Value:
-        key = (name, args)
+        key = (name, args, *kwargs.items())
         found = self.memo.get(key)
         if found is None:
             found = self.memo[key] = compute(self, *args, **kwargs)
@@ -127,6 +128,16 @@ class State:
         """Angular velocity of a body in the world frame, shape (N, 3) (rad/s)."""
         return self._velocity(body, "angular_velocity")
 
+    @_remembered
+    def speed(self, body: str) -> Tensor:
+        """Euclidean norm of a body's linear velocity, shape (N,) (m/s)."""
+        return vector_norm(self.linear_velocity(body), dim=1)
+
+    @_remembered
+    def spin(self, body: str) -> Tensor:
+        """Euclidean norm of a body's angular velocity, shape (N,) (rad/s)."""
+        return vector_norm(self.angular_velocity(body), dim=1)
+
     # -- robots ------------------------------------------------------------------------------
 
     def qpos(self, robot: str) -> Tensor:
@@ -148,6 +159,10 @@ class State:
     def link_position(self, robot: str, link: str) -> Tensor:
         """Position of a link, shape (N, 3) (m)."""
         return torch.from_numpy(self._poses[self._index.links[robot][link], :, :3])
+
+    def base_position(self, robot: str) -> Tensor:
+        """Position of a robot's root link, shape (N, 3) (m)."""
+        return torch.from_numpy(self._poses[self._index.bases[robot], :, :3])
 
     def tcp_pose(self, robot: str) -> Tensor:
         """Pose of a robot's tool centre point, shape (N, 7)."""
@@ -178,6 +193,14 @@ class State:
         return self._distance(second, first)
 
     @_remembered
+    def gripper_opening(self, robot: str) -> Tensor:
+        """How far a robot's gripper is open, shape (N,): 0 closed, 1 wide open, 1 without one."""
+        joints, widest = self._index.grippers[robot]
+        if not joints:
+            return torch.ones(self.num_envs)
+        return torch.from_numpy(np.add.reduce(self.joint_positions[:, joints], 1) / widest)
+
+    @_remembered
     def arm_speed(self, robot: str) -> Tensor:
         """Euclidean norm of the arm's joint velocities, shape (N,) (rad/s)."""
         return vector_norm(self.arm_qvel(robot), dim=1)
@@ -197,14 +220,23 @@ class State:
         return torch.zeros(self.num_envs, 3) if forces is None else forces[:, 0]
 
     @_remembered
-    def is_grasping(self, robot: str, body: str) -> Tensor:
-        """Whether a robot's two fingers hold a body, shape (N,) bool; see `robots.Fingers`."""
+    def is_grasping(self, robot: str, body: str, max_angle: float | None = None) -> Tensor:
+        """Whether a robot's two fingers hold a body, shape (N,) bool; see `robots.Fingers`.
+
+        Args:
+            robot: Robot name.
+            body: Body name.
+            max_angle: Largest angle between force and opening direction (degrees), if not that
+                of the robot's fingers.
+        """
         fingers = self._index.fingers[robot]
         if fingers is None:
             return torch.from_numpy(np.zeros(self.num_envs, bool))
         forces = self._contact_forces(robot, fingers.links, body)
         if forces is None:
             return torch.from_numpy(np.zeros(self.num_envs, bool))
+        if max_angle is not None:
+            fingers = replace(fingers, max_angle=max_angle)
         return grasped(fingers, forces, [self.link_pose(robot, link) for link in fingers.links])
 
     # -- distances ---------------------------------------------------------------------------

@@ -20,14 +20,22 @@ CATALOGUE = {
         "maniskill.lift_peg_upright_native",
     ),
     "PickCube-v1": ("tasks.pick_cube:PickCube", "maniskill.pick_cube_native"),
+    "PlaceSphere-v1": ("tasks.place_sphere:PlaceSphere", "maniskill.place_sphere_native"),
     "PokeCube-v1": ("tasks.poke_cube:PokeCube", "maniskill.poke_cube_native"),
     "PullCube-v1": ("tasks.pull_cube:PullCube", "maniskill.pull_cube_native"),
+    "PullCubeTool-v1": ("tasks.pull_cube_tool:PullCubeTool", "maniskill.pull_cube_tool_native"),
     "PushCube-v1": ("tasks.push_cube:PushCube", "maniskill.push_cube_native"),
     "PushT-v1": ("tasks.push_t:PushT", "maniskill.push_t_native"),
     "RollBall-v1": ("tasks.roll_ball:RollBall", "maniskill.roll_ball_native"),
+    "StackCube-v1": ("tasks.stack_cube:StackCube", "maniskill.stack_cube_native"),
+    "StackPyramid-v1": ("tasks.stack_pyramid:StackPyramid", "maniskill.stack_pyramid_native"),
     "TwoRobotPickCube-v1": (
         "tasks.two_robot_pick_cube:TwoRobotPickCube",
         "maniskill.two_robot_pick_cube_native",
+    ),
+    "TwoRobotStackCube-v1": (
+        "tasks.two_robot_stack_cube:TwoRobotStackCube",
+        "maniskill.two_robot_stack_cube_native",
     ),
 }
 

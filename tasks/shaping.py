@@ -5,8 +5,10 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from simulation import State
+
 # Tensors, because arithmetic with Python numbers costs twice as much per call.
-_ONE, _FIVE = torch.tensor(1.0), torch.tensor(5.0)
+_ONE, _FIVE, _TEN = torch.tensor([1.0, 5.0, 10.0])
 
 
 def closeness(*distances: Tensor) -> tuple[Tensor, ...]:
@@ -16,3 +18,20 @@ def closeness(*distances: Tensor) -> tuple[Tensor, ...]:
         distances: Tensors of one shape; taken together, since calls cost more than numbers.
     """
     return torch.sub(_ONE, torch.stack(distances).mul_(_FIVE).tanh_()).unbind()
+
+
+def stillness(state: State, body: str) -> Tensor:
+    """Return ``1 - tanh(10 v + w)`` of a body's speed v (m/s) and spin w (rad/s), shape (N,)."""
+    return _ONE - torch.tanh(state.speed(body) * _TEN + state.spin(body))
+
+
+def letting_go(state: State, robot: str, grasped: Tensor, released: Tensor) -> Tensor:
+    """Return how far a gripper is open while it holds something, and ``released`` afterwards.
+
+    Args:
+        state: The state.
+        robot: Whose gripper.
+        grasped: Whether it holds something, shape (N,) bool.
+        released: What having let go is worth, shape ().
+    """
+    return torch.where(grasped, state.gripper_opening(robot), released)

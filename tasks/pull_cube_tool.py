@@ -1,0 +1,137 @@
+"""PullCubeTool: pull a cube into reach with an L-shaped tool."""
+
+from __future__ import annotations
+
+from math import pi
+
+import torch
+from torch import Tensor
+
+from layouts import single
+from simulation import Box, PhysicsSettings, State, World, add_table
+from tasks.props import DARK_BLUE, RED, add_cube
+from tasks.randomness import EpisodeRandom
+from tasks.registry import register_task
+from tasks.shaping import closeness
+from tasks.task import Info, MultiRobotTask
+
+# mani_skill 3.0.1, envs/tasks/tabletop/pull_cube_tool.py (m)
+CUBE_HALF_SIZE = 0.02
+HANDLE_LENGTH = 0.2
+HOOK_LENGTH = 0.05
+WIDTH = 0.05
+HEIGHT = 0.05
+HANDLE_DENSITY = 500.0  # kg/m³; the hook keeps 1000
+ARM_REACH = 0.35  # as native's formulas take it
+CUBE_HEIGHT = 0.02 / 2 + 0.015  # of its middle above the table at a reset: it drops by 5 mm
+PULLED_DISTANCE = 0.6  # of the cube from the robot's base, seen from above
+MAX_GRASP_ANGLE = 20.0  # degrees; of the tool, for the reward
+
+
+@register_task("PullCubeTool-v1", "maniskill.pull_cube_tool_native")
+class PullCubeTool(MultiRobotTask):
+    """Grasp an L-shaped tool and pull a cube with it that is out of the arm's reach.
+
+    The tool's end lies at x and y in [-0.3, -0.1], the cube at x in [0.05, 0.25] and y in
+    [-0.25, 0.05] (m), turned by up to 30°. Success: the cube is within 0.6 m of the robot's base,
+    seen from above.
+    """
+
+    layout = single({"arm": "panda"})
+    physics = PhysicsSettings()
+    max_episode_steps = 100
+    max_reward = 5
+
+    def build(self, world: World) -> None:
+        """Add the table, the cube and the tool."""
+        add_table(world)
+        origin = (0.0, 0.0, 0.0)
+        add_cube(world, "cube", CUBE_HALF_SIZE, position=origin, color=DARK_BLUE)
+        handle = Box(
+            half_size=(HANDLE_LENGTH / 2, WIDTH / 2, HEIGHT / 2),
+            position=(HANDLE_LENGTH / 2, 0.0, 0.0),
+            density=HANDLE_DENSITY,
+            color=RED,
+        )
+        hook = Box(
+            half_size=(HOOK_LENGTH / 2, WIDTH, HEIGHT / 2),
+            position=(HANDLE_LENGTH - HOOK_LENGTH / 2, WIDTH, 0.0),
+            color=RED,
+        )
+        world.add("l_shape_tool", handle, hook)
+
+    def sample(self, world: World, rng: EpisodeRandom) -> None:
+        """Lay the tool before the robot and the cube beyond its reach."""
+        x, y = (-rng.uniform(1, 2) * 0.2 - 0.1)[0].tolist()
+        world.set_pose("l_shape_tool", (x, y, HEIGHT / 2))
+        x = ARM_REACH + rng.uniform(1) * HANDLE_LENGTH - 0.3
+        y = rng.uniform(1) * 0.3 - 0.25
+        turn = rng.yaw_quaternion(-pi / 6, pi / 6)
+        world.set_pose("cube", (x.item(), y.item(), CUBE_HEIGHT), turn)
+
+    def evaluate(self, state: State) -> dict[str, Tensor]:
+        """Success: the cube is near the robot."""
+        way = state.position("cube") - state.base_position("arm")
+        success = torch.linalg.vector_norm(way[:, :2], dim=1) < _PULLED_DISTANCE
+        distance = _distance(state.position("cube"), state.base_position("arm") + _CENTRE)
+        return {
+            "success": success,
+            "success_once": success,  # native's words for the same
+            "success_at_end": success,
+            "cube_progress": _ONE - torch.tanh(_THREE * distance),
+            "cube_distance": distance,
+            "reward": self._staged_reward(state, success) / _FIVE,
+        }
+
+    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+        """TCP, cube and tool."""
+        return {
+            "tcp_pose": state.tcp_pose("arm"),
+            "cube_pose": state.pose("cube"),
+            "tool_pose": state.pose("l_shape_tool"),
+        }
+
+    def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+        """Reach and grasp the tool (4), place it behind the cube, pull; 5 more on success.
+
+        While the tool is grasped its place is worth up to 1.5, and the way that a well-placed tool
+        has pulled the cube up to 3. A cube that was pushed away costs 2.
+        """
+        return self._staged_reward(state, info["success"])
+
+    def _staged_reward(self, state: State, success: Tensor) -> Tensor:
+        key = "PullCubeTool reward"  # native tells it in `evaluate`, too
+        if key not in state.memo:
+            state.memo[key] = _staged_reward(state, success)
+        return state.memo[key]
+
+
+def _staged_reward(state: State, success: Tensor) -> Tensor:
+    cube, tool = state.position("cube"), state.position("l_shape_tool")
+    target = state.base_position("arm") + _TARGET
+    (reach,) = closeness(_distance(state.tcp_position("arm"), tool + _GRASP))
+    grasped = state.is_grasping("arm", "l_shape_tool", MAX_GRASP_ANGLE).float()
+    hook_error = _distance(tool, cube + _BEHIND_CUBE)
+    placed = _ONE_AND_HALF * (_ONE - torch.tanh(_THREE * hook_error))
+    start = _distance(_CUBE_START, target)
+    progress = (start - _distance(cube, target)) / start
+    pulled = _THREE * progress * (hook_error < _NEAR)
+
+    reward = _TWO * reach + _TWO * grasped + placed * grasped + pulled * grasped
+    reward = torch.where(cube[:, 0] > _PUSHED_AWAY_X, reward - _TWO, reward)
+    return torch.where(success, reward + _FIVE, reward)
+
+
+def _distance(start: Tensor, end: Tensor) -> Tensor:
+    """Distance between points (N, 3), shape (N,) (m)."""
+    return torch.linalg.vector_norm(start - end, dim=1)
+
+
+# Tensors, because arithmetic with Python numbers costs twice as much per call.
+_ONE, _ONE_AND_HALF, _TWO, _THREE, _FIVE = torch.tensor([1.0, 1.5, 2.0, 3.0, 5.0])
+_PULLED_DISTANCE, _NEAR, _PUSHED_AWAY_X = torch.tensor([PULLED_DISTANCE, 0.05, ARM_REACH + 0.15])
+_CENTRE = torch.tensor([ARM_REACH * 0.1, 0.0, 0.0])  # from the base (m)
+_TARGET = torch.tensor([0.05, 0.0, 0.0])  # from the base (m)
+_GRASP = torch.tensor([0.02, 0.0, 0.0])  # from the tool's end (m)
+_BEHIND_CUBE = torch.tensor([-(HOOK_LENGTH + CUBE_HALF_SIZE), -0.067, 0.0])  # tool from cube (m)
+_CUBE_START = torch.tensor([ARM_REACH + 0.1, 0.0, 0.01])  # what progress counts from (m)

@@ -1,0 +1,61 @@
+"""Whether a body lies on another one and at rest, and how far it is from lying there."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from simulation import State
+
+HEIGHT_TOLERANCE = 0.005  # m
+
+
+def lies_on(state: State, top: str, bottom: str, aside: Tensor, *heights: Tensor) -> Tensor:
+    """Tell whether a body lies on another one, to within 5 mm of height.
+
+    Args:
+        state: The state.
+        top: The upper body.
+        bottom: The lower body.
+        aside: How far its origin may be from the lower one's, seen from above (m).
+        heights: How much higher its origin must be, in parts (m); float32 sums depend on the
+            order of their parts.
+
+    Returns:
+        Shape (N,), bool.
+    """
+    error = state.offset(bottom, top)[:, 2]
+    for height in heights:
+        error = error - height
+    return (state.planar_distance(bottom, top) <= aside) & (error.abs() <= _HEIGHT_TOLERANCE)
+
+
+def distance_to_top(state: State, top: str, bottom: str, *heights: Tensor) -> Tensor:
+    """Return how far a body is from its place on another one, shape (N,) (m).
+
+    Args:
+        state: The state.
+        top: The body to be put on top.
+        bottom: The body that it is to lie on.
+        heights: How much higher its origin must be, in parts (m), as for `lies_on`.
+    """
+    goal = state.position(bottom).clone()
+    for height in heights:
+        goal[:, 2] += height
+    return torch.linalg.vector_norm(goal - state.position(top), dim=1)
+
+
+def is_at_rest(state: State, body: str) -> Tensor:
+    """Tell whether a body is slower than 1 cm/s and 0.5 rad/s, shape (N,) bool."""
+    return (state.speed(body) <= _SLOW) & (state.spin(body) <= _SLOW_SPIN)
+
+
+def diagonal(side: float) -> Tensor:
+    """Diagonal of a square in float32, as torch rounds it, shape () (unit of ``side``)."""
+    return torch.linalg.vector_norm(torch.tensor([side, side]))
+
+
+# Tensors, because comparisons with Python numbers cost twice as much per call.
+_HEIGHT_TOLERANCE = torch.tensor(HEIGHT_TOLERANCE)
+# The same in StackCube, StackPyramid and PlaceSphere of mani_skill 3.0.1 (m/s, rad/s)
+_SLOW, _SLOW_SPIN = torch.tensor([1e-2, 0.5])
