@@ -1,0 +1,45 @@
+import math
+
+import pytest
+import torch
+
+from simulation.rotations import last_euler_angle, rotation_matrix
+
+
+def random_quaternions(count: int) -> torch.Tensor:
+    return torch.randn(count, 4, generator=torch.Generator().manual_seed(0))
+
+
+def about(axis: int, angle: float) -> torch.Tensor:
+    quaternion = torch.zeros(1, 4)
+    quaternion[0, 0], quaternion[0, 1 + axis] = math.cos(angle / 2), math.sin(angle / 2)
+    return rotation_matrix(quaternion)
+
+
+def test_matrices_are_rotations():
+    matrices = rotation_matrix(random_quaternions(100))
+    identity = torch.eye(3).expand(100, 3, 3)
+    torch.testing.assert_close(matrices @ matrices.mT, identity, atol=1e-6, rtol=0)
+    torch.testing.assert_close(torch.linalg.det(matrices), torch.ones(100))
+
+
+def test_a_quarter_turn_about_each_axis_carries_the_next_axis_into_the_one_after():
+    for axis in range(3):
+        turned = about(axis, math.pi / 2)[0, :, (axis + 1) % 3]
+        torch.testing.assert_close(turned, torch.eye(3)[(axis + 2) % 3], atol=1e-6, rtol=0)
+
+
+def test_the_last_euler_angle_is_that_of_the_last_turn():
+    for z in (-3.0, -0.5, 0.0, 2.0):
+        matrix = about(0, 0.7) @ about(1, -0.4) @ about(2, z)
+        assert last_euler_angle(matrix).item() == pytest.approx(z, abs=1e-6)
+
+
+def test_a_row_does_not_depend_on_the_batch_it_is_in():
+    quaternions = random_quaternions(100)
+    matrices = rotation_matrix(quaternions)
+    angles = last_euler_angle(matrices)
+    for i in range(100):
+        alone = rotation_matrix(quaternions[i : i + 1])
+        assert torch.equal(alone[0], matrices[i])
+        assert torch.equal(last_euler_angle(alone)[0], angles[i])
