@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import copy
 import pickle
+from keyword import iskeyword
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robots import ActionSplit, JointGroup
 
-NAMES = st.lists(st.from_regex(r"[a-z]{1,6}", fullmatch=True), min_size=1, max_size=5, unique=True)
+NAME = st.from_regex(r"[a-z]{1,6}", fullmatch=True).filter(lambda name: not iskeyword(name))
+NAMES = st.lists(NAME, min_size=1, max_size=5, unique=True)
 
 
 @st.composite

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -21,9 +22,16 @@ sys.addaudithook(watch)
 """
 
 
-def run(code: str) -> list[str]:
+def run(code: str, **variables: str) -> list[str]:
     command = [sys.executable, "-c", AUDIT + code]
-    done = subprocess.run(command, cwd=CHECKOUT, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command,
+        cwd=CHECKOUT,
+        env={**os.environ, **variables},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout.split()
 
@@ -43,7 +51,7 @@ def test_loading_a_robot_touches_no_robot_file():
 from robots import RobotRegistry
 for name in RobotRegistry.names():
     RobotRegistry.load(name).describe_action()
-files = ("assets_cache", "manifest.json", ".urdf", ".srdf", ".stl", ".glb", "robot_layouts")
+files = ("assets_cache", "manifest.json", ".urdf", ".srdf", ".stl", ".glb", "robot-layouts")
 print(*[path for event, path in seen if any(part in path for part in files)])
 print(*[event for event, path in seen if event.startswith("socket.")])
 print("opened", any("robots" in path for event, path in seen))
@@ -51,15 +59,13 @@ print("opened", any("robots" in path for event, path in seen))
     assert run(code) == ["opened", "True"]
 
 
-def test_locating_loads_neither_the_hub_client_nor_the_simulator():
+def test_locating_loads_neither_the_hub_client_nor_the_simulator(tmp_path: Path):
     code = f"""
-import os, tempfile
 import robots.assets
 from robots.asset_sources import InstalledManiSkill
-os.environ["ROBOT_LAYOUTS_ASSETS"] = tempfile.mkdtemp()
 robots.assets.default_sources = lambda: [InstalledManiSkill()]
 robots.RobotRegistry.load("panda").urdf.locate()
 print(*[name for name in {HEAVY!r} if name in sys.modules])
 print("ran")
 """
-    assert run(code) == ["ran"]
+    assert run(code, ROBOT_LAYOUTS_ASSETS=str(tmp_path)) == ["ran"]
