@@ -19,6 +19,7 @@ from robots.errors import (
     DescriptorError,
     LayoutError,
     MissingPackageError,
+    RecordingError,
     RobotLayoutsError,
     SimulationError,
     TaskError,
@@ -26,7 +27,7 @@ from robots.errors import (
     closest_match,
     unknown_name_message,
 )
-from robots.locator import UrdfLocator
+from robots.locator import LocalUrdf, UrdfLocator
 from robots.registry import RobotRegistry
 
 __all__ = [
@@ -41,7 +42,9 @@ __all__ = [
     "Home",
     "JointGroup",
     "LayoutError",
+    "LocalUrdf",
     "MissingPackageError",
+    "RecordingError",
     "RobotDescriptor",
     "RobotLayoutsError",
     "RobotRegistry",

@@ -58,6 +58,10 @@ class TaskError(RobotLayoutsError, ValueError):
     """A task asked for something that it does not offer (a mode, a field, a robot)."""
 
 
+class RecordingError(RobotLayoutsError, OSError):
+    """A recording that cannot be written or read."""
+
+
 class MissingPackageError(RobotLayoutsError, ImportError):
     """An optional package that the call needs is not installed; the message names the command."""
 

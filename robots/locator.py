@@ -2,21 +2,69 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
+
+from robots.errors import AssetError
 
 
 @dataclass(frozen=True)
 class UrdfLocator:
-    """A URDF inside a package of robot files listed in the asset manifest."""
+    """A URDF listed in the manifest of robot files; making one touches nothing.
+
+    Attributes:
+        package: Package of the manifest, for example ``"maniskill_panda"``.
+        file: Path of the URDF inside the package.
+    """
 
     package: str
     file: str
 
     def locate(self, *, pictures: bool = False) -> Path:
-        """Return the path of the URDF (provisional)."""
-        from importlib.util import find_spec
+        """Return the path of the URDF with every file it needs beside it, fetched and checked.
 
-        spec = find_spec("mani_skill")
-        assert spec is not None and spec.origin is not None
-        return Path(spec.origin).parent / "assets" / "robots" / "panda" / self.file
+        Args:
+            pictures: Whether the visual meshes are needed too.
+
+        Raises:
+            UnknownNameError: If the manifest has no such package or URDF.
+            AssetError: If a file could not be had from any source; names each and why.
+        """
+        from robots.assets import locate
+
+        return locate(self.package, self.file, pictures=pictures)
+
+
+@dataclass(frozen=True)
+class LocalUrdf:
+    """A URDF that the user keeps on disk; making one touches nothing.
+
+    Attributes:
+        path: Path of the URDF; ``~`` is the home directory.
+    """
+
+    path: str | os.PathLike[str]
+
+    def locate(self, *, pictures: bool = False) -> Path:
+        """Return the absolute path of the URDF after a look at the meshes it refers to.
+
+        Args:
+            pictures: Whether the visual meshes are needed too.
+
+        Raises:
+            AssetError: If the URDF or a mesh is missing, or it is no URDF.
+        """
+        from robots.urdf_xml import read_references
+
+        path = Path(self.path).expanduser().absolute()
+        try:
+            xml = path.read_bytes()
+        except OSError as error:
+            raise AssetError(f"cannot read the URDF {path}: {error.strerror}") from error
+        references = read_references(xml, path.as_posix(), exists=os.path.isfile)
+        wanted = references.collision + (references.visual if pictures else ())
+        missing = [mesh for mesh in wanted if not os.path.isfile(mesh)]
+        if missing:
+            raise AssetError(f"{path} refers to files that do not exist: {', '.join(missing)}")
+        return path

@@ -1,0 +1,136 @@
+"""`python -m robots.fetch_assets`: brings robot files to this machine, or tells what is missing."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from robots.asset_sources import AssetSource, InstalledManiSkill, LocalCopy, ManiSkillWheel
+from robots.asset_store import AssetStore, FileState, default_root
+from robots.assets import default_sources, ensure
+from robots.errors import RobotLayoutsError, UnknownNameError
+from robots.hub_source import REVISION_VARIABLE, HubSource
+from robots.locator import UrdfLocator
+from robots.manifest import AssetFile, load_manifest
+from robots.progress import size
+from robots.registry import RobotRegistry
+
+SOURCES = ("local", "hf", "mani_skill", "wheel")
+ONLINE_SOURCES = ("hf", "wheel")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Returns:
+        0 if every file is there and right, 1 if not, 2 if the command makes no sense.
+    """
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    if options.offline and options.source in ONLINE_SOURCES:
+        parser.error(f"--source {options.source} needs the network, which --offline rules out")
+    try:
+        needs = robot_files(options.robots, pictures=not options.physics_only)
+        store = AssetStore((options.dest or default_root()).expanduser().absolute())
+        if not options.check:
+            ensure(_union(needs), store, _sources(options, store), trust=options.trust_source)
+        return _report(needs, store)
+    except UnknownNameError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except RobotLayoutsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+
+
+def robot_files(robots: Sequence[str], *, pictures: bool) -> dict[str, tuple[AssetFile, ...]]:
+    """Return the files that each robot needs; robots with a URDF of the user's own need none.
+
+    Args:
+        robots: Registry names; none means all.
+        pictures: Whether they will also be drawn.
+
+    Raises:
+        UnknownNameError: If no robot has such a name.
+    """
+    needs: dict[str, tuple[AssetFile, ...]] = {}
+    for name in robots or RobotRegistry.names():
+        urdf = RobotRegistry.load(name).urdf
+        if isinstance(urdf, UrdfLocator):
+            package = load_manifest().package(urdf.package)
+            needs[name] = package.needed(urdf.file, pictures=pictures)
+        else:
+            needs[name] = ()
+    return needs
+
+
+def describe_file(file: AssetFile, store: AssetStore) -> str:
+    """Return one line: state, path, size, what it is for, where it came from."""
+    state = store.state(file)
+    use = "physics" if file.physics else "pictures"
+    source = store.record().get(str(file), {}).get("source") if state.usable else None
+    return f"{state.value}: {file} ({size(file.bytes)}, {use}{f'; {source}' if source else ''})"
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m robots.fetch_assets", description=__doc__)
+    add = parser.add_argument
+    add("robots", nargs="*", metavar="ROBOT", help="robots to fetch; all if none is named")
+    add("--check", action="store_true", help="fetch nothing, only list what is missing or wrong")
+    add("--offline", action="store_true", help="never use the network")
+    add("--source", choices=SOURCES, help="use this source alone")
+    add("--dest", type=Path, metavar="DIR", help="folder to fill, instead of the usual local copy")
+    add("--physics-only", action="store_true", help="leave out what only pictures need")
+    add(
+        "--trust-source",
+        action="store_true",
+        help="accept files that differ from the manifest, and mark them",
+    )
+    add(
+        "--revision",
+        metavar="REV",
+        help=f"branch, tag or commit of the Hub's dataset (default ${REVISION_VARIABLE} or main)",
+    )
+    return parser
+
+
+def _sources(options: argparse.Namespace, store: AssetStore) -> list[AssetSource]:
+    if options.source is None:
+        elsewhere = [LocalCopy(default_root())] if store.root != default_root() else []
+        return elsewhere + default_sources(offline=options.offline, revision=options.revision)
+    states = FileState if options.trust_source else (FileState.VERIFIED,)
+    present = [state for state in states if state is not FileState.MISSING]
+    chosen: dict[str, AssetSource] = {
+        "local": LocalCopy(default_root(), states=present),
+        "hf": HubSource(revision=options.revision),
+        "mani_skill": InstalledManiSkill(),
+        "wheel": ManiSkillWheel(),
+    }
+    return [chosen[options.source]]
+
+
+def _union(needs: dict[str, tuple[AssetFile, ...]]) -> list[AssetFile]:
+    return list(dict.fromkeys(file for files in needs.values() for file in files))
+
+
+def _report(needs: dict[str, tuple[AssetFile, ...]], store: AssetStore) -> int:
+    print(f"robot files in {store.root}")
+    for robot, files in needs.items():
+        bad = len(store.unusable(files))
+        total = f"{len(files)} files, {size(sum(file.bytes for file in files))}"
+        print(
+            f"  {robot}: " + (f"{bad} of {total} cannot be used" if bad else f"complete, {total}")
+        )
+    files = _union(needs)
+    for file in files:
+        if store.state(file) is not FileState.VERIFIED:
+            print(f"    {describe_file(file, store)}")
+    for origin in {file.origin: None for file in files}:
+        print(f"  {origin.name}: licence {origin.licence}: {origin.licence_note}")
+    return 1 if store.unusable(files) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,180 @@
+"""Downloads files from a Hugging Face dataset, in a process of its own that `hub_source` can end.
+
+The Hub's client waits without limit for some answers and blocks in name look-ups, which no thread
+can be freed from; a process can. It answers with JSON lines, and ends when its stdin does.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from typing import Any, TextIO, TypeVar
+
+_ATTEMPTS = 3
+_FIRST_WAIT = 0.3  # s, tripled after each attempt
+_DOWNLOADS_AT_ONCE = 8
+_CHUNK_SIZE = 2**16  # bytes
+_FINAL_STATUSES = {
+    401: "access refused (401): the dataset is private, gated or gone, and no token is sent",
+    403: "access refused (403): the dataset is gated or private, and no token is sent",
+    404: "not found (404)",
+}
+
+Result = TypeVar("Result")
+
+
+def main(job_json: str) -> None:
+    """Do a job and tell stdout how it goes.
+
+    Args:
+        job_json: ``dataset``, ``revision``, ``endpoint``, ``files`` and ``again`` (whether to pass
+            by the Hub's cache) as JSON.
+    """
+    channel = _Channel(os.fdopen(os.dup(1), "w", encoding="utf-8"))
+    os.dup2(2, 1)  # whatever else prints must not disturb the channel
+    job = json.loads(job_json)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    try:
+        _download_all(job, channel)
+    except Exception as error:  # the border of the process: the client may raise anything
+        channel.tell(failed=_reason(error))
+    channel.tell(done=True)
+    os._exit(0)  # downloads still running in threads are of no use any more
+
+
+class _Channel:
+    """JSON lines to the parent process, from any thread."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream, self._lock = stream, threading.Lock()
+
+    def tell(self, **message: object) -> None:
+        with self._lock:
+            print(json.dumps(message), file=self._stream, flush=True)
+
+
+class _WarningTeller(logging.Handler):
+    """Passes on what the client says about its own retries."""
+
+    def __init__(self, channel: _Channel) -> None:
+        super().__init__(logging.WARNING)
+        self._channel = channel
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._channel.tell(warning=" ".join(record.getMessage().split()))
+
+
+def _download_all(job: dict[str, Any], channel: _Channel) -> None:
+    try:
+        from huggingface_hub import HfApi, constants
+    except ImportError as error:
+        channel.tell(failed=f"{error} (pip install huggingface_hub)")
+        return
+    # Else nothing is heard of a slow download until ten megabytes are there.
+    constants.DOWNLOAD_CHUNK_SIZE = _CHUNK_SIZE
+    logger = logging.getLogger("huggingface_hub")
+    logger.handlers, logger.propagate = [_WarningTeller(channel)], False
+    revision = job["revision"]
+    if not _is_commit(revision):
+        api = HfApi(endpoint=job["endpoint"], token=False)
+        revision = _with_retries(
+            lambda: api.dataset_info(job["dataset"], revision=revision, expand=["sha"]).sha
+        )
+    with ThreadPoolExecutor(_DOWNLOADS_AT_ONCE) as pool:
+        downloads = {
+            pool.submit(_download, job, path, str(revision), channel): path for path in job["files"]
+        }
+        for download in as_completed(downloads):
+            _tell_outcome(download.result, downloads[download], channel)
+
+
+def _tell_outcome(result: Callable[[], str], path: str, channel: _Channel) -> None:
+    try:
+        channel.tell(file=path, at=result())
+    except Exception as error:  # the border of the process, as in main
+        if _status(error) == 404:
+            channel.tell(absent=path)
+            return
+        channel.tell(failed=f"{path}: {_reason(error)}")
+        channel.tell(done=True)
+        os._exit(0)
+
+
+def _download(job: dict[str, Any], path: str, revision: str, channel: _Channel) -> str:
+    from huggingface_hub import hf_hub_download
+
+    return _with_retries(
+        lambda: hf_hub_download(
+            job["dataset"],
+            path,
+            repo_type="dataset",
+            revision=revision,
+            endpoint=job["endpoint"],
+            token=False,
+            force_download=job["again"],
+            tqdm_class=_counter(channel),
+        )
+    )
+
+
+def _counter(channel: _Channel) -> type[Any]:
+    """Return a progress bar that shows nothing and passes on how many bytes arrived."""
+    from tqdm import tqdm
+
+    class Counter(tqdm):  # pyright: ignore[reportMissingTypeArgument]
+        def __init__(self, *args: Any, **settings: Any) -> None:  # noqa: ANN401
+            super().__init__(*args, **{**settings, "disable": True})
+
+        def update(self, n: float | None = 1) -> None:
+            channel.tell(bytes=int(n or 0))
+
+    return Counter
+
+
+def _with_retries(call: Callable[[], Result]) -> Result:
+    wait = _FIRST_WAIT
+    for _ in range(_ATTEMPTS - 1):
+        try:
+            return call()
+        except Exception as error:  # the client lets its HTTP library's errors through
+            if _status(error) in _FINAL_STATUSES or isinstance(error, OSError) and error.errno:
+                raise
+        time.sleep(wait)
+        wait *= 3
+    return call()
+
+
+def _status(error: BaseException | None) -> int | None:
+    while error is not None:
+        status = getattr(getattr(error, "response", None), "status_code", None)
+        if status is not None:
+            return int(status)
+        error = error.__cause__
+    return None
+
+
+def _reason(error: BaseException) -> str:
+    status = _status(error)
+    if status is not None:
+        return _FINAL_STATUSES.get(status, f"HTTP error {status}")
+    if isinstance(error, OSError) and error.errno:
+        return f"the Hub's cache cannot be written: {error.strerror}: {error.filename}"
+    if type(error).__name__ == "LocalEntryNotFoundError" and error.__cause__ is not None:
+        return _reason(error.__cause__)
+    first_line = str(error).strip().split("\n")[0]
+    return f"{type(error).__name__}: {first_line}"
+
+
+def _is_commit(revision: str) -> bool:
+    return len(revision) == 40 and set(revision) <= set("0123456789abcdef")
+
+
+def _end_with_parent() -> None:
+    sys.stdin.read()  # returns when the parent closes its end, or dies
+    os._exit(1)

@@ -1,0 +1,245 @@
+"""`python -m robots.inspect panda`: joints, action numbers, gripper, cameras, files of a robot."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+from robots.asset_sources import SourceError, find_mani_skill
+from robots.asset_store import AssetStore, FileState, default_root
+from robots.descriptor import RobotDescriptor
+from robots.errors import AssetError, RobotLayoutsError, UnknownNameError
+from robots.fetch_assets import describe_file
+from robots.locator import LocalUrdf, UrdfLocator
+from robots.manifest import AssetFile, AssetPackage, load_manifest
+from robots.progress import size
+from robots.registry import RobotRegistry
+from robots.urdf_xml import UrdfJoint, read_joints
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print reports, or the catalogue if no robot is named; fetches nothing.
+
+    Returns:
+        0, or 1 if files are unreadable, or 2 if a robot does not exist.
+    """
+    parser = argparse.ArgumentParser(prog="python -m robots.inspect", description=__doc__)
+    parser.add_argument("robots", nargs="*", metavar="ROBOT", help="robots to report on")
+    robots = parser.parse_args(arguments).robots
+    try:
+        if not robots:
+            print("\n".join(_catalogue()))
+        for name in robots:
+            print(report(RobotRegistry.load(name), AssetStore(default_root())))
+    except UnknownNameError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except RobotLayoutsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def report(robot: RobotDescriptor, store: AssetStore) -> str:
+    """Return everything there is to know about a robot, as text.
+
+    Args:
+        robot: The robot.
+        store: The local copy of robot files to look into.
+    """
+    urdf, remark = find_urdf(robot, store)
+    sections = {
+        f"{robot.name}: {robot.dof} joints, {robot.action_dim} action numbers": [
+            f"numbers from  {robot.source}",
+            f"reach         {robot.reach:g} m from the base axis",
+            f"TCP link      {robot.tcp_link}",
+            f"home          position {_row(robot.home.position)} m, quaternion wxyz"
+            f" {_row(robot.home.quaternion)}, keyframe {robot.home.keyframe!r}",
+            f"URDF          {remark}",
+        ],
+        "Joints that move": _joints(robot, urdf),
+        "Action, each number from -1 to 1": map(str, robot.describe_action()),
+        "Drives": _drives(robot),
+        "Keyframes (rad, m)": _keyframes(robot, urdf),
+        "Gripper": _gripper(robot),
+        "Cameras": _cameras(robot),
+        "Files": _files(robot, store),
+    }
+    lines: list[str] = []
+    for title, body in sections.items():
+        lines += [title, *(f"  {line}" for line in body), ""]
+    return "\n".join(lines)
+
+
+def find_urdf(robot: RobotDescriptor, store: AssetStore) -> tuple[Path | None, str]:
+    """Return where the robot's URDF can be read now, fetching nothing, and a remark on it."""
+    urdf = robot.urdf
+    if isinstance(urdf, LocalUrdf):
+        path = urdf.locate()
+        return path, str(path)
+    if not isinstance(urdf, UrdfLocator):
+        return None, f"{urdf!r}: unknown kind of locator, not read"
+    package = load_manifest().package(urdf.package)
+    file = next(
+        file for file in package.needed(urdf.file, pictures=False) if file.path == urdf.file
+    )
+    if store.state(file).usable:
+        return store.path(file), f"{store.path(file)} ({store.state(file).value})"
+    try:
+        path = find_mani_skill() / package.origin.mani_skill / urdf.file
+    except SourceError:
+        return None, f"{store.path(file)} is {store.state(file).value}; {_fetch_hint(robot)}"
+    return path, f"{path} (installed mani_skill; not in {store.root} yet: {_fetch_hint(robot)})"
+
+
+def _fetch_hint(robot: RobotDescriptor) -> str:
+    return f"`python -m robots.fetch_assets {robot.name}` fetches it"
+
+
+def _catalogue() -> Iterator[str]:
+    robots = [RobotRegistry.load(name) for name in RobotRegistry.names()]
+    rows = [("robot", "joints", "action", "reach (m)", "numbers from")]
+    rows += [(r.name, str(r.dof), str(r.action_dim), f"{r.reach:g}", r.source) for r in robots]
+    return _table(rows)
+
+
+def _joints(robot: RobotDescriptor, urdf: Path | None) -> Iterable[str]:
+    if urdf is None:
+        return ["not known without the URDF"]
+    groups = {
+        joint: name for name, group in robot.action_split.groups.items() for joint in group.joints
+    }
+    rows = [("joint", "type", "limits", "effort", "speed", "driven by")]
+    for joint in read_joints(_read(urdf), urdf.name):
+        driven = groups.get(joint.name, "nothing")
+        mimics = f" (URDF: mimics {joint.mimics})" if joint.mimics else ""
+        rows.append((joint.name, joint.type, _limits(joint), *_bounds(joint), driven + mimics))
+    return _table(rows)
+
+
+def _limits(joint: UrdfJoint) -> str:
+    if joint.lower is None or joint.upper is None:
+        return "none"
+    return f"{joint.lower:g} … {joint.upper:g} {joint.unit}"
+
+
+def _bounds(joint: UrdfJoint) -> tuple[str, str]:
+    force = "N" if joint.unit == "m" else "N·m"
+    return (
+        "none" if joint.effort is None else f"{joint.effort:g} {force}",
+        "none" if joint.velocity is None else f"{joint.velocity:g} {joint.unit}/s",
+    )
+
+
+def _drives(robot: RobotDescriptor) -> Iterator[str]:
+    rows = [("group", "joints", "stiffness", "damping", "force limit", "friction")]
+    for name, group in robot.action_split.groups.items():
+        force, per = ("N", "N/m") if group.unit == "m" else ("N·m", "N·m/rad")
+        rows.append(
+            (
+                name,
+                str(len(group.joints)) + (" on one number" if group.mimic else ""),
+                f"{group.stiffness:g} {per}",
+                f"{group.damping:g} {per.replace('/', '·s/')}",
+                f"{group.force_limit:g} {force}",
+                f"{group.friction:g}",
+            )
+        )
+    return _table(rows)
+
+
+def _keyframes(robot: RobotDescriptor, urdf: Path | None) -> Iterator[str]:
+    places = _tcp_places(robot, urdf) if urdf is not None else {}
+    for name, qpos in robot.keyframes.items():
+        place = f"; TCP at {_row(places[name])} m from the base" if name in places else ""
+        yield f"{name}: {_row(qpos)}{place}"
+
+
+def _tcp_places(robot: RobotDescriptor, urdf: Path) -> dict[str, Sequence[float]]:
+    """Return the TCP link's position at each keyframe, in the base frame (m)."""
+    from yourdfpy import URDF
+
+    model = URDF.load(str(urdf), build_scene_graph=True, load_meshes=False)
+    places: dict[str, Sequence[float]] = {}
+    for name, qpos in robot.keyframes.items():
+        # By name: yourdfpy moves a mimic joint by itself, and counts it not.
+        by_name = dict(zip(robot.joints, qpos, strict=True))
+        model.update_cfg([by_name.get(joint, 0.0) for joint in model.actuated_joint_names])
+        places[name] = model.get_transform(robot.tcp_link)[:3, 3].tolist()
+    return places
+
+
+def _gripper(robot: RobotDescriptor) -> Iterator[str]:
+    if robot.gripper_material is None and robot.fingers is None:
+        yield "none"
+    if (material := robot.gripper_material) is not None:
+        yield (
+            f"material of {', '.join(material.links)}:"
+            f" static friction {material.static_friction:g}, dynamic {material.dynamic_friction:g},"
+            f" restitution {material.restitution:g},"
+            f" patch radius {material.patch_radius:g} m"
+        )
+    if (fingers := robot.fingers) is not None:
+        yield (
+            f"grasps while {' and '.join(fingers.links)} each feel {fingers.min_force:g} N or more,"
+            f" within {fingers.max_angle:g}° of the direction they open in"
+        )
+
+
+def _cameras(robot: RobotDescriptor) -> Iterator[str]:
+    if not robot.cameras:
+        yield "none"
+    for camera in robot.cameras:
+        yield (
+            f"{camera.name} on {camera.link}: {camera.width} × {camera.height} pixels,"
+            f" {camera.fov:.3g} rad field of view, {camera.near:g} … {camera.far:g} m"
+        )
+
+
+def _files(robot: RobotDescriptor, store: AssetStore) -> Iterator[str]:
+    urdf = robot.urdf
+    if not isinstance(urdf, UrdfLocator):
+        yield "the user's own; not in the manifest"
+        return
+    package = load_manifest().package(urdf.package)
+    yield f"local copy {store.root / urdf.package}"
+    yield f"licence {package.origin.licence}: {package.origin.licence_note}"
+    yield from _summaries(urdf, package, store)
+    for file in package.needed(urdf.file, pictures=True):
+        yield f"  {describe_file(file, store)}"
+
+
+def _summaries(urdf: UrdfLocator, package: AssetPackage, store: AssetStore) -> Iterator[str]:
+    physics = package.needed(urdf.file, pictures=False)
+    pictures = [f for f in package.needed(urdf.file, pictures=True) if f not in physics]
+    for title, files in (("physics ", physics), ("pictures", pictures)):
+        yield f"{title} {_summary(files, store)}"
+
+
+def _summary(files: Sequence[AssetFile], store: AssetStore) -> str:
+    states = [store.state(file) for file in files]
+    counts = [f"{states.count(state)} {state.value}" for state in FileState if state in states]
+    return f"{len(files)} files, {size(sum(file.bytes for file in files))}: {', '.join(counts)}"
+
+
+def _read(urdf: Path) -> bytes:
+    try:
+        return urdf.read_bytes()
+    except OSError as error:
+        raise AssetError(f"cannot read the URDF {urdf}: {error.strerror}") from error
+
+
+def _row(values: Iterable[float]) -> str:
+    return "(" + ", ".join(f"{round(value, 6) + 0.0:.4g}" for value in values) + ")"
+
+
+def _table(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        yield "  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

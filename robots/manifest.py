@@ -1,0 +1,171 @@
+"""Which robot files there are, what each must contain, and which URDF needs it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from robots.errors import AssetError, UnknownNameError
+
+CHECKOUT_CACHE = Path(__file__).resolve().parent.parent / "assets_cache"
+
+
+@dataclass(frozen=True)
+class PackageOrigin:
+    """Where the files of one package come from, and under what licence.
+
+    Attributes:
+        name: Package name, also its folder in the cache.
+        mani_skill: Its folder inside the mani_skill package.
+        hub_dataset: Hugging Face dataset that holds a copy.
+        hub_folder: Its folder inside the dataset.
+        wheel: Requirement whose wheel holds the files.
+        licence: Short name of the licence.
+        licence_note: What the licence asks for, in one sentence.
+    """
+
+    name: str
+    mani_skill: str
+    hub_dataset: str
+    hub_folder: str
+    wheel: str
+    licence: str
+    licence_note: str
+
+
+@dataclass(frozen=True)
+class AssetFile:
+    """One robot file, as the manifest promises it.
+
+    Attributes:
+        origin: The package it belongs to.
+        path: Path inside the package, with forward slashes.
+        bytes: Size (bytes).
+        sha256: SHA-256 of its contents, in hex.
+        physics: URDFs that cannot be simulated without it.
+        pictures: URDFs that cannot be drawn without it.
+    """
+
+    origin: PackageOrigin
+    path: str
+    bytes: int
+    sha256: str
+    physics: tuple[str, ...] = ()
+    pictures: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """Return package and path."""
+        return f"{self.origin.name}/{self.path}"
+
+
+@dataclass(frozen=True)
+class AssetPackage:
+    """The files of one package, sorted by path."""
+
+    origin: PackageOrigin
+    files: tuple[AssetFile, ...]
+
+    @property
+    def urdfs(self) -> tuple[str, ...]:
+        """Every URDF of the package, sorted."""
+        return tuple(sorted({urdf for file in self.files for urdf in file.physics}))
+
+    def needed(self, urdf: str, *, pictures: bool) -> tuple[AssetFile, ...]:
+        """Return the files that a URDF needs, itself included.
+
+        Args:
+            urdf: Path of the URDF inside the package.
+            pictures: Whether it will also be drawn.
+
+        Raises:
+            UnknownNameError: If the package has no such URDF.
+        """
+        if urdf not in self.urdfs:
+            raise UnknownNameError(f"URDF of {self.origin.name}", urdf, self.urdfs)
+        return tuple(
+            file
+            for file in self.files
+            if urdf in file.physics or (pictures and urdf in file.pictures)
+        )
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """Every package of robot files, by name."""
+
+    packages: Mapping[str, AssetPackage]
+
+    def package(self, name: str) -> AssetPackage:
+        """Return one package.
+
+        Raises:
+            UnknownNameError: If the manifest has no such package.
+        """
+        if name not in self.packages:
+            raise UnknownNameError("package of robot files", name, sorted(self.packages))
+        return self.packages[name]
+
+    def to_json(self) -> str:
+        """Return the manifest as it is kept in the repository."""
+        packages = {name: _package_to_json(self.packages[name]) for name in sorted(self.packages)}
+        return json.dumps({"packages": packages}, indent=1) + "\n"
+
+    @classmethod
+    def from_json(cls, text: str) -> Manifest:
+        """Read what `to_json` wrote."""
+        packages = json.loads(text)["packages"]
+        return cls({name: _package_from_json(name, data) for name, data in packages.items()})
+
+
+@lru_cache(maxsize=1)
+def load_manifest() -> Manifest:
+    """Return the manifest of this checkout, or of this installation.
+
+    Raises:
+        AssetError: If there is none.
+    """
+    source: Any = CHECKOUT_CACHE / "manifest.json"
+    if not source.is_file():
+        source = resources.files("robots").joinpath("manifest.json")
+    try:
+        return Manifest.from_json(source.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise AssetError(
+            f"no manifest of robot files: neither {CHECKOUT_CACHE / 'manifest.json'} nor {source}"
+            " exists; install robot-layouts again"
+        ) from None
+
+
+def _package_to_json(package: AssetPackage) -> dict[str, Any]:
+    origin = {key: value for key, value in vars(package.origin).items() if key != "name"}
+    files = {
+        file.path: {
+            "bytes": file.bytes,
+            "sha256": file.sha256,
+            "physics": list(file.physics),
+            "pictures": list(file.pictures),
+        }
+        for file in sorted(package.files, key=lambda file: file.path)
+    }
+    return {**origin, "files": files}
+
+
+def _package_from_json(name: str, data: dict[str, Any]) -> AssetPackage:
+    origin = PackageOrigin(name, **{key: data[key] for key in data if key != "files"})
+    files = tuple(
+        AssetFile(
+            origin,
+            path,
+            entry["bytes"],
+            entry["sha256"],
+            tuple(entry["physics"]),
+            tuple(entry["pictures"]),
+        )
+        for path, entry in data["files"].items()
+    )
+    return AssetPackage(origin, files)

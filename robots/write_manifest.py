@@ -1,0 +1,133 @@
+"""Rewrites `assets_cache/manifest.json` from an installed mani_skill, when a robot is added."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import sys
+from importlib import metadata
+from pathlib import Path
+
+from robots.asset_sources import find_mani_skill
+from robots.errors import AssetError, RobotLayoutsError
+from robots.locator import UrdfLocator
+from robots.manifest import CHECKOUT_CACHE, AssetFile, AssetPackage, Manifest, PackageOrigin
+from robots.registry import CATALOGUE, RobotRegistry
+from robots.urdf_xml import read_references
+
+HUB_DATASET = "RoboVerseOrg/roboverse_data"
+PREFIX = "maniskill_"  # package maniskill_panda is mani_skill's folder assets/robots/panda
+LICENCE_FILE = "LICENSE"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Write the manifest, or with ``--check`` tell whether it is up to date."""
+    parser = argparse.ArgumentParser(prog="python -m robots.write_manifest", description=__doc__)
+    parser.add_argument("--check", action="store_true", help="only compare; exit code 1 if stale")
+    check = parser.parse_args(arguments).check
+    path = CHECKOUT_CACHE / "manifest.json"
+    try:
+        text = build_manifest(find_mani_skill()).to_json()
+    except RobotLayoutsError as error:
+        print(error, file=sys.stderr)
+        return 1
+    if check:
+        fresh = path.is_file() and path.read_text(encoding="utf-8") == text
+        print(
+            f"{path} is {'up to date' if fresh else 'stale; run python -m robots.write_manifest'}"
+        )
+        return 0 if fresh else 1
+    path.write_text(text, encoding="utf-8")
+    print(f"wrote {path}")
+    return 0
+
+
+def build_manifest(mani_skill: Path) -> Manifest:
+    """Return the manifest of everything that the catalogue's URDFs need.
+
+    Args:
+        mani_skill: Folder of an installed mani_skill package.
+
+    Raises:
+        AssetError: If a URDF refers to a file that mani_skill lacks.
+    """
+    urdfs: dict[str, set[str]] = {}
+    for name in CATALOGUE:
+        locator = RobotRegistry.load(name).urdf
+        if isinstance(locator, UrdfLocator):
+            urdfs.setdefault(locator.package, set()).add(locator.file)
+    return Manifest({name: build_package(name, mani_skill, urdfs[name]) for name in urdfs})
+
+
+def build_package(name: str, mani_skill: Path, urdfs: set[str]) -> AssetPackage:
+    """Return one package with everything that some of its URDFs need.
+
+    Args:
+        name: ``maniskill_`` and the name of a folder in mani_skill's ``assets/robots``.
+        mani_skill: Folder of an installed mani_skill package.
+        urdfs: URDFs to include, relative to that folder.
+
+    Raises:
+        AssetError: If a URDF refers to a file that the folder lacks.
+    """
+    relative = f"assets/robots/{name.removeprefix(PREFIX)}"
+    folder = mani_skill / relative
+    if not (name.startswith(PREFIX) and folder.is_dir()):
+        raise AssetError(f"package {name!r} has no folder {folder}; call it {PREFIX}<folder>")
+    version = metadata.version("mani_skill")
+    origin = PackageOrigin(
+        name=name,
+        mani_skill=relative,
+        hub_dataset=HUB_DATASET,
+        hub_folder=f"robots/{name}",
+        wheel=f"mani_skill=={version}",
+        licence="CC BY-NC 4.0",
+        licence_note=(
+            f"robot files of mani_skill {version}, Creative Commons"
+            " Attribution-NonCommercial 4.0: name the authors, no commercial use"
+        ),
+    )
+    physics: dict[str, set[str]] = {}
+    pictures: dict[str, set[str]] = {}
+    for urdf in urdfs:
+        _add_needs(folder, urdf, physics, pictures)
+    files = (
+        _asset_file(origin, folder, path, physics.get(path, set()), pictures.get(path, set()))
+        for path in sorted({*physics, *pictures})
+    )
+    return AssetPackage(origin, tuple(files))
+
+
+def _add_needs(
+    folder: Path, urdf: str, physics: dict[str, set[str]], pictures: dict[str, set[str]]
+) -> None:
+    references = read_references(
+        (folder / urdf).read_bytes(), urdf, exists=lambda path: (folder / path).is_file()
+    )
+    beside = [urdf.removesuffix(".urdf") + ".srdf", LICENCE_FILE]
+    optional = [path for path in beside if (folder / path).is_file()]
+    for path in (urdf, *optional, *references.collision):
+        physics.setdefault(path, set()).add(urdf)
+    for path in references.visual:
+        pictures.setdefault(path, set()).add(urdf)
+
+
+def _asset_file(
+    origin: PackageOrigin, folder: Path, path: str, physics: set[str], pictures: set[str]
+) -> AssetFile:
+    if path.startswith("../") or not (folder / path).is_file():
+        urdfs = ", ".join(sorted(physics | pictures))
+        raise AssetError(f"{urdfs} refers to {path}, which is not a file inside {folder}")
+    data = (folder / path).read_bytes()
+    return AssetFile(
+        origin,
+        path,
+        len(data),
+        hashlib.sha256(data).hexdigest(),
+        tuple(sorted(physics)),
+        tuple(sorted(pictures)),
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,240 @@
+"""The local copy: what is trusted, what is fetched again, what is refused, and in which words."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import pytest
+
+from robots import AssetError, RobotRegistry, UnknownNameError, UrdfLocator, asset_store
+from robots.asset_sources import InstalledManiSkill, LocalCopy, SourceError
+from robots.asset_store import AssetStore, FileState, default_root
+from robots.assets import ensure
+from robots.urdf_xml import read_references
+from tests.robots.conftest import PANDA, contents
+
+ROBOTS = RobotRegistry.names()
+
+
+class FakeSource:
+    """Gives prepared contents, and keeps a record of what it was asked for."""
+
+    name, title = "fake", "fake source"
+
+    def __init__(self, given: dict[str, bytes], error: str = "") -> None:
+        self.given, self.error, self.asked = given, error, []
+
+    def fetch(self, files, scratch, *, again):
+        self.asked.append(([file.path for file in files], again))
+        yield from ((file, self.given[file.path]) for file in files if file.path in self.given)
+        if self.error:
+            raise SourceError(self.error)
+
+
+def right(files) -> dict[str, bytes]:
+    return {file.path: contents(file) for file in files}
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("pictures", [False, True])
+def test_locate_returns_a_urdf_whose_files_are_all_there(robot, pictures, monkeypatch):
+    monkeypatch.setattr("robots.assets.default_sources", lambda: [InstalledManiSkill()])
+    urdf = RobotRegistry.load(robot).urdf.locate(pictures=pictures)
+    references = read_references(urdf.read_bytes(), urdf.as_posix())
+    wanted = references.collision + (references.visual if pictures else ())
+    assert wanted
+    assert [path for path in wanted if not Path(path).is_file()] == []
+    assert urdf.with_suffix(".srdf").is_file()
+
+
+def test_locate_tries_the_hub_then_the_installed_package(capfd):
+    UrdfLocator("maniskill_panda", "panda_stick.urdf").locate()
+    said = capfd.readouterr().err
+    assert said.index("Hugging Face Hub") < said.index("installed mani_skill: 11 of 11 files")
+    assert "licence CC BY-NC 4.0" in said
+
+
+def test_locate_says_nothing_once_the_files_are_there(store, physics, fill, capfd):
+    fill(store, physics)
+    assert UrdfLocator("maniskill_panda", "panda_v2.urdf").locate().is_file()
+    assert capfd.readouterr().err == ""
+
+
+def test_locate_names_the_closest_package_and_urdf():
+    with pytest.raises(UnknownNameError, match="Did you mean 'maniskill_panda'"):
+        UrdfLocator("maniskil_panda", "panda_v2.urdf").locate()
+    with pytest.raises(UnknownNameError, match="Did you mean 'panda_v2.urdf'"):
+        UrdfLocator("maniskill_panda", "panda_v2").locate()
+
+
+def test_files_are_hashed_once_until_they_change(store, physics, fill, monkeypatch):
+    fill(store, physics)
+    hashed: list[int] = []
+    sha256 = hashlib.sha256
+    monkeypatch.setattr(hashlib, "sha256", lambda data: hashed.append(len(data)) or sha256(data))
+    for _ in range(3):
+        assert store.unusable(physics) == []
+    assert sorted(hashed) == sorted(file.bytes for file in physics)
+
+
+def test_a_changed_local_file_is_noticed_and_fetched_again(store, physics, fill):
+    fill(store, physics)
+    assert store.unusable(physics) == []
+    mesh = physics[0]
+    store.path(mesh).write_bytes(bytes(mesh.bytes))
+    assert store.unusable(physics) == [mesh]
+    source = FakeSource(right(physics))
+    ensure(physics, store, [source])
+    assert store.unusable(physics) == []
+    assert source.asked == [([mesh.path], False)]
+
+
+def test_a_wrong_file_is_asked_for_once_more_and_then_refused(store, physics):
+    given = right(physics)
+    given[physics[0].path] = b"something else"
+    source = FakeSource(given)
+    with pytest.raises(AssetError, match=f"fake source: refused, .*twice: {physics[0]}"):
+        ensure(physics, store, [source])
+    assert [again for _, again in source.asked] == [False, True]
+    assert source.asked[1][0] == [physics[0].path]
+    assert store.state(physics[0]) is FileState.MISSING
+
+
+def test_the_next_source_is_asked_only_for_what_is_still_missing(store, physics):
+    first = FakeSource(right(physics[:4]), error="ran dry")
+    second = FakeSource(right(physics))
+    ensure(physics, store, [first, second])
+    assert second.asked == [([file.path for file in physics[4:]], False)]
+
+
+def test_one_error_names_every_source_and_what_to_do(store, physics):
+    sources = [FakeSource({}, error="is on fire"), FakeSource({}, error="is flooded")]
+    with pytest.raises(AssetError) as error:
+        ensure(physics, store, sources)
+    text = str(error.value)
+    for part in ("is on fire", "is flooded", str(store.root), "pip install mani_skill==3.0.1"):
+        assert part in text
+    assert text.count(": missing") == len(physics)
+
+
+def test_trust_accepts_marks_and_is_remembered(store, physics, capfd):
+    mesh = physics[0]
+    source = FakeSource({**right(physics), mesh.path: b"my own mesh"})
+    ensure(physics, store, [source], trust=True)
+    assert store.state(mesh) is FileState.TRUSTED
+    assert [store.state(file) for file in physics[1:]] == [FileState.VERIFIED] * (len(physics) - 1)
+    record = json.loads((store.root / "fetched.json").read_text())
+    assert record[str(mesh)] == {
+        "source": "fake source",
+        "sha256": hashlib.sha256(b"my own mesh").hexdigest(),
+        "trusted": True,
+    }
+    assert UrdfLocator("maniskill_panda", "panda_v2.urdf").locate().is_file()
+
+
+def test_trust_holds_for_the_accepted_bytes_alone(store, physics):
+    mesh = physics[0]
+    source = FakeSource({**right(physics), mesh.path: b"my own mesh"})
+    ensure(physics, store, [source], trust=True)
+    store.path(mesh).write_bytes(b"my own mess")
+    assert store.state(mesh) is FileState.WRONG
+
+
+def test_trust_refuses_a_urdf_that_needs_unknown_files(store, physics):
+    urdf = next(file for file in physics if file.path == "panda_v2.urdf")
+    changed = contents(urdf).replace(b"collision/link3.stl", b"collision/other.stl")
+    source = FakeSource({**right(physics), urdf.path: changed})
+    with pytest.raises(AssetError, match=r"files outside the manifest: .*collision/other\.stl"):
+        ensure(physics, store, [source], trust=True)
+    assert store.state(urdf) is FileState.MISSING
+
+
+def test_trust_refuses_a_urdf_that_is_none(store, physics):
+    source = FakeSource({**right(physics), "panda_v2.urdf": b"<html>Not found</html>"})
+    with pytest.raises(AssetError, match="fake source: cannot be trusted: panda_v2.urdf is not a"):
+        ensure(physics, store, [source], trust=True)
+
+
+def test_a_local_copy_gives_only_verified_files(store, physics, fill, tmp_path):
+    elsewhere = AssetStore(tmp_path / "elsewhere")
+    fill(elsewhere, physics)
+    elsewhere.path(physics[0]).write_bytes(b"damaged")
+    with pytest.raises(AssetError, match=rf"lacks 1 files: {physics[0]} \(differs"):
+        ensure(physics, store, [LocalCopy(elsewhere.root)])
+    assert store.unusable(physics) == [physics[0]]
+
+
+def test_nothing_is_written_when_nothing_is_needed(store, physics, fill):
+    fill(store, physics)
+    before = sorted(store.root.rglob("*"))
+    ensure(physics, store, [])
+    assert sorted(store.root.rglob("*")) == before
+
+
+def test_a_file_is_exchanged_and_never_written_over(store, physics, fill, tmp_path):
+    fill(store, physics)
+    store.path(physics[0]).write_bytes(b"damaged")
+    (tmp_path / "reader").hardlink_to(store.path(physics[0]))
+    ensure(physics, store, [FakeSource(right(physics))])
+    assert store.unusable(physics) == []
+    assert (tmp_path / "reader").read_bytes() == b"damaged"
+
+
+def test_what_a_killed_fetch_left_is_removed(store, physics):
+    left = store.root / ".partial" / "abc" / "file"
+    left.parent.mkdir(parents=True)
+    left.write_bytes(b"half a mesh")
+    ensure(physics, store, [FakeSource(right(physics))])
+    assert not (store.root / ".partial").exists()
+
+
+def test_a_read_only_destination_is_named(read_only_folder, physics):
+    with pytest.raises(AssetError, match=rf"cannot write robot files to {read_only_folder}/x:"):
+        ensure(physics, AssetStore(read_only_folder / "x"), [InstalledManiSkill()])
+
+
+def test_a_file_in_place_of_the_destination_is_named(tmp_path, physics):
+    (tmp_path / "file").touch()
+    store = AssetStore(tmp_path / "file")
+    assert store.unusable(physics) == list(physics)
+    with pytest.raises(AssetError, match="cannot write robot files to .*choose another folder"):
+        ensure(physics, store, [InstalledManiSkill()])
+
+
+def test_a_complete_read_only_copy_is_enough(store, physics, fill, monkeypatch):
+    fill(store, physics)
+
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError("Read-only file system")
+
+    for name in ("mkdir", "replace", "rename", "unlink"):
+        monkeypatch.setattr(f"os.{name}", refuse)
+    ensure(physics, store, [])
+
+
+def test_a_damaged_record_is_named(store, physics, fill):
+    fill(store, physics)
+    (store.root / "fetched.json").write_text("{")
+    assert store.unusable(physics) == []
+    store.path(physics[0]).write_bytes(b"damaged")
+    with pytest.raises(AssetError, match=r"cannot read .*fetched\.json.*delete it"):
+        store.unusable(physics)
+
+
+def test_the_local_copy_is_where_it_is_said_to_be(monkeypatch, tmp_path):
+    monkeypatch.setenv("ROBOT_LAYOUTS_ASSETS", "~/robot_files")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert default_root() == tmp_path / "robot_files"
+    monkeypatch.setenv("ROBOT_LAYOUTS_ASSETS", "")
+    assert default_root() == Path(asset_store.__file__).parents[1] / "assets_cache"
+    monkeypatch.setattr(asset_store, "CHECKOUT_CACHE", tmp_path / "no_checkout")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    assert default_root() == tmp_path / "cache" / "robot-layouts"
+
+
+def test_pictures_are_a_superset_of_physics():
+    for urdf in PANDA.urdfs:
+        physics = set(PANDA.needed(urdf, pictures=False))
+        assert physics < set(PANDA.needed(urdf, pictures=True))

@@ -1,0 +1,131 @@
+"""Every robot of the catalogue: does its data agree with its URDF and the manifest?"""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import dataclass
+
+import pytest
+
+from robots import RobotDescriptor, RobotRegistry, UrdfLocator
+from robots.manifest import AssetPackage, load_manifest
+from robots.registry import CATALOGUE
+from robots.urdf_xml import UrdfJoint, read_joints, read_links, read_references
+from tests.robots.conftest import contents
+
+ROBOTS = tuple(CATALOGUE)
+
+
+@dataclass
+class Robot:
+    """A descriptor beside what its URDF says."""
+
+    descriptor: RobotDescriptor
+    package: AssetPackage
+    joints: dict[str, UrdfJoint]
+    links: tuple[str, ...]
+    references: tuple[tuple[str, ...], tuple[str, ...]]
+
+
+@pytest.fixture(params=ROBOTS)
+def robot(request) -> Robot:
+    descriptor = RobotRegistry.load(request.param)
+    assert isinstance(descriptor.urdf, UrdfLocator)
+    package = load_manifest().package(descriptor.urdf.package)
+    name = descriptor.urdf.file
+    xml = contents(next(file for file in package.files if file.path == name))
+    joints = {joint.name: joint for joint in read_joints(xml, name)}
+    references = read_references(xml, name)
+    return Robot(
+        descriptor,
+        package,
+        joints,
+        read_links(xml, name),
+        (references.collision, references.visual),
+    )
+
+
+def test_the_catalogue_is_sorted_and_each_descriptor_is_named_as_its_module():
+    assert list(CATALOGUE) == sorted(CATALOGUE)
+    for name, target in CATALOGUE.items():
+        assert target == f"robots.{name}:{name.upper()}"
+        assert RobotRegistry.load(name).name == name
+
+
+def test_every_moving_joint_is_driven_and_exists(robot):
+    assert set(robot.descriptor.joints) == set(robot.joints)
+
+
+def test_units_of_groups_are_those_of_the_urdf(robot):
+    for group in robot.descriptor.action_split.groups.values():
+        assert {robot.joints[joint].unit for joint in group.joints} == {group.unit}
+
+
+def test_a_joint_that_mimics_is_driven_in_a_mimic_group(robot):
+    for joint in robot.joints.values():
+        if joint.mimics is not None:
+            groups = robot.descriptor.action_split.groups.values()
+            group = next(group for group in groups if joint.name in group.joints)
+            assert group.mimic
+            assert joint.mimics in group.joints
+
+
+def test_keyframes_are_within_the_joint_limits(robot):
+    descriptor = robot.descriptor
+    assert descriptor.keyframes
+    for qpos in descriptor.keyframes.values():
+        for name, value in zip(descriptor.joints, qpos, strict=True):
+            joint = robot.joints[name]
+            assert joint.lower - 1e-6 <= value <= joint.upper + 1e-6, name
+
+
+def test_every_link_that_is_named_exists(robot):
+    descriptor = robot.descriptor
+    named = {descriptor.tcp_link, *descriptor.tcp_position_links}
+    named |= {camera.link for camera in descriptor.cameras}
+    named |= set(descriptor.fingers.links) if descriptor.fingers else set()
+    named |= set(descriptor.gripper_material.links) if descriptor.gripper_material else set()
+    assert named <= set(robot.links)
+
+
+def test_grippers_have_fingers_and_material_and_sticks_do_not(robot):
+    has_gripper = "gripper" in robot.descriptor.action_split
+    assert (robot.descriptor.fingers is not None) == has_gripper
+    assert (robot.descriptor.gripper_material is not None) == has_gripper
+
+
+def test_the_manifest_holds_every_file_that_the_urdf_refers_to(robot):
+    urdf = robot.descriptor.urdf.file
+    physics = {file.path for file in robot.package.needed(urdf, pictures=False)}
+    everything = {file.path for file in robot.package.needed(urdf, pictures=True)}
+    collision, visual = robot.references
+    assert physics == {urdf, urdf.replace(".urdf", ".srdf"), *collision}
+    assert everything == physics | set(visual)
+
+
+def test_the_numbers_name_their_source(robot):
+    assert robot.descriptor.source.startswith("mani_skill 3.0.1, agents/robots/")
+
+
+def test_sizes_add_up(robot):
+    descriptor = robot.descriptor
+    numbers = descriptor.describe_action()
+    assert len(numbers) == descriptor.action_dim == descriptor.action_split.size
+    assert [number.index for number in numbers] == list(range(descriptor.action_dim))
+    assert len({number.name for number in numbers}) == len(numbers)
+    assert tuple(joint for number in numbers for joint in number.joints) == descriptor.joints
+
+
+def test_a_descriptor_survives_pickling_and_hashes_by_value(robot):
+    copy = pickle.loads(pickle.dumps(robot.descriptor))
+    assert copy == robot.descriptor
+    assert hash(copy) == hash(robot.descriptor)
+
+
+@pytest.mark.parametrize(
+    ("name", "joints", "numbers"),
+    [("panda", 9, 8), ("panda_stick", 7, 7), ("panda_wristcam", 9, 8)],
+)
+def test_the_pandas_have_the_sizes_that_layouts_count_on(name, joints, numbers):
+    descriptor = RobotRegistry.load(name)
+    assert (descriptor.dof, descriptor.action_dim) == (joints, numbers)

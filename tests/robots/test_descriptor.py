@@ -1,0 +1,123 @@
+"""Descriptors refuse what contradicts itself, in words that say what would be right."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import FrozenInstanceError, replace
+
+import pytest
+
+from robots import ActionSplit, DescriptorError, JointGroup, RobotRegistry, UnknownNameError
+
+PANDA = RobotRegistry.load("panda")
+ARM = PANDA.action_split.groups["arm"]
+
+
+def group(**changes) -> JointGroup:
+    settings = {"lower": -1.0, "upper": 1.0, "stiffness": 1e3, "damping": 1e2, "force_limit": 100.0}
+    return JointGroup(**{"joints": ("a", "b"), **settings, **changes})
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"joints": ()}, "a joint group needs at least one joint"),
+        ({"joints": ("a", "a")}, "names a joint twice: ('a', 'a')"),
+        ({"unit": "deg"}, "unit is 'deg'; it must be 'rad' or 'm'"),
+        ({"stiffness": -1.0}, "stiffness is -1.0; it must be finite and not negative"),
+        ({"damping": math.nan}, "damping is nan; it must be finite and not negative"),
+        ({"force_limit": math.inf}, "force_limit is inf; it must be finite"),
+        ({"friction": -0.1}, "friction is -0.1; it must be finite"),
+        ({"lower": (-1.0,)}, "lower has 1 numbers; the group ('a', 'b') takes 2"),
+        ({"upper": (1.0, 2.0), "mimic": True}, "upper has 2 numbers; the group ('a', 'b') takes 1"),
+        ({"upper": -1.0}, "range [-1.0, -1.0] of ('a', 'b') is not increasing"),
+        ({"lower": math.nan}, "range [nan, 1.0] of ('a', 'b') is not increasing"),
+    ],
+)
+def test_a_joint_group_refuses_nonsense(changes, message):
+    with pytest.raises(DescriptorError) as error:
+        group(**changes)
+    assert message in str(error.value)
+
+
+def test_a_mimic_group_takes_one_number():
+    assert group(mimic=True).size == 1
+    assert group(mimic=True).ranges == ((-1.0, 1.0),)
+    assert group(upper=(1.0, 2.0)).ranges == ((-1.0, 1.0), (-1.0, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"name": "7dof"}, "robot name '7dof' must be a letter followed by letters, digits and _"),
+        ({"name": "a-b"}, "robot name 'a-b' must be a letter"),
+        ({"reach": 0.0}, "panda: reach is 0.0 m; it must be positive"),
+        ({"reach": math.nan}, "panda: reach is nan m; it must be positive"),
+        ({"keyframes": {"rest": (0.0,)}}, "keyframe 'rest' has 1 numbers; the robot has 9 joints"),
+        ({"keyframes": {"rest": (math.nan,) * 9}}, "panda: keyframe 'rest' is not finite"),
+    ],
+)
+def test_a_descriptor_refuses_nonsense(changes, message):
+    with pytest.raises(DescriptorError) as error:
+        replace(PANDA, **changes)
+    assert message in str(error.value)
+
+
+def test_a_home_at_an_unknown_keyframe_is_refused():
+    with pytest.raises(UnknownNameError, match="keyframe of panda 'resst'. Did you mean 'rest'"):
+        replace(PANDA, home=replace(PANDA.home, keyframe="resst"))
+
+
+def test_an_action_split_refuses_nonsense():
+    with pytest.raises(DescriptorError, match="needs at least one joint group"):
+        ActionSplit()
+    with pytest.raises(DescriptorError, match=r"joints \['a', 'b'\] are in more than one group"):
+        ActionSplit(arm=group(), hand=group())
+    with pytest.raises(UnknownNameError, match="joint group 'grip'. Did you mean 'gripper'"):
+        PANDA.action_split["grip"]
+
+
+def test_descriptors_splits_and_keyframes_are_frozen():
+    with pytest.raises(FrozenInstanceError):
+        PANDA.reach = 1.0
+    with pytest.raises(AttributeError, match="ActionSplit is frozen"):
+        PANDA.action_split.size = 3
+    changes = (
+        lambda frames: frames.update(rest=()),
+        lambda frames: frames.pop("rest"),
+        lambda frames: frames.clear(),
+        lambda frames: frames.setdefault("new", ()),
+        lambda frames: frames.popitem(),
+        lambda frames: frames.__setitem__("rest", ()),
+        lambda frames: frames.__delitem__("rest"),
+        lambda frames: frames.__ior__({"rest": ()}),
+    )
+    for change in changes:
+        with pytest.raises(TypeError, match="keyframes are frozen"):
+            change(PANDA.keyframes)
+    assert len(PANDA.keyframe("rest")) == 9
+
+
+def test_action_numbers_are_described_with_name_unit_and_range():
+    numbers = PANDA.describe_action()
+    assert [number.name for number in numbers] == [
+        *(f"arm.panda_joint{i}" for i in range(1, 8)),
+        "gripper",
+    ]
+    first, last = numbers[0], numbers[-1]
+    assert (first.unit, first.lower, first.upper, first.relative) == (
+        "rad per step",
+        -0.1,
+        0.1,
+        True,
+    )
+    assert (last.unit, last.lower, last.upper, last.relative) == ("m", -0.01, 0.04, False)
+    assert last.joints == ("panda_finger_joint1", "panda_finger_joint2")
+    assert str(last).split() == ["7", "gripper", "-0.01", "…", "0.04", "m"]
+
+
+def test_a_variant_is_a_replacement():
+    stiff = replace(PANDA, action_split=PANDA.action_split.replace(arm=replace(ARM, stiffness=2e3)))
+    assert stiff != PANDA
+    assert stiff.action_split.groups["arm"].stiffness == 2e3
+    assert stiff.action_split["gripper"] == PANDA.action_split["gripper"]

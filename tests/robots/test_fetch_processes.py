@@ -1,0 +1,191 @@
+"""Fetches in real processes: killed, several at once, without room, through pip."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import threading
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from robots import AssetError, UrdfLocator, asset_sources
+from robots.asset_sources import ManiSkillWheel
+from robots.asset_store import FileState
+from robots.assets import ensure
+from tests.robots.conftest import contents
+from tests.robots.hub_server import HubServer, stall
+
+HAND = "franka_description/meshes/collision/hand.stl"
+CHECKOUT = Path(__file__).parents[2]
+FETCH = [sys.executable, "-m", "robots.fetch_assets", "--physics-only"]
+
+
+def start(*arguments: str, **settings) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [*FETCH, *arguments],
+        cwd=CHECKOUT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **settings,
+    )
+
+
+def finish(process: subprocess.Popen[str]) -> tuple[int, str]:
+    out, err = process.communicate(timeout=120)
+    return process.returncode, out + err
+
+
+def test_a_killed_fetch_leaves_nothing_that_is_trusted(hub: HubServer, store, physics):
+    reached = threading.Event()
+    hub.fail("GET", HAND, stall(reached), times=1)
+    process = start("panda", "--source", "hf", start_new_session=True)
+    assert reached.wait(timeout=60)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    assert process.returncode == -signal.SIGKILL
+
+    states = {store.state(file) for file in physics}
+    assert FileState.MISSING in states
+    assert states <= {FileState.VERIFIED, FileState.MISSING}
+
+    code, text = finish(start("panda", "--source", "hf"))
+    assert code == 0, text
+    assert store.unusable(physics) == []
+    assert not (store.root / ".partial").exists()
+
+
+def test_a_process_killed_while_writing_leaves_no_half_file(store, physics, tmp_path):
+    # The sixth file is killed after its bytes are in the scratch folder, before it is in place.
+    script = tmp_path / "killed.py"
+    script.write_text(
+        "import os, signal\n"
+        "from robots import asset_store, UrdfLocator\n"
+        "from robots.asset_sources import InstalledManiSkill\n"
+        "import robots.assets\n"
+        "robots.assets.default_sources = lambda: [InstalledManiSkill()]\n"
+        "real, calls = os.fsync, []\n"
+        "def fsync(descriptor):\n"
+        "    calls.append(descriptor)\n"
+        "    if len(calls) == 12:\n"
+        "        os.ftruncate(descriptor, 10)\n"
+        "        os.kill(os.getpid(), signal.SIGKILL)\n"
+        "    real(descriptor)\n"
+        "os.fsync = fsync\n"
+        "UrdfLocator('maniskill_panda', 'panda_v2.urdf').locate()\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
+    done = subprocess.run([sys.executable, script], env=environment, check=False)
+    assert done.returncode == -signal.SIGKILL
+    assert len(store.unusable(physics)) == len(physics) - 5
+    assert all(not store.path(file).exists() for file in store.unusable(physics))
+    assert (store.root / ".partial").exists()
+    assert UrdfLocator("maniskill_panda", "panda_v2.urdf").locate().is_file()
+    assert not (store.root / ".partial").exists()
+
+
+def test_four_processes_at_once_download_each_file_once(hub: HubServer, store, physics):
+    results = [finish(process) for process in [start("panda", "--source", "hf") for _ in range(4)]]
+    assert [code for code, _ in results] == [0] * 4, results
+    assert store.unusable(physics) == []
+    assert len(hub.downloads()) == len(set(hub.downloads())) == len(physics)
+
+
+def _locate(_: int) -> str:
+    return str(UrdfLocator("maniskill_panda", "panda_v2.urdf").locate())
+
+
+def test_spawned_workers_locate_at_once(store, physics, fill):
+    fill(store, physics)
+    with multiprocessing.get_context("spawn").Pool(2) as pool:
+        found = set(pool.map(_locate, range(4)))
+    assert found == {str(store.root / "maniskill_panda" / "panda_v2.urdf")}
+
+
+def test_a_full_disk_is_named_and_leaves_no_half_file(store, physics):
+    import resource
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (12_000, 12_000))
+
+    process = start("panda", "--source", "mani_skill", preexec_fn=limit)
+    code, text = finish(process)
+    assert code == 1
+    assert f"cannot write robot files to {store.root}: File too large" in text
+    assert "Traceback" not in text
+    assert all(not store.path(file).exists() for file in store.unusable(physics))
+
+
+@pytest.fixture
+def wheel_index(tmp_path, monkeypatch, physics) -> Path:
+    """Let pip find a small mani_skill wheel, and nothing else."""
+    index = tmp_path / "index"
+    index.mkdir()
+    info = "mani_skill-3.0.1.dist-info"
+    with zipfile.ZipFile(index / "mani_skill-3.0.1-py3-none-any.whl", "w") as wheel:
+        wheel.writestr(
+            f"{info}/METADATA", "Metadata-Version: 2.1\nName: mani_skill\nVersion: 3.0.1\n"
+        )
+        wheel.writestr(
+            f"{info}/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+        )
+        wheel.writestr(f"{info}/RECORD", "")
+        wheel.writestr("mani_skill/__init__.py", "raise ImportError('not meant to be imported')")
+        for file in physics:
+            wheel.writestr(f"mani_skill/{file.origin.mani_skill}/{file.path}", contents(file))
+    for name in [name for name in os.environ if name.startswith("PIP_")]:
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
+    monkeypatch.setenv("PIP_NO_INDEX", "1")
+    monkeypatch.setenv("PIP_FIND_LINKS", str(index))
+    return index
+
+
+def test_the_wheel_comes_through_pip_and_only_robot_files_are_kept(wheel_index, store, physics):
+    ensure(physics, store, [ManiSkillWheel()])
+    assert store.unusable(physics) == []
+    kept = {path for path in store.root.rglob("*") if path.is_file()}
+    extra = {path.name for path in kept - {store.path(file) for file in physics}}
+    assert extra == {".lock", "fetched.json"}
+
+
+def test_a_wheel_without_a_file_is_named(wheel_index, store, physics):
+    archive = next(wheel_index.iterdir())
+    smaller = archive.with_suffix(".new")
+    with zipfile.ZipFile(archive) as old, zipfile.ZipFile(smaller, "w") as new:
+        for member in old.namelist():
+            if not member.endswith("hand.stl"):
+                new.writestr(member, old.read(member))
+    smaller.replace(archive)
+    with pytest.raises(AssetError, match=r"lacks 1 files: mani_skill/assets/.*/hand\.stl"):
+        ensure(physics, store, [ManiSkillWheel()])
+
+
+def test_what_pip_says_is_passed_on(wheel_index, store, physics):
+    next(wheel_index.iterdir()).unlink()
+    with pytest.raises(AssetError, match="pip failed: No matching distribution found"):
+        ensure(physics, store, [ManiSkillWheel()])
+
+
+def test_a_python_without_pip_is_named(store, physics, monkeypatch):
+    monkeypatch.setattr(asset_sources, "find_spec", lambda name: None)
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(AssetError, match="this Python has no pip.*and there is no uv"):
+        ensure(physics, store, [ManiSkillWheel()])
+
+
+def test_uv_runs_pip_where_python_has_none(wheel_index, store, physics, monkeypatch, tmp_path):
+    uv = tmp_path / "bin" / "uv"
+    uv.parent.mkdir()
+    shift = '[ "$1 $2 $3" = "tool run pip" ] && shift 3'
+    uv.write_text(f'#!/bin/sh\n{shift}\n"{sys.executable}" -m pip "$@"\n')
+    uv.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{uv.parent}:{os.environ['PATH']}")
+    monkeypatch.setattr(asset_sources, "find_spec", lambda name: None)
+    ensure(physics, store, [ManiSkillWheel()])
+    assert store.unusable(physics) == []

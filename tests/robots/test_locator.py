@@ -1,0 +1,59 @@
+"""Locators: a URDF of the manifest, and a URDF of the user's own."""
+
+from __future__ import annotations
+
+import dataclasses
+import pickle
+
+import pytest
+
+from robots import AssetError, UrdfLocator
+from robots.locator import LocalUrdf
+
+URDF = """<robot name="toy">
+  <link name="base">
+    <visual><geometry><mesh filename="meshes/base.glb"/></geometry></visual>
+    <collision><geometry><mesh filename="package://meshes/base.stl"/></geometry></collision>
+  </link>
+</robot>"""
+
+
+@pytest.fixture
+def toy(tmp_path):
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "base.stl").touch()
+    (tmp_path / "meshes" / "base.glb").touch()
+    path = tmp_path / "toy.urdf"
+    path.write_text(URDF)
+    return path
+
+
+@pytest.mark.parametrize("locator", [UrdfLocator("no_package", "no.urdf"), LocalUrdf("/no/such")])
+def test_a_locator_is_a_frozen_value_that_touches_nothing(locator):
+    assert pickle.loads(pickle.dumps(locator)) == locator
+    assert hash(dataclasses.replace(locator)) == hash(locator)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        setattr(locator, dataclasses.fields(locator)[0].name, "other")
+
+
+def test_a_users_urdf_is_found_with_its_meshes(toy, monkeypatch):
+    assert LocalUrdf(toy).locate(pictures=True) == toy
+    monkeypatch.setenv("HOME", str(toy.parent))
+    assert LocalUrdf("~/toy.urdf").locate() == toy
+    monkeypatch.chdir(toy.parent)
+    assert LocalUrdf("toy.urdf").locate() == toy
+
+
+def test_a_missing_urdf_is_named(tmp_path):
+    with pytest.raises(AssetError, match=rf"cannot read the URDF {tmp_path}/no\.urdf: No such"):
+        LocalUrdf(tmp_path / "no.urdf").locate()
+
+
+def test_a_missing_mesh_is_named_when_it_is_needed(toy):
+    (toy.parent / "meshes" / "base.glb").unlink()
+    assert LocalUrdf(toy).locate() == toy
+    with pytest.raises(AssetError, match=r"do not exist: .*meshes/base\.glb"):
+        LocalUrdf(toy).locate(pictures=True)
+    (toy.parent / "meshes" / "base.stl").unlink()
+    with pytest.raises(AssetError, match=r"do not exist: .*meshes/base\.stl"):
+        LocalUrdf(toy).locate()

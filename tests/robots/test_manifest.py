@@ -1,0 +1,95 @@
+"""The manifest of robot files, and the command that writes it."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from robots import AssetError, UnknownNameError, manifest, write_manifest
+from robots.asset_sources import find_mani_skill
+from robots.manifest import CHECKOUT_CACHE, Manifest, load_manifest
+from robots.write_manifest import build_package
+
+
+@pytest.fixture
+def _fresh_manifest():
+    load_manifest.cache_clear()
+    yield
+    load_manifest.cache_clear()
+
+
+def test_the_manifest_survives_writing_and_reading():
+    assert Manifest.from_json(load_manifest().to_json()) == load_manifest()
+
+
+def test_the_tracked_manifest_is_what_mani_skill_holds(capsys):
+    assert write_manifest.main(["--check"]) == 0
+    assert "is up to date" in capsys.readouterr().out
+
+
+def test_a_stale_manifest_is_noticed_and_rewritten(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(write_manifest, "CHECKOUT_CACHE", tmp_path)
+    assert write_manifest.main(["--check"]) == 1
+    assert write_manifest.main([]) == 0
+    written = (tmp_path / "manifest.json").read_text()
+    assert written == (CHECKOUT_CACHE / "manifest.json").read_text()
+
+
+def test_every_package_says_its_origin_and_licence():
+    for package in load_manifest().packages.values():
+        assert package.origin.licence == "CC BY-NC 4.0"
+        assert "name the authors, no commercial use" in package.origin.licence_note
+        assert package.origin.wheel == "mani_skill==3.0.1"
+
+
+def test_convex_hulls_beside_the_meshes_are_left_out():
+    paths = [file.path for package in load_manifest().packages.values() for file in package.files]
+    assert paths
+    assert not [path for path in paths if "convex" in path]
+
+
+def test_physics_is_small_and_the_camera_is_in_the_pictures():
+    package = load_manifest().package("maniskill_panda")
+    assert sum(file.bytes for file in package.files if file.physics) < 200_000
+    pictures = {file.path for file in package.needed("panda_v3.urdf", pictures=True)}
+    assert "realsense2_description/meshes/d415.stl" in pictures
+
+
+def test_another_robot_needs_no_more_than_writing_the_manifest_again():
+    package = build_package("maniskill_so100", find_mani_skill(), {"so100.urdf"})
+    paths = {file.path for file in package.needed("so100.urdf", pictures=False)}
+    assert {"so100.urdf", "so100.srdf", "LICENSE"} < paths
+    assert any(path.startswith("meshes/") for path in paths)
+
+
+def test_a_package_that_is_no_folder_of_mani_skill_is_refused():
+    with pytest.raises(AssetError, match="call it maniskill_<folder>"):
+        build_package("robotiq", find_mani_skill(), {"x.urdf"})
+
+
+def test_a_urdf_that_reaches_outside_its_folder_is_refused(tmp_path):
+    folder = tmp_path / "assets" / "robots" / "toy"
+    folder.mkdir(parents=True)
+    mesh = "<collision><geometry><mesh filename='../other/x.stl'/></geometry></collision>"
+    (folder / "toy.urdf").write_text(f"<robot name='toy'><link name='a'>{mesh}</link></robot>")
+    with pytest.raises(AssetError, match=r"toy\.urdf refers to \.\./other/x\.stl, which is not"):
+        build_package("maniskill_toy", tmp_path, {"toy.urdf"})
+
+
+def test_an_unknown_package_is_named():
+    with pytest.raises(UnknownNameError, match="package of robot files 'panda'.*maniskill_panda"):
+        load_manifest().package("panda")
+
+
+@pytest.mark.usefixtures("_fresh_manifest")
+def test_an_installation_reads_the_manifest_of_its_package(tmp_path, monkeypatch):
+    installed = tmp_path / "site" / "robots"
+    installed.mkdir(parents=True)
+    monkeypatch.setattr(manifest, "CHECKOUT_CACHE", tmp_path / "site" / "assets_cache")
+    monkeypatch.setattr(manifest.resources, "files", lambda package: Path(installed))
+    with pytest.raises(AssetError, match="no manifest of robot files.*install robot-layouts"):
+        load_manifest()
+    shutil.copy(CHECKOUT_CACHE / "manifest.json", installed)
+    assert "maniskill_panda" in load_manifest().packages

@@ -1,0 +1,109 @@
+"""The registry: look-ups, registrations, robots of other packages, and its errors."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from robots import DescriptorError, RobotRegistry, UnknownNameError, closest_match
+
+CHECKOUT = Path(__file__).parents[2]
+
+
+@pytest.fixture(autouse=True)
+def _own_registrations(monkeypatch):
+    monkeypatch.setattr(RobotRegistry, "_registered", {})
+
+
+def test_loading_twice_gives_the_same_robot():
+    assert RobotRegistry.load("panda") is RobotRegistry.load("panda")
+
+
+def test_an_unknown_name_is_a_key_error_with_the_closest_match_and_the_choices():
+    with pytest.raises(KeyError) as error:
+        RobotRegistry.load("Panda_Stik")
+    assert isinstance(error.value, UnknownNameError)
+    assert str(error.value) == (
+        "unknown robot 'Panda_Stik'. Did you mean 'panda_stick'?"
+        " Choices: panda, panda_stick, panda_wristcam."
+        " Add your own with RobotRegistry.register(descriptor)."
+    )
+    with pytest.raises(UnknownNameError, match="^unknown robot 'xyz'. Choices: panda,"):
+        RobotRegistry.load("xyz")
+
+
+def test_the_closest_match_ignores_case_and_keeps_its_own():
+    assert closest_match("Panda", ["gripper", "PANDA"]) == "PANDA"
+    assert closest_match("xyz", ["gripper", "PANDA"]) is None
+
+
+def test_a_registered_robot_is_found_and_listed_in_order():
+    mine = replace(RobotRegistry.load("panda"), name="my_panda", reach=0.7)
+    assert RobotRegistry.register(mine) is mine
+    assert RobotRegistry.load("my_panda") is mine
+    assert RobotRegistry.names() == ("my_panda", "panda", "panda_stick", "panda_wristcam")
+    assert RobotRegistry.register(replace(mine)) == mine
+
+
+@pytest.mark.parametrize("name", ["panda", "my_panda"])
+def test_a_second_robot_of_the_same_name_is_refused(name):
+    RobotRegistry.register(replace(RobotRegistry.load("panda"), name="my_panda"))
+    other = replace(RobotRegistry.load("panda"), name=name, reach=2.0)
+    with pytest.raises(DescriptorError, match=f"another robot is already called '{name}'"):
+        RobotRegistry.register(other)
+
+
+def test_only_descriptors_are_registered():
+    with pytest.raises(DescriptorError, match="register gave a str; a RobotDescriptor is needed"):
+        RobotRegistry.register("panda")  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def other_package(tmp_path) -> Path:
+    """An installed package that brings robots through entry points."""
+    (tmp_path / "acme.py").write_text(
+        "from dataclasses import replace\n"
+        "from robots import RobotRegistry\n"
+        "ARM = replace(RobotRegistry.load('panda'), name='acme_arm', source='acme')\n"
+        "NONSENSE = 42\n"
+    )
+    info = tmp_path / "acme-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: acme\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(
+        "[robot_layouts.robots]\nacme_arm = acme:ARM\nacme_nonsense = acme:NONSENSE\n"
+    )
+    return tmp_path
+
+
+def run_with(other_package: Path, code: str) -> str:
+    environment = {**os.environ, "PYTHONPATH": f"{other_package}{os.pathsep}{CHECKOUT}"}
+    return subprocess.run(
+        [sys.executable, "-c", f"from robots import RobotRegistry\n{code}"],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+
+
+def test_another_package_brings_a_robot(other_package):
+    code = "print(RobotRegistry.load('acme_arm').source, *RobotRegistry.names())"
+    expected = "acme acme_arm acme_nonsense panda panda_stick panda_wristcam\n"
+    assert run_with(other_package, code) == expected
+
+
+def test_another_packages_nonsense_is_named(other_package):
+    code = (
+        "try: RobotRegistry.load('acme_nonsense')\n"
+        "except Exception as error: print(type(error).__name__, error)"
+    )
+    said = run_with(other_package, code)
+    assert said == (
+        "DescriptorError entry point 'acme:NONSENSE' gave a int; a RobotDescriptor is needed\n"
+    )
