@@ -9,6 +9,7 @@ from simulation.shapes import Color
 RED: Color = (1.0, 0.0, 0.0, 1.0)
 GREEN: Color = (0.0, 1.0, 0.0, 1.0)
 BLUE: Color = (0.0, 0.0, 1.0, 1.0)
+WHITE: Color = (1.0, 1.0, 1.0, 1.0)
 
 
 def add_cube(

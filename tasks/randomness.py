@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -50,17 +52,30 @@ class EpisodeRandom:
         """Draw float32 numbers in [0, 1) from the torch stream."""
         return torch.rand(shape, generator=self.torch)
 
+    def uniform_between(self, low: Sequence[float], high: Sequence[float]) -> Tensor:
+        """Draw one float32 number between each pair of bounds from the torch stream."""
+        lowest, highest = torch.tensor(low), torch.tensor(high)
+        return self.uniform(1, len(low))[0] * (highest - lowest) + lowest
+
+    def torch_normal(self, std: float, count: int) -> Tensor:
+        """Draw ``count`` float32 numbers of mean 0 from the torch stream (unit of ``std``)."""
+        return torch.normal(0.0, std, (1, count), generator=self.torch)[0]
+
     def normal(self, std: float, count: int) -> NDArray[np.float64]:
         """Draw ``count`` numbers of mean 0 from the numpy stream (unit of ``std``)."""
         return self.numpy.normal(0, std, count)
 
-    def yaw_quaternion(self) -> Tensor:
-        """Draw a rotation about z by an angle in [0, 2π), as a wxyz quaternion (4,), w ≥ 0.
+    def yaw_quaternion(self, lowest: float = 0.0, highest: float = np.pi * 2) -> Tensor:
+        """Draw a rotation about z, as a wxyz quaternion (4,), w ≥ 0.
+
+        Args:
+            lowest: Smallest angle (rad).
+            highest: Largest angle (rad).
 
         Follows the operations of native's ``random_quaternions(lock_x=True, lock_y=True)``: it
         draws three angles, uses the last, and reads the quaternion off the rotation matrix.
         """
-        angle = self.uniform(1, 3)[0, 2] * (np.pi * 2)
+        angle = self.uniform(1, 3)[0, 2] * (highest - lowest) + lowest
         cos, sin = torch.cos(angle), torch.sin(angle)
         w_squared, z_squared = 1.0 + cos + cos + 1.0, 1.0 - cos - cos + 1.0
         w, z = torch.sqrt(w_squared), torch.sqrt(z_squared)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 # One line per task, sorted by id: id -> module:class, then its other names.
 CATALOGUE = {
     "PickCube-v1": ("tasks.pick_cube:PickCube", "maniskill.pick_cube_native"),
+    "PlugCharger-v1": ("tasks.plug_charger:PlugCharger", "maniskill.plug_charger_native"),
     "PushT-v1": ("tasks.push_t:PushT", "maniskill.push_t_native"),
     "TwoRobotPickCube-v1": (
         "tasks.two_robot_pick_cube:TwoRobotPickCube",

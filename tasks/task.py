@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 import torch
 from gymnasium.spaces import Box
+from numpy.typing import NDArray
 from torch import Tensor
 
 from layouts import Layout
@@ -123,10 +124,18 @@ class MultiRobotTask:
         for name, placement in world.layout.items():
             dof = placement.robot.dof
             noise = rng.normal(placement.qpos_noise, dof) if shared is None else shared[:dof]
-            groups = placement.robot.action_split.groups.values()
-            noisy = [group.reset_noise for group in groups for _ in group.joints]
-            qpos = np.array(placement.start_qpos)
-            world.robots[name].reset(np.where(noisy, noise + qpos, qpos))
+            self.stand(world, name, noise)
+
+    def stand(self, world: World, robot: str, noise: NDArray[Any]) -> None:
+        """Stand a robot at its placement, off its keyframe by ``noise``, (dof,) (rad, m).
+
+        Groups without reset noise stay exact. The sum is taken in the type of ``noise``.
+        """
+        placement = world.layout[robot]
+        groups = placement.robot.action_split.groups.values()
+        noisy = [group.reset_noise for group in groups for _ in group.joints]
+        qpos = np.array(placement.start_qpos, noise.dtype)
+        world.robots[robot].reset(np.where(noisy, noise + qpos, qpos))
 
     # -- making and closing ------------------------------------------------------------------
 
