@@ -48,23 +48,27 @@ def pairwise_forces(
     return {name: impulse.astype(np.float32) / timestep for name, impulse in impulses.items()}
 
 
-def grasped(fingers: Fingers, forces: Tensor, poses: Sequence[Tensor]) -> Tensor:
+def grasped(
+    fingers: Fingers, forces: Tensor, poses: Sequence[Tensor], max_angle: float | None = None
+) -> Tensor:
     """Tell from contact forces whether two fingers hold a body.
 
     Args:
         fingers: Which way they open, and the thresholds.
         forces: Force of the body on each finger, shape (N, 2, 3) (N, world frame).
         poses: Pose of each finger link, each (N, 7).
+        max_angle: Largest angle instead of the fingers' own (degrees).
 
     Returns:
         Shape (N,), bool.
     """
+    limit = fingers.max_angle if max_angle is None else max_angle
     held = torch.ones(len(forces), dtype=torch.bool)
     for i, (pose, sign) in enumerate(zip(poses, fingers.opening_signs, strict=True)):
         force = forces[:, i]
         angle = torch.rad2deg(_angle_between(sign * _y_axis(pose[:, 3:]), force))
         strong = torch.linalg.vector_norm(force, dim=1) >= fingers.min_force
-        held &= strong & (angle <= fingers.max_angle)
+        held &= strong & (angle <= limit)
     return held
 
 

@@ -29,7 +29,7 @@ def _remembered(
 
     @wraps(compute)
     def look_up(self: State, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Value:
-        key = (name, args)
+        key = (name, args, *kwargs.items())
         found = self.memo.get(key)
         if found is None:
             found = self.memo[key] = compute(self, *args, **kwargs)
@@ -193,15 +193,23 @@ class State:
         return torch.zeros(self.num_envs, 3) if forces is None else forces[:, 0]
 
     @_remembered
-    def is_grasping(self, robot: str, body: str) -> Tensor:
-        """Whether a robot's two fingers hold a body, shape (N,) bool; see `robots.Fingers`."""
+    def is_grasping(self, robot: str, body: str, max_angle: float | None = None) -> Tensor:
+        """Whether a robot's two fingers hold a body, shape (N,) bool; see `robots.Fingers`.
+
+        Args:
+            robot: Robot name.
+            body: Body name.
+            max_angle: Largest angle between force and opening direction (degrees); None takes
+                the robot's own.
+        """
         fingers = self._index.fingers(robot)
         if fingers is None:
             return torch.zeros(self.num_envs, dtype=torch.bool)
         forces = self._contact_forces(robot, fingers.links, body)
         if forces is None:
             return torch.zeros(self.num_envs, dtype=torch.bool)
-        return grasped(fingers, forces, [self.link_pose(robot, link) for link in fingers.links])
+        poses = [self.link_pose(robot, link) for link in fingers.links]
+        return grasped(fingers, forces, poses, max_angle)
 
     # -- distances ---------------------------------------------------------------------------
 

@@ -87,8 +87,8 @@ def _half_angle(sine: Tensor, cosine: Tensor) -> Tensor:
 
 def _product(a: Floats, b: Floats) -> Floats:
     """Products of quaternions, (N, 4)."""
-    factors = b.take(_FACTOR, 1) * _SIGN
-    terms = a[:, :, None] * factors
+    factors: Floats = b.take(_FACTOR, 1) * _SIGN
+    terms: Floats = a[:, :, None] * factors
     return terms[:, 0] + terms[:, 1] + terms[:, 2] + terms[:, 3]
 
 

@@ -15,6 +15,10 @@ if TYPE_CHECKING:
 
 # One line per task, sorted by id: id -> module:class, then its other names.
 CATALOGUE = {
+    "PegInsertionSide-v1": (
+        "tasks.peg_insertion_side:PegInsertionSide",
+        "maniskill.peg_insertion_side_native",
+    ),
     "PickCube-v1": ("tasks.pick_cube:PickCube", "maniskill.pick_cube_native"),
     "PlugCharger-v1": ("tasks.plug_charger:PlugCharger", "maniskill.plug_charger_native"),
     "PushT-v1": ("tasks.push_t:PushT", "maniskill.push_t_native"),

@@ -55,6 +55,7 @@ class MultiRobotTask:
         reward_modes: Reward modes, the default first.
         max_reward: What ``normalized_dense`` divides the dense reward by.
         shared_joint_noise: Whether all robots get the same joint noise at a reset.
+        joint_noise_draws: How often joint noise is drawn at a reset; the last draw counts.
         rebuilds: Whether every reset builds the worlds anew, with a new `design`.
         viewpoint: Camera position and target of `render` (m, world).
         num_envs: Number of environments N.
@@ -72,6 +73,7 @@ class MultiRobotTask:
     reward_modes: ClassVar[tuple[str, ...]] = ()
     max_reward: ClassVar[float] = 1.0
     shared_joint_noise: ClassVar[bool] = False
+    joint_noise_draws: ClassVar[int] = 1
     rebuilds: ClassVar[bool] = False
     viewpoint: ClassVar[tuple[tuple[float, float, float], tuple[float, float, float]]] = (
         (0.6, 0.7, 0.6),
@@ -116,14 +118,8 @@ class MultiRobotTask:
 
     def reset_robots(self, world: World, rng: EpisodeRandom) -> None:
         """Stand every robot at its placement, with joint noise."""
-        shared = None
-        if self.shared_joint_noise:
-            largest = max(len(robot.joints) for robot in world.robots.values())
-            deviation = max(p.qpos_noise for p in world.layout.values())
-            shared = rng.normal(deviation, largest)
-        for name, placement in world.layout.items():
-            dof = placement.robot.dof
-            noise = rng.normal(placement.qpos_noise, dof) if shared is None else shared[:dof]
+        draws = [self._joint_noise(world.layout, rng) for _ in range(self.joint_noise_draws)]
+        for name, noise in draws[-1].items():
             self.stand(world, name, noise)
 
     def stand(self, world: World, robot: str, noise: NDArray[Any]) -> None:
@@ -297,6 +293,13 @@ class MultiRobotTask:
         return self._camera.take()
 
     # -- inside ------------------------------------------------------------------------------
+
+    def _joint_noise(self, layout: Layout, rng: EpisodeRandom) -> dict[str, NDArray[np.float64]]:
+        if not self.shared_joint_noise:
+            return {n: rng.normal(p.qpos_noise, p.robot.dof) for n, p in layout.items()}
+        largest = max(placement.robot.dof for placement in layout.values())
+        shared = rng.normal(max(p.qpos_noise for p in layout.values()), largest)
+        return {name: shared[: placement.robot.dof] for name, placement in layout.items()}
 
     def _build_world(self, world: World, index: int) -> None:
         rng = self._rngs[index]
