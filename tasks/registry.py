@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 # One line per task, sorted by id: id -> module:class, then its other names.
 CATALOGUE = {
+    "DrawTriangle-v1": ("tasks.draw_triangle:DrawTriangle", "maniskill.draw_triangle_native"),
     "PegInsertionSide-v1": (
         "tasks.peg_insertion_side:PegInsertionSide",
         "maniskill.peg_insertion_side_native",

@@ -116,6 +116,12 @@ class MultiRobotTask:
     def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
         """Remember what later steps compare with; called after ``env_ids`` were reset."""
 
+    def respond(self, state: State) -> None:
+        """Move bodies in answer to a control step, before the step is judged.
+
+        Called after every step's physics if a subclass has it; the state is read anew then.
+        """
+
     def reset_robots(self, world: World, rng: EpisodeRandom) -> None:
         """Stand every robot at its placement, with joint noise."""
         draws = [self._joint_noise(world.layout, rng) for _ in range(self.joint_noise_draws)]
@@ -174,6 +180,7 @@ class MultiRobotTask:
             visuals=scenario.render_mode is not None,
         )
         self._camera: Any = None
+        self._responds = type(self).respond is not MultiRobotTask.respond
         obs, _ = self._begin(list(range(self.num_envs)), reconfigured=True)
         self.observation_slices = self._slices() if self.obs_mode == "state" else {}
         if isinstance(obs, Tensor):
@@ -252,7 +259,12 @@ class MultiRobotTask:
         flat = self._reader.read(action)
         self.simulation.step(flat, self._state.joint_positions)
         self._elapsed += 1
-        state = self._state = self.simulation.read()
+        state = self.simulation.read()
+        if self._responds:
+            self.respond(state)
+            self.simulation.touched()
+            state = self.simulation.read()
+        self._state = state
         info = self._info(state)
         obs = self._observation(state, info)
         reward = self._reward(state, torch.from_numpy(flat), info)
