@@ -21,6 +21,10 @@ CATALOGUE = {
         "maniskill.peg_insertion_side_native",
     ),
     "PickCube-v1": ("tasks.pick_cube:PickCube", "maniskill.pick_cube_native"),
+    "PickCubeSO100-v1": (
+        "tasks.pick_cube_so100:PickCubeSO100",
+        "maniskill.pick_cube_so100_native",
+    ),
     "PlugCharger-v1": ("tasks.plug_charger:PlugCharger", "maniskill.plug_charger_native"),
     "PushT-v1": ("tasks.push_t:PushT", "maniskill.push_t_native"),
     "TwoRobotPickCube-v1": (
