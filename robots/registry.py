@@ -14,6 +14,7 @@ CATALOGUE = {
     "panda": "robots.panda:PANDA",
     "panda_stick": "robots.panda_stick:PANDA_STICK",
     "panda_wristcam": "robots.panda_wristcam:PANDA_WRISTCAM",
+    "so100": "robots.so100:SO100",
 }
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+from typing import ClassVar
+
 import torch
 from torch import Tensor
 
@@ -13,11 +16,7 @@ from tasks.registry import register_task
 from tasks.shaping import closeness
 from tasks.task import Info, MultiRobotTask
 
-# mani_skill 3.0.1, envs/tasks/tabletop/pick_cube.py and pick_cube_cfgs.py (m)
-CUBE_HALF_SIZE = 0.02
-GOAL_RADIUS = 0.025
-SPAWN_HALF_SIZE = 0.1
-MAX_GOAL_HEIGHT = 0.3
+# mani_skill 3.0.1, envs/tasks/tabletop/pick_cube.py
 STATIC_SPEED = 0.2  # rad/s
 
 
@@ -27,6 +26,13 @@ class PickCube(MultiRobotTask):
 
     Cube and goal are drawn from a square of 0.2 m around the origin, the goal up to 0.3 m above
     the cube. Success: the cube is within 2.5 cm of the goal and the arm is static.
+
+    Attributes:
+        cube_half_size: Half the cube's edge (m).
+        goal_radius: How near to the goal the cube must come (m).
+        spawn_half_size: Half the edge of the square that cube and goal are drawn from (m).
+        spawn_centre: Its centre, x and y (m).
+        max_goal_height: How high above the cube the goal may be (m).
     """
 
     layout = single({"arm": "panda"})
@@ -34,23 +40,38 @@ class PickCube(MultiRobotTask):
     max_episode_steps = 50
     max_reward = 5
 
+    # mani_skill 3.0.1, envs/tasks/tabletop/pick_cube_cfgs.py, "panda"
+    cube_half_size: ClassVar[float] = 0.02
+    goal_radius: ClassVar[float] = 0.025
+    spawn_half_size: ClassVar[float] = 0.1
+    spawn_centre: ClassVar[tuple[float, float]] = (0.0, 0.0)
+    max_goal_height: ClassVar[float] = 0.3
+
+    @cached_property
+    def _goal_radius(self) -> Tensor:
+        return torch.tensor(self.goal_radius)
+
     def build(self, world: World) -> None:
         """Add the table, the cube and the goal."""
         add_table(world)
-        add_cube(world, "cube", CUBE_HALF_SIZE, position=(0.0, 0.0, CUBE_HALF_SIZE))
-        add_goal(world, GOAL_RADIUS)
+        add_cube(world, "cube", self.cube_half_size, position=(0.0, 0.0, self.cube_half_size))
+        add_goal(world, self.goal_radius)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the cube on the table and the goal above it."""
-        x, y = (rng.uniform(1, 2) * (SPAWN_HALF_SIZE * 2) - SPAWN_HALF_SIZE)[0].tolist()
-        world.set_pose("cube", (x, y, CUBE_HALF_SIZE), rng.yaw_quaternion())
-        x, y = (rng.uniform(1, 2) * (SPAWN_HALF_SIZE * 2) - SPAWN_HALF_SIZE)[0].tolist()
-        z = rng.uniform(1) * MAX_GOAL_HEIGHT + CUBE_HALF_SIZE
+        x, y = self._place(rng)
+        world.set_pose("cube", (x, y, self.cube_half_size), rng.yaw_quaternion())
+        x, y = self._place(rng)
+        z = rng.uniform(1) * self.max_goal_height + self.cube_half_size
         world.set_pose("goal_site", (x, y, z.item()))
+
+    def _place(self, rng: EpisodeRandom) -> list[float]:
+        offset = rng.uniform(1, 2) * (self.spawn_half_size * 2) - self.spawn_half_size
+        return (offset + torch.tensor(self.spawn_centre))[0].tolist()
 
     def evaluate(self, state: State) -> dict[str, Tensor]:
         """Success: placed and static."""
-        placed = state.distance("cube", "goal_site") <= _GOAL_RADIUS
+        placed = state.distance("cube", "goal_site") <= self._goal_radius
         static = state.is_static("arm", STATIC_SPEED)
         return {
             "success": placed & static,
@@ -82,4 +103,4 @@ class PickCube(MultiRobotTask):
         return torch.where(info["success"], _DONE, reward)
 
 
-_GOAL_RADIUS, _DONE = torch.tensor([GOAL_RADIUS, 5.0])  # m, reward
+_DONE = torch.tensor(5.0)

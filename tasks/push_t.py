@@ -69,6 +69,7 @@ class PushT(MultiRobotTask):
     physics = PhysicsSettings()
     max_episode_steps = 100
     max_reward = 3.0
+    joint_noise_draws = 2
     viewpoint = ((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1))
 
     def build(self, world: World) -> None:
@@ -81,12 +82,6 @@ class PushT(MultiRobotTask):
         world.add("goal_Tee", *outline, kind="kinematic", position=above)
         marker = Cylinder(radius=0.02, half_length=1e-4, color=grey, collides=False)
         world.add("goal_ee", marker, kind="kinematic", position=above)
-
-    def reset_robots(self, world: World, rng: EpisodeRandom) -> None:
-        """Stand the arm over the marker; native draws its noise twice and uses the second."""
-        for placement in world.layout.values():
-            rng.normal(placement.qpos_noise, placement.robot.dof)
-        super().reset_robots(world, rng)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the T down beside its outline."""

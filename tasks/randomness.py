@@ -52,6 +52,15 @@ class EpisodeRandom:
         """Draw float32 numbers in [0, 1) from the torch stream."""
         return torch.rand(shape, generator=self.torch)
 
+    def uniform_between(self, low: Sequence[float], high: Sequence[float]) -> Tensor:
+        """Draw one float32 number between each pair of bounds from the torch stream."""
+        lowest, highest = torch.tensor(low), torch.tensor(high)
+        return self.uniform(1, len(low))[0] * (highest - lowest) + lowest
+
+    def torch_normal(self, std: float, count: int) -> Tensor:
+        """Draw ``count`` float32 numbers of mean 0 from the torch stream (unit of ``std``)."""
+        return torch.normal(0.0, std, (1, count), generator=self.torch)[0]
+
     def normal(self, std: float, count: int) -> NDArray[np.float64]:
         """Draw ``count`` numbers of mean 0 from the numpy stream (unit of ``std``)."""
         return self.numpy.normal(0, std, count)

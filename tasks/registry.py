@@ -15,12 +15,22 @@ if TYPE_CHECKING:
 
 # One line per task, sorted by id: id -> module:class, then its other names.
 CATALOGUE = {
+    "DrawTriangle-v1": ("tasks.draw_triangle:DrawTriangle", "maniskill.draw_triangle_native"),
     "LiftPegUpright-v1": (
         "tasks.lift_peg_upright:LiftPegUpright",
         "maniskill.lift_peg_upright_native",
     ),
+    "PegInsertionSide-v1": (
+        "tasks.peg_insertion_side:PegInsertionSide",
+        "maniskill.peg_insertion_side_native",
+    ),
     "PickCube-v1": ("tasks.pick_cube:PickCube", "maniskill.pick_cube_native"),
+    "PickCubeSO100-v1": (
+        "tasks.pick_cube_so100:PickCubeSO100",
+        "maniskill.pick_cube_so100_native",
+    ),
     "PlaceSphere-v1": ("tasks.place_sphere:PlaceSphere", "maniskill.place_sphere_native"),
+    "PlugCharger-v1": ("tasks.plug_charger:PlugCharger", "maniskill.plug_charger_native"),
     "PokeCube-v1": ("tasks.poke_cube:PokeCube", "maniskill.poke_cube_native"),
     "PullCube-v1": ("tasks.pull_cube:PullCube", "maniskill.pull_cube_native"),
     "PullCubeTool-v1": ("tasks.pull_cube_tool:PullCubeTool", "maniskill.pull_cube_tool_native"),

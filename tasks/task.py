@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 import torch
 from gymnasium.spaces import Box
+from numpy.typing import NDArray
 from torch import Tensor
 
 from layouts import Layout
@@ -54,6 +55,7 @@ class MultiRobotTask:
         reward_modes: Reward modes, the default first.
         max_reward: What ``normalized_dense`` divides the dense reward by.
         shared_joint_noise: Whether all robots get the same joint noise at a reset.
+        joint_noise_draws: How often joint noise is drawn at a reset; the last draw counts.
         rebuilds: Whether every reset builds the worlds anew, with a new `design`.
         viewpoint: Camera position and target of `render` (m, world).
         num_envs: Number of environments N.
@@ -71,6 +73,7 @@ class MultiRobotTask:
     reward_modes: ClassVar[tuple[str, ...]] = ()
     max_reward: ClassVar[float] = 1.0
     shared_joint_noise: ClassVar[bool] = False
+    joint_noise_draws: ClassVar[int] = 1
     rebuilds: ClassVar[bool] = False
     viewpoint: ClassVar[tuple[tuple[float, float, float], tuple[float, float, float]]] = (
         (0.6, 0.7, 0.6),
@@ -113,20 +116,28 @@ class MultiRobotTask:
     def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
         """Remember what later steps compare with; called after ``env_ids`` were reset."""
 
+    def respond(self, state: State) -> None:
+        """Move bodies in answer to a control step, before the step is judged.
+
+        Called after every step's physics if a subclass has it; the state is read anew then.
+        """
+
     def reset_robots(self, world: World, rng: EpisodeRandom) -> None:
         """Stand every robot at its placement, with joint noise."""
-        shared = None
-        if self.shared_joint_noise:
-            largest = max(len(robot.joints) for robot in world.robots.values())
-            deviation = max(p.qpos_noise for p in world.layout.values())
-            shared = rng.normal(deviation, largest)
-        for name, placement in world.layout.items():
-            dof = placement.robot.dof
-            noise = rng.normal(placement.qpos_noise, dof) if shared is None else shared[:dof]
-            groups = placement.robot.action_split.groups.values()
-            noisy = [group.reset_noise for group in groups for _ in group.joints]
-            qpos = np.array(placement.start_qpos)
-            world.robots[name].reset(np.where(noisy, noise + qpos, qpos))
+        draws = [self._joint_noise(world.layout, rng) for _ in range(self.joint_noise_draws)]
+        for name, noise in draws[-1].items():
+            self.stand(world, name, noise)
+
+    def stand(self, world: World, robot: str, noise: NDArray[Any]) -> None:
+        """Stand a robot at its placement, off its keyframe by ``noise``, (dof,) (rad, m).
+
+        Groups without reset noise stay exact. The sum is taken in the type of ``noise``.
+        """
+        placement = world.layout[robot]
+        groups = placement.robot.action_split.groups.values()
+        noisy = [group.reset_noise for group in groups for _ in group.joints]
+        qpos = np.array(placement.start_qpos, noise.dtype)
+        world.robots[robot].reset(np.where(noisy, noise + qpos, qpos))
 
     # -- making and closing ------------------------------------------------------------------
 
@@ -170,6 +181,7 @@ class MultiRobotTask:
             visuals=scenario.render_mode is not None,
         )
         self._camera: Any = None
+        self._responds = type(self).respond is not MultiRobotTask.respond
         obs, _ = self._begin(list(range(self.num_envs)), reconfigured=True)
         self.observation_slices = self._slices() if self.obs_mode == "state" else {}
         if isinstance(obs, Tensor):
@@ -248,7 +260,12 @@ class MultiRobotTask:
         flat = self._reader.read(action)
         self.simulation.step(flat, self._state.joint_positions)
         self._elapsed += 1
-        state = self._state = self.simulation.read()
+        state = self.simulation.read()
+        if self._responds:
+            self.respond(state)
+            self.simulation.touched()
+            state = self.simulation.read()
+        self._state = state
         info = self._info(state)
         obs = self._observation(state, info)
         reward = self._reward(state, torch.from_numpy(flat), info)
@@ -289,6 +306,13 @@ class MultiRobotTask:
         return self._camera.take()
 
     # -- inside ------------------------------------------------------------------------------
+
+    def _joint_noise(self, layout: Layout, rng: EpisodeRandom) -> dict[str, NDArray[np.float64]]:
+        if not self.shared_joint_noise:
+            return {n: rng.normal(p.qpos_noise, p.robot.dof) for n, p in layout.items()}
+        largest = max(placement.robot.dof for placement in layout.values())
+        shared = rng.normal(max(p.qpos_noise for p in layout.values()), largest)
+        return {name: shared[: placement.robot.dof] for name, placement in layout.items()}
 
     def _build_world(self, world: World, index: int) -> None:
         rng = self._rngs[index]

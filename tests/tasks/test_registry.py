@@ -1,5 +1,6 @@
 import copy
 import pickle
+import re
 
 import pytest
 import torch
@@ -16,7 +17,7 @@ def test_every_task_has_its_id_and_its_native_name(task_id: str):
     cls = tasks.get_task_class(task_id)
     assert cls.task_id == task_id
     assert tasks.get_task_class(task_id.lower()) is cls
-    snake = "".join(f"_{c.lower()}" if c.isupper() else c for c in task_id[:-3]).lstrip("_")
+    snake = re.sub("(?<=[a-z])(?=[A-Z])", "_", task_id[:-3]).lower()
     assert tasks.get_task_class(f"maniskill.{snake}_native") is cls
     assert tasks.get_task_class(f"ManiSkill.{snake.upper()}_native") is cls
 

@@ -1,0 +1,150 @@
+"""PlugCharger: pick a charger up and plug it into a receptacle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import pi
+
+import torch
+from torch import Tensor
+from torch.linalg import vector_norm
+
+from layouts import single
+from robots.descriptor import Vector3
+from simulation import Box, PhysicsSettings, State, World, add_table
+from simulation.shapes import Color
+from tasks.poses import angle_between, compose
+from tasks.props import WHITE
+from tasks.randomness import EpisodeRandom
+from tasks.registry import register_task
+from tasks.task import Info, MultiRobotTask
+
+# mani_skill 3.0.1, envs/tasks/tabletop/plug_charger.py (m, rad)
+BODY_HALF_SIZE = (2e-2, 1.5e-2, 1.2e-2)
+PRONG_HALF_SIZE = (8e-3, 0.75e-3, 3.2e-3)
+PRONG_OFFSET = 7e-3  # of each prong from the middle
+CLEARANCE = 5e-4  # on each side of a prong
+RECEPTACLE_HALF_SIZE = (1e-2, 5e-2, 5e-2)
+RECEPTACLE_HEIGHT = 0.1
+CHARGER_SPAWN = ((-0.1, -0.2), (-0.01 - PRONG_HALF_SIZE[0] * 2, 0.2))  # lowest, highest x and y
+CHARGER_YAW = (-pi / 3, pi / 3)
+RECEPTACLE_SPAWN = ((0.01, -0.1), (0.1, 0.1))
+RECEPTACLE_YAW = (pi - pi / 8, pi + pi / 8)
+PLUGGED_DISTANCE = 5e-3
+PLUGGED_ANGLE = 0.2
+
+BRASS: Color = (219 / 255, 181 / 255, 57 / 255, 1.0)
+
+
+def charger() -> list[Box]:
+    """Return the two prongs and the body; the origin is where the prongs leave the body."""
+    prongs = [
+        Box(half_size=PRONG_HALF_SIZE, position=(PRONG_HALF_SIZE[0], y, 0.0), color=BRASS)
+        for y in (PRONG_OFFSET, -PRONG_OFFSET)
+    ]
+    body = Box(half_size=BODY_HALF_SIZE, position=(-BODY_HALF_SIZE[0], 0.0, 0.0), color=WHITE)
+    return [*prongs, body]
+
+
+def receptacle() -> list[Box]:
+    """Return the plate around two slots, as five boxes, and the brass that shows in the slots."""
+    depth, width, height = RECEPTACLE_HALF_SIZE
+    slot_width, slot_height = (size + CLEARANCE for size in PRONG_HALF_SIZE[1:])
+    side = 0.5 * (width - slot_width - PRONG_OFFSET)
+    lid = 0.5 * (height - slot_height)
+    side_y, lid_z = slot_width + PRONG_OFFSET + side, slot_height + lid
+    slot_y = PRONG_OFFSET * 0.5 + slot_width
+
+    def box(y: float, z: float, half_size: Vector3, *, brass: bool = False) -> Box:
+        return Box(
+            half_size=half_size,
+            position=(-depth, y, z),
+            color=BRASS if brass else WHITE,
+            collides=not brass,
+        )
+
+    return [
+        box(0.0, lid_z, (depth, width, lid)),
+        box(0.0, -lid_z, (depth, width, lid)),
+        box(side_y, 0.0, (depth, side, height)),
+        box(-side_y, 0.0, (depth, side, height)),
+        box(0.0, 0.0, (depth, PRONG_OFFSET - slot_width, slot_height)),
+        box(-slot_y, 0.0, (depth, slot_width, slot_height), brass=True),
+        box(slot_y, 0.0, (depth, slot_width, slot_height), brass=True),
+    ]
+
+
+@register_task("PlugCharger-v1", "maniskill.plug_charger_native")
+class PlugCharger(MultiRobotTask):
+    """Pick a charger up from the table and plug its two prongs into a receptacle in the air.
+
+    The charger lies before the receptacle, turned by up to 60°; the receptacle hangs 0.1 m above
+    the table and faces the robot within 22.5°. Success: the charger is within 5 mm and 0.2 rad of
+    being plugged in.
+    """
+
+    layout = single({"arm": "panda_wristcam"}, keyframe="rest")
+    physics = PhysicsSettings()
+    max_episode_steps = 200
+    reward_modes = ("none", "sparse")
+    viewpoint = ((0.3, 0.4, 0.35), (-0.05, 0.0, 0.08))
+
+    def build(self, world: World) -> None:
+        """Add the table, the charger and the receptacle."""
+        add_table(world)
+        world.add("charger", *charger(), position=(0.0, 0.0, BODY_HALF_SIZE[2]))
+        above = (0.0, 0.0, RECEPTACLE_HEIGHT)
+        world.add("receptacle", *receptacle(), kind="kinematic", position=above)
+
+    def reset_robots(self, world: World, rng: EpisodeRandom) -> None:
+        """Stand the arm with noise from the torch stream.
+
+        Native draws from the numpy stream first, as everywhere, and drops that.
+        """
+        super().reset_robots(world, rng)
+        for name, placement in world.layout.items():
+            noise = rng.torch_normal(placement.qpos_noise, placement.robot.dof)
+            self.stand(world, name, noise.numpy())
+
+    def sample(self, world: World, rng: EpisodeRandom) -> None:
+        """Lay the charger on the table and hang the receptacle up."""
+        x, y = rng.uniform_between(*CHARGER_SPAWN).tolist()
+        world.set_pose("charger", (x, y, BODY_HALF_SIZE[2]), rng.yaw_quaternion(*CHARGER_YAW))
+        x, y = rng.uniform_between(*RECEPTACLE_SPAWN).tolist()
+        turn = rng.yaw_quaternion(*RECEPTACLE_YAW)
+        world.set_pose("receptacle", (x, y, RECEPTACLE_HEIGHT), turn)
+
+    def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
+        """Remember where the charger belongs; native takes that at a reset, never later."""
+        goal = compose(state.pose("receptacle"), _HALF_TURN)
+        if len(env_ids) == self.num_envs:
+            self._goal = goal
+        else:
+            self._goal = self._goal.clone()
+            self._goal[list(env_ids)] = goal[list(env_ids)]
+
+    def evaluate(self, state: State) -> dict[str, Tensor]:
+        """Success: near the plugged-in pose, in position and angle."""
+        charger = state.pose("charger")
+        distance = vector_norm(self._goal[:, :3] - charger[:, :3], dim=1)
+        angle = angle_between(self._goal[:, 3:], charger[:, 3:])
+        return {
+            "obj_to_goal_dist": distance,
+            "obj_to_goal_angle": angle,
+            "success": (distance <= _PLUGGED_DISTANCE) & (angle <= _PLUGGED_ANGLE),
+        }
+
+    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+        """TCP, charger, receptacle, and where the charger belongs."""
+        return {
+            "tcp_pose": state.tcp_pose("arm"),
+            "charger_pose": state.pose("charger"),
+            "receptacle_pose": state.pose("receptacle"),
+            "goal_pose": self._goal,
+        }
+
+
+# Tensors, because arithmetic with Python numbers costs twice as much per call.
+_PLUGGED_DISTANCE, _PLUGGED_ANGLE = torch.tensor(PLUGGED_DISTANCE), torch.tensor(PLUGGED_ANGLE)
+# The charger plugs in facing the plate. The cosine of a quarter turn is 6e-17 in native, too.
+_HALF_TURN = torch.tensor([[0.0, 0.0, 0.0, 6.123233995736766e-17, 0.0, 0.0, 1.0]])
