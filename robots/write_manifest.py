@@ -75,17 +75,15 @@ def build_package(name: str, mani_skill: Path, urdfs: set[str]) -> AssetPackage:
     if not (name.startswith(PREFIX) and folder.is_dir()):
         raise AssetError(f"package {name!r} has no folder {folder}; call it {PREFIX}<folder>")
     version = metadata.version("mani_skill")
+    licence, terms = _licence(folder)
     origin = PackageOrigin(
         name=name,
         mani_skill=relative,
         hub_dataset=HUB_DATASET,
         hub_folder=f"robots/{name}",
         wheel=f"mani_skill=={version}",
-        licence="CC BY-NC 4.0",
-        licence_note=(
-            f"robot files of mani_skill {version}, Creative Commons"
-            " Attribution-NonCommercial 4.0: name the authors, no commercial use"
-        ),
+        licence=licence,
+        licence_note=f"robot files of mani_skill {version}, {terms}",
     )
     physics: dict[str, set[str]] = {}
     pictures: dict[str, set[str]] = {}
@@ -96,6 +94,19 @@ def build_package(name: str, mani_skill: Path, urdfs: set[str]) -> AssetPackage:
         for path in sorted({*physics, *pictures})
     )
     return AssetPackage(origin, tuple(files))
+
+
+def _licence(folder: Path) -> tuple[str, str]:
+    """Return the short name and terms of a folder's own licence, or else of mani_skill's assets."""
+    own = folder / LICENCE_FILE
+    if not own.is_file():
+        return (
+            "CC BY-NC 4.0",
+            "Creative Commons Attribution-NonCommercial 4.0: name the authors, no commercial use",
+        )
+    if own.read_text(encoding="utf-8").split()[:4] == ["Apache", "License", "Version", "2.0,"]:
+        return "Apache-2.0", "Apache License 2.0: keep the licence file with the files"
+    raise AssetError(f"{own} is a licence this command does not know; tell it in write_manifest.py")
 
 
 def _add_needs(

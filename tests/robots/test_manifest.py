@@ -38,10 +38,22 @@ def test_a_stale_manifest_is_noticed_and_rewritten(tmp_path, monkeypatch, capsys
 
 
 def test_every_package_says_its_origin_and_licence():
-    for package in load_manifest().packages.values():
-        assert package.origin.licence == "CC BY-NC 4.0"
-        assert "name the authors, no commercial use" in package.origin.licence_note
+    licences = {
+        "maniskill_panda": ("CC BY-NC 4.0", "name the authors, no commercial use"),
+        "maniskill_so100": ("Apache-2.0", "keep the licence file"),
+    }
+    for name, package in load_manifest().packages.items():
+        assert package.origin.licence == licences[name][0]
+        assert licences[name][1] in package.origin.licence_note
         assert package.origin.wheel == "mani_skill==3.0.1"
+
+
+def test_a_licence_that_is_not_known_is_refused(tmp_path):
+    folder = tmp_path / "assets" / "robots" / "toy"
+    folder.mkdir(parents=True)
+    (folder / "LICENSE").write_text("Ask me first.")
+    with pytest.raises(AssetError, match="a licence this command does not know"):
+        build_package("maniskill_toy", tmp_path, {"toy.urdf"})
 
 
 def test_convex_hulls_beside_the_meshes_are_left_out():

@@ -30,7 +30,7 @@ def test_an_unknown_name_is_a_key_error_with_the_closest_match_and_the_choices()
     assert isinstance(error.value, UnknownNameError)
     assert str(error.value) == (
         "unknown robot 'Panda_Stik'. Did you mean 'panda_stick'?"
-        " Choices: panda, panda_stick, panda_wristcam."
+        " Choices: panda, panda_stick, panda_wristcam, so100."
         " Add your own with RobotRegistry.register(descriptor)."
     )
     with pytest.raises(UnknownNameError, match="^unknown robot 'xyz'. Choices: panda,"):
@@ -46,7 +46,7 @@ def test_a_registered_robot_is_found_and_listed_in_order():
     mine = replace(RobotRegistry.load("panda"), name="my_panda", reach=0.7)
     assert RobotRegistry.register(mine) is mine
     assert RobotRegistry.load("my_panda") is mine
-    assert RobotRegistry.names() == ("my_panda", "panda", "panda_stick", "panda_wristcam")
+    assert RobotRegistry.names() == ("my_panda", "panda", "panda_stick", "panda_wristcam", "so100")
     assert RobotRegistry.register(replace(mine)) == mine
 
 
@@ -94,7 +94,7 @@ def run_with(other_package: Path, code: str) -> str:
 
 def test_another_package_brings_a_robot(other_package):
     code = "print(RobotRegistry.load('acme_arm').source, *RobotRegistry.names())"
-    expected = "acme acme_arm acme_nonsense panda panda_stick panda_wristcam\n"
+    expected = "acme acme_arm acme_nonsense panda panda_stick panda_wristcam so100\n"
     assert run_with(other_package, code) == expected
 
 
