@@ -32,7 +32,7 @@ def make_native(task_id: str, reward_mode: str | None = None) -> Any:
         SimulationError: If there is no Vulkan driver, without which native builds no scene.
         TaskError: If mani_skill has no such task or the task no such reward mode.
     """
-    with _quiet():
+    with quiet():
         gym = _import_native()
         _expect_task(task_id, reward_mode)
         chosen = {} if reward_mode is None else {"reward_mode": reward_mode}
@@ -117,8 +117,8 @@ def _expect_task(task_id: str, reward_mode: str | None) -> None:
 
 
 @contextmanager
-def _quiet() -> Generator[None]:
-    """Hold back what mani_skill says while it is imported and builds."""
+def quiet() -> Generator[None]:
+    """Hold back what mani_skill says while it is imported or builds a scene."""
     logger = logging.getLogger(_LOGGER)
     before, logger.disabled = logger.disabled, True
     try:

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from parity.native import make_native, native_action, native_action_dim
+from parity.native import make_native, native_action, native_action_dim, quiet
 from parity.snapshot import Snapshot, select, stack, take
 from tasks import MultiRobotTask
 
@@ -87,12 +87,11 @@ class NativeSide:
 
     def reset(self, seeds: Sequence[int], env_ids: Sequence[int], *, rebuild: bool) -> Snapshot:
         """Begin episodes; see `Side`."""
-        return stack(
-            [
-                take(env, 1, *env.reset(seed=seed, options={"reconfigure": rebuild}))
-                for seed, env in zip(seeds, (self.envs[i] for i in env_ids), strict=True)
-            ]
-        )
+        rows: list[Snapshot] = []
+        with quiet():
+            for seed, env in zip(seeds, (self.envs[i] for i in env_ids), strict=True):
+                rows.append(take(env, 1, *env.reset(seed=seed, options={"reconfigure": rebuild})))
+        return stack(rows)
 
     def step(self, actions: Floats) -> Snapshot:
         """Advance every environment; see `Side`."""

@@ -77,7 +77,7 @@ class Puppeteer:
     def place(self, body: str) -> tuple[np.ndarray, float]:
         """Position (m) and yaw (rad) of a body."""
         pose = self.world.body(body).entity.pose
-        return np.array(pose.p), 2 * atan2(pose.q[3], pose.q[0])
+        return np.array(pose.p), yaw_of(pose.q)
 
 
 def downwards(yaw: float) -> tuple[float, ...]:
@@ -91,10 +91,10 @@ def nearest_quarter(yaw: float, to: float) -> float:
 
 
 def grasp_and_shake(
-    puppeteer: Puppeteer, robot: str, yaw_at_rest: float, approach: int = 14
+    puppeteer: Puppeteer, robot: str, yaw_at_rest: float, approach: int = 14, body: str = "cube"
 ) -> None:
-    """Grasp the cube from above, lift it, shake it, and end with it in the hand."""
-    (x, y, z), yaw = puppeteer.place("cube")
+    """Grasp a body from above, lift it, shake it, and end with it in the hand."""
+    (x, y, z), yaw = puppeteer.place(body)
     hand = downwards(nearest_quarter(yaw, yaw_at_rest))
     puppeteer.move(approach, OPEN, {robot: ((x, y, z + 0.08), hand)})
     puppeteer.move(8, OPEN, {robot: ((x, y, z), hand)})
@@ -131,6 +131,23 @@ def push_t(puppeteer: Puppeteer) -> None:
         puppeteer.move(4, OPEN, {"arm": ((x + 0.08 * dx, y + 0.08 * dy, 0.12), hand)})
 
 
+def touch_something(puppeteer: Puppeteer) -> None:
+    """Reach for the first movable body with every robot in turn; for tasks not listed below."""
+    bodies = [b.name for b in puppeteer.world.bodies.values() if b.kind == "dynamic"]
+    for robot, placement in puppeteer.env.layout.items():
+        if bodies:
+            yaw_at_rest = yaw_of(placement.base_quaternion)
+            grasp_and_shake(puppeteer, robot, yaw_at_rest, body=bodies[0])
+        else:
+            puppeteer.shake(robot, 40, CLOSED)
+
+
+def yaw_of(quaternion: Sequence[float]) -> float:
+    """Yaw (rad) of an orientation (wxyz) that only turns about z."""
+    return 2 * atan2(quaternion[3], quaternion[0])
+
+
+# Motions made for a task; `touch_something` serves the others.
 MOTIONS: dict[str, Callable[[Puppeteer], None]] = {
     "PickCube-v1": pick_cube,
     "PushT-v1": push_t,
@@ -142,5 +159,5 @@ MOTIONS: dict[str, Callable[[Puppeteer], None]] = {
 def touching_episode(task_id: str, seed: int) -> Episode:
     """Return the scripted motion of a task, planned for a seed."""
     puppeteer = Puppeteer(task_id, seed)
-    MOTIONS[task_id](puppeteer)
+    MOTIONS.get(task_id, touch_something)(puppeteer)
     return puppeteer.episode()

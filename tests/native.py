@@ -15,7 +15,9 @@ from parity.sides import NativeSide, OurSide
 TASKS = tasks.list_tasks()
 NATIVE = [
     pytest.mark.native,
-    pytest.mark.filterwarnings("ignore:__array_wrap__:DeprecationWarning"),  # mani_skill's own
+    # mani_skill's own
+    pytest.mark.filterwarnings("ignore:__array_wrap__:DeprecationWarning"),
+    pytest.mark.filterwarnings("ignore:The 'warn' method:DeprecationWarning"),
 ]
 
 

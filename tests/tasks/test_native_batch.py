@@ -12,6 +12,8 @@ from tests.native import NATIVE, TASKS, Pair, complaints, pair
 pytestmark = NATIVE
 
 NUM_ENVS = 8
+QUICK = ("PickCube-v1", "PushT-v1", "TwoRobotPickCube-v1")  # batching is the same in every task
+BATCHED = [t if t in QUICK else pytest.param(t, marks=pytest.mark.long) for t in TASKS]
 
 
 def step_and_compare(both: Pair, rng: np.random.Generator, steps: int) -> None:
@@ -22,7 +24,7 @@ def step_and_compare(both: Pair, rng: np.random.Generator, steps: int) -> None:
 
 
 @pytest.mark.parametrize("history", HISTORIES)
-@pytest.mark.parametrize("task_id", TASKS)
+@pytest.mark.parametrize("task_id", BATCHED)
 def test_random_and_scripted_episodes_side_by_side(task_id, history):
     both = pair(task_id, num_envs=NUM_ENVS)
     scripted = [Episode(i, touching_episode(task_id, i).actions[:60]) for i in (0, 1)]
@@ -32,7 +34,7 @@ def test_random_and_scripted_episodes_side_by_side(task_id, history):
     assert complaints(results) == []
 
 
-@pytest.mark.parametrize("task_id", TASKS)
+@pytest.mark.parametrize("task_id", BATCHED)
 def test_one_seed_counts_up(task_id):
     both = pair(task_id, num_envs=NUM_ENVS)
     both.forget()
@@ -41,7 +43,7 @@ def test_one_seed_counts_up(task_id):
     np.testing.assert_array_equal(obs.numpy(), native["observation", "observation"])
 
 
-@pytest.mark.parametrize("task_id", TASKS)
+@pytest.mark.parametrize("task_id", BATCHED)
 def test_partial_resets_midway(task_id):
     both = pair(task_id, num_envs=NUM_ENVS)
     both.forget()
@@ -63,7 +65,7 @@ def expect_untouched(both: Pair, before: dict, env_ids: list[int]) -> None:
             np.testing.assert_array_equal(after[group][name][env_ids], rows[env_ids])
 
 
-@pytest.mark.parametrize("task_id", TASKS)
+@pytest.mark.parametrize("task_id", BATCHED)
 def test_last_batch_may_be_smaller(task_id):
     both = pair(task_id, num_envs=NUM_ENVS)
     episodes = random_episodes(range(NUM_ENVS + 2), 5, both.ours.action_dim)

@@ -12,7 +12,7 @@ from tests.native import NATIVE, TASKS, Pair, pair
 
 pytestmark = NATIVE
 
-GRASPING_TASKS = [task_id for task_id in TASKS if "PickCube" in task_id]
+GRASPING_TASKS = ("PickCube-v1", "TwoRobotPickCube-v1")  # their motions end with a cube in hand
 
 
 def grasps(both: Pair) -> tuple[list[bool], list[bool]]:
