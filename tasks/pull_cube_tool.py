@@ -70,7 +70,10 @@ class PullCubeTool(MultiRobotTask):
         world.set_pose("cube", (x.item(), y.item(), CUBE_HEIGHT), turn)
 
     def evaluate(self, state: State) -> dict[str, Tensor]:
-        """Success: the cube is near the robot."""
+        """Success: the cube is near the robot.
+
+        Progress and distance are told per environment; native averages them over its batch.
+        """
         way = state.position("cube") - state.base_position("arm")
         success = torch.linalg.vector_norm(way[:, :2], dim=1) < _PULLED_DISTANCE
         distance = _distance(state.position("cube"), state.base_position("arm") + _CENTRE)

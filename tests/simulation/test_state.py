@@ -1,0 +1,70 @@
+import pytest
+import torch
+
+import tasks
+from robots import UnknownNameError
+from simulation import State
+from tasks import MultiRobotTask
+
+
+@pytest.fixture
+def env() -> MultiRobotTask:
+    return tasks.make("TwoRobotPickCube-v1", num_envs=2, robots={"right": "panda_stick"})
+
+
+def state_of(env: MultiRobotTask) -> State:
+    return env.simulation.read()
+
+
+def test_gripper_opening_is_a_share_of_its_range(env: MultiRobotTask):
+    env.reset(seed=0)
+    assert state_of(env).gripper_opening("left").tolist() == [1.0, 1.0]
+    action = torch.zeros(2, 15)
+    action[1, 7] = 1.0
+    for _ in range(20):
+        env.step(action)  # 0 closes to the middle between -0.01 m and 0.04 m
+    opening = state_of(env).gripper_opening("left")
+    torch.testing.assert_close(opening, torch.tensor([0.015 / 0.04, 1.0]), atol=5e-3, rtol=0)
+
+
+def test_a_robot_without_a_gripper_is_open(env: MultiRobotTask):
+    assert state_of(env).gripper_opening("right").tolist() == [1.0, 1.0]
+    with pytest.raises(UnknownNameError, match="Did you mean 'right'"):
+        state_of(env).gripper_opening("rigth")
+
+
+def test_base_positions_are_where_the_layout_says(env: MultiRobotTask):
+    state = state_of(env)
+    for name, y in (("left", -0.75), ("right", 0.75)):
+        torch.testing.assert_close(state.base_position(name), torch.tensor([[0.0, y, 0.0]] * 2))
+
+
+def test_speed_and_spin_are_norms(env: MultiRobotTask):
+    for world in env.simulation.worlds:
+        world.body("cube").component.set_linear_velocity([0.3, 0.0, 0.4])
+        world.body("cube").component.set_angular_velocity([0.0, 2.0, 0.0])
+    env.simulation.touched()
+    state = state_of(env)
+    torch.testing.assert_close(state.speed("cube"), torch.full((2,), 0.5))
+    torch.testing.assert_close(state.spin("cube"), torch.full((2,), 2.0))
+
+
+def test_a_remembered_answer_is_that_of_the_same_question(env: MultiRobotTask):
+    env.step(torch.ones(2, 15))
+    state = state_of(env)
+    assert not state.is_static("left", threshold=0.0).any()
+    assert state.is_static("left", threshold=100.0).all()
+
+
+def test_a_grasp_may_be_told_by_a_narrower_angle():
+    env = tasks.make("PullCubeTool-v1")
+    env.reset(seed=0)
+    world = env.simulation.worlds[0]
+    x, y, z = state_of(env).tcp_position("arm")[0].tolist()
+    world.set_pose("l_shape_tool", (x - 0.05, y, z))
+    for _ in range(3):
+        env.step(torch.tensor([[0.0] * 7 + [-1.0]]))
+    state = state_of(env)
+    assert state.is_grasping("arm", "l_shape_tool").all()
+    assert state.is_grasping("arm", "l_shape_tool", 90.0).all()
+    assert not state.is_grasping("arm", "l_shape_tool", 0.0).any()

@@ -1,0 +1,33 @@
+import math
+
+import torch
+
+from tasks import EpisodeRandom
+
+LOW, HIGH = (-0.1, -0.2), (0.1, 0.2)
+
+
+def test_points_are_apart_and_within_their_region():
+    for seed in range(50):
+        points = EpisodeRandom(seed).points_apart(3, LOW, HIGH, torch.tensor(0.06))
+        gaps = torch.cdist(points, points) + torch.eye(3)
+        assert gaps.min() > 0.06
+        assert (points >= torch.tensor(LOW)).all()
+        assert (points <= torch.tensor(HIGH)).all()
+
+
+def test_a_point_without_room_is_the_origin():
+    points = EpisodeRandom(0).points_apart(2, LOW, HIGH, torch.tensor(10.0))
+    assert points[0].tolist() != [0.0, 0.0]
+    assert points[1].tolist() == [0.0, 0.0]
+
+
+def test_a_yaw_may_be_bounded():
+    rng = EpisodeRandom(0)
+    yaws = []
+    for _ in range(200):
+        w, x, y, z = rng.yaw_quaternion(-math.pi / 6, math.pi / 6).tolist()
+        assert (x, y) == (0.0, 0.0)
+        yaws.append(2 * math.atan2(z, w))
+    assert -math.pi / 6 <= min(yaws) < -0.4
+    assert 0.4 < max(yaws) <= math.pi / 6
