@@ -29,6 +29,7 @@ class PickCube(MultiRobotTask):
     the cube. Success: the cube is within 2.5 cm of the goal and the arm is static.
     """
 
+    source = "mani_skill 3.0.1, envs/tasks/tabletop/pick_cube.py"
     layout = single({"arm": "panda"})
     physics = PhysicsSettings()
     max_episode_steps = 50
