@@ -79,6 +79,7 @@ class TestSummary:
         found_run(history="reused", reward_mode="sparse", max_difference={"reward": 1.0}),
         found_run(source="over-range", equal=False, max_difference={"qpos": 1e-6, "root": "inf"}),
         found_run(task="PushT-v1", reward_mode="none", max_difference={"root": 0.5}),
+        found_run(task="PushT-v1", reward_mode="none", max_difference={"root": 1e-6}),
     )
 
     def test_of_runs(self):

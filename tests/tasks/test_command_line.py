@@ -52,6 +52,7 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 @pytest.fixture
 def only_pick_cube_recorded(monkeypatch):
     monkeypatch.setattr("tasks.__main__.parity_verdicts", lambda: {"PickCube-v1": "bitwise"})
+    monkeypatch.setattr("tasks.__main__.list_tasks", lambda: tuple(CATALOGUE))
 
 
 def test_list_has_a_row_for_every_task(capsys, only_pick_cube_recorded):
