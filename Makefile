@@ -4,15 +4,16 @@ PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python
 
-.PHONY: help demo test test-all check bench clean
+.PHONY: help demo test test-all check bench parity clean
 .NOTPARALLEL:
 
 help:
 	@echo "make demo      two robots hand a cube over, ten times"
 	@echo "make test      the tests"
 	@echo "make test-all  the tests, those that take minutes included"
-	@echo "make check     lint, format, types, and which room imports which"
+	@echo "make check     lint, format, types, which room imports which, README's table"
 	@echo "make bench     speed of a step beside native ManiSkill"
+	@echo "make parity    every task beside native ManiSkill; writes README.md's table"
 	@echo "make clean     remove .venv"
 
 demo: $(VENV)/.demo
@@ -30,9 +31,15 @@ check: $(VENV)/.check
 	$(RUN) -m ruff format --check .
 	$(RUN) -m pyright --pythonpath $(RUN)
 	$(VENV)/bin/lint-imports
+	$(RUN) -m parity readme --check
 
 bench: $(VENV)/.test
 	OMP_NUM_THREADS=1 $(RUN) -m parity.bench $(ARGS)
+
+# ARGS="--demos DIR" plays recorded demonstrations as well.
+parity: $(VENV)/.test
+	OMP_NUM_THREADS=1 $(RUN) -m parity compare --all --record $(ARGS)
+	$(RUN) -m parity readme
 
 clean:
 	rm -rf $(VENV)

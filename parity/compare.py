@@ -13,15 +13,23 @@ import torch
 from rich.console import Console
 
 import tasks
-from parity.comparison import HISTORIES
-from parity.episodes import Episode, find_demonstrations, load_episodes, random_episodes
+from parity.comparison import HISTORIES, History
+from parity.episodes import (
+    Episode,
+    find_demonstrations,
+    load_episodes,
+    over_range_episodes,
+    random_episodes,
+)
 from parity.progress import LiveLine
 from parity.report import document, sentences, table
+from parity.results import RESULTS, record
 from parity.runs import Run, play
+from parity.summary import summarise, summary_table
 from robots import RobotLayoutsError, TaskError, closest_match
 from tasks import MultiRobotTask
 
-TABLE_WIDTH = 150  # columns that a table may take; a narrower terminal wraps it
+TABLE_WIDTH = 180  # columns that a table may take; a narrower terminal wraps it
 
 
 def parser() -> argparse.ArgumentParser:
@@ -35,7 +43,12 @@ def parser() -> argparse.ArgumentParser:
     add = arguments.add_argument
     which = arguments.add_mutually_exclusive_group(required=True)
     which.add_argument("--task", action="append", metavar="TASK", help="task id; may be repeated")
-    which.add_argument("--all", action="store_true", help="every task")
+    which.add_argument(
+        "--all",
+        action="store_true",
+        help="every task: random and over-range actions and --demos, fresh and reused, and reused"
+        " in each further reward mode",
+    )
     add("--seeds", type=int, default=10, metavar="N", help="reset seeds 0 … N-1 (10)")
     add("--steps", type=int, default=100, metavar="N", help="steps of a random episode (100)")
     add("--actions", type=Path, metavar="FILE", help="play this .h5 or .npz file instead")
@@ -44,12 +57,12 @@ def parser() -> argparse.ArgumentParser:
         "--history",
         nargs="+",
         choices=HISTORIES,
-        default=["fresh"],
         help="fresh rebuilds both scenes before every episode, reused only resets them (fresh)",
     )
     add("--reward-mode", nargs="+", metavar="MODE", help="reward modes, or 'all' (the default one)")
     add("--num-envs", type=int, default=1, metavar="N", help="environments that play at once (1)")
     add("--json", type=Path, metavar="FILE", help="write the results to FILE")
+    add("--record", action="store_true", help="keep the results of --all in parity/results.json")
     return arguments
 
 
@@ -77,11 +90,15 @@ def _compare(args: argparse.Namespace) -> int:
         )
     console = Console()
     console.width = max(console.width, TABLE_WIDTH)
-    console.print(table(results))
+    found = document(results)
+    summaries = summarise(found["runs"])
+    console.print(summary_table(summaries) if args.all else table(results))
     for sentence in sentences(results):
         console.print(sentence, markup=False, highlight=False, soft_wrap=True)
     if args.json:
-        _write(args.json, json.dumps(document(results), indent=1) + "\n")
+        _write(args.json, json.dumps(found | {"tasks": summaries}, indent=1) + "\n")
+    if args.record:
+        _write(RESULTS, record(found, summaries))
     return 0 if all(result.equal for result in results) else 1
 
 
@@ -91,11 +108,23 @@ def plan(args: argparse.Namespace) -> list[Run]:
     demonstrations = find_demonstrations(args.demos) if args.demos else {}
     runs: list[Run] = []
     for cls in classes:
-        modes = _reward_modes(cls, args.reward_mode)
+        ways = _ways(cls, args)
         for source, episodes in _sources(cls, args, demonstrations.get(cls.task_id, [])):
-            for history, mode in product(args.history, modes):
+            for history, mode in ways:
                 runs.append(Run(cls.task_id, source, tuple(episodes), history, mode, args.num_envs))
     return runs
+
+
+def _ways(cls: type[MultiRobotTask], args: argparse.Namespace) -> list[tuple[History, str]]:
+    """Return each history and reward mode to play in.
+
+    Physics knows nothing of the reward mode, so ``--all`` plays both histories in the default one,
+    and does not rebuild the scenes in the others.
+    """
+    if args.all and not (args.history or args.reward_mode):
+        default, *others = cls.reward_modes
+        return [*((history, default) for history in HISTORIES), *(("reused", m) for m in others)]
+    return list(product(args.history or ["fresh"], _reward_modes(cls, args.reward_mode)))
 
 
 def _sources(
@@ -104,12 +133,14 @@ def _sources(
     width = cls.layout.action_dim
     if args.actions:
         return [(args.actions.name, load_episodes(args.actions, cls.task_id, width))]
-    random = ("random", random_episodes(range(args.seeds), args.steps, width))
+    drawn = [("random", random_episodes(range(args.seeds), args.steps, width))]
+    if args.all:
+        drawn.append(("over-range", over_range_episodes(range(args.seeds), args.steps, width)))
     recorded = [
         (f"{path.parent.name}/{path.name.split('.')[0]}", load_episodes(path, cls.task_id, width))
         for path in demonstrations
     ]
-    return [random, *recorded]
+    return [*drawn, *recorded]
 
 
 def _reward_modes(cls: type[MultiRobotTask], asked: Sequence[str] | None) -> tuple[str, ...]:
@@ -135,6 +166,8 @@ def _check(args: argparse.Namespace) -> None:
             raise TaskError(f"--{option} is {getattr(args, name)}; it must be 1 or more")
     if args.actions and (args.all or len(args.task) > 1 or args.demos):
         raise TaskError("--actions holds the episodes of one task: give one --task, no --demos")
+    if args.record and (not args.all or args.history or args.reward_mode):
+        raise TaskError("--record keeps all of --all: give --all, no --history, no --reward-mode")
     if args.json and not args.json.absolute().parent.is_dir():
         raise TaskError(f"--json {args.json}: there is no folder {args.json.absolute().parent}")
 

@@ -54,6 +54,16 @@ def random_episodes(seeds: Iterable[int], steps: int, action_dim: int) -> list[E
     return episodes
 
 
+def over_range_episodes(seeds: Iterable[int], steps: int, action_dim: int) -> list[Episode]:
+    """Return episodes of uniform random actions from [-3, 3]; the arguments are the same."""
+    episodes: list[Episode] = []
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        actions = rng.uniform(-_OVER_RANGE, _OVER_RANGE, (steps, action_dim))
+        episodes.append(Episode(seed, actions.astype(np.float32)))
+    return episodes
+
+
 def load_episodes(path: Path, task_id: str, action_dim: int) -> list[Episode]:
     """Read recorded episodes of a task.
 

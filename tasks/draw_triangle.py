@@ -106,6 +106,7 @@ class DrawTriangle(MultiRobotTask):
     outline is within 2.5 cm of a dot, and every dot within 2.5 cm of a point of the outline.
     """
 
+    source = "mani_skill 3.0.1, envs/tasks/drawing/draw_triangle.py"
     layout = Layout({"arm": Placement(RobotRegistry.load("panda_stick"), qpos_noise=0.0)})
     physics = PhysicsSettings(contact_offset=0.01, position_iterations=4, velocity_iterations=0)
     max_episode_steps = MAX_DOTS

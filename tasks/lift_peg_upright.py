@@ -33,6 +33,7 @@ class LiftPegUpright(MultiRobotTask):
     middle within 5 mm of half its length above the table.
     """
 
+    source = "mani_skill 3.0.1, envs/tasks/tabletop/lift_peg_upright.py"
     layout = single({"arm": "panda"})
     physics = PhysicsSettings()
     max_episode_steps = 50

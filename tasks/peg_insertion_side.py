@@ -94,6 +94,7 @@ class PegInsertionSide(MultiRobotTask):
     Success: the head is inside the hole, at most 1.5 cm short of the box's middle.
     """
 
+    source = "mani_skill 3.0.1, envs/tasks/tabletop/peg_insertion_side.py"
     layout = single({"arm": "panda_wristcam"})
     physics = PhysicsSettings()
     max_episode_steps = 100

@@ -35,6 +35,7 @@ class PickCube(MultiRobotTask):
         max_goal_height: How high above the cube the goal may be (m).
     """
 
+    source = "mani_skill 3.0.1, envs/tasks/tabletop/pick_cube.py"
     layout = single({"arm": "panda"})
     physics = PhysicsSettings()
     max_episode_steps = 50

@@ -15,6 +15,7 @@ class PickCubeSO100(PickCube):
     cube. Success: the cube is within 1.56 cm of the goal and the arm is static.
     """
 
+    source = "mani_skill 3.0.1, envs/tasks/tabletop/pick_cube.py"
     layout = single({"arm": "so100"})
     viewpoint = ((-0.1, 0.3, 0.4), (-0.46, 0.0, 0.1))
 

@@ -30,6 +30,7 @@ class PlaceSphere(MultiRobotTask):
     Success: the ball lies in the bin, at rest, and is not grasped.
     """
 
+    source = "mani_skill 3.0.1, envs/tasks/tabletop/place_sphere.py"
     layout = single({"arm": "panda"})
     physics = PhysicsSettings()
     max_episode_steps = 50

@@ -83,6 +83,7 @@ class PlugCharger(MultiRobotTask):
     being plugged in.
     """
 
+    source = "mani_skill 3.0.1, envs/tasks/tabletop/plug_charger.py"
     layout = single({"arm": "panda_wristcam"}, keyframe="rest")
     physics = PhysicsSettings()
     max_episode_steps = 200

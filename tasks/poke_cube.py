@@ -40,6 +40,7 @@ class PokeCube(MultiRobotTask):
     static.
     """
 
+    source = "mani_skill 3.0.1, envs/tasks/tabletop/poke_cube.py"
     layout = single({"arm": "panda"})
     physics = PhysicsSettings()
     max_episode_steps = 50

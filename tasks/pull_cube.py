@@ -31,6 +31,7 @@ class PullCube(MultiRobotTask):
     not count.
     """
 
+    source = "mani_skill 3.0.1, envs/tasks/tabletop/pull_cube.py"
     layout = single({"arm": "panda"})
     physics = PhysicsSettings()
     max_episode_steps = 50

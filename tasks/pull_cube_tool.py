@@ -37,6 +37,7 @@ class PullCubeTool(MultiRobotTask):
     seen from above.
     """
 
+    source = "mani_skill 3.0.1, envs/tasks/tabletop/pull_cube_tool.py"
     layout = single({"arm": "panda"})
     physics = PhysicsSettings()
     max_episode_steps = 100

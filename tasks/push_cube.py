@@ -32,6 +32,7 @@ class PushCube(MultiRobotTask):
     table.
     """
 
+    source = "mani_skill 3.0.1, envs/tasks/tabletop/push_cube.py"
     layout = single({"arm": "panda"})
     physics = PhysicsSettings()
     max_episode_steps = 50

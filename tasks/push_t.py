@@ -65,6 +65,7 @@ class PushT(MultiRobotTask):
     The T lies within 0.2 m × 0.3 m beside the outline. Success: it covers 90 % of the outline.
     """
 
+    source = "mani_skill 3.0.1, envs/tasks/tabletop/push_t.py"
     layout = single({"arm": "panda_stick"}, keyframe="push_start")
     physics = PhysicsSettings()
     max_episode_steps = 100

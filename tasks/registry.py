@@ -98,6 +98,11 @@ def get_task_class(name: str) -> type[MultiRobotTask]:
     return _registered[key]
 
 
+def other_names(cls: type[MultiRobotTask]) -> tuple[str, ...]:
+    """Return what a task class is known as besides its id, in lower case."""
+    return tuple(n for n, c in _registered.items() if c is cls and n != cls.task_id.lower())
+
+
 def make(
     task_id: str,
     num_envs: int = 1,

@@ -39,6 +39,7 @@ class RollBall(MultiRobotTask):
     middle, seen from above; it need not stop there.
     """
 
+    source = "mani_skill 3.0.1, envs/tasks/tabletop/roll_ball.py"
     layout = Layout({"arm": Placement(load_robot("panda"), BASE_POSITION, BASE_QUATERNION)})
     physics = PhysicsSettings()
     max_episode_steps = 80

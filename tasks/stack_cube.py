@@ -31,6 +31,7 @@ class StackCube(MultiRobotTask):
     grasped.
     """
 
+    source = "mani_skill 3.0.1, envs/tasks/tabletop/stack_cube.py"
     layout = single({"arm": "panda_wristcam"})
     physics = PhysicsSettings()
     max_episode_steps = 50

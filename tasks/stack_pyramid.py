@@ -30,6 +30,7 @@ class StackPyramid(MultiRobotTask):
     move or be held.
     """
 
+    source = "mani_skill 3.0.1, envs/tasks/tabletop/stack_pyramid.py"
     layout = single({"arm": "panda_wristcam"})
     physics = PhysicsSettings()
     max_episode_steps = 250

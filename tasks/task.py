@@ -49,6 +49,7 @@ class MultiRobotTask:
 
     Attributes:
         task_id: The task's id.
+        source: Where a clone's numbers come from: package, version and file.
         layout: Default layout.
         physics: Solver settings; None keeps SAPIEN's own defaults.
         max_episode_steps: Control steps until an episode is truncated.
@@ -66,6 +67,7 @@ class MultiRobotTask:
     """
 
     task_id: ClassVar[str] = ""
+    source: ClassVar[str] = ""
     scenario: ClassVar[Any] = _FreshScenario()
     layout: Layout
     physics: ClassVar[PhysicsSettings | None] = None

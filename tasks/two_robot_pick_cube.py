@@ -29,6 +29,7 @@ class TwoRobotPickCube(MultiRobotTask):
     [-0.05, 0.05] (m). Success: the cube is within 2.5 cm of the goal and the right arm static.
     """
 
+    source = "mani_skill 3.0.1, envs/tasks/tabletop/two_robot_pick_cube.py"
     layout = face_to_face({"left": "panda_wristcam", "right": "panda_wristcam"}, spacing=1.5)
     physics = PhysicsSettings()
     max_episode_steps = 100

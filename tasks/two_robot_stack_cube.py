@@ -32,6 +32,7 @@ class TwoRobotStackCube(MultiRobotTask):
     within half a cube, the green one is within 6 cm of the target, and neither is grasped.
     """
 
+    source = "mani_skill 3.0.1, envs/tasks/tabletop/two_robot_stack_cube.py"
     layout = face_to_face({"left": "panda_wristcam", "right": "panda_wristcam"}, spacing=1.5)
     physics = PhysicsSettings()
     max_episode_steps = 100

@@ -1,0 +1,118 @@
+"""``python -m parity readme``: the recorded results as a table in README.md, and its check."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from parity.results import RESULTS, ResultsError, read
+from parity.summary import REWARD_MODES, number_text, reward_text, success_text
+from robots import RobotLayoutsError
+from tasks import list_tasks
+
+README = Path(__file__).parents[1] / "README.md"
+BEGIN = "<!-- parity table: begin; written by `python -m parity readme` -->"
+END = "<!-- parity table: end -->"
+DIFFERENCES = ("object pose", "qpos", "observation")  # the rest stands in the record
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Returns:
+        0 if README.md shows the record, 1 if a check finds that it does not or that the record
+        does not hold exactly the tasks there are, 2 if a file cannot be read.
+    """
+    parser = argparse.ArgumentParser(
+        prog="python -m parity readme",
+        description="Write what `python -m parity compare --all --record` found into README.md.",
+    )
+    parser.add_argument("--check", action="store_true", help="write nothing; tell what is stale")
+    parser.add_argument("--readme", type=Path, default=README, help="the README (this project's)")
+    parser.add_argument("--results", type=Path, default=RESULTS, help="the record (this project's)")
+    args = parser.parse_args(argv)
+    try:
+        record, text = read(args.results), _read_text(args.readme)
+        fresh = with_table(text, record)
+        if not args.check and fresh != text:
+            args.readme.write_text(fresh, encoding="utf-8")
+    except (RobotLayoutsError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    complaints = list(missing_and_extra(record["tasks"], list_tasks()))
+    if args.check and fresh != text:
+        complaints.append(f"{args.readme.name} is stale; run `python -m parity readme`")
+    for complaint in complaints:
+        print(complaint, file=sys.stderr)
+    return 1 if args.check and complaints else 0
+
+
+def with_table(readme: str, record: Mapping[str, Any]) -> str:
+    """Return a README with the record's table between the two markers.
+
+    Raises:
+        ResultsError: If there is not exactly one of each marker, in order, or the record lacks
+            something that the table shows.
+    """
+    for marker in (BEGIN, END):
+        if readme.count(marker) != 1:
+            raise ResultsError(
+                f"the README has the line {marker!r} {readme.count(marker)} times; it needs it once"
+            )
+    before, _, rest = readme.partition(BEGIN)
+    if END not in rest:
+        raise ResultsError(f"the README has the line {END!r} before {BEGIN!r}")
+    try:
+        table = "\n".join(markdown(record))
+    except (KeyError, TypeError, ValueError) as error:
+        raise ResultsError(f"the record is not complete: {error!r}; run `make parity`") from error
+    return f"{before}{BEGIN}\n\n{table}\n\n{END}{rest.partition(END)[2]}"
+
+
+def markdown(record: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the lines of the table, one row per task, and what it was measured with."""
+    modes = [f"reward, {mode}" for mode in REWARD_MODES]
+    numbers = ("obs", "actions", "episodes", "steps", "contact steps", *DIFFERENCES, *modes)
+    last = ("success and info", "succeeded native / here")
+    yield _row("task", "robots", *numbers, *last)
+    yield _row("---", "---", *["---:"] * (len(numbers) + len(last)))
+    for task, found in record["tasks"].items():
+        counts = ("observation_size", "action_size", "episodes", "steps", "contact_steps")
+        yield _row(
+            f"`{task}`",
+            found["robots"],
+            *(str(found[count]) for count in counts),
+            *(number_text(found["max_difference"][quantity]) for quantity in DIFFERENCES),
+            *(reward_text(found, mode) for mode in REWARD_MODES),
+            number_text(found["max_difference"]["info"]),
+            success_text(found),
+        )
+    versions = ", ".join(f"{package} {v}" for package, v in record["versions"].items())
+    yield ""
+    yield f"Measured on {record['machine']} with {versions}."
+
+
+def missing_and_extra(recorded: Iterable[str], tasks: Iterable[str]) -> Iterator[str]:
+    """Yield a complaint if tasks are not in the record, and one if it holds what is no task."""
+    recorded, tasks = set(recorded), set(tasks)
+    if tasks - recorded:
+        yield f"the record lacks {', '.join(sorted(tasks - recorded))}; run `make parity`"
+    if recorded - tasks:
+        extra = ", ".join(sorted(recorded - tasks))
+        yield f"the record holds {extra}, which no task is called; run `make parity`"
+
+
+def _row(*cells: str) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _read_text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ResultsError(
+            f"cannot read {path}: {error.strerror}; it lies in a checkout"
+        ) from error

@@ -1,0 +1,87 @@
+"""``python -m tasks list`` and ``python -m tasks describe TASK``: what there is to achieve."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from rich.console import Console
+
+from robots import RobotLayoutsError, UnknownNameError
+from tasks.description import TaskFacts, describe, facts, list_table, parity_verdicts
+from tasks.registry import list_tasks, make
+
+MIN_WIDTH = 100  # columns that a table may take; a narrower terminal wraps it
+LEGEND = (
+    "norm is normalized_dense; the first reward mode is the default. parity: the last recorded"
+    " comparison with native ManiSkill, where there was one."
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Args:
+        arguments: Words after ``python -m tasks``; by default those of this process.
+
+    Returns:
+        Exit status: 0 if all went well, 1 after an error, 2 if there is no such task.
+    """
+    options = _parser().parse_args(arguments)
+    try:
+        if options.command == "list":
+            _list()
+        else:
+            _describe(options.task)
+    except RobotLayoutsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2 if isinstance(error, UnknownNameError) else 1
+    return 0
+
+
+def _list() -> None:
+    verdicts = parity_verdicts()
+    console = _console()
+    console.print(list_table(_all_facts(), verdicts))
+    console.print(LEGEND)
+
+
+def _all_facts() -> list[TaskFacts]:
+    """Make every task once, which takes seconds, and say so where someone watches."""
+    found: list[TaskFacts] = []
+    task_ids = list_tasks()
+    with Console(stderr=True).status("") as status:
+        for number, task_id in enumerate(task_ids, start=1):
+            status.update(f"making {task_id} to count its numbers ({number} of {len(task_ids)})")
+            found.append(facts(task_id))
+    return found
+
+
+def _describe(name: str) -> None:
+    env = make(name)
+    console = _console()
+    for part in describe(env):
+        console.print(part, soft_wrap=isinstance(part, str))
+    env.close()
+
+
+def _console() -> Console:
+    console = Console(markup=False, highlight=False)
+    console.width = max(console.width, MIN_WIDTH)
+    return console
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m tasks", description="See which tasks there are, and what each is."
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    commands.add_parser("list", help="print every task as a row of a table")
+    one = commands.add_parser("describe", help="print everything about a task")
+    one.add_argument("task", metavar="TASK", help="task id or another of its names")
+    return parser
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

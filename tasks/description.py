@@ -1,0 +1,206 @@
+"""A task in words and numbers, for people: one line of a list, or everything about it."""
+
+from __future__ import annotations
+
+import inspect
+import json
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich import box
+from rich.console import RenderableType
+from rich.table import Table
+
+from layouts import Layout
+from robots import TaskError
+from tasks.registry import get_task_class, make, other_names
+from tasks.task import MultiRobotTask
+
+# Written by ``python -m parity compare --all --record``; a checkout and the wheel both carry it.
+PARITY_RESULTS = Path(__file__).parents[1] / "parity" / "results.json"
+UNKNOWN = "–"
+
+_SUCCESS = "Success:"
+_SECTIONS = ("Attributes:", "Args:", "Note:", "Example:", "Examples:")  # of Google docstrings
+
+
+@dataclass(frozen=True)
+class TaskFacts:
+    """What a list of tasks says about one.
+
+    Attributes:
+        task_id: Its id.
+        robots: The robots of its default layout, in words.
+        action_size: Numbers of one action.
+        observation_size: Numbers of one flat observation.
+        max_episode_steps: Control steps until an episode is truncated.
+        reward_modes: Its reward modes, the default first.
+    """
+
+    task_id: str
+    robots: str
+    action_size: int
+    observation_size: int
+    max_episode_steps: int
+    reward_modes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Docstring:
+    """What a task's docstring says.
+
+    Attributes:
+        summary: Its first paragraph.
+        randomisation: What is drawn at a reset; empty if it does not say.
+        success: When it is done, without the word "Success:"; empty if it does not say.
+    """
+
+    summary: str
+    randomisation: str
+    success: str
+
+
+def facts(task_id: str) -> TaskFacts:
+    """Return the facts about a task; makes one environment, to count its observation.
+
+    Raises:
+        UnknownNameError: If there is no such task.
+        AssetError: If robot files cannot be found.
+    """
+    cls = get_task_class(task_id)
+    env = make(task_id)
+    try:
+        return TaskFacts(
+            cls.task_id,
+            robots_text(cls.layout),
+            cls.layout.action_dim,
+            env.single_observation_space.shape[0],
+            cls.max_episode_steps,
+            cls.reward_modes,
+        )
+    finally:
+        env.close()
+
+
+def robots_text(layout: Layout) -> str:
+    """Return a layout's robots in words, in order: ``2 × panda_wristcam``."""
+    counts = Counter(placement.robot.name for placement in layout.values())
+    return " + ".join(f"{n} × {name}" if n > 1 else name for name, n in counts.items())
+
+
+def parity_verdicts(path: Path = PARITY_RESULTS) -> dict[str, str]:
+    """Return task id → ``"bitwise"`` or ``"differs"``, as it was last recorded; empty if never.
+
+    Raises:
+        TaskError: If the record cannot be read.
+    """
+    if not path.is_file():
+        return {}
+    try:
+        entries: dict[str, Any] = json.loads(path.read_text())["tasks"]
+        return {task: "bitwise" if e["equal"] else "differs" for task, e in entries.items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise TaskError(f"{path} is not a record of comparisons: {error!r}") from error
+
+
+def list_table(tasks: Iterable[TaskFacts], verdicts: dict[str, str]) -> Table:
+    """Return one row per task.
+
+    Args:
+        tasks: Their facts.
+        verdicts: Task id → verdict of the comparison with native.
+    """
+    rows = _table(
+        "task", "robots", "action", "obs", "steps", "rewards", "parity", numbers=(2, 3, 4)
+    )
+    for task in tasks:
+        rows.add_row(
+            task.task_id,
+            task.robots,
+            *map(str, (task.action_size, task.observation_size, task.max_episode_steps)),
+            short_modes(task.reward_modes),
+            verdicts.get(task.task_id, UNKNOWN),
+        )
+    return rows
+
+
+def short_modes(modes: Sequence[str]) -> str:
+    """Return reward modes in few words: ``norm`` for ``normalized_dense``."""
+    return " ".join(mode.replace("normalized_dense", "norm") for mode in modes)
+
+
+def read_docstring(cls: type[MultiRobotTask]) -> Docstring:
+    """Return the parts of a task's own docstring, each on one line."""
+    paragraphs = inspect.cleandoc(cls.__doc__ or "").split("\n\n")
+    prose = [" ".join(p.split()) for p in paragraphs if not p.lstrip().startswith(_SECTIONS)]
+    first, *others = prose or [""]
+    summary, _, success = (part.strip() for part in first.partition(_SUCCESS))
+    drawn: list[str] = []
+    for paragraph in others:
+        before, _, after = (part.strip() for part in paragraph.partition(_SUCCESS))
+        drawn.append(before)
+        success = success or after
+    return Docstring(summary, "\n".join(filter(None, drawn)), success)
+
+
+def describe(env: MultiRobotTask) -> Iterator[RenderableType]:
+    """Yield everything there is to know about a task, as lines and tables to print.
+
+    Args:
+        env: The task, with flat observations.
+    """
+    cls = type(env)
+    said = read_docstring(cls)
+    yield f"{cls.task_id}: {said.summary}\n"
+    rows = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    for name, value in (
+        ("randomisation", said.randomisation),
+        ("success", said.success),
+        ("episode", f"{cls.max_episode_steps} steps, {env.made_from.control_frequency:g} per s"),
+        ("reward modes", ", ".join([f"{cls.reward_modes[0]} (default)", *cls.reward_modes[1:]])),
+        ("source", cls.source),
+        ("other names", ", ".join(other_names(cls))),
+        ("parity", parity_verdicts().get(cls.task_id, "")),
+    ):
+        rows.add_row(name, value or UNKNOWN)
+    yield rows
+    yield f"\nLayout: {env.layout}\n"
+    yield "Action, each number from -1 to 1; numbers beyond are clipped"
+    yield action_table(env.layout)
+    yield f"Observation, {env.single_observation_space.shape[0]} numbers"
+    yield observation_table(env.observation_slices)
+
+
+def action_table(layout: Layout) -> Table:
+    """Return one row per action number: whose it is, and what -1 and +1 mean."""
+    rows = _table("#", "robot", "number", "at -1", "at +1", "unit", numbers=(0, 3, 4))
+    for place, part in layout.action_split.items():
+        for number in layout[place].robot.describe_action():
+            sign = "+" if number.relative else ""
+            rows.add_row(
+                str(part.start + number.index),
+                place,
+                number.name,
+                f"{number.lower:{sign}g}",
+                f"{number.upper:{sign}g}",
+                number.unit,
+            )
+    return rows
+
+
+def observation_table(slices: dict[str, slice]) -> Table:
+    """Return one row per named entry of the flat observation."""
+    rows = _table("entry", "slice", "size", numbers=(1, 2))
+    for name, part in slices.items():
+        rows.add_row(name, f"{part.start}:{part.stop}", str(part.stop - part.start))
+    return rows
+
+
+def _table(*columns: str, numbers: Sequence[int]) -> Table:
+    rows = Table(box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
+    for i, column in enumerate(columns):
+        rows.add_column(column, justify="right" if i in numbers else "left", no_wrap=True)
+    return rows
