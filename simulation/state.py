@@ -77,7 +77,7 @@ class State:
         self._index = index = simulation.index
         self.memo: dict[Any, Any] = {}
         self._offsets = _NOTHING
-        self._distances: tuple[Tensor, ...] = ()
+        self._distances = _NOTHING
         self.num_envs = count = len(simulation.worlds)
         self._poses = poses = np.empty((index.frames, count, 7), np.float32)
         self.joint_positions = qpos = np.empty((count, index.dof), np.float32)
@@ -270,7 +270,7 @@ class State:
     def _distance(self, start: int, end: int, *, planar: bool = False) -> Tensor:
         place = self._index.pairs.place(start, end, planar=planar)
         if place >= len(self._distances):
-            self._distances = vector_norm(self._all_offsets(place), dim=2).unbind()
+            self._distances = vector_norm(self._all_offsets(place), dim=2)
         return self._distances[place]
 
     def _all_offsets(self, place: int) -> Tensor:

@@ -100,7 +100,7 @@ class PushT(MultiRobotTask):
     def evaluate(self, state: State) -> dict[str, Tensor]:
         """Success: the T covers its outline."""
         success = torch.from_numpy(np.zeros(self.num_envs, bool))
-        for i, distance in enumerate(state.planar_distance("goal_Tee", "Tee").tolist()):
+        for i, distance in enumerate(state.planar_distance("goal_Tee", "Tee").numpy()):
             if distance < FARTHEST_COVERED:
                 success[i] = _cover(state.pose("Tee")[i].numpy().tobytes()) >= COVERED
         return {"success": success}
@@ -120,8 +120,8 @@ class PushT(MultiRobotTask):
             state.planar_distance("goal_Tee", "Tee"), state.tcp_distance("arm", "Tee")
         )
         # ((turned + 1) / 2)² / 2: halving is exact, so it may be done at once.
-        turn = (turned + _ONE).square_().mul_(_EIGHTH)
-        reward = turn.add_(placed.square().mul_(_HALF)).add_(reach.sqrt().div_(_TWENTY))
+        facing = turned + _ONE
+        reward = facing * facing * _EIGHTH + placed * placed * _HALF + reach.sqrt() / _TWENTY
         return torch.where(info["success"], _DONE, reward)
 
 

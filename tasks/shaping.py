@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import torch
 from torch import Tensor
 
@@ -11,13 +13,16 @@ from simulation import State
 _ONE, _FIVE, _TEN = torch.tensor([1.0, 5.0, 10.0])
 
 
-def closeness(*distances: Tensor) -> tuple[Tensor, ...]:
+def closeness(*distances: Tensor) -> Sequence[Tensor]:
     """Return ``1 - tanh(5 d)`` of each distance: 1 at 0, 0.24 at 0.2, nearly 0 from 0.5 on.
 
     Args:
-        distances: Tensors of one shape; taken together, since calls cost more than numbers.
+        distances: Tensors of one shape. Many are taken together, since calls cost more than
+            numbers; two are not worth the joining.
     """
-    return torch.sub(_ONE, torch.stack(distances).mul_(_FIVE).tanh_()).unbind()
+    if len(distances) <= 2:
+        return [_ONE - (distance * _FIVE).tanh() for distance in distances]
+    return (_ONE - (torch.stack(distances) * _FIVE).tanh()).unbind()
 
 
 def stillness(state: State, body: str) -> Tensor:
