@@ -11,7 +11,7 @@ import pytest
 from robots import RobotRegistry
 from robots.asset_store import AssetStore, FileState
 from robots.fetch_assets import main
-from tests.robots.conftest import PANDA
+from robots.manifest import load_manifest
 
 CHECKOUT = Path(__file__).parents[2]
 MESH = "franka_description/meshes/collision/link4.stl"
@@ -64,8 +64,9 @@ def test_offline_fetches_from_the_installed_package_alone(store, physics):
 def test_all_robots_with_pictures_is_the_default(store):
     assert main(["--source", "mani_skill"]) == 0
     for name in RobotRegistry.names():
-        urdf = RobotRegistry.load(name).urdf.file
-        assert store.unusable(PANDA.needed(urdf, pictures=True)) == []
+        urdf = RobotRegistry.load(name).urdf
+        package = load_manifest().package(urdf.package)
+        assert store.unusable(package.needed(urdf.file, pictures=True)) == []
 
 
 def test_physics_only_leaves_the_pictures_out(store, capsys):
