@@ -5,7 +5,7 @@ environment of ours.
 """
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from math import atan2, cos, pi, sin
 
 import numpy as np
@@ -48,13 +48,23 @@ class Puppeteer:
             if robot in targets:
                 solution = InverseKinematics(self.world, robot).solve(*targets[robot], qpos)
                 goals[robot] = goals[robot] if solution is None else solution
+        self.follow(steps, grip, goals, targets)
+
+    def follow(
+        self,
+        steps: int,
+        grip: float,
+        goals: Mapping[str, np.ndarray],
+        grippers: Container[str],
+    ) -> None:
+        """Move arms towards joint positions (rad) for some steps, and some of the grippers."""
         for _ in range(steps):
             action = np.full(self.env.layout.action_dim, OPEN, np.float32)
             for robot, part in self.env.action_split.items():
                 qpos = self.world.robots[robot].articulation.qpos
                 delta = (goals[robot] - qpos[: len(goals[robot])]) / STEP
                 action[part][: len(delta)] = np.clip(delta, -1, 1)
-                if robot in targets:
+                if robot in grippers:
                     action[part][len(delta) :] = grip
             self.play(action)
 
@@ -108,6 +118,47 @@ def pick_cube(puppeteer: Puppeteer) -> None:
     grasp_and_shake(puppeteer, "arm", 0.0)
 
 
+def pick_cube_so100(puppeteer: Puppeteer) -> None:
+    """Bring the jaws over the cube and close them; it mostly slips away, but it is touched."""
+    (x, y, z), _ = puppeteer.place("cube")
+    for height, steps, grip in ((0.05, 25, 0.0), (0.0, 30, 0.0), (0.0, 15, CLOSED)):
+        goal = jaws_down(puppeteer, "arm", np.array([x, y, z + height]))
+        puppeteer.follow(steps, grip, {"arm": goal}, ["arm"])
+    puppeteer.shake("arm", 10, CLOSED)
+
+
+def jaws_down(puppeteer: Puppeteer, robot: str, position: np.ndarray) -> np.ndarray:
+    """Arm joints (rad) that bring the mean of two jaw tips near a position (m), jaws down.
+
+    Found by drawing joints, ever nearer to the best so far: this arm has too few joints for
+    inverse kinematics of a pose.
+    """
+    simulated = puppeteer.world.robots[robot]
+    model = simulated.articulation.create_pinocchio_model()
+    names = [link.name for link in simulated.articulation.links]
+    tips = [names.index(link) for link in simulated.descriptor.tcp_position_links]
+    hand = names.index(simulated.descriptor.tcp_link)
+    limits = np.concatenate([joint.limits for joint in simulated.joints])
+    start = simulated.articulation.qpos.astype(float)
+    arm = len(simulated.descriptor.arm_joints)
+
+    def cost(joints: np.ndarray) -> float:
+        model.compute_forward_kinematics(np.append(joints, start[arm:]))
+        first, second = ((simulated.base_pose * model.get_link_pose(i)).p for i in tips)
+        frame = simulated.base_pose * model.get_link_pose(hand)
+        tilt = 1 - frame.to_transformation_matrix()[2, 1]  # the jaws point along -y
+        return float(np.linalg.norm((first + second) / 2 - position) + 0.02 * tilt)
+
+    rng = np.random.default_rng(puppeteer.seed)
+    best, least, spread = start[:arm], cost(start[:arm]), 1.0
+    for _ in range(1500):
+        drawn = np.clip(best + rng.normal(0, spread, arm), *limits[:arm].T)
+        if (found := cost(drawn)) < least:
+            best, least = drawn, found
+        spread = max(spread * 0.997, 0.02)
+    return best
+
+
 def two_robot_pick_cube(puppeteer: Puppeteer) -> None:
     """The left arm lays the cube down in the middle, the right one takes it up."""
     grasp_and_shake(puppeteer, "left", pi / 2)
@@ -150,6 +201,7 @@ def yaw_of(quaternion: Sequence[float]) -> float:
 # Motions made for a task; `touch_something` serves the others.
 MOTIONS: dict[str, Callable[[Puppeteer], None]] = {
     "PickCube-v1": pick_cube,
+    "PickCubeSO100-v1": pick_cube_so100,
     "PushT-v1": push_t,
     "TwoRobotPickCube-v1": two_robot_pick_cube,
 }

@@ -8,6 +8,11 @@ from tests.native import NATIVE, TASKS, Pair, pair
 
 pytestmark = NATIVE
 
+# Tasks whose joint noise is not drawn from the stream that goes on without a seed, and why.
+NO_NOISE = {"DrawTriangle-v1": "native starts it without joint noise"}
+OTHER_NOISE = {"PlugCharger-v1": "native draws its joint noise from torch's global stream"}
+NOISY = [task_id for task_id in TASKS if task_id not in NO_NOISE | OTHER_NOISE]
+
 
 def expect_equal_resets(both: Pair, seeds: range) -> None:
     both.forget()
@@ -38,10 +43,11 @@ def test_seeds_differ_from_each_other(task_id):
     """So that the tests above compare a hundred resets and not one."""
     ours = pair(task_id).ours
     first, second = (ours.reset([seed], [0], rebuild=False) for seed in (0, 1))
-    assert {"object pose", "qpos", "observation"} <= {key[0] for key in differing(first, second)}
+    expected = {"object pose", "observation"} | (set() if task_id in NO_NOISE else {"qpos"})
+    assert expected <= {key[0] for key in differing(first, second)}
 
 
-@pytest.mark.parametrize("task_id", TASKS)
+@pytest.mark.parametrize("task_id", NOISY)
 def test_without_a_seed_joint_noise_goes_on(task_id):
     """Objects are left out: native draws theirs from torch's global stream, ours from its own."""
     both = pair(task_id)
