@@ -1,0 +1,51 @@
+"""For every task, a clone that is wrong in one number is noticed."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+import tasks
+from parity.episodes import random_episodes
+from simulation import PhysicsSettings, World
+from tests.native import NATIVE, TASKS, against_native
+
+pytestmark = NATIVE
+
+
+def make_bodies_heavier(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Give every body that physics moves a tenth more density."""
+    add = World.add
+
+    def add_heavier(world: World, name: str, *shapes: Any, **options: Any) -> Any:
+        if options.get("kind", "dynamic") == "dynamic":
+            shapes = tuple(replace(shape, density=1.1 * shape.density) for shape in shapes)
+        return add(world, name, *shapes, **options)
+
+    monkeypatch.setattr(World, "add", add_heavier)
+
+
+def widen_the_hole(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tasks.peg_insertion_side.CLEARANCE", 0.004)  # m, instead of 0.003
+
+
+def nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave everything as it is."""
+
+
+# Where a wrong density cannot be told, or something else is special to the task.
+OTHER_MUTANTS = {
+    "DrawTriangle-v1": (nothing, {"physics": PhysicsSettings()}),  # its own solver is 4/0
+    "PegInsertionSide-v1": (widen_the_hole, {}),
+}
+
+
+@pytest.mark.parametrize("task_id", TASKS)
+def test_one_wrong_number(task_id: str, monkeypatch: pytest.MonkeyPatch):
+    mutate, fields = OTHER_MUTANTS.get(task_id, (make_bodies_heavier, {}))
+    mutate(monkeypatch)
+    mutant = tasks.make(task_id, **fields)
+    episode = random_episodes([0], 40, mutant.layout.action_dim)[0]
+    (result,) = against_native(task_id, mutant).play([episode])
+    assert not result.equal
+    assert result.first_difference.step <= 1
