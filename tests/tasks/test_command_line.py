@@ -45,7 +45,9 @@ class Silent(Waiting):
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     assert main(arguments) == 0
     printed = capsys.readouterr()
-    assert printed.err == ""
+    # The first test that needs a robot's files in a fresh checkout fetches them, and says so.
+    said = [line for line in printed.err.splitlines() if not line.startswith("robot files: ")]
+    assert said == []
     return printed.out
 
 
