@@ -61,8 +61,8 @@ def run_demo(options: DemoOptions, console: Console) -> bool:
     expert = find_expert(options.task)
     layout = tasks.get_task_class(options.task).layout
     console.print(f"[bold]{options.task}[/], {options.seeds} seeds", highlight=False)
-    _find_files(layout, console)
     film_why_not = _pictures_problem(layout) if options.video else "not asked for"
+    _find_files(layout, console)
     task = tasks.make(options.task, obs_mode="state")
     _show_layout(layout, options.out, console)
 
