@@ -159,6 +159,11 @@ def jaws_down(puppeteer: Puppeteer, robot: str, position: np.ndarray) -> np.ndar
     return best
 
 
+def poke_cube(puppeteer: Puppeteer) -> None:
+    """Grasp the peg, which lies nearer than the cube."""
+    grasp_and_shake(puppeteer, "arm", 0.0, body="peg")
+
+
 def two_robot_pick_cube(puppeteer: Puppeteer) -> None:
     """The left arm lays the cube down in the middle, the right one takes it up."""
     grasp_and_shake(puppeteer, "left", pi / 2)
@@ -202,6 +207,7 @@ def yaw_of(quaternion: Sequence[float]) -> float:
 MOTIONS: dict[str, Callable[[Puppeteer], None]] = {
     "PickCube-v1": pick_cube,
     "PickCubeSO100-v1": pick_cube_so100,
+    "PokeCube-v1": poke_cube,
     "PushT-v1": push_t,
     "TwoRobotPickCube-v1": two_robot_pick_cube,
 }
