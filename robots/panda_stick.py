@@ -15,7 +15,7 @@ PANDA_STICK = replace(
     fingers=None,
     keyframes={
         "rest": PANDA.keyframe("rest")[:7],
-        # TCP over the end marker of PushT (tasks/push_t.py in native's own words).
+        # Stick over the marker where PushT starts (native: envs/tasks/tabletop/push_t.py).
         "push_start": (0.662, 0.212, 0.086, -2.685, -0.115, 2.898, 1.673),
     },
     source="mani_skill 3.0.1, agents/robots/panda/panda_stick.py and tasks/tabletop/push_t.py",
