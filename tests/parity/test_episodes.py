@@ -109,9 +109,7 @@ def test_actions_by_robot_are_refused(tmp_path):
     path = demonstration(tmp_path)
     with h5py.File(path, "w") as file:
         file["traj_0/actions/panda-0"] = np.zeros((3, 8))
-    with pytest.raises(
-        TrajectoryError, match=r"by robot \(panda-0\), not one flat array"
-    ):
+    with pytest.raises(TrajectoryError, match=r"by robot \(panda-0\), not one flat array"):
         load_episodes(path, TASK, 8)
 
 
