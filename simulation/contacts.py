@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from robots import Fingers
+from simulation.arrays import Flags, Floats
 from simulation.rotations import rotation_matrix
 from simulation.world import World
 
@@ -49,7 +49,7 @@ def pairwise_forces(
     return {name: impulse.astype(np.float32) / timestep for name, impulse in impulses.items()}
 
 
-def grasped(fingers: Fingers, forces: Tensor, poses: Sequence[Tensor]) -> Tensor:
+def grasped(fingers: Fingers, forces: Floats, poses: Sequence[Floats]) -> Flags:
     """Tell from contact forces whether two fingers hold a body.
 
     Args:
@@ -62,20 +62,21 @@ def grasped(fingers: Fingers, forces: Tensor, poses: Sequence[Tensor]) -> Tensor
     """
     held = torch.ones(len(forces), dtype=torch.bool)
     for i, (pose, sign) in enumerate(zip(poses, fingers.opening_signs, strict=True)):
-        force = forces[:, i]
-        angle = torch.rad2deg(_angle_between(sign * rotation_matrix(pose[:, 3:])[:, :, 1], force))
+        force = torch.from_numpy(forces[:, i])
+        opening = torch.from_numpy(sign * rotation_matrix(pose[:, 3:])[:, :, 1])
+        angle = torch.rad2deg(_angle_between(opening, force))
         strong = torch.linalg.vector_norm(force, dim=1) >= fingers.min_force
         held &= strong & (angle <= fingers.max_angle)
-    return held
+    return held.numpy()
 
 
-def _angle_between(a: Tensor, b: Tensor) -> Tensor:
+def _angle_between(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
     """Angle between vectors (N, 3), shape (N,) (rad)."""
     cosine = torch.einsum("ij,ij->i", _unit(a), _unit(b))
     return torch.arccos(torch.clip(cosine, -1, 1))
 
 
-def _unit(vector: Tensor) -> Tensor:
+def _unit(vector: torch.Tensor) -> torch.Tensor:
     """Vectors (N, 3) scaled to length 1; shorter ones than 1e-6 stay as they are."""
     norm = torch.linalg.vector_norm(vector, dim=1)
     norm = 1 / torch.where(norm < 1e-6, 1.0, norm)

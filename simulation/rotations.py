@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from torch import Tensor
+
+from simulation.arrays import Floats, arctan2
 
 # Products of quaternion entries (w = 0, x = 1, y = 2, z = 3) that each of the nine matrix entries,
 # row by row, is the sum or difference of.
@@ -19,7 +20,7 @@ _SIGN = np.array([sign for _, sign in _PAIRS], np.float32)
 _TWO, _ONE = np.float32(2.0), np.float32(1.0)
 
 
-def rotation_matrix(quaternion: Tensor) -> Tensor:
+def rotation_matrix(quaternion: Floats) -> Floats:
     """Return the rotation matrices of quaternions.
 
     Args:
@@ -28,16 +29,15 @@ def rotation_matrix(quaternion: Tensor) -> Tensor:
     Returns:
         Shape (N, 3, 3), float32; column i is the frame's axis i in the world.
     """
-    # Sums of four depend on their order, so torch adds; all else is exact in numpy and cheaper.
-    scale = _TWO / (quaternion * quaternion).sum(-1, keepdim=True).numpy()
-    q = quaternion.numpy()
-    products = (q[:, :, None] * q[:, None, :]).reshape(len(q), 16)
+    # Sums of four depend on their order, so torch adds.
+    scale = _TWO / torch.from_numpy(quaternion * quaternion).sum(-1, keepdim=True).numpy()
+    products = (quaternion[:, :, None] * quaternion[:, None, :]).reshape(len(quaternion), 16)
     entries = scale * (products[:, _FIRST] + _SIGN * products[:, _SECOND])
     entries[:, ::4] = _ONE - entries[:, ::4]
-    return torch.from_numpy(entries.reshape(len(q), 3, 3))
+    return entries.reshape(len(quaternion), 3, 3)
 
 
-def last_euler_angle(matrix: Tensor) -> Tensor:
+def last_euler_angle(matrix: Floats) -> Floats:
     """Return the third of the angles by which turning about x, then y, then z gives a rotation.
 
     The turns are about the axes of the frame being turned ("XYZ" in native's words).
@@ -48,8 +48,4 @@ def last_euler_angle(matrix: Tensor) -> Tensor:
     Returns:
         Angle in (-π, π], shape (N,) (rad).
     """
-    sine, cosine = -matrix[:, 0, 1], matrix[:, 0, 0]
-    if len(matrix) == 1:
-        return torch.atan2(sine, cosine)
-    # One by one, because torch's atan2 of a batch rounds differently from that of one number.
-    return torch.stack([torch.atan2(y, x) for y, x in zip(sine, cosine, strict=True)])
+    return arctan2(-matrix[:, 0, 1], matrix[:, 0, 0])

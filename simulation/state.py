@@ -1,4 +1,4 @@
-"""What a batch of worlds looks like after a step: poses, joints, contacts, grasps, as tensors."""
+"""What a batch of worlds looks like after a step: poses, joints, contacts, grasps, as arrays."""
 
 from __future__ import annotations
 
@@ -8,18 +8,16 @@ from functools import wraps
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
-import torch
-from torch import Tensor
-from torch.linalg import vector_norm
 
 from robots import SimulationError
+from simulation.arrays import Flags, Floats, norm
 from simulation.contacts import grasped, pairwise_forces
 from simulation.rotations import last_euler_angle, rotation_matrix
 
 if TYPE_CHECKING:
     from simulation.simulation import Simulation
 
-_NOTHING = torch.empty(0)
+_NOTHING = np.empty(0, np.float32)
 _Arguments = ParamSpec("_Arguments")
 _Value = TypeVar("_Value")
 
@@ -49,7 +47,7 @@ class State:
 
     Poses and joints are read at once; velocities and contacts on first use, which must be before
     the simulation moves on. Poses are position (m) and quaternion (wxyz), in the world frame.
-    Tensors are float32, and share memory with the state: copy one before changing it.
+    Numbers are float32 arrays that share memory with the state: copy one before changing it.
 
     Attributes:
         num_envs: Number of worlds N.
@@ -96,91 +94,91 @@ class State:
 
     # -- bodies ------------------------------------------------------------------------------
 
-    def pose(self, body: str) -> Tensor:
+    def pose(self, body: str) -> Floats:
         """Pose of a body, shape (N, 7)."""
-        return torch.from_numpy(self._poses[self._index.bodies[body]])
+        return self._poses[self._index.bodies[body]]
 
-    def position(self, body: str) -> Tensor:
+    def position(self, body: str) -> Floats:
         """Position of a body, shape (N, 3) (m)."""
-        return torch.from_numpy(self._poses[self._index.bodies[body], :, :3])
+        return self._poses[self._index.bodies[body], :, :3]
 
-    def quaternion(self, body: str) -> Tensor:
+    def quaternion(self, body: str) -> Floats:
         """Orientation of a body, wxyz, shape (N, 4)."""
-        return torch.from_numpy(self._poses[self._index.bodies[body], :, 3:])
+        return self._poses[self._index.bodies[body], :, 3:]
 
     @_remembered
-    def rotation(self, body: str) -> Tensor:
+    def rotation(self, body: str) -> Floats:
         """Rotation matrix of a body, shape (N, 3, 3); its columns are the body's axes."""
         return rotation_matrix(self.quaternion(body))
 
     @_remembered
-    def last_euler_angle(self, body: str) -> Tensor:
+    def last_euler_angle(self, body: str) -> Floats:
         """Angle about z of a body turned about its own x, then y, then z, shape (N,) (rad)."""
         return last_euler_angle(self.rotation(body))
 
     @_remembered
-    def linear_velocity(self, body: str) -> Tensor:
+    def linear_velocity(self, body: str) -> Floats:
         """Linear velocity of a body in the world frame, shape (N, 3) (m/s)."""
         return self._velocity(body, "linear_velocity")
 
     @_remembered
-    def angular_velocity(self, body: str) -> Tensor:
+    def angular_velocity(self, body: str) -> Floats:
         """Angular velocity of a body in the world frame, shape (N, 3) (rad/s)."""
         return self._velocity(body, "angular_velocity")
 
     @_remembered
-    def speed(self, body: str) -> Tensor:
+    def speed(self, body: str) -> Floats:
         """Euclidean norm of a body's linear velocity, shape (N,) (m/s)."""
-        return vector_norm(self.linear_velocity(body), dim=1)
+        return norm(self.linear_velocity(body))
 
     @_remembered
-    def spin(self, body: str) -> Tensor:
+    def spin(self, body: str) -> Floats:
         """Euclidean norm of a body's angular velocity, shape (N,) (rad/s)."""
-        return vector_norm(self.angular_velocity(body), dim=1)
+        return norm(self.angular_velocity(body))
 
     # -- robots ------------------------------------------------------------------------------
 
-    def qpos(self, robot: str) -> Tensor:
+    def qpos(self, robot: str) -> Floats:
         """Joint positions of a robot in SAPIEN's joint order, shape (N, dof) (rad, m)."""
-        return torch.from_numpy(self.joint_positions[:, self._index.joints[robot]])
+        return self.joint_positions[:, self._index.joints[robot]]
 
-    def qvel(self, robot: str) -> Tensor:
+    def qvel(self, robot: str) -> Floats:
         """Joint velocities of a robot in SAPIEN's joint order, shape (N, dof) (rad/s, m/s)."""
-        return torch.from_numpy(self._joint_velocities[:, self._index.joints[robot]])
+        return self._joint_velocities[:, self._index.joints[robot]]
 
-    def arm_qvel(self, robot: str) -> Tensor:
+    def arm_qvel(self, robot: str) -> Floats:
         """Joint velocities of a robot without its gripper, shape (N, arm joints) (rad/s)."""
-        return torch.from_numpy(self._joint_velocities[:, self._index.arm_joints[robot]])
+        return self._joint_velocities[:, self._index.arm_joints[robot]]
 
-    def link_pose(self, robot: str, link: str) -> Tensor:
+    def link_pose(self, robot: str, link: str) -> Floats:
         """Pose of a link, shape (N, 7)."""
-        return torch.from_numpy(self._poses[self._index.links[robot][link]])
+        return self._poses[self._index.links[robot][link]]
 
-    def link_position(self, robot: str, link: str) -> Tensor:
+    def link_position(self, robot: str, link: str) -> Floats:
         """Position of a link, shape (N, 3) (m)."""
-        return torch.from_numpy(self._poses[self._index.links[robot][link], :, :3])
+        return self._poses[self._index.links[robot][link], :, :3]
 
-    def base_position(self, robot: str) -> Tensor:
+    def base_position(self, robot: str) -> Floats:
         """Position of a robot's root link, shape (N, 3) (m)."""
-        return torch.from_numpy(self._poses[self._index.bases[robot], :, :3])
+        return self._poses[self._index.bases[robot], :, :3]
 
-    def tcp_pose(self, robot: str) -> Tensor:
+    def tcp_pose(self, robot: str) -> Floats:
         """Pose of a robot's tool centre point, shape (N, 7)."""
-        return torch.from_numpy(self._poses[self._index.tcps[robot]])
+        return self._poses[self._index.tcps[robot]]
 
-    def tcp_position(self, robot: str) -> Tensor:
+    def tcp_position(self, robot: str) -> Floats:
         """Position of a robot's tool centre point, shape (N, 3) (m)."""
-        return torch.from_numpy(self._poses[self._index.tcps[robot], :, :3])
+        return self._poses[self._index.tcps[robot], :, :3]
 
-    def finger_heights(self, robot: str) -> tuple[Tensor, Tensor] | None:
+    def finger_heights(self, robot: str) -> tuple[Floats, Floats] | None:
         """Height of a robot's two finger links, each (N,) (m), or None if it has none."""
         fingers = self._index.fingers[robot]
         if fingers is None:
             return None
         first, second = (self._poses[self._index.links[robot][f], :, 2] for f in fingers.links)
-        return torch.from_numpy(first), torch.from_numpy(second)
+        return first, second
 
-    def finger_gap(self, robot: str) -> Tensor:
+    def finger_gap(self, robot: str) -> Floats:
         """Distance between the origins of a robot's two finger links, shape (N,) (m).
 
         Raises:
@@ -193,34 +191,34 @@ class State:
         return self._distance(second, first)
 
     @_remembered
-    def gripper_opening(self, robot: str) -> Tensor:
+    def gripper_opening(self, robot: str) -> Floats:
         """How far a robot's gripper is open, shape (N,): 0 closed, 1 wide open, 1 without one."""
         joints, widest = self._index.grippers[robot]
         if not joints:
-            return torch.ones(self.num_envs)
-        return torch.from_numpy(np.add.reduce(self.joint_positions[:, joints], 1) / widest)
+            return np.ones(self.num_envs, np.float32)
+        return np.add.reduce(self.joint_positions[:, joints], 1) / widest
 
     @_remembered
-    def arm_speed(self, robot: str) -> Tensor:
+    def arm_speed(self, robot: str) -> Floats:
         """Euclidean norm of the arm's joint velocities, shape (N,) (rad/s)."""
-        return vector_norm(self.arm_qvel(robot), dim=1)
+        return norm(self.arm_qvel(robot))
 
     @_remembered
-    def is_static(self, robot: str, threshold: float = 0.2) -> Tensor:
+    def is_static(self, robot: str, threshold: float = 0.2) -> Flags:
         """Whether no arm joint is faster than ``threshold`` (rad/s), shape (N,) bool."""
         speeds = np.abs(self._joint_velocities[:, self._index.arm_joints[robot]])
-        return torch.from_numpy(np.maximum.reduce(speeds, 1) <= np.float32(threshold))
+        return np.maximum.reduce(speeds, 1) <= np.float32(threshold)
 
     # -- contacts ----------------------------------------------------------------------------
 
     @_remembered
-    def contact_force(self, robot: str, link: str, body: str) -> Tensor:
+    def contact_force(self, robot: str, link: str, body: str) -> Floats:
         """Sum of the contact forces of a body on a link, shape (N, 3) (N, world frame)."""
         forces = self._contact_forces(robot, (link,), body)
-        return torch.zeros(self.num_envs, 3) if forces is None else forces[:, 0]
+        return np.zeros((self.num_envs, 3), np.float32) if forces is None else forces[:, 0]
 
     @_remembered
-    def is_grasping(self, robot: str, body: str, max_angle: float | None = None) -> Tensor:
+    def is_grasping(self, robot: str, body: str, max_angle: float | None = None) -> Flags:
         """Whether a robot's two fingers hold a body, shape (N,) bool; see `robots.Fingers`.
 
         Args:
@@ -231,74 +229,74 @@ class State:
         """
         fingers = self._index.fingers[robot]
         if fingers is None:
-            return torch.from_numpy(np.zeros(self.num_envs, bool))
+            return np.zeros(self.num_envs, bool)
         forces = self._contact_forces(robot, fingers.links, body)
         if forces is None:
-            return torch.from_numpy(np.zeros(self.num_envs, bool))
+            return np.zeros(self.num_envs, bool)
         if max_angle is not None:
             fingers = replace(fingers, max_angle=max_angle)
         return grasped(fingers, forces, [self.link_pose(robot, link) for link in fingers.links])
 
     # -- distances ---------------------------------------------------------------------------
 
-    def offset(self, start: str, end: str) -> Tensor:
+    def offset(self, start: str, end: str) -> Floats:
         """Way from one body's origin to another's, shape (N, 3) (m, world frame)."""
         return self._offset(self._index.bodies[start], self._index.bodies[end])
 
-    def distance(self, start: str, end: str) -> Tensor:
+    def distance(self, start: str, end: str) -> Floats:
         """Distance between the origins of two bodies, shape (N,) (m)."""
         return self._distance(self._index.bodies[start], self._index.bodies[end])
 
-    def planar_distance(self, start: str, end: str) -> Tensor:
+    def planar_distance(self, start: str, end: str) -> Floats:
         """Distance between the origins of two bodies seen from above, shape (N,) (m)."""
         return self._distance(self._index.bodies[start], self._index.bodies[end], planar=True)
 
-    def tcp_offset(self, robot: str, body: str) -> Tensor:
+    def tcp_offset(self, robot: str, body: str) -> Floats:
         """Way from a robot's tool centre point to a body's origin, shape (N, 3) (m, world)."""
         return self._offset(self._index.tcps[robot], self._index.bodies[body])
 
-    def tcp_distance(self, robot: str, body: str) -> Tensor:
+    def tcp_distance(self, robot: str, body: str) -> Floats:
         """Distance from a robot's tool centre point to a body's origin, shape (N,) (m)."""
         return self._distance(self._index.tcps[robot], self._index.bodies[body])
 
     # -- inside ------------------------------------------------------------------------------
 
-    def _offset(self, start: int, end: int) -> Tensor:
+    def _offset(self, start: int, end: int) -> Floats:
         place = self._index.pairs.place(start, end, planar=False)
         return self._all_offsets(place)[place]
 
-    def _distance(self, start: int, end: int, *, planar: bool = False) -> Tensor:
+    def _distance(self, start: int, end: int, *, planar: bool = False) -> Floats:
         place = self._index.pairs.place(start, end, planar=planar)
         if place >= len(self._distances):
-            self._distances = vector_norm(self._all_offsets(place), dim=2)
+            self._distances = norm(self._all_offsets(place))
         return self._distances[place]
 
-    def _all_offsets(self, place: int) -> Tensor:
+    def _all_offsets(self, place: int) -> Floats:
         """Offsets of all pairs that were ever asked for, (K, N, 3), at least up to ``place``."""
         if place >= len(self._offsets):
             pairs = self._index.pairs
             ways = self._poses.take(pairs.ends, 0) - self._poses.take(pairs.starts, 0)
             ways[pairs.planar, :, 2] = 0.0  # exact: a zero adds nothing to a norm
-            self._offsets = torch.from_numpy(ways[:, :, :3])
+            self._offsets = ways[:, :, :3]
         return self._offsets
 
-    def _velocity(self, body: str, which: str) -> Tensor:
+    def _velocity(self, body: str, which: str) -> Floats:
         self._expect_current()
         bodies = [world.body(body) for world in self._simulation.worlds]
         if bodies[0].kind != "dynamic":
-            return torch.zeros(self.num_envs, 3)
-        return torch.from_numpy(np.stack([getattr(found.component, which) for found in bodies]))
+            return np.zeros((self.num_envs, 3), np.float32)
+        return np.stack([getattr(found.component, which) for found in bodies])
 
-    def _contact_forces(self, robot: str, links: tuple[str, ...], body: str) -> Tensor | None:
+    def _contact_forces(self, robot: str, links: tuple[str, ...], body: str) -> Floats | None:
         """Forces of a body on some links, (N, L, 3), or None if nothing touches anywhere."""
         self._expect_current()
-        forces: np.ndarray | None = None
+        forces: Floats | None = None
         for i, world in enumerate(self._simulation.worlds):
             for link, force in pairwise_forces(world, robot, links, body).items():
                 if forces is None:
                     forces = np.zeros((self.num_envs, len(links), 3), np.float32)
                 forces[i, links.index(link)] = force
-        return None if forces is None else torch.from_numpy(forces)
+        return forces
 
     def _expect_current(self) -> None:
         if self._stamp != self._simulation.stamp:

@@ -14,6 +14,7 @@ from layouts import Layout, Placement
 from robots import RobotRegistry, SimulationError
 from robots.descriptor import Quaternion
 from simulation import Box, Cylinder, PhysicsSettings, State, World, add_table
+from simulation.arrays import Array, Floats
 from simulation.shapes import Color
 from tasks.props import WHITE
 from tasks.randomness import EpisodeRandom
@@ -70,20 +71,21 @@ def _corners() -> Tensor:
     return torch.from_numpy(np.array([(a + c) - b, (a + b) - c, (b + c) - a])).T
 
 
-def _placed_corners(pose: Tensor) -> Tensor:
+def _placed_corners(pose: Floats) -> Tensor:
     """Corners of a triangle at ``pose`` (7,), (3, 3) float64 (m, world).
 
     The rotation is a float32 matrix and multiplies float64 corners, as in native.
     """
-    w, x, y, z = pose[3:].unbind()
-    scale = 2.0 / (pose[3:] * pose[3:]).sum()
+    position, quaternion = torch.from_numpy(pose).split((3, 4))
+    w, x, y, z = quaternion.unbind()
+    scale = 2.0 / (quaternion * quaternion).sum()
     rows = (
         (1 - scale * (y * y + z * z), scale * (x * y - z * w), scale * (x * z + y * w)),
         (scale * (x * y + z * w), 1 - scale * (x * x + z * z), scale * (y * z - x * w)),
         (scale * (x * z - y * w), scale * (y * z + x * w), 1 - scale * (x * x + y * y)),
     )
     matrix = torch.stack([torch.stack(row) for row in rows])
-    return (matrix.double()[None] @ _CORNERS[None])[0].T + pose[:3]
+    return (matrix.double()[None] @ _CORNERS[None])[0].T + position
 
 
 def _points_between(corners: Tensor) -> Tensor:
@@ -166,7 +168,7 @@ class DrawTriangle(MultiRobotTask):
 
     def respond(self, state: State) -> None:
         """Leave a dot under every stick that is low enough, and hide a dot for every other."""
-        tips = state.tcp_position("arm")
+        tips = torch.from_numpy(state.tcp_position("arm"))
         drawing = tips[:, 2] < _REACH
         for i, draws in enumerate(drawing.tolist()):
             dot = _DOTS[self._used[i]]
@@ -179,17 +181,18 @@ class DrawTriangle(MultiRobotTask):
             self._covered |= near & drawing[:, None]
             self._strayed |= ~near.any(1) & drawing
 
-    def evaluate(self, state: State) -> dict[str, Tensor]:
+    def evaluate(self, state: State) -> dict[str, Array]:
         """Success: all of the outline is covered, and nothing else."""
-        return {"success": self._covered.all(1) & ~self._strayed}
+        return {"success": (self._covered.all(1) & ~self._strayed).numpy()}
 
-    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP, triangle, and its corners: from the TCP and in the world (float64)."""
-        ways = self._corners - state.tcp_position("arm")[:, None]
+        corners = self._corners.numpy()
+        ways = corners - state.tcp_position("arm")[:, None]
         return {
             "tcp_pose": state.tcp_pose("arm"),
             "goal_pose": state.pose("goal_tri"),
-            "tcp_to_verts_pos": ways.flatten(1),
+            "tcp_to_verts_pos": ways.reshape(self.num_envs, -1),
             "goal_pos": state.position("goal_tri"),
-            "vertices": self._corners.flatten(1),
+            "vertices": corners.reshape(self.num_envs, -1),
         }

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from math import cos, pi, sin
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from layouts import single
 from simulation import PhysicsSettings, State, World, add_table
+from simulation.arrays import Array, Floats, constants
 from tasks.props import DARK_BLUE, DARK_RED, add_peg
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -57,31 +57,30 @@ class LiftPegUpright(MultiRobotTask):
         x, y = (rng.uniform(1, 2) * (SPAWN_HALF_SIZE * 2) - SPAWN_HALF_SIZE)[0].tolist()
         world.set_pose("peg", (x, y, PEG_HALF_WIDTH), LYING)
 
-    def evaluate(self, state: State) -> dict[str, Tensor]:
+    def evaluate(self, state: State) -> dict[str, Array]:
         """Success: upright and standing on the table."""
         # Native tells upright from one Euler angle, although that angle is a quarter turn, too,
         # while the peg lies along y.
-        upright = (state.last_euler_angle("peg").abs() - _QUARTER_TURN).abs() < _MAX_TILT
+        upright = np.abs(np.abs(state.last_euler_angle("peg")) - _QUARTER_TURN) < _MAX_TILT
         return {"success": upright & (_lift(state) < _MAX_LIFT)}
 
-    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP and peg."""
         return {"tcp_pose": state.tcp_pose("arm"), "obj_pose": state.pose("peg")}
 
-    def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Turn (1), lift (1), reach or grasp (1/5); 3 on success."""
-        turned = state.rotation("peg")[:, 2, 0].abs()  # how vertical the peg's own axis is
+        turned = np.abs(state.rotation("peg")[:, 2, 0])  # how vertical the peg's own axis is
         lifted, reach = closeness(_lift(state), state.tcp_distance("arm", "peg"))
-        held = torch.where(state.is_grasping("arm", "peg"), _ONE, reach)
-        return torch.where(info["success"], _DONE, turned + lifted + held / _FIVE)
+        held = np.where(state.is_grasping("arm", "peg"), _ONE, reach)
+        return np.where(info["success"], _DONE, turned + lifted + held / _FIVE)
 
 
-# Tensors, because arithmetic with Python numbers costs twice as much per call.
-_ONE, _DONE, _FIVE = torch.tensor([1.0, 3.0, 5.0])
-_PEG_HALF_LENGTH, _MAX_LIFT = torch.tensor([PEG_HALF_LENGTH, MAX_LIFT])
-_QUARTER_TURN, _MAX_TILT = torch.tensor([pi / 2, MAX_TILT])
+_ONE, _DONE, _FIVE = constants(1.0, 3.0, 5.0)
+_PEG_HALF_LENGTH, _MAX_LIFT = constants(PEG_HALF_LENGTH, MAX_LIFT)
+_QUARTER_TURN, _MAX_TILT = constants(pi / 2, MAX_TILT)
 
 
-def _lift(state: State) -> Tensor:
+def _lift(state: State) -> Floats:
     """How far the peg's middle is from where it is when the peg stands, (N,) (m)."""
-    return (state.position("peg")[:, 2] - _PEG_HALF_LENGTH).abs()
+    return np.abs(state.position("peg")[:, 2] - _PEG_HALF_LENGTH)

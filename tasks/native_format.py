@@ -12,6 +12,7 @@ from torch import Tensor
 from layouts import Layout
 from robots import TaskError, unknown_name_message
 from simulation import Simulation, State
+from simulation.arrays import Floats
 
 StateDict = dict[str, dict[str, Tensor]]
 
@@ -37,27 +38,27 @@ def read_state_dict(simulation: Simulation, state: State) -> StateDict:
     velocity (rad/s). Robots are the same of their root, then qpos and qvel.
     """
     actors = {
-        name: torch.cat(
-            [state.pose(name), state.linear_velocity(name), state.angular_velocity(name)], 1
-        )
+        name: _joined(state.pose(name), state.linear_velocity(name), state.angular_velocity(name))
         for name, body in simulation.worlds[0].bodies.items()
         if body.kind != "static"
     }
     articulations = {
-        key: torch.cat(
-            [*_root_rows(simulation, state, name), state.qpos(name), state.qvel(name)], 1
-        )
+        key: _joined(*_root_rows(simulation, state, name), state.qpos(name), state.qvel(name))
         for name, key in articulation_keys(simulation.layout).items()
     }
     return {"actors": actors, "articulations": articulations}
 
 
-def _root_rows(simulation: Simulation, state: State, robot: str) -> list[Tensor]:
+def _joined(*parts: Floats) -> Tensor:
+    return torch.from_numpy(np.concatenate(parts, 1))
+
+
+def _root_rows(simulation: Simulation, state: State, robot: str) -> list[Floats]:
     roots = [world.robots[robot].articulation.links[0] for world in simulation.worlds]
     return [
         state.link_pose(robot, roots[0].name),
-        torch.from_numpy(np.stack([root.linear_velocity for root in roots])),
-        torch.from_numpy(np.stack([root.angular_velocity for root in roots])),
+        np.stack([root.linear_velocity for root in roots]),
+        np.stack([root.angular_velocity for root in roots]),
     ]
 
 

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-import torch
-from torch import Tensor
-from torch.linalg import vector_norm
 
 from layouts import single
 from simulation import Box, PhysicsSettings, State, World, add_table
+from simulation.arrays import Array, Floats, constants, norm, tanh
 from simulation.shapes import Color
 from tasks.poses import compose, inverse, transform
 from tasks.randomness import EpisodeRandom
@@ -128,21 +126,20 @@ class PegInsertionSide(MultiRobotTask):
         """Read the designs off the worlds."""
         designs: list[PegDesign] = [world.design for world in self.simulation.worlds]
         sizes = np.array([(d.half_length, d.radius, d.radius) for d in designs], np.float32)
-        self._half_sizes = torch.from_numpy(sizes)
-        radii = np.array([design.hole_radius for design in designs], np.float32)
-        self._hole_radii = torch.from_numpy(radii)
-        self._head = self._half_sizes * torch.tensor([1.0, 0.0, 0.0])  # in the peg's frame
+        self._half_sizes = sizes
+        self._hole_radii = np.array([design.hole_radius for design in designs], np.float32)
+        self._head = self._half_sizes * np.array([1.0, 0.0, 0.0], np.float32)  # in the peg's frame
         holes = [(0.0, *d.hole_centre, 1.0, 0.0, 0.0, 0.0) for d in designs]  # in the box's
-        self._hole = torch.tensor(holes)
+        self._hole = np.array(holes, np.float32)
 
-    def evaluate(self, state: State) -> dict[str, Tensor]:
+    def evaluate(self, state: State) -> dict[str, Array]:
         """Success: the peg's head is in the hole, deep enough."""
         at_hole = transform(inverse(self._hole_pose(state)), self._head_position(state))
-        x, y, z = at_hole.unbind(1)
-        inside = torch.maximum(y.abs(), z.abs()) <= self._hole_radii
+        x, y, z = at_hole.T
+        inside = np.maximum(np.abs(y), np.abs(z)) <= self._hole_radii
         return {"success": (x >= _INSERTED) & inside, "peg_head_pos_at_hole": at_hole}
 
-    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP, peg and hole, each with its size."""
         return {
             "tcp_pose": state.tcp_pose("arm"),
@@ -152,29 +149,29 @@ class PegInsertionSide(MultiRobotTask):
             "box_hole_radius": self._hole_radii,
         }
 
-    def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Reach the peg's tail (1), grasp (1), line up (3), insert (5); 10 on success."""
         peg, hole = state.pose("peg"), self._hole_pose(state)
         to_grasp = state.tcp_position("arm") - transform(peg, _GRASP_POINT)
-        reach = _ONE - torch.tanh(_FOUR * vector_norm(to_grasp, dim=1))
+        reach = _ONE - tanh(_FOUR * norm(to_grasp))
         grasped = state.is_grasping("arm", "peg", MAX_GRASP_ANGLE)
 
-        goal = hole.clone()  # where the peg's middle is when its head is at the hole's centre
+        goal = hole.copy()  # where the peg's middle is when its head is at the hole's centre
         goal[:, :3] = transform(hole, -self._head)
         to_goal = inverse(goal)
         head_off, middle_off = (
-            vector_norm(transform(to_goal, point)[:, 1:], dim=1)
+            norm(transform(to_goal, point)[:, 1:])
             for point in (self._head_position(state), peg[:, :3])
         )
-        astray = _HALF * (head_off + middle_off) + _FOUR_HALF * torch.maximum(head_off, middle_off)
-        line_up = _THREE * (_ONE - torch.tanh(astray))
+        astray = _HALF * (head_off + middle_off) + _FOUR_HALF * np.maximum(head_off, middle_off)
+        line_up = _THREE * (_ONE - tanh(astray))
         aligned = (head_off < _ALIGNED) & (middle_off < _ALIGNED)
-        depth = vector_norm(info["peg_head_pos_at_hole"], dim=1)
-        insert = _FIVE * (_ONE - torch.tanh(_FIVE * depth))
+        depth = norm(info["peg_head_pos_at_hole"])
+        insert = _FIVE * (_ONE - tanh(_FIVE * depth))
         reward = reach + grasped + line_up * grasped + insert * (grasped & aligned)
-        return torch.where(info["success"], _DONE, reward)
+        return np.where(info["success"], _DONE, reward)
 
-    def _hole_pose(self, state: State) -> Tensor:
+    def _hole_pose(self, state: State) -> Floats:
         """Pose of the hole's centre, x along its axis, (N, 7)."""
         found = state.memo.get("hole_pose")
         if found is None:
@@ -182,7 +179,7 @@ class PegInsertionSide(MultiRobotTask):
             state.memo["hole_pose"] = found
         return found
 
-    def _head_position(self, state: State) -> Tensor:
+    def _head_position(self, state: State) -> Floats:
         """Position of the middle of the peg's head, (N, 3) (m)."""
         found = state.memo.get("head_position")
         if found is None:
@@ -191,7 +188,6 @@ class PegInsertionSide(MultiRobotTask):
         return found
 
 
-# Tensors, because arithmetic with Python numbers costs twice as much per call.
-_HALF, _ONE, _THREE, _FOUR, _FOUR_HALF, _FIVE = torch.tensor([0.5, 1.0, 3.0, 4.0, 4.5, 5.0])
-_INSERTED, _ALIGNED, _DONE = torch.tensor([INSERTED, ALIGNED, 10.0])
-_GRASP_POINT = torch.tensor([[GRASP_X, 0.0, 0.0]])
+_HALF, _ONE, _THREE, _FOUR, _FOUR_HALF, _FIVE = constants(0.5, 1.0, 3.0, 4.0, 4.5, 5.0)
+_INSERTED, _ALIGNED, _DONE = constants(INSERTED, ALIGNED, 10.0)
+_GRASP_POINT = np.array([[GRASP_X, 0.0, 0.0]], np.float32)

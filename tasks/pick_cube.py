@@ -5,11 +5,11 @@ from __future__ import annotations
 from functools import cached_property
 from typing import ClassVar
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from layouts import single
 from simulation import PhysicsSettings, State, World, add_table
+from simulation.arrays import Array, Floats, constants
 from tasks.props import add_cube, add_goal
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -49,8 +49,8 @@ class PickCube(MultiRobotTask):
     max_goal_height: ClassVar[float] = 0.3
 
     @cached_property
-    def _goal_radius(self) -> Tensor:
-        return torch.tensor(self.goal_radius)
+    def _goal_radius(self) -> Floats:
+        return np.array(self.goal_radius, np.float32)
 
     def build(self, world: World) -> None:
         """Add the table, the cube and the goal."""
@@ -68,9 +68,9 @@ class PickCube(MultiRobotTask):
 
     def _place(self, rng: EpisodeRandom) -> list[float]:
         offset = rng.uniform(1, 2) * (self.spawn_half_size * 2) - self.spawn_half_size
-        return (offset + torch.tensor(self.spawn_centre))[0].tolist()
+        return (offset[0].numpy() + np.array(self.spawn_centre, np.float32)).tolist()
 
-    def evaluate(self, state: State) -> dict[str, Tensor]:
+    def evaluate(self, state: State) -> dict[str, Array]:
         """Success: placed and static."""
         placed = state.distance("cube", "goal_site") <= self._goal_radius
         static = state.is_static("arm", STATIC_SPEED)
@@ -81,7 +81,7 @@ class PickCube(MultiRobotTask):
             "is_grasped": state.is_grasping("arm", "cube"),
         }
 
-    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
         """Grasp, TCP, goal and cube."""
         return {
             "is_grasped": info["is_grasped"],
@@ -92,16 +92,16 @@ class PickCube(MultiRobotTask):
             "obj_to_goal_pos": state.offset("cube", "goal_site"),
         }
 
-    def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Reach (1), grasp (1), place (1), hold still (1); 5 on success."""
         reach, place, still = closeness(
             state.tcp_distance("arm", "cube"),
             state.distance("cube", "goal_site"),
             state.arm_speed("arm"),
         )
-        grasped, placed = info["is_grasped"].float(), info["is_obj_placed"].float()
+        grasped, placed = info["is_grasped"], info["is_obj_placed"]
         reward = reach + grasped + place * grasped + still * placed
-        return torch.where(info["success"], _DONE, reward)
+        return np.where(info["success"], _DONE, reward)
 
 
-_DONE = torch.tensor(5.0)
+(_DONE,) = constants(5.0)

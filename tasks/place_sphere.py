@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from layouts import single
 from simulation import Box, PhysicsSettings, Sphere, State, World, add_table
+from simulation.arrays import Array, Floats, constants
 from tasks.props import DARK_BLUE
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -52,7 +52,7 @@ class PlaceSphere(MultiRobotTask):
         y = rng.uniform(1, 1) * 0.2 - 0.1
         world.set_pose("bin", (x.item(), y.item(), WALL))
 
-    def evaluate(self, state: State) -> dict[str, Tensor]:
+    def evaluate(self, state: State) -> dict[str, Array]:
         """Success: in the bin, at rest and let go."""
         grasped = state.is_grasping("arm", "sphere")
         placed = lies_on(state, "sphere", "bin", _TOLERANCE, _RADIUS, _WALL)
@@ -64,7 +64,7 @@ class PlaceSphere(MultiRobotTask):
             "success": placed & static & ~grasped,
         }
 
-    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
         """Grasp, TCP, bin and ball."""
         return {
             "is_grasped": info["is_obj_grasped"],
@@ -74,7 +74,7 @@ class PlaceSphere(MultiRobotTask):
             "tcp_to_obj_pos": state.tcp_offset("arm", "sphere"),
         }
 
-    def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Reach (2), grasp and place (5), let go, come to rest, hold still; 13 on success."""
         grasped = info["is_obj_grasped"]
         reach, place = closeness(
@@ -84,9 +84,9 @@ class PlaceSphere(MultiRobotTask):
         released = letting_go(state, "arm", grasped, _RELEASED)
         arm_static = state.is_static("arm", STATIC_SPEED)
         placed = _FROM_3 + (released + stillness(state, "sphere") + arm_static) / _THREE
-        reward = torch.where(grasped, _FROM_2 + place, _TWO * reach)
-        reward = torch.where(info["is_obj_on_bin"], placed, reward)
-        return torch.where(info["success"], _DONE, reward)
+        reward = np.where(grasped, _FROM_2 + place, _TWO * reach)
+        reward = np.where(info["is_obj_on_bin"], placed, reward)
+        return np.where(info["success"], _DONE, reward)
 
 
 def _bin() -> list[Box]:
@@ -106,7 +106,6 @@ def _bin() -> list[Box]:
     ]
 
 
-# Tensors, because arithmetic with Python numbers costs twice as much per call.
-_TWO, _THREE = torch.tensor([2.0, 3.0])
-_FROM_2, _FROM_3, _RELEASED, _DONE = torch.tensor([4.0, 6.0, 16.0, 13.0])  # rewards
-_RADIUS, _WALL, _TOLERANCE = torch.tensor([RADIUS, WALL, TOLERANCE])  # m
+_TWO, _THREE = constants(2.0, 3.0)
+_FROM_2, _FROM_3, _RELEASED, _DONE = constants(4.0, 6.0, 16.0, 13.0)  # rewards
+_RADIUS, _WALL, _TOLERANCE = constants(RADIUS, WALL, TOLERANCE)  # m

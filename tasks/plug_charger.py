@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import pi
 
-import torch
-from torch import Tensor
-from torch.linalg import vector_norm
+import numpy as np
 
 from layouts import single
 from robots.descriptor import Vector3
 from simulation import Box, PhysicsSettings, State, World, add_table
+from simulation.arrays import Array, constants, norm
 from simulation.shapes import Color
 from tasks.poses import angle_between, compose
 from tasks.props import WHITE
@@ -121,13 +120,13 @@ class PlugCharger(MultiRobotTask):
         if len(env_ids) == self.num_envs:
             self._goal = goal
         else:
-            self._goal = self._goal.clone()
+            self._goal = self._goal.copy()
             self._goal[list(env_ids)] = goal[list(env_ids)]
 
-    def evaluate(self, state: State) -> dict[str, Tensor]:
+    def evaluate(self, state: State) -> dict[str, Array]:
         """Success: near the plugged-in pose, in position and angle."""
         charger = state.pose("charger")
-        distance = vector_norm(self._goal[:, :3] - charger[:, :3], dim=1)
+        distance = norm(self._goal[:, :3] - charger[:, :3])
         angle = angle_between(self._goal[:, 3:], charger[:, 3:])
         return {
             "obj_to_goal_dist": distance,
@@ -135,7 +134,7 @@ class PlugCharger(MultiRobotTask):
             "success": (distance <= _PLUGGED_DISTANCE) & (angle <= _PLUGGED_ANGLE),
         }
 
-    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP, charger, receptacle, and where the charger belongs."""
         return {
             "tcp_pose": state.tcp_pose("arm"),
@@ -145,7 +144,6 @@ class PlugCharger(MultiRobotTask):
         }
 
 
-# Tensors, because arithmetic with Python numbers costs twice as much per call.
-_PLUGGED_DISTANCE, _PLUGGED_ANGLE = torch.tensor(PLUGGED_DISTANCE), torch.tensor(PLUGGED_ANGLE)
+_PLUGGED_DISTANCE, _PLUGGED_ANGLE = constants(PLUGGED_DISTANCE, PLUGGED_ANGLE)
 # The charger plugs in facing the plate. The cosine of a quarter turn is 6e-17 in native, too.
-_HALF_TURN = torch.tensor([[0.0, 0.0, 0.0, 6.123233995736766e-17, 0.0, 0.0, 1.0]])
+_HALF_TURN = np.array([[0.0, 0.0, 0.0, 6.123233995736766e-17, 0.0, 0.0, 1.0]], np.float32)

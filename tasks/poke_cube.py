@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from math import pi
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from layouts import single
 from simulation import PhysicsSettings, State, World, add_table
+from simulation.arrays import Array, Floats, constants, norm
 from tasks.props import DARK_BLUE, FACE_UP, TARGET_HEIGHT, add_cube, add_peg, add_target
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -72,11 +72,11 @@ class PokeCube(MultiRobotTask):
         world.set_pose("cube", (x.item(), y, CUBE_HALF_SIZE), turn)
         world.set_pose("goal_region", ((x + GOAL_OFFSET).item(), y, TARGET_HEIGHT), FACE_UP)
 
-    def evaluate(self, state: State) -> dict[str, Tensor]:
+    def evaluate(self, state: State) -> dict[str, Array]:
         """Success: the cube is over the target, and the arm static."""
         placed = state.planar_distance("cube", "goal_region") < _GOAL_RADIUS
-        angle = (state.last_euler_angle("peg") - state.last_euler_angle("cube")).abs()
-        head_distance = torch.linalg.vector_norm(_cube_to_head(state)[:, :2], dim=1)
+        angle = np.abs(state.last_euler_angle("peg") - state.last_euler_angle("cube"))
+        head_distance = norm(_cube_to_head(state)[:, :2])
         return {
             "success": placed & state.is_static("arm", STATIC_SPEED),
             "is_cube_placed": placed,
@@ -86,7 +86,7 @@ class PokeCube(MultiRobotTask):
             "head_to_cube_dist": head_distance,
         }
 
-    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP, cube, peg, and the ways between them; native's ``goal_pos`` is the peg's."""
         return {
             "tcp_pose": state.tcp_pose("arm"),
@@ -99,7 +99,7 @@ class PokeCube(MultiRobotTask):
             "peghead_to_cube_pos": _cube_to_head(state),
         }
 
-    def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Reach (2), bring the grasped peg to the cube (6), push (8), stop (1); 10 on success."""
         tcp_to_peg = state.tcp_distance("arm", "peg")
         reach, align, near, place, still = closeness(
@@ -110,20 +110,19 @@ class PokeCube(MultiRobotTask):
             state.arm_speed("arm"),
         )
         held = info["is_peg_grasped"] & (tcp_to_peg < _GRASP_RADIUS)
-        reward = torch.where(held, _FROM_2 + near + align, _TWO * reach)
-        reward = torch.where(held & info["is_peg_cube_fit"], _FROM_3 + place, reward)
-        reward = torch.where(info["is_cube_placed"], reward + still, reward)
-        return torch.where(info["success"], _DONE, reward)
+        reward = np.where(held, _FROM_2 + near + align, _TWO * reach)
+        reward = np.where(held & info["is_peg_cube_fit"], _FROM_3 + place, reward)
+        reward = np.where(info["is_cube_placed"], reward + still, reward)
+        return np.where(info["success"], _DONE, reward)
 
 
-# Tensors, because arithmetic with Python numbers costs twice as much per call.
-_TWO, _FROM_2, _FROM_3, _DONE = torch.tensor([2.0, 4.0, 7.0, 10.0])
-_GOAL_RADIUS, _GRASP_RADIUS = torch.tensor([GOAL_RADIUS, GRASP_RADIUS])
-_MAX_ANGLE, _MAX_HEAD_DISTANCE = torch.tensor([MAX_ANGLE, MAX_HEAD_DISTANCE])
-_HEAD_OFFSET = torch.tensor([PEG_HALF_LENGTH, 0.0, 0.0])
+_TWO, _FROM_2, _FROM_3, _DONE = constants(2.0, 4.0, 7.0, 10.0)
+_GOAL_RADIUS, _GRASP_RADIUS = constants(GOAL_RADIUS, GRASP_RADIUS)
+_MAX_ANGLE, _MAX_HEAD_DISTANCE = constants(MAX_ANGLE, MAX_HEAD_DISTANCE)
+_HEAD_OFFSET = np.array([PEG_HALF_LENGTH, 0.0, 0.0], np.float32)
 
 
-def _cube_to_head(state: State) -> Tensor:
+def _cube_to_head(state: State) -> Floats:
     """Way from the cube to the peg's head, (N, 3) (m).
 
     As in native, the head is half a peg along the world's x axis from the peg's middle, however

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from layouts import single
 from simulation import PhysicsSettings, State, World, add_table
+from simulation.arrays import Array, Floats, constants, norm
 from tasks.props import DARK_BLUE, FACE_UP, TARGET_HEIGHT, add_cube, add_target
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -50,11 +50,11 @@ class PullCube(MultiRobotTask):
         world.set_pose("cube", (x, y, CUBE_HALF_SIZE))
         world.set_pose("goal_region", ((xy[0] - GOAL_OFFSET).item(), y, TARGET_HEIGHT), FACE_UP)
 
-    def evaluate(self, state: State) -> dict[str, Tensor]:
+    def evaluate(self, state: State) -> dict[str, Array]:
         """Success: over the target."""
         return {"success": state.planar_distance("cube", "goal_region") < _GOAL_RADIUS}
 
-    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP, target and cube."""
         return {
             "tcp_pose": state.tcp_pose("arm"),
@@ -62,16 +62,13 @@ class PullCube(MultiRobotTask):
             "obj_pose": state.pose("cube"),
         }
 
-    def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Reach behind the cube (1); from there place (1); 3 on success."""
-        pull_distance = torch.linalg.vector_norm(
-            state.position("cube") + _PULL_OFFSET - state.tcp_position("arm"), dim=1
-        )
+        pull_distance = norm(state.position("cube") + _PULL_OFFSET - state.tcp_position("arm"))
         reach, place = closeness(pull_distance, state.planar_distance("cube", "goal_region"))
-        reward = reach + place * (pull_distance < _PULL_RADIUS).float()
-        return torch.where(info["success"], _DONE, reward)
+        reward = reach + place * (pull_distance < _PULL_RADIUS)
+        return np.where(info["success"], _DONE, reward)
 
 
-# Tensors, because arithmetic with Python numbers costs twice as much per call.
-_GOAL_RADIUS, _PULL_RADIUS, _DONE = torch.tensor([GOAL_RADIUS, PULL_RADIUS, 3.0])
-_PULL_OFFSET = torch.tensor([PULL_OFFSET, 0.0, 0.0])
+_GOAL_RADIUS, _PULL_RADIUS, _DONE = constants(GOAL_RADIUS, PULL_RADIUS, 3.0)
+_PULL_OFFSET = np.array([PULL_OFFSET, 0.0, 0.0], np.float32)

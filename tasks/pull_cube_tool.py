@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from math import pi
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from layouts import single
 from simulation import Box, PhysicsSettings, State, World, add_table
+from simulation.arrays import Array, Flags, Floats, constants, norm, tanh
 from tasks.props import DARK_BLUE, RED, add_cube
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -70,24 +70,24 @@ class PullCubeTool(MultiRobotTask):
         turn = rng.yaw_quaternion(-pi / 6, pi / 6)
         world.set_pose("cube", (x.item(), y.item(), CUBE_HEIGHT), turn)
 
-    def evaluate(self, state: State) -> dict[str, Tensor]:
+    def evaluate(self, state: State) -> dict[str, Array]:
         """Success: the cube is near the robot.
 
         Progress and distance are told per environment; native averages them over its batch.
         """
         way = state.position("cube") - state.base_position("arm")
-        success = torch.linalg.vector_norm(way[:, :2], dim=1) < _PULLED_DISTANCE
+        success = norm(way[:, :2]) < _PULLED_DISTANCE
         distance = _distance(state.position("cube"), state.base_position("arm") + _CENTRE)
         return {
             "success": success,
             "success_once": success,  # native's words for the same
             "success_at_end": success,
-            "cube_progress": _ONE - torch.tanh(_THREE * distance),
+            "cube_progress": _ONE - tanh(_THREE * distance),
             "cube_distance": distance,
             "reward": self._staged_reward(state, success) / _FIVE,
         }
 
-    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP, cube and tool."""
         return {
             "tcp_pose": state.tcp_pose("arm"),
@@ -95,7 +95,7 @@ class PullCubeTool(MultiRobotTask):
             "tool_pose": state.pose("l_shape_tool"),
         }
 
-    def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Reach and grasp the tool (4), place it behind the cube, pull; 5 more on success.
 
         While the tool is grasped its place is worth up to 1.5, and the way that a well-placed tool
@@ -103,39 +103,39 @@ class PullCubeTool(MultiRobotTask):
         """
         return self._staged_reward(state, info["success"])
 
-    def _staged_reward(self, state: State, success: Tensor) -> Tensor:
+    def _staged_reward(self, state: State, success: Flags) -> Floats:
         key = "PullCubeTool reward"  # native tells it in `evaluate`, too
         if key not in state.memo:
             state.memo[key] = _staged_reward(state, success)
         return state.memo[key]
 
 
-def _staged_reward(state: State, success: Tensor) -> Tensor:
+def _staged_reward(state: State, success: Flags) -> Floats:
     cube, tool = state.position("cube"), state.position("l_shape_tool")
     target = state.base_position("arm") + _TARGET
     (reach,) = closeness(_distance(state.tcp_position("arm"), tool + _GRASP))
-    grasped = state.is_grasping("arm", "l_shape_tool", MAX_GRASP_ANGLE).float()
+    grasped = state.is_grasping("arm", "l_shape_tool", MAX_GRASP_ANGLE)
     hook_error = _distance(tool, cube + _BEHIND_CUBE)
-    placed = _ONE_AND_HALF * (_ONE - torch.tanh(_THREE * hook_error))
+    placed = _ONE_AND_HALF * (_ONE - tanh(_THREE * hook_error))
     start = _distance(_CUBE_START, target)
     progress = (start - _distance(cube, target)) / start
     pulled = _THREE * progress * (hook_error < _NEAR)
 
     reward = _TWO * reach + _TWO * grasped + placed * grasped + pulled * grasped
-    reward = torch.where(cube[:, 0] > _PUSHED_AWAY_X, reward - _TWO, reward)
-    return torch.where(success, reward + _FIVE, reward)
+    reward = np.where(cube[:, 0] > _PUSHED_AWAY_X, reward - _TWO, reward)
+    return np.where(success, reward + _FIVE, reward)
 
 
-def _distance(start: Tensor, end: Tensor) -> Tensor:
+def _distance(start: Floats, end: Floats) -> Floats:
     """Distance between points (N, 3), shape (N,) (m)."""
-    return torch.linalg.vector_norm(start - end, dim=1)
+    return norm(start - end)
 
 
-# Tensors, because arithmetic with Python numbers costs twice as much per call.
-_ONE, _ONE_AND_HALF, _TWO, _THREE, _FIVE = torch.tensor([1.0, 1.5, 2.0, 3.0, 5.0])
-_PULLED_DISTANCE, _NEAR, _PUSHED_AWAY_X = torch.tensor([PULLED_DISTANCE, 0.05, ARM_REACH + 0.15])
-_CENTRE = torch.tensor([ARM_REACH * 0.1, 0.0, 0.0])  # from the base (m)
-_TARGET = torch.tensor([0.05, 0.0, 0.0])  # from the base (m)
-_GRASP = torch.tensor([0.02, 0.0, 0.0])  # from the tool's end (m)
-_BEHIND_CUBE = torch.tensor([-(HOOK_LENGTH + CUBE_HALF_SIZE), -0.067, 0.0])  # tool from cube (m)
-_CUBE_START = torch.tensor([ARM_REACH + 0.1, 0.0, 0.01])  # what progress counts from (m)
+_ONE, _ONE_AND_HALF, _TWO, _THREE, _FIVE = constants(1.0, 1.5, 2.0, 3.0, 5.0)
+_PULLED_DISTANCE, _NEAR, _PUSHED_AWAY_X = constants(PULLED_DISTANCE, 0.05, ARM_REACH + 0.15)
+_CENTRE = np.array([ARM_REACH * 0.1, 0.0, 0.0], np.float32)  # from the base (m)
+_TARGET = np.array([0.05, 0.0, 0.0], np.float32)  # from the base (m)
+_GRASP = np.array([0.02, 0.0, 0.0], np.float32)  # from the tool's end (m)
+# Where the tool's end belongs, seen from the cube (m)
+_BEHIND_CUBE = np.array([-(HOOK_LENGTH + CUBE_HALF_SIZE), -0.067, 0.0], np.float32)
+_CUBE_START = np.array([ARM_REACH + 0.1, 0.0, 0.01], np.float32)  # what progress counts from (m)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from layouts import single
 from simulation import PhysicsSettings, State, World, add_table
+from simulation.arrays import Array, Floats, constants, norm
 from tasks.props import DARK_BLUE, FACE_UP, TARGET_HEIGHT, add_cube, add_target
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -51,12 +51,12 @@ class PushCube(MultiRobotTask):
         world.set_pose("cube", (x, y, CUBE_HALF_SIZE))
         world.set_pose("goal_region", ((xy[0] + GOAL_OFFSET).item(), y, TARGET_HEIGHT), FACE_UP)
 
-    def evaluate(self, state: State) -> dict[str, Tensor]:
+    def evaluate(self, state: State) -> dict[str, Array]:
         """Success: over the target and on the table."""
         over = state.planar_distance("cube", "goal_region") < _GOAL_RADIUS
         return {"success": over & (state.position("cube")[:, 2] < _MAX_HEIGHT)}
 
-    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP, target and cube."""
         return {
             "tcp_pose": state.tcp_pose("arm"),
@@ -64,23 +64,20 @@ class PushCube(MultiRobotTask):
             "obj_pose": state.pose("cube"),
         }
 
-    def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Reach (1); from there place (1) and keep down (1); 4 on success."""
         cube = state.position("cube")
-        push_distance = torch.linalg.vector_norm(
-            cube + _PUSH_OFFSET - state.tcp_position("arm"), dim=1
-        )
+        push_distance = norm(cube + _PUSH_OFFSET - state.tcp_position("arm"))
         reach, place, down = closeness(
             push_distance,
             state.planar_distance("cube", "goal_region"),
-            (cube[:, 2] - _CUBE_HALF_SIZE).abs(),
+            np.abs(cube[:, 2] - _CUBE_HALF_SIZE),
         )
-        reached = (push_distance < _PUSH_RADIUS).float()
+        reached = push_distance < _PUSH_RADIUS
         reward = reach + place * reached + place * down * reached
-        return torch.where(info["success"], _DONE, reward)
+        return np.where(info["success"], _DONE, reward)
 
 
-# Tensors, because arithmetic with Python numbers costs twice as much per call.
-_GOAL_RADIUS, _MAX_HEIGHT, _PUSH_RADIUS = torch.tensor([GOAL_RADIUS, MAX_HEIGHT, PUSH_RADIUS])
-_CUBE_HALF_SIZE, _DONE = torch.tensor([CUBE_HALF_SIZE, 4.0])
-_PUSH_OFFSET = torch.tensor([PUSH_OFFSET, 0.0, 0.0])
+_GOAL_RADIUS, _MAX_HEIGHT, _PUSH_RADIUS = constants(GOAL_RADIUS, MAX_HEIGHT, PUSH_RADIUS)
+_CUBE_HALF_SIZE, _DONE = constants(CUBE_HALF_SIZE, 4.0)
+_PUSH_OFFSET = np.array([PUSH_OFFSET, 0.0, 0.0], np.float32)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
-from math import cos, pi, sin
+from math import pi
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from layouts import single
 from simulation import Box, Cylinder, Friction, PhysicsSettings, State, World, add_table
+from simulation.arrays import Array, Floats, arccos, constants, cos, sin, sqrt
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness
@@ -86,7 +87,7 @@ class PushT(MultiRobotTask):
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the T down beside its outline."""
-        yaw = (cos(GOAL_YAW / 2), 0.0, 0.0, sin(GOAL_YAW / 2))
+        yaw = (math.cos(GOAL_YAW / 2), 0.0, 0.0, math.sin(GOAL_YAW / 2))
         world.set_pose("goal_Tee", (*GOAL_XY, 1e-3), yaw)
         offsets = [rng.uniform(1) * size + SPAWN_OFFSET for size in SPAWN_SIZE]
         x, y = (
@@ -95,17 +96,17 @@ class PushT(MultiRobotTask):
         half_angle = rng.uniform(1) * (2 * pi) / 2
         turn = (half_angle.cos().item(), 0.0, 0.0, half_angle.sin().item())
         world.set_pose("Tee", (x, y, HALF_THICKNESS + 1e-3), turn)
-        world.set_pose("goal_ee", END_MARKER, (cos(pi / 4), 0.0, sin(pi / 4), 0.0))
+        world.set_pose("goal_ee", END_MARKER, (math.cos(pi / 4), 0.0, math.sin(pi / 4), 0.0))
 
-    def evaluate(self, state: State) -> dict[str, Tensor]:
+    def evaluate(self, state: State) -> dict[str, Array]:
         """Success: the T covers its outline."""
-        success = torch.from_numpy(np.zeros(self.num_envs, bool))
-        for i, distance in enumerate(state.planar_distance("goal_Tee", "Tee").numpy()):
+        success = np.zeros(self.num_envs, bool)
+        for i, distance in enumerate(state.planar_distance("goal_Tee", "Tee").tolist()):
             if distance < FARTHEST_COVERED:
-                success[i] = _cover(state.pose("Tee")[i].numpy().tobytes()) >= COVERED
+                success[i] = _cover(state.pose("Tee")[i].tobytes()) >= COVERED
         return {"success": success}
 
-    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP, outline and T."""
         return {
             "tcp_pose": state.tcp_pose("arm"),
@@ -113,27 +114,27 @@ class PushT(MultiRobotTask):
             "obj_pose": state.pose("Tee"),
         }
 
-    def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Turn (1/2), place (1/2), keep the stick near (1/20); 3 on success."""
-        turned = (_yaw(state.quaternion("Tee")) - _GOAL_YAW).cos()
+        turned = cos(_yaw(state.quaternion("Tee")) - _GOAL_YAW)
         placed, reach = closeness(
             state.planar_distance("goal_Tee", "Tee"), state.tcp_distance("arm", "Tee")
         )
         # ((turned + 1) / 2)² / 2: halving is exact, so it may be done at once.
         facing = turned + _ONE
-        reward = facing * facing * _EIGHTH + placed * placed * _HALF + reach.sqrt() / _TWENTY
-        return torch.where(info["success"], _DONE, reward)
+        reward = facing * facing * _EIGHTH + placed * placed * _HALF + sqrt(reach) / _TWENTY
+        return np.where(info["success"], _DONE, reward)
 
 
-def _yaw(quaternion: Tensor) -> Tensor:
+def _yaw(quaternion: Floats) -> Floats:
     """Angle about z in [0, 2π] of wxyz quaternions (N, 4) that turn about z only, (N,) (rad)."""
-    w, z = quaternion.numpy()[:, ::3].T
-    return _TWO * torch.from_numpy(np.where(z < 0, -w, w)).acos()
+    w, z = quaternion[:, ::3].T
+    return _TWO * arccos(np.where(z < 0, -w, w))
 
 
-def _planar_transform(yaw: Tensor, x: float, y: float) -> Tensor:
+def _planar_transform(yaw: Floats, x: float, y: float) -> torch.Tensor:
     """Homogeneous 3 × 3 matrix of a rotation about z (rad, one number) and a shift (m)."""
-    cosine, sine = yaw.cos().item(), yaw.sin().item()
+    cosine, sine = cos(yaw).item(), sin(yaw).item()
     return torch.tensor([[cosine, -sine, x], [sine, cosine, y], [0.0, 0.0, 1.0]])
 
 
@@ -148,7 +149,7 @@ def _outline() -> NDArray[np.bool_]:
     return picture
 
 
-def _pixel_centres() -> Tensor:
+def _pixel_centres() -> torch.Tensor:
     """Homogeneous coordinates of the centres of all pixels, (3, 4096) (m), from the top row on."""
     line = torch.arange(RESOLUTION, dtype=torch.float32) - RESOLUTION / 2
     x = line.expand(RESOLUTION, RESOLUTION)
@@ -156,16 +157,14 @@ def _pixel_centres() -> Tensor:
     return torch.cat([metres, torch.ones(1, RESOLUTION, RESOLUTION)]).view(3, -1)
 
 
-# Tensors, because arithmetic with Python numbers costs twice as much per call.
-_EIGHTH, _HALF, _ONE, _TWO, _TWENTY = torch.tensor([1 / 8, 1 / 2, 1.0, 2.0, 20.0])
-_DONE = torch.tensor(3.0)
-_GOAL_YAW = torch.tensor(GOAL_YAW)
+_EIGHTH, _HALF, _ONE, _TWO, _TWENTY, _DONE = constants(1 / 8, 1 / 2, 1.0, 2.0, 20.0, 3.0)
+_GOAL_YAW = np.array([GOAL_YAW], np.float32)
 _GOAL_X, _GOAL_Y = torch.tensor(GOAL_XY).tolist()  # as float32 rounds them
 _OUTLINE = _outline()
 _TEE_PIXELS = np.flatnonzero(_OUTLINE.T[::-1])  # in the order of the pixel centres
 _CENTRES = _pixel_centres()
 _WORLD_TO_GOAL = torch.linalg.inv(
-    _planar_transform(2 * (torch.tensor([GOAL_YAW]) / 2).cos().acos(), _GOAL_X, _GOAL_Y)
+    _planar_transform(_TWO * arccos(cos(_GOAL_YAW / _TWO)), _GOAL_X, _GOAL_Y)
 )
 
 
@@ -180,7 +179,7 @@ def _cover(pose: bytes) -> float:
         pose: Position (m) and quaternion (wxyz), seven float32.
     """
     x, y, _, *quaternion = np.frombuffer(pose, np.float32).tolist()
-    tee_to_world = _planar_transform(_yaw(torch.tensor([quaternion])), x, y)
+    tee_to_world = _planar_transform(_yaw(np.array([quaternion], np.float32)), x, y)
     tee_to_goal = (_WORLD_TO_GOAL @ tee_to_world[None])[0]
     centres = (tee_to_goal @ _CENTRES).numpy().take(_TEE_PIXELS, 1)[:2]
     scale = np.float32(RESOLUTION / 2 / PICTURE_HALF_WIDTH)

@@ -87,7 +87,7 @@ class EpisodeRandom:
         return -quaternion if quaternion[0] < 0 else quaternion
 
     def points_apart(
-        self, count: int, low: Sequence[float], high: Sequence[float], distance: Tensor
+        self, count: int, low: Sequence[float], high: Sequence[float], distance: float
     ) -> Tensor:
         """Draw points in a rectangle, each drawn again until it is far enough from those before.
 
@@ -98,7 +98,7 @@ class EpisodeRandom:
             count: Number of points.
             low: Smallest coordinates, shape (2,) (m).
             high: Largest coordinates, shape (2,) (m).
-            distance: How far two points must be apart, shape () (m).
+            distance: How far two points must be apart (m).
 
         Returns:
             Shape (count, 2) (m).

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import hypot
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from layouts import Layout, Placement
 from layouts.layout import load_robot
 from simulation import PhysicsSettings, Sphere, State, World, add_table
+from simulation.arrays import Array, Floats, constants, norm, tanh
 from tasks.props import FACE_UP, TARGET_HEIGHT, add_target
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -65,15 +65,15 @@ class RollBall(MultiRobotTask):
     def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
         """Forget that the arm was where it should hit from."""
         if len(env_ids) == self.num_envs:
-            self._reached = torch.zeros(self.num_envs, dtype=torch.bool)
+            self._reached = np.zeros(self.num_envs, bool)
         else:
             self._reached[list(env_ids)] = False
 
-    def evaluate(self, state: State) -> dict[str, Tensor]:
+    def evaluate(self, state: State) -> dict[str, Array]:
         """Success: over the target."""
         return {"success": state.planar_distance("ball", "goal_region") < _GOAL_RADIUS}
 
-    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP, target, ball, how it rolls, and the ways between them."""
         return {
             "tcp_pose": state.tcp_pose("arm"),
@@ -84,23 +84,22 @@ class RollBall(MultiRobotTask):
             "ball_to_goal_pos": state.offset("ball", "goal_region"),
         }
 
-    def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Reach behind the ball (1); from then on roll (1 … 21); 30 on success.
 
         Whether the arm was behind the ball is remembered until the next reset, and noticed only
         by this reward, as in native.
         """
         off_target = state.offset("goal_region", "ball")
-        off_target = off_target / state.distance("goal_region", "ball").unsqueeze(1)
+        off_target = off_target / state.distance("goal_region", "ball")[:, None]
         hit_from = state.position("ball") + off_target * _HIT_OFFSET
-        hit_distance = torch.linalg.vector_norm(hit_from - state.tcp_position("arm"), dim=1)
+        hit_distance = norm(hit_from - state.tcp_position("arm"))
         self._reached |= hit_distance < _HIT_RADIUS
-        rolled = _ONE - state.planar_distance("ball", "goal_region").tanh()
-        reach = _ONE - (_TWO * hit_distance).tanh()
-        reward = torch.where(self._reached, _TWENTY * rolled + _ONE, reach)
-        return torch.where(info["success"], _DONE, reward)
+        rolled = _ONE - tanh(state.planar_distance("ball", "goal_region"))
+        reach = _ONE - tanh(_TWO * hit_distance)
+        reward = np.where(self._reached, _TWENTY * rolled + _ONE, reach)
+        return np.where(info["success"], _DONE, reward)
 
 
-# Tensors, because arithmetic with Python numbers costs twice as much per call.
-_ONE, _TWO, _TWENTY, _DONE = torch.tensor([1.0, 2.0, 20.0, 30.0])
-_GOAL_RADIUS, _HIT_OFFSET, _HIT_RADIUS = torch.tensor([GOAL_RADIUS, HIT_OFFSET, HIT_RADIUS])
+_ONE, _TWO, _TWENTY, _DONE = constants(1.0, 2.0, 20.0, 30.0)
+_GOAL_RADIUS, _HIT_OFFSET, _HIT_RADIUS = constants(GOAL_RADIUS, HIT_OFFSET, HIT_RADIUS)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from layouts import single
 from simulation import PhysicsSettings, State, World, add_table
+from simulation.arrays import Array, Floats, constants
 from tasks.props import GREEN, RED, add_cube
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -51,7 +51,7 @@ class StackCube(MultiRobotTask):
         for cube, (x, y) in zip(("cubeA", "cubeB"), places.tolist(), strict=True):
             world.set_pose(cube, (x, y, CUBE_HALF_SIZE), rng.yaw_quaternion())
 
-    def evaluate(self, state: State) -> dict[str, Tensor]:
+    def evaluate(self, state: State) -> dict[str, Array]:
         """Success: stacked, at rest and let go."""
         grasped = state.is_grasping("arm", "cubeA")
         stacked = lies_on(state, "cubeA", "cubeB", _ASIDE, _CUBE_SIZE)
@@ -63,7 +63,7 @@ class StackCube(MultiRobotTask):
             "success": stacked & static & ~grasped,
         }
 
-    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP, cubes, and the ways between them."""
         return {
             "tcp_pose": state.tcp_pose("arm"),
@@ -74,7 +74,7 @@ class StackCube(MultiRobotTask):
             "cubeA_to_cubeB_pos": state.offset("cubeA", "cubeB"),
         }
 
-    def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Reach (2), grasp and place (5), let go and come to rest (7); 8 on success."""
         grasped = info["is_cubeA_grasped"]
         reach, place = closeness(
@@ -83,14 +83,13 @@ class StackCube(MultiRobotTask):
         )
         released = letting_go(state, "arm", grasped, _ONE)
         stacked = _FROM_3 + (released + stillness(state, "cubeA")) * _HALF
-        reward = torch.where(grasped, _FROM_2 + place, _TWO * reach)
-        reward = torch.where(info["is_cubeA_on_cubeB"], stacked, reward)
-        return torch.where(info["success"], _DONE, reward)
+        reward = np.where(grasped, _FROM_2 + place, _TWO * reach)
+        reward = np.where(info["is_cubeA_on_cubeB"], stacked, reward)
+        return np.where(info["success"], _DONE, reward)
 
 
-# Tensors, because arithmetic with Python numbers costs twice as much per call.
-_HALF, _ONE, _TWO = torch.tensor([0.5, 1.0, 2.0])
-_FROM_2, _FROM_3, _DONE = torch.tensor([4.0, 6.0, 8.0])  # rewards
-_CUBE_SIZE = torch.tensor(CUBE_HALF_SIZE) * 2  # m
-_ASIDE = diagonal(CUBE_HALF_SIZE) + TOLERANCE
-_APART = (diagonal(CUBE_HALF_SIZE) + GAP) * 2
+_HALF, _ONE, _TWO = constants(0.5, 1.0, 2.0)
+_FROM_2, _FROM_3, _DONE = constants(4.0, 6.0, 8.0)  # rewards
+(_CUBE_SIZE,) = constants(2 * CUBE_HALF_SIZE)  # m
+_ASIDE = diagonal(CUBE_HALF_SIZE) + np.float32(TOLERANCE)
+_APART = 2 * float(diagonal(CUBE_HALF_SIZE) + np.float32(GAP))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from layouts import single
 from simulation import PhysicsSettings, State, World, add_table
+from simulation.arrays import Array, Flags, constants
 from tasks.props import BLUE, GREEN, RED, add_cube
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -49,7 +49,7 @@ class StackPyramid(MultiRobotTask):
         for cube, (x, y) in zip(("cubeA", "cubeB", "cubeC"), places.tolist(), strict=True):
             world.set_pose(cube, (x, y, CUBE_HALF_SIZE), rng.yaw_quaternion())
 
-    def evaluate(self, state: State) -> dict[str, Tensor]:
+    def evaluate(self, state: State) -> dict[str, Array]:
         """Success: red beside green, blue on both, red and blue at rest and let go."""
         success = _is_beside(state, "cubeA", "cubeB")
         for base in ("cubeA", "cubeB"):
@@ -58,7 +58,7 @@ class StackPyramid(MultiRobotTask):
             success = success & is_at_rest(state, cube) & ~state.is_grasping("arm", cube)
         return {"success": success}
 
-    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP, cubes, and the ways between them."""
         return {
             "tcp_pose": state.tcp_pose("arm"),
@@ -74,16 +74,16 @@ class StackPyramid(MultiRobotTask):
         }
 
 
-def _is_beside(state: State, cube: str, other: str) -> Tensor:
+def _is_beside(state: State, cube: str, other: str) -> Flags:
     """Whether two cubes are at most a diagonal apart, seen from above, shape (N,) bool."""
     return state.planar_distance(cube, other) <= _ASIDE
 
 
-def _differs_in_height(state: State, base: str) -> Tensor:
+def _differs_in_height(state: State, base: str) -> Flags:
     """Whether the blue cube is higher or lower than another one, shape (N,) bool."""
-    return state.offset(base, "cubeC")[:, 2].abs() > _MIN_HEIGHT
+    return np.abs(state.offset(base, "cubeC")[:, 2]) > _MIN_HEIGHT
 
 
-_MIN_HEIGHT = torch.tensor(MIN_HEIGHT)
-_ASIDE = diagonal(2 * CUBE_HALF_SIZE) + TOLERANCE
-_APART = diagonal(CUBE_HALF_SIZE) * 2
+(_MIN_HEIGHT,) = constants(MIN_HEIGHT)
+_ASIDE = diagonal(2 * CUBE_HALF_SIZE) + np.float32(TOLERANCE)
+_APART = 2 * float(diagonal(CUBE_HALF_SIZE))

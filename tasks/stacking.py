@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from simulation import State
+from simulation.arrays import Flags, Floats, constants, norm
 
 HEIGHT_TOLERANCE = 0.005  # m
 
 
-def lies_on(state: State, top: str, bottom: str, aside: Tensor, *heights: Tensor) -> Tensor:
+def lies_on(state: State, top: str, bottom: str, aside: Floats, *heights: Floats) -> Flags:
     """Tell whether a body lies on another one, to within 5 mm of height.
 
     Args:
@@ -27,10 +27,10 @@ def lies_on(state: State, top: str, bottom: str, aside: Tensor, *heights: Tensor
     error = state.offset(bottom, top)[:, 2]
     for height in heights:
         error = error - height
-    return (state.planar_distance(bottom, top) <= aside) & (error.abs() <= _HEIGHT_TOLERANCE)
+    return (state.planar_distance(bottom, top) <= aside) & (np.abs(error) <= _HEIGHT_TOLERANCE)
 
 
-def distance_to_top(state: State, top: str, bottom: str, *heights: Tensor) -> Tensor:
+def distance_to_top(state: State, top: str, bottom: str, *heights: Floats) -> Floats:
     """Return how far a body is from its place on another one, shape (N,) (m).
 
     Args:
@@ -39,23 +39,22 @@ def distance_to_top(state: State, top: str, bottom: str, *heights: Tensor) -> Te
         bottom: The body that it is to lie on.
         heights: How much higher its origin must be, in parts (m), as for `lies_on`.
     """
-    goal = state.position(bottom).clone()
+    goal = state.position(bottom).copy()
     for height in heights:
         goal[:, 2] += height
-    return torch.linalg.vector_norm(goal - state.position(top), dim=1)
+    return norm(goal - state.position(top))
 
 
-def is_at_rest(state: State, body: str) -> Tensor:
+def is_at_rest(state: State, body: str) -> Flags:
     """Tell whether a body is slower than 1 cm/s and 0.5 rad/s, shape (N,) bool."""
     return (state.speed(body) <= _SLOW) & (state.spin(body) <= _SLOW_SPIN)
 
 
-def diagonal(side: float) -> Tensor:
+def diagonal(side: float) -> Floats:
     """Diagonal of a square in float32, as torch rounds it, shape () (unit of ``side``)."""
-    return torch.linalg.vector_norm(torch.tensor([side, side]))
+    return norm(np.array([side, side], np.float32))
 
 
-# Tensors, because comparisons with Python numbers cost twice as much per call.
-_HEIGHT_TOLERANCE = torch.tensor(HEIGHT_TOLERANCE)
+(_HEIGHT_TOLERANCE,) = constants(HEIGHT_TOLERANCE)
 # The same in StackCube, StackPyramid and PlaceSphere of mani_skill 3.0.1 (m/s, rad/s)
-_SLOW, _SLOW_SPIN = torch.tensor([1e-2, 0.5])
+_SLOW, _SLOW_SPIN = constants(1e-2, 0.5)

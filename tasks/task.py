@@ -15,6 +15,7 @@ from torch import Tensor
 from layouts import Layout
 from robots import SimulationError, TaskError, unknown_name_message
 from simulation import PhysicsSettings, Simulation, State, World
+from simulation.arrays import Array, Floats
 from tasks.actions import ActionReader
 from tasks.native_format import (
     StateDict,
@@ -103,15 +104,15 @@ class MultiRobotTask:
         """Place the task's bodies for a new episode; the robots are placed already."""
         raise NotImplementedError
 
-    def evaluate(self, state: State) -> dict[str, Tensor]:
+    def evaluate(self, state: State) -> dict[str, Array]:
         """Return ``success`` (N,) bool and whatever else describes the state."""
         raise NotImplementedError
 
-    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
         """Return named parts of the observation, each (N, k) or (N,), after the robots' own."""
         return {}
 
-    def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Return the dense reward, (N,)."""
         raise NotImplementedError
 
@@ -172,7 +173,7 @@ class MultiRobotTask:
         self._observation_keys = observation_keys(self.layout)
         self._robots = tuple(self.layout)
         self._rngs = [EpisodeRandom(FIRST_SEED + i) for i in range(self.num_envs)]
-        self._max_reward = torch.tensor(float(self.max_reward))
+        self._max_reward = np.array(self.max_reward, np.float32)
         self._elapsed = np.zeros(self.num_envs, np.int32)
         self._simulation: Simulation | None = Simulation(
             self.layout,
@@ -270,9 +271,10 @@ class MultiRobotTask:
         self._state = state
         info = self._info(state)
         obs = self._observation(state, info)
-        reward = self._reward(state, torch.from_numpy(flat), info)
-        truncated = torch.from_numpy(self._elapsed >= self.max_episode_steps)
-        return obs, reward, info["success"].clone(), truncated, info
+        reward = _tensor(self._reward(state, flat, info))
+        terminated = _tensor(info["success"].copy())
+        truncated = _tensor(self._elapsed >= self.max_episode_steps)
+        return obs, reward, terminated, truncated, _tensors(info)
 
     def get_state_dict(self) -> StateDict:
         """Return all poses and velocities under native's keys; see `native_format`."""
@@ -335,41 +337,42 @@ class MultiRobotTask:
         self.begin_episodes(state, ids)
         info = self._info(state)
         obs = self._observation(state, info)
-        info["reconfigure"] = reconfigured
-        return obs, info
+        return obs, {**_tensors(info), "reconfigure": reconfigured}
 
     def _info(self, state: State) -> Info:
-        elapsed = torch.from_numpy(self._elapsed.copy())
-        return {"elapsed_steps": elapsed, **self.evaluate(state)}
+        return {"elapsed_steps": self._elapsed.copy(), **self.evaluate(state)}
 
     def _observation(self, state: State, info: Info) -> Any:
         if self.obs_mode == "none":
             return {}
         extra = self.observe(state, info)
         if self.obs_mode == "state_dict":
-            own = {key: x.clone() for key, x in extra.items()}
+            own = {key: _tensor(x.copy()) for key, x in extra.items()}
             return {"agent": self._proprioception(state), "extra": own}
         parts = [part for name in self._robots for part in (state.qpos(name), state.qvel(name))]
-        parts.extend(_as_columns(part) for part in extra.values())
-        return torch.cat(parts, 1)
+        parts.extend(part if part.ndim == 2 else part[:, None] for part in extra.values())
+        return _tensor(np.concatenate(parts, 1, dtype=np.float32))
 
     def _proprioception(self, state: State) -> dict[str, Any]:
         parts: dict[str, Any] = {}
         for name, key in self._observation_keys.items():
-            own = {"qpos": state.qpos(name).clone(), "qvel": state.qvel(name).clone()}
+            own = {
+                "qpos": _tensor(state.qpos(name).copy()),
+                "qvel": _tensor(state.qvel(name).copy()),
+            }
             parts.update(own if key is None else {key: own})
         return parts
 
-    def _reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+    def _reward(self, state: State, action: Floats, info: Info) -> Floats:
         match self.reward_mode:
             case "normalized_dense":
                 return self.dense_reward(state, action, info) / self._max_reward
             case "dense":
                 return self.dense_reward(state, action, info)
             case "sparse":
-                return info["success"].float()
+                return info["success"].astype(np.float32)
             case _:
-                return torch.zeros(self.num_envs)
+                return np.zeros(self.num_envs, np.float32)
 
     def _slices(self) -> dict[str, slice]:
         state, sizes = self._state, dict[str, int]()
@@ -420,8 +423,9 @@ class MultiRobotTask:
         return bool((options or {}).get("reconfigure", False))
 
 
-def _as_columns(part: Tensor) -> Tensor:
-    """Make a part of an observation float32 of shape (N, k); mixed types are slow to join."""
-    if part.dtype is not torch.float32:
-        part = part.float()
-    return part if part.ndim == 2 else part.unsqueeze(1)
+_tensor = torch.from_numpy
+
+
+def _tensors(info: Info) -> Info:
+    """Return info as users get it: tensors that share its arrays' memory."""
+    return {key: _tensor(value) for key, value in info.items()}

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from layouts import face_to_face
 from simulation import PhysicsSettings, State, World, add_table
+from simulation.arrays import Array, Floats, constants, norm, tanh
 from tasks.props import add_cube, add_goal
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -57,11 +57,11 @@ class TwoRobotPickCube(MultiRobotTask):
         """Remember where the left arm started."""
         qpos = state.qpos("left")
         if len(env_ids) == self.num_envs:
-            self._left_start = qpos.clone()
+            self._left_start = qpos.copy()
         else:
             self._left_start[list(env_ids)] = qpos[list(env_ids)]
 
-    def evaluate(self, state: State) -> dict[str, Tensor]:
+    def evaluate(self, state: State) -> dict[str, Array]:
         """Success: placed, and the right arm static."""
         placed = state.distance("cube", "goal_site") <= _GOAL_RADIUS
         static = state.is_static("right", STATIC_SPEED)
@@ -71,7 +71,7 @@ class TwoRobotPickCube(MultiRobotTask):
             "is_right_arm_static": static,
         }
 
-    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
         """Both TCPs, the cube, and the ways between them."""
         return {
             "left_arm_tcp": state.tcp_pose("left"),
@@ -82,45 +82,44 @@ class TwoRobotPickCube(MultiRobotTask):
             "cube_to_goal_pos": state.offset("cube", "goal_site"),
         }
 
-    def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Bring (2), take over (8), carry (12), place (19), hold still (21 on success)."""
         cube_y = state.position("cube")[:, 1]
         to_goal = state.tcp_distance("right", "goal_site")
         reach, across, take, retreat, carry, right_still, left_still, *fingers = closeness(
             state.tcp_distance("left", "cube"),
-            (_SIDE_Y - cube_y).clamp(min=0),
+            np.maximum(_SIDE_Y - cube_y, _ZERO),
             state.tcp_distance("right", "cube"),
-            (state.tcp_position("left")[:, 1] - _RETREAT_Y).abs(),
+            np.abs(state.tcp_position("left")[:, 1] - _RETREAT_Y),
             to_goal,
             state.arm_speed("right"),
             state.arm_speed("left"),
             *_finger_errors(state),
         )
         grasped = state.is_grasping("right", "cube")
-        strayed = torch.linalg.vector_norm(state.qpos("left") - self._left_start, dim=1)
+        strayed = norm(state.qpos("left") - self._left_start)
         stage_1 = (reach + across) * _HALF
         ready = (fingers[0] + fingers[1]) * _HALF if fingers else 0.0
-        stage_2 = take + ready + retreat + _TWO * grasped.float()
-        stage_3 = _TWO * carry + (_ONE - torch.tanh(strayed))
+        stage_2 = take + ready + retreat + _TWO * grasped
+        stage_3 = _TWO * carry + (_ONE - tanh(strayed))
         stage_5 = (right_still + left_still) * _HALF
 
-        reward = torch.where(cube_y >= _ZERO, _FROM_2 + stage_2, stage_1)
-        reward = torch.where(grasped, _FROM_3 + stage_3, reward)
-        reward = torch.where((to_goal < _NEAR) & grasped, _FROM_4 + _TWO * stage_3, reward)
-        reward = torch.where(info["is_obj_placed"], _FROM_5 + stage_5, reward)
-        return torch.where(info["success"], _DONE, reward)
+        reward = np.where(cube_y >= _ZERO, _FROM_2 + stage_2, stage_1)
+        reward = np.where(grasped, _FROM_3 + stage_3, reward)
+        reward = np.where((to_goal < _NEAR) & grasped, _FROM_4 + _TWO * stage_3, reward)
+        reward = np.where(info["is_obj_placed"], _FROM_5 + stage_5, reward)
+        return np.where(info["success"], _DONE, reward)
 
 
-# Tensors, because arithmetic with Python numbers costs twice as much per call.
-_ZERO, _HALF, _ONE, _TWO = torch.tensor([0.0, 0.5, 1.0, 2.0])
-_FROM_2, _FROM_3, _FROM_4, _FROM_5, _DONE = torch.tensor([2.0, 8.0, 12.0, 19.0, 21.0])  # rewards
-_GOAL_RADIUS = torch.tensor(GOAL_RADIUS)
-_SIDE_Y, _RETREAT_Y, _NEAR, _FINGER_GAP = torch.tensor([0.05, -0.2, 0.25, 0.07])  # m
+_ZERO, _HALF, _ONE, _TWO = constants(0.0, 0.5, 1.0, 2.0)
+_FROM_2, _FROM_3, _FROM_4, _FROM_5, _DONE = constants(2.0, 8.0, 12.0, 19.0, 21.0)  # rewards
+(_GOAL_RADIUS,) = constants(GOAL_RADIUS)
+_SIDE_Y, _RETREAT_Y, _NEAR, _FINGER_GAP = constants(0.05, -0.2, 0.25, 0.07)  # m
 
 
-def _finger_errors(state: State) -> tuple[Tensor, ...]:
+def _finger_errors(state: State) -> tuple[Floats, ...]:
     """How far the right fingers are from level and from open, (N,) each (m); none, no errors."""
     heights = state.finger_heights("right")
     if heights is None:
         return ()
-    return (heights[0] - heights[1]).abs(), (state.finger_gap("right") - _FINGER_GAP).abs()
+    return np.abs(heights[0] - heights[1]), np.abs(state.finger_gap("right") - _FINGER_GAP)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from layouts import face_to_face
 from simulation import PhysicsSettings, State, World, add_table
+from simulation.arrays import Array, Floats, constants, norm, tanh
 from tasks.props import DARK_BLUE, FACE_UP, GREEN, TARGET_HEIGHT, add_cube, add_target
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -60,7 +60,7 @@ class TwoRobotStackCube(MultiRobotTask):
         x = rng.uniform(1) * 0.1 - 0.05
         world.set_pose("goal_region", (x.item(), GOAL_Y, TARGET_HEIGHT), FACE_UP)
 
-    def evaluate(self, state: State) -> dict[str, Tensor]:
+    def evaluate(self, state: State) -> dict[str, Array]:
         """Success: target reached, stacked, and both let go."""
         stacked = lies_on(state, "cubeA", "cubeB", _ASIDE, _CUBE_SIZE)
         placed = state.planar_distance("cubeB", "goal_region") < _GOAL_RADIUS
@@ -73,7 +73,7 @@ class TwoRobotStackCube(MultiRobotTask):
             "success": stacked & placed & ~left & ~right,
         }
 
-    def observe(self, state: State, info: Info) -> dict[str, Tensor]:
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
         """Both TCPs, the target, the cubes, and the ways between them."""
         return {
             "left_arm_tcp": state.tcp_pose("left"),
@@ -86,34 +86,31 @@ class TwoRobotStackCube(MultiRobotTask):
             "cubeA_to_cubeB_pos": state.offset("cubeA", "cubeB"),
         }
 
-    def dense_reward(self, state: State, action: Tensor, info: Info) -> Tensor:
+    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Grasp blue (1), place green (3), stack and retreat (7), let go (9); 10 on success."""
         left, right = info["is_cubeA_grasped"], info["is_cubeB_grasped"]
         push_place = state.position("cubeB") + _PUSH_OFFSET
-        push_distance = torch.linalg.vector_norm(push_place - state.tcp_position("right"), dim=1)
+        push_distance = norm(push_place - state.tcp_position("right"))
         reach, place, stack, retreat = closeness(
             state.tcp_distance("left", "cubeA"),
             state.planar_distance("cubeB", "goal_region"),
             distance_to_top(state, "cubeA", "cubeB", _CUBE_SIZE),
-            (state.tcp_position("right")[:, 1] - _RETREAT_Y).abs(),
+            np.abs(state.tcp_position("right")[:, 1] - _RETREAT_Y),
         )
-        both_reach = (reach + _ONE - torch.tanh(_FIVE * push_distance)) * _HALF
+        both_reach = (reach + _ONE - tanh(_FIVE * push_distance)) * _HALF
         released = letting_go(state, "left", left, _ONE) + letting_go(state, "right", right, _ONE)
 
-        reward = torch.where(
-            left, _FROM_2 + (place + left.float()) * _HALF, (both_reach + left.float()) * _HALF
-        )
+        reward = np.where(left, _FROM_2 + (place + left) * _HALF, (both_reach + left) * _HALF)
         placed = info["cubeB_placed"]
-        reward = torch.where(placed & left, _FROM_3 + (stack * _TWO + retreat), reward)
+        reward = np.where(placed & left, _FROM_3 + (stack * _TWO + retreat), reward)
         stacked = info["is_cubeA_on_cubeB"] & placed
-        reward = torch.where(stacked, _FROM_4 + released * _HALF, reward)
-        return torch.where(info["success"], _DONE, reward)
+        reward = np.where(stacked, _FROM_4 + released * _HALF, reward)
+        return np.where(info["success"], _DONE, reward)
 
 
-# Tensors, because arithmetic with Python numbers costs twice as much per call.
-_HALF, _ONE, _TWO, _FIVE = torch.tensor([0.5, 1.0, 2.0, 5.0])
-_FROM_2, _FROM_3, _FROM_4, _DONE = torch.tensor([2.0, 4.0, 8.0, 10.0])  # rewards
-_GOAL_RADIUS, _RETREAT_Y = torch.tensor([GOAL_RADIUS, RETREAT_Y])  # m
-_CUBE_SIZE = torch.tensor(CUBE_HALF_SIZE) * 2  # m
-_ASIDE = diagonal(CUBE_HALF_SIZE) + TOLERANCE
-_PUSH_OFFSET = torch.tensor([0.0, (torch.tensor(CUBE_HALF_SIZE) + PUSH_GAP).item(), 0.0])  # m
+_HALF, _ONE, _TWO, _FIVE = constants(0.5, 1.0, 2.0, 5.0)
+_FROM_2, _FROM_3, _FROM_4, _DONE = constants(2.0, 4.0, 8.0, 10.0)  # rewards
+_GOAL_RADIUS, _RETREAT_Y = constants(GOAL_RADIUS, RETREAT_Y)  # m
+(_CUBE_SIZE,) = constants(2 * CUBE_HALF_SIZE)  # m
+_ASIDE = diagonal(CUBE_HALF_SIZE) + np.float32(TOLERANCE)
+_PUSH_OFFSET = np.array([0.0, np.float32(CUBE_HALF_SIZE) + np.float32(PUSH_GAP), 0.0], np.float32)

@@ -26,15 +26,15 @@ class Scene:
 
     def body(self, name: str) -> Pose:
         """Return the pose of a body."""
-        return _split(self._state.pose(name).numpy()[0])
+        return _split(self._state.pose(name)[0])
 
     def tcp(self, robot: str) -> Pose:
         """Return the pose of a robot's tool centre point."""
-        return _split(self._state.tcp_pose(robot).numpy()[0])
+        return _split(self._state.tcp_pose(robot)[0])
 
     def qpos(self, robot: str) -> Floats:
         """Return all joints of a robot in SAPIEN's order, shape (dof,) (rad, m)."""
-        return self._state.qpos(robot).numpy()[0].astype(float)
+        return self._state.qpos(robot)[0].astype(float)
 
     def grasps(self, robot: str, body: str) -> bool:
         """Return whether a robot's fingers hold a body."""
