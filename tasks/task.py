@@ -105,7 +105,10 @@ class MultiRobotTask:
         raise NotImplementedError
 
     def evaluate(self, state: State) -> dict[str, Array]:
-        """Return ``success`` (N,) bool and whatever else describes the state."""
+        """Return ``success`` (N,) bool and whatever else describes the state.
+
+        Arrays, as the state gives them: they reach the user as tensors.
+        """
         raise NotImplementedError
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:
@@ -340,7 +343,8 @@ class MultiRobotTask:
         return obs, {**_tensors(info), "reconfigure": reconfigured}
 
     def _info(self, state: State) -> Info:
-        return {"elapsed_steps": self._elapsed.copy(), **self.evaluate(state)}
+        told = {key: np.asarray(value) for key, value in self.evaluate(state).items()}
+        return {"elapsed_steps": self._elapsed.copy(), **told}
 
     def _observation(self, state: State, info: Info) -> Any:
         if self.obs_mode == "none":
@@ -366,13 +370,16 @@ class MultiRobotTask:
     def _reward(self, state: State, action: Floats, info: Info) -> Floats:
         match self.reward_mode:
             case "normalized_dense":
-                return self.dense_reward(state, action, info) / self._max_reward
+                return self._dense(state, action, info) / self._max_reward
             case "dense":
-                return self.dense_reward(state, action, info)
+                return self._dense(state, action, info)
             case "sparse":
                 return info["success"].astype(np.float32)
             case _:
                 return np.zeros(self.num_envs, np.float32)
+
+    def _dense(self, state: State, action: Floats, info: Info) -> Floats:
+        return np.asarray(self.dense_reward(state, action, info), np.float32)
 
     def _slices(self) -> dict[str, slice]:
         state, sizes = self._state, dict[str, int]()

@@ -1,3 +1,4 @@
+import numpy as np
 import torch
 
 import tasks
@@ -10,13 +11,17 @@ def put_ball_where_the_arm_should_hit_it(env: tasks.MultiRobotTask) -> None:
     tcp, goal = state.tcp_position("arm"), state.position("goal_region")
     way = goal - tcp
     ball = env.get_state_dict()["actors"]["ball"].clone()
-    ball[:, :3] = tcp + way / way.norm(dim=1, keepdim=True) * HIT_OFFSET
+    ball[:, :3] = torch.from_numpy(
+        tcp + way / np.linalg.norm(way, axis=1, keepdims=True) * HIT_OFFSET
+    )
     env.set_state_dict({"actors": {"ball": ball}})
 
 
-def reward(env: tasks.MultiRobotTask) -> torch.Tensor:
+def reward(env: tasks.MultiRobotTask) -> np.ndarray:
     state = env.simulation.read()
-    return env.dense_reward(state, torch.zeros(env.action_space.shape), env.evaluate(state))
+    return env.dense_reward(
+        state, np.zeros(env.action_space.shape, np.float32), env.evaluate(state)
+    )
 
 
 def test_having_been_behind_the_ball_counts_until_the_next_reset():

@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 import torch
 
@@ -7,7 +8,7 @@ from tasks import MultiRobotTask
 HALF = 0.02
 
 
-def put(env: MultiRobotTask, **places: tuple[float, float, float]) -> dict[str, torch.Tensor]:
+def put(env: MultiRobotTask, **places: tuple[float, float, float]) -> dict[str, np.ndarray]:
     """Put bodies somewhere and return what the task tells of them."""
     for name, position in places.items():
         env.simulation.worlds[0].set_pose(name, position)
