@@ -20,6 +20,12 @@ of their own. The actions hold for freshly built worlds, ``reset(seed, {"reconfi
 
 # One line per task, sorted by id: id -> module:function.
 CATALOGUE = {
+    "DrawTriangle-v1": "rollouts.experts.draw_triangle:draw_outline",
+    "LiftPegUpright-v1": "rollouts.experts.lift_peg_upright:stand_up",
+    "PokeCube-v1": "rollouts.experts.poke_cube:poke",
+    "PullCube-v1": "rollouts.experts.slide_cube:slide",
+    "PullCubeTool-v1": "rollouts.experts.pull_cube_tool:pull",
+    "PushCube-v1": "rollouts.experts.slide_cube:slide",
     "TwoRobotPickCube-v1": "rollouts.experts.two_robot_pick_cube:hand_over",
 }
 
