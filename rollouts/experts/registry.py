@@ -21,6 +21,7 @@ of their own. The actions hold for freshly built worlds, ``reset(seed, {"reconfi
 # One line per task, sorted by id: id -> module:function.
 CATALOGUE = {
     "PickCube-v1": "rollouts.experts.pick_cube:pick_cube",
+    "PlaceSphere-v1": "rollouts.experts.place_sphere:place_sphere",
     "StackCube-v1": "rollouts.experts.stack_cube:stack_cube",
     "TwoRobotPickCube-v1": "rollouts.experts.two_robot_pick_cube:hand_over",
 }
