@@ -24,6 +24,7 @@ CATALOGUE = {
     "PlaceSphere-v1": "rollouts.experts.place_sphere:place_sphere",
     "StackCube-v1": "rollouts.experts.stack_cube:stack_cube",
     "TwoRobotPickCube-v1": "rollouts.experts.two_robot_pick_cube:hand_over",
+    "TwoRobotStackCube-v1": "rollouts.experts.two_robot_stack_cube:stack_for_two",
 }
 
 _registered: dict[str, Expert] = {}
