@@ -22,6 +22,8 @@ from rollouts.experts.geometry import (
 from rollouts.experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
 from tasks import MultiRobotTask
 
+Numbers = Sequence[float] | Floats
+
 QUARTERS = (0, 1, 2, 3)
 
 
@@ -67,7 +69,9 @@ def pick(
     ready: float = 0.1,
     around: float = 0.03,
 ) -> tuple[Waypoint, ...]:
-    """Return the waypoints ``above``, ``around`` and ``grasp``, which end with the body held.
+    """Return the waypoints after which a gripper holds a body: above, around, grasp.
+
+    Each is called by that word and the body's name.
 
     Args:
         robot: Whose gripper.
@@ -81,12 +85,11 @@ def pick(
     def before(scene: Scene) -> list[Pose]:
         return [backed_off(grip, above) for grip in grips(scene)]
 
+    held = partial(Scene.grasps, robot=robot, body=body)
     return (
-        Waypoint("above", before, OPEN, near=ready),
-        Waypoint("around", grips, OPEN, near=around),
-        Waypoint(
-            "grasp", None, CLOSED, steps=2, until=partial(Scene.grasps, robot=robot, body=body)
-        ),
+        Waypoint(f"above {body}", before, OPEN, near=ready),
+        Waypoint(f"around {body}", grips, OPEN, near=around),
+        Waypoint(f"grasp {body}", None, CLOSED, steps=2, until=held),
     )
 
 
@@ -130,7 +133,7 @@ def held_at(
     return [holding(scene, robot, body, place, quaternion) for quaternion in turned]
 
 
-def is_near(scene: Scene, body: str, other: str, offset: Sequence[float], limit: float) -> bool:
+def is_near(scene: Scene, body: str, other: str, offset: Numbers, limit: float) -> bool:
     """Return whether a body is at a place beside another one.
 
     Args:

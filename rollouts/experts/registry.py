@@ -23,6 +23,7 @@ CATALOGUE = {
     "PickCube-v1": "rollouts.experts.pick_cube:pick_cube",
     "PlaceSphere-v1": "rollouts.experts.place_sphere:place_sphere",
     "StackCube-v1": "rollouts.experts.stack_cube:stack_cube",
+    "StackPyramid-v1": "rollouts.experts.stack_pyramid:stack_pyramid",
     "TwoRobotPickCube-v1": "rollouts.experts.two_robot_pick_cube:hand_over",
     "TwoRobotStackCube-v1": "rollouts.experts.two_robot_stack_cube:stack_for_two",
 }
