@@ -56,6 +56,7 @@ class Rehearsal:
 
         Raises:
             UnknownNameError: If the layout has no such robot, or the script no such waypoint.
+            TaskError: If two waypoints of a robot have the same name.
         """
         task, scene = self.task, Scene(self.task)
         _check_names(script, task)
@@ -186,6 +187,9 @@ def _check_names(script: Script, task: MultiRobotTask) -> None:
     for robot in script:
         _ = task.layout[robot]
     names = [f"{robot}.{waypoint.name}" for robot in script for waypoint in script[robot]]
+    for name in names:
+        if names.count(name) > 1:
+            raise TaskError(f"{names.count(name)} waypoints are called {name!r}; one may be")
     for waypoints in script.values():
         for name in (name for waypoint in waypoints for name in waypoint.after):
             if name not in names:
