@@ -34,6 +34,17 @@ def turn(axis: str, angle: float) -> Floats:
     return quaternion
 
 
+def backed_off(pose: tuple[Floats, Floats], distance: float) -> tuple[Floats, Floats]:
+    """Return the pose that lies ``distance`` (m) behind, against the gripper's approach.
+
+    Args:
+        pose: Position (3,) (m) and orientation (4,) of a gripper.
+        distance: How far; negative goes ahead (m).
+    """
+    position, quaternion = pose
+    return position - distance * rotate(quaternion, np.array([0.0, 0.0, 1.0])), quaternion
+
+
 def yaw_of(quaternion: Floats) -> float:
     """Return the heading of a body's own x axis, seen from above."""
     x, y, _ = rotate(quaternion, np.array([1.0, 0.0, 0.0]))

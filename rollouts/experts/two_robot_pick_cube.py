@@ -9,18 +9,17 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from robots import TaskError
 from rollouts.experts.geometry import (
     Floats,
+    backed_off,
     gripper_facing,
     heading,
-    inverse,
     multiply,
     nearest_quarter_turn,
-    rotate,
     turn,
     yaw_of,
 )
+from rollouts.experts.grasps import holding, need_fingers
 from rollouts.experts.rehearsal import first_success
 from rollouts.experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
 from tasks import MultiRobotTask
@@ -77,12 +76,7 @@ def hand_over(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
     Raises:
         TaskError: If an arm has no fingers, or cannot reach what it should.
     """
-    for place in (GIVER, TAKER):
-        if task.layout[place].robot.fingers is None:
-            raise TaskError(
-                f"the hand-over needs fingers on both arms; {place!r} is a"
-                f" {task.layout[place].robot.name}, which has none"
-            )
+    need_fingers(task, "the hand-over", GIVER, TAKER)
     ends = [np.array(task.layout[place].base_position) for place in (GIVER, TAKER)]
     return first_success(
         task, seed, lambda scene: [_HandOver(style, *ends).script() for style in STYLES]
@@ -126,11 +120,13 @@ class _HandOver:
 
     def present(self, scene: Scene) -> list[Pose]:
         return [
-            _holding(scene, GIVER, self.meeting, gripper_facing(self.forward, self.style.give_tilt))
+            holding(
+                scene, GIVER, CUBE, self.meeting, gripper_facing(self.forward, self.style.give_tilt)
+            )
         ]
 
     def retreat(self, scene: Scene) -> list[Pose]:
-        return [_backed_off(scene.tcp(GIVER), 0.1)]
+        return [backed_off(scene.tcp(GIVER), 0.1)]
 
     def expect(self, scene: Scene, back: float) -> list[Pose]:
         return [self._grip(self.meeting, self.forward + np.pi, self.style.take_tilt, back)]
@@ -144,23 +140,10 @@ class _HandOver:
         goal, _ = scene.body(GOAL)
         _, now = scene.tcp(TAKER)
         leaning = [multiply(now, turn("y", lean)) for lean in CARRY_LEANS]
-        return [_holding(scene, TAKER, goal, quaternion) for quaternion in leaning]
+        return [holding(scene, TAKER, CUBE, goal, quaternion) for quaternion in leaning]
 
     def _grip(self, cube: Floats, direction: float, tilt: float, back: float = 0.0) -> Pose:
         """Hold the cube's half that faces the gripper, or stay ``back`` (m) before that."""
         towards = np.array([np.cos(direction), np.sin(direction), 0.0])
         pose = cube - self.style.half * towards, gripper_facing(direction, tilt)
-        return _backed_off(pose, back)
-
-
-def _backed_off(pose: Pose, distance: float) -> Pose:
-    """Return the pose that lies ``distance`` (m) behind, against the gripper's approach."""
-    position, quaternion = pose
-    return position - distance * rotate(quaternion, np.array([0.0, 0.0, 1.0])), quaternion
-
-
-def _holding(scene: Scene, robot: str, cube: Floats, quaternion: Floats) -> Pose:
-    """Return the gripper's pose that brings the cube it holds to a place, turned as asked."""
-    tcp, now = scene.tcp(robot)
-    arm = rotate(multiply(quaternion, inverse(now)), tcp - scene.body(CUBE)[0])
-    return cube + arm, quaternion
+        return backed_off(pose, back)
