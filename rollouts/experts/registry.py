@@ -21,6 +21,7 @@ of their own. The actions hold for freshly built worlds, ``reset(seed, {"reconfi
 # One line per task, sorted by id: id -> module:function.
 CATALOGUE = {
     "DrawTriangle-v1": "rollouts.experts.draw_triangle:draw_outline",
+    "PegInsertionSide-v1": "rollouts.experts.peg_insertion_side:insert_peg",
     "TwoRobotPickCube-v1": "rollouts.experts.two_robot_pick_cube:hand_over",
 }
 
