@@ -37,14 +37,14 @@ class Style:
     turned: bool = False
 
 
-# Tried in this order. The first solves 49 of the seeds 0 … 49, the second 43.
+# Tried in this order. The first solves 96 % of seeds 0 … 449.
 STYLES = (
     Style(),
     Style(tilt=radians(15)),
+    Style(behind=0.05),  # for pegs whose tail is out of reach
     Style(turned=True),
-    Style(tilt=radians(15), turned=True),
     Style(tilt=radians(30)),
-    Style(tilt=radians(30), turned=True),
+    Style(tilt=radians(15), turned=True),
 )
 
 
