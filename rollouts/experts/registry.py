@@ -22,6 +22,7 @@ of their own. The actions hold for freshly built worlds, ``reset(seed, {"reconfi
 CATALOGUE = {
     "DrawTriangle-v1": "rollouts.experts.draw_triangle:draw_outline",
     "PegInsertionSide-v1": "rollouts.experts.peg_insertion_side:insert_peg",
+    "PlugCharger-v1": "rollouts.experts.plug_charger:plug_in",
     "TwoRobotPickCube-v1": "rollouts.experts.two_robot_pick_cube:hand_over",
 }
 
