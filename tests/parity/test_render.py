@@ -12,8 +12,10 @@ from parity.__main__ import main
 from parity.clip import Candidate, Clip, ClipOptions, choose
 from parity.episodes import random_episodes
 from parity.sides import NativeSide, OurSide
+from robots import RobotRegistry
 from tests.native import NATIVE
 from tests.parity.test_command import run_alone
+from tests.parity.test_mutants import with_arm
 
 SIZE = 192  # pixels
 STEPS = 5
@@ -89,6 +91,16 @@ class TestRendering:
         assert (delta.reshape(len(delta), -1).max(1) > 100).all()
         mean = delta.mean() / 4
         assert mean == pytest.approx(made.mean_pixel_difference, rel=0.5), "amplified four times"
+
+    def test_drives_stiffer_by_a_hundredth_are_seen(self, tmp_path):
+        native = NativeSide("PickCube-v1", picture_size=SIZE)
+        stiffer = with_arm(RobotRegistry.load("panda"), stiffness=1010.0)
+        ours = OurSide(tasks.make("PickCube-v1", robots={"arm": stiffer}))
+        (episode,) = random_episodes([4], 2 * STEPS, 8)
+        made = Clip(native, ours, Candidate(episode, "random")).write(tmp_path)
+        assert made.max_state_difference > 0
+        assert 0 < made.differing_frames < made.frames, "the reset's frame is the same"
+        assert not made.verified
 
     def test_choosing(self):
         """The candidate is chosen in which both sides are the same."""
