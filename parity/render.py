@@ -15,10 +15,10 @@ from rich.console import Console
 
 import tasks
 from parity.clip import Candidate, Clip, ClipOptions, SideBySide, choose
-from parity.episodes import Episode, load_episodes
+from parity.episodes import Episode, load_episodes, recorded_control_mode
 from parity.progress import LiveLine
 from parity.sides import NativeSide, OurSide
-from robots import MissingPackageError, RecordingError, RobotLayoutsError, TaskError
+from robots import CONTROL_MODES, MissingPackageError, RecordingError, RobotLayoutsError, TaskError
 from rollouts.experts import find_expert
 from rollouts.video import package_problem
 from tasks import MultiRobotTask
@@ -86,10 +86,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _render(args: argparse.Namespace) -> int:
     _check(args)
     torch.set_num_threads(1)  # the tensors are small
-    with closing(tasks.make(args.task)) as env:
+    task_id = tasks.get_task_class(args.task).task_id
+    mode = (recorded_control_mode(args.demo) if args.demo else None) or CONTROL_MODES[0]
+    with closing(tasks.make(task_id, control_mode=mode)) as env:
         recorded = _recorded(args, env) if args.demo else None
-        with closing(NativeSide(env.task_id, picture_size=args.size)) as native:
-            folder = _made_folder(args.out / env.task_id)
+        with closing(NativeSide(task_id, control_mode=mode, picture_size=args.size)) as native:
+            folder = _made_folder(args.out / task_id)
             candidates = recorded or _planned(args, env)
             gc.freeze()  # native collects garbage at every rebuild: 0.2 s, unless told what stays
             try:
