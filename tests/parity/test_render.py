@@ -15,6 +15,7 @@ from parity.sides import NativeSide, OurSide
 from robots import RobotRegistry
 from tests.native import NATIVE
 from tests.parity.test_command import run_alone
+from tests.parity.test_episodes import demonstration
 from tests.parity.test_mutants import with_arm
 
 SIZE = 192  # pixels
@@ -76,6 +77,14 @@ class TestRendering:
         assert np.abs(native.astype(int) - ours).mean() < 2, "h264 is not exact"
         assert delta.max() < 8
         assert imageio.imread(folder / "side_by_side.png").shape[2] == 3
+
+    def test_a_file_in_joint_positions(self, tmp_path):
+        demo = demonstration(tmp_path / "planned", control_mode="pd_joint_pos")
+        out = ("--out", tmp_path, "--size", SIZE, "--truncate-buffer", -1, "--seed", 41)
+        assert run("--task", "maniskill.pick_cube_native", "--demo", demo, *out) == 1
+        found = json.loads((tmp_path / "PickCube-v1" / "side_by_side.json").read_text())
+        expect_equal(found)
+        assert (found["seed"], found["source"]) == (41, "planned/trajectory episode 1")
 
     def test_a_clip_of_sides_that_differ(self, tmp_path):
         """Our side begins the episode of another seed: every frame differs, and it is told."""
