@@ -12,6 +12,7 @@ from robots import unknown_name_message
 COMMANDS = {
     "compare": ("parity.compare", "step tasks beside native and compare every bit"),
     "readme": ("parity.readme", "write the recorded results into README.md, or check them there"),
+    "render": ("parity.render", "show native and ours side by side, with their difference"),
 }
 
 

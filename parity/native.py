@@ -21,7 +21,11 @@ _VULKAN_WORDS = ("vk::", "vulkan", "rendering device")
 
 
 def make_native(
-    task_id: str, reward_mode: str | None = None, control_mode: str = CONTROL_MODES[0]
+    task_id: str,
+    reward_mode: str | None = None,
+    control_mode: str = CONTROL_MODES[0],
+    *,
+    picture_size: int | None = None,
 ) -> Any:
     """Make the native environment of a task: one environment, state observations, CPU physics.
 
@@ -29,6 +33,7 @@ def make_native(
         task_id: ManiSkill's id, for example ``"PickCube-v1"``.
         reward_mode: One of the task's reward modes; None takes native's default.
         control_mode: One of `robots.CONTROL_MODES`.
+        picture_size: Width and height of its ``render_rgb_array`` (pixels); None takes native's.
 
     Raises:
         MissingPackageError: If mani_skill, or a package that it needs, is not installed.
@@ -38,7 +43,9 @@ def make_native(
     with quiet():
         gym = _import_native()
         _expect_task(task_id, reward_mode)
-        chosen = {} if reward_mode is None else {"reward_mode": reward_mode}
+        chosen: dict[str, Any] = {} if reward_mode is None else {"reward_mode": reward_mode}
+        if picture_size is not None:
+            chosen["human_render_camera_configs"] = {"width": picture_size, "height": picture_size}
         try:
             return gym.make(
                 task_id,

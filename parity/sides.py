@@ -86,9 +86,14 @@ class NativeSide:
         reward_mode: str | None = None,
         num_envs: int = 1,
         control_mode: str = CONTROL_MODES[0],
+        *,
+        picture_size: int | None = None,
     ) -> None:
         """Make the environments; see `parity.native.make_native` for what can go wrong."""
-        self.envs = [make_native(task_id, reward_mode, control_mode) for _ in range(num_envs)]
+        self.envs = [
+            make_native(task_id, reward_mode, control_mode, picture_size=picture_size)
+            for _ in range(num_envs)
+        ]
         self.num_envs = num_envs
         self.action_dim = native_action_dim(self.envs[0])
 
