@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robots import MissingPackageError, SimulationError, TaskError, closest_match
+from robots import CONTROL_MODES, MissingPackageError, SimulationError, TaskError, closest_match
 
 INSTALL = "pip install 'robot-layouts[parity]'"
 
@@ -20,12 +20,15 @@ _LOGGER = "mani_skill "  # spelled like this by mani_skill itself
 _VULKAN_WORDS = ("vk::", "vulkan", "rendering device")
 
 
-def make_native(task_id: str, reward_mode: str | None = None) -> Any:
+def make_native(
+    task_id: str, reward_mode: str | None = None, control_mode: str = CONTROL_MODES[0]
+) -> Any:
     """Make the native environment of a task: one environment, state observations, CPU physics.
 
     Args:
         task_id: ManiSkill's id, for example ``"PickCube-v1"``.
         reward_mode: One of the task's reward modes; None takes native's default.
+        control_mode: One of `robots.CONTROL_MODES`.
 
     Raises:
         MissingPackageError: If mani_skill, or a package that it needs, is not installed.
@@ -40,7 +43,7 @@ def make_native(task_id: str, reward_mode: str | None = None) -> Any:
             return gym.make(
                 task_id,
                 obs_mode="state",
-                control_mode="pd_joint_delta_pos",
+                control_mode=control_mode,
                 sim_backend="physx_cpu",
                 render_backend="cpu",
                 **chosen,
