@@ -1,0 +1,232 @@
+"""Recorded episodes as named columns: whose joint, which body, in what order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import tasks
+from layouts import Layout, Placement
+from robots import RobotDescriptor
+from rollouts.episode import States
+from rollouts.trajectory import Trajectory, TrajectoryError, TrajectoryFile
+from tasks import MultiRobotTask
+from tasks.native_format import articulation_keys
+
+Floats = NDArray[np.float32]
+Flags = NDArray[np.bool_]
+
+POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")  # of a body, in the world frame (m, wxyz)
+ROW = 13  # numbers of a body, and of a robot's root, in a state dict
+
+
+@dataclass(frozen=True)
+class Columns:
+    """One episode of T steps, column by column; joints are in the order of the descriptors.
+
+    Attributes:
+        episode_id: Its number in the recording.
+        seed: Seed of its reset, or None.
+        actions: Flat actions, (T, A).
+        qpos: Place → joint positions, (T + 1, dof) (rad, m).
+        qvel: Place → joint velocities, (T + 1, dof) (rad/s, m/s).
+        bodies: Poses of all bodies, one after the other, (T + 1, 7 · bodies) (m, wxyz).
+        states: The state dict as it was recorded.
+        rewards: Shape (T,), or None if the recording holds none.
+        success: Shape (T,), or None if the recording holds none.
+        done: Whether the episode ended with the step, (T,); always at its last step.
+    """
+
+    episode_id: int
+    seed: int | None
+    actions: Floats
+    qpos: dict[str, Floats]
+    qvel: dict[str, Floats]
+    bodies: Floats
+    states: States
+    rewards: Floats | None
+    success: Flags | None
+    done: Flags
+
+    def __len__(self) -> int:
+        """Return the number of steps T."""
+        return len(self.actions)
+
+
+class ColumnReader:
+    """Reads the episodes of one recording as columns, all with the same names.
+
+    Attributes:
+        task: The task they were recorded in.
+        action_names: ``place.joint`` of each action number, ``place.group`` where one number
+            drives a whole group.
+        joint_names: ``place.joint`` of each joint.
+        bodies: The bodies of the task that move, or that a reset places.
+        body_names: ``body.x`` to ``body.qz`` of each body.
+    """
+
+    def __init__(self, task: MultiRobotTask) -> None:
+        """Take the names from a task and its robots."""
+        self.task = task
+        world = task.simulation.worlds[0]
+        placements = task.layout.items()
+        self.action_names = [
+            f"{place}.{name}" for place, p in placements for name in action_names(p.robot)
+        ]
+        self.joint_names = [
+            f"{place}.{joint}" for place, p in placements for joint in p.robot.joints
+        ]
+        self.bodies = [
+            name
+            for name, body in world.bodies.items()
+            if body.kind != "static" and not body.anchored
+        ]
+        self.body_names = [f"{body}.{number}" for body in self.bodies for number in POSE]
+        self._keys = articulation_keys(task.layout)
+        self._order = {place: robot.active_index for place, robot in world.robots.items()}
+        self._judged: tuple[bool, bool] | None = None
+
+    def read(self, trajectory: Trajectory) -> Columns:
+        """Return an episode's columns.
+
+        Raises:
+            TrajectoryError: If it holds no states, or those of other robots or bodies, or if it
+                lacks rewards or success and earlier episodes have them, or the reverse.
+        """
+        states = self._checked(trajectory)
+        rows = {place: states["articulations"][key] for place, key in self._keys.items()}
+        order, none = self._order, np.empty((len(trajectory.actions) + 1, 0), np.float32)
+        poses = [states["actors"][body][:, : len(POSE)] for body in self.bodies]
+        return Columns(
+            episode_id=trajectory.episode_id,
+            seed=trajectory.seed,
+            actions=trajectory.actions,
+            qpos={n: row[:, ROW : ROW + len(order[n])][:, order[n]] for n, row in rows.items()},
+            qvel={n: row[:, ROW + len(order[n]) :][:, order[n]] for n, row in rows.items()},
+            bodies=np.concatenate([none, *poses], 1),
+            states=states,
+            rewards=trajectory.rewards,
+            success=trajectory.success,
+            done=_done(trajectory),
+        )
+
+    def tcp_poses(self, columns: Columns) -> dict[str, Floats]:
+        """Return each robot's TCP pose in the world frame, (T + 1, 7) (m, wxyz).
+
+        A recording does not hold them; they follow from its joints, and are within a micrometre
+        of where the TCP was.
+        """
+        poses: dict[str, list[Floats]] = {place: [] for place in self.task.layout}
+        for t in range(len(columns) + 1):
+            self.task.set_state_dict(state_row(columns.states, t))
+            state = self.task.simulation.read()
+            for place, found in poses.items():
+                found.append(state.tcp_pose(place)[0].numpy().copy())
+        return {place: np.stack(found) for place, found in poses.items()}
+
+    def _checked(self, trajectory: Trajectory) -> States:
+        states = trajectory.states
+        if not states:
+            raise TrajectoryError(
+                f"episode {trajectory.episode_id} was recorded without states, which are what is"
+                " exported; record it with env_states"
+            )
+        widths = dict.fromkeys((("actors", body) for body in self.bodies), ROW)
+        for place, key in self._keys.items():
+            widths["articulations", key] = ROW + 2 * len(self._order[place])
+        for (kind, name), width in widths.items():
+            rows = states.get(kind, {}).get(name)
+            if rows is None or rows.shape[1] != width:
+                found = "is missing" if rows is None else f"has {rows.shape[1]} numbers"
+                raise TrajectoryError(
+                    f"episode {trajectory.episode_id}: {kind}/{name} {found} in its states;"
+                    f" {self.task.task_id} with these robots has {width} there"
+                )
+        judged = (trajectory.rewards is not None, trajectory.success is not None)
+        self._judged = self._judged or judged
+        if judged != self._judged:
+            raise TrajectoryError(
+                f"episode {trajectory.episode_id} and those before it do not both have rewards and"
+                " success; export them apart"
+            )
+        return states
+
+
+def action_names(robot: RobotDescriptor) -> list[str]:
+    """Return the joint that each action number drives, or the group where it drives several."""
+    return [
+        number.joints[0] if len(number.joints) == 1 else number.group
+        for number in robot.describe_action()
+    ]
+
+
+def state_row(states: States, t: int) -> dict[str, dict[str, Floats]]:
+    """Return the state dict after step ``t``, each entry (1, k); 0 is that after the reset."""
+    return {
+        kind: {name: rows[t : t + 1] for name, rows in entries.items()}
+        for kind, entries in states.items()
+    }
+
+
+def succeeded(trajectory: Trajectory) -> bool:
+    """Return whether the last step of an episode ended in success.
+
+    Raises:
+        TrajectoryError: If the recording does not say.
+    """
+    if trajectory.success is None:
+        raise TrajectoryError(
+            f"episode {trajectory.episode_id} does not say whether it succeeded; export all"
+            " episodes, without only_successes"
+        )
+    return bool(trajectory.success[-1])
+
+
+def make_task(file: TrajectoryFile, *, pictures: bool = False) -> MultiRobotTask:
+    """Make the task of a recording, with its robots where they stood.
+
+    Args:
+        file: The recording.
+        pictures: Whether to draw its worlds.
+
+    Raises:
+        UnknownNameError: If there is no such task or robot.
+        TaskError: If the task cannot be made like that.
+        AssetError: If robot files cannot be found.
+    """
+    return tasks.make(
+        file.task_id,
+        layout=recorded_layout(file.layout) if file.layout else None,
+        obs_mode="none",
+        control_mode=file.control_mode,
+        render_mode="rgb_array" if pictures else None,
+    )
+
+
+def recorded_layout(described: Mapping[str, Mapping[str, Any]]) -> Layout:
+    """Return the layout that `rollouts.recorder.describe_layout` described."""
+    return Layout(
+        {
+            place: Placement(
+                robot["robot"],
+                tuple(robot["position"]),
+                tuple(robot["quaternion"]),
+                robot["keyframe"],
+                robot["qpos_noise"],
+            )
+            for place, robot in described.items()
+        }
+    )
+
+
+def _done(trajectory: Trajectory) -> Flags:
+    done = np.zeros(len(trajectory.actions), np.bool_)
+    for flags in (trajectory.terminated, trajectory.truncated):
+        if flags is not None:
+            done |= flags
+    done[-1] = True
+    return done

@@ -1,0 +1,144 @@
+"""Writes a robomimic dataset: one hdf5 file with a group per demonstration."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import h5py
+import numpy as np
+
+from rollouts.episode import States
+from rollouts.export.columns import POSE, ColumnReader, Columns, Floats
+
+FILE_NAME = "low_dim.hdf5"  # what robomimic calls observations without pictures
+GYM = 2  # robomimic's number for environments made by gym
+VALIDATION_EVERY = 10  # the last of each ten demonstrations is for validation
+
+
+class RobomimicWriter:
+    """Writes episodes one after the other; the file is complete when it is closed."""
+
+    def __init__(self, folder: Path, reader: ColumnReader, *, origin: Mapping[str, Any]) -> None:
+        """Begin the file.
+
+        Args:
+            folder: An empty folder.
+            reader: Names the columns.
+            origin: What is kept of where the episodes come from; anything that json can hold.
+        """
+        self._reader, self._origin = reader, origin
+        self._file = h5py.File(folder / FILE_NAME, "w")
+        self._data = self._file.create_group("data")
+        self._total, self._solved = 0, list[str]()
+
+    def __enter__(self) -> RobomimicWriter:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Complete the file, or let go of it after an error."""
+        try:
+            if error is None:
+                self._complete()
+        finally:
+            self._file.close()
+
+    def add(self, columns: Columns) -> None:
+        """Write one episode."""
+        name, steps = f"demo_{len(self._data)}", len(columns)
+        demo = self._data.create_group(name)
+        demo.attrs["num_samples"] = steps
+        demo.attrs["episode_id"] = columns.episode_id
+        if columns.seed is not None:
+            demo.attrs["seed"] = columns.seed
+        states = flat_states(columns.states)
+        demo["actions"] = columns.actions
+        demo["states"] = states[:-1]
+        demo["dones"] = columns.done.astype(np.int64)
+        if columns.rewards is not None:
+            demo["rewards"] = columns.rewards
+        for key, rows in self._observations(columns).items():
+            demo[f"obs/{key}"] = rows[:-1]
+            demo[f"next_obs/{key}"] = rows[1:]
+        if "state_layout" not in self._data.attrs:
+            self._data.attrs["state_layout"] = json.dumps(state_layout(columns.states))
+        if columns.success is not None and columns.success[-1]:
+            self._solved.append(name)
+        self._total += steps
+
+    def _observations(self, columns: Columns) -> dict[str, Floats]:
+        """Return what is observed after the reset and after each step, each (T + 1, k)."""
+        parts: dict[str, Floats] = {}
+        tcp_poses = self._reader.tcp_poses(columns)
+        for place in columns.qpos:
+            parts[f"{place}_qpos"] = columns.qpos[place]
+            parts[f"{place}_qvel"] = columns.qvel[place]
+            parts[f"{place}_tcp_pose"] = tcp_poses[place]
+        if self._reader.bodies:
+            parts["object"] = columns.bodies
+        return parts
+
+    def _complete(self) -> None:
+        self._data.attrs["total"] = self._total
+        self._data.attrs["env_args"] = json.dumps(self._environment())
+        self._data.attrs["names"] = json.dumps(self._names())
+        self._data.attrs["recording"] = json.dumps(self._origin)
+        demos = [f"demo_{i}" for i in range(len(self._data))]
+        valid = [demo for i, demo in enumerate(demos) if i % VALIDATION_EVERY == 9]
+        valid = valid or demos[1:][-1:]  # of few demonstrations the last; of one none
+        masks = {
+            "train": [demo for demo in demos if demo not in set(valid)],
+            "valid": valid,
+            "success": self._solved,
+        }
+        for name, chosen in masks.items():
+            if chosen:
+                self._file[f"mask/{name}"] = np.array(chosen, dtype="S")
+
+    def _environment(self) -> dict[str, Any]:
+        """Return robomimic's description of the environment; the keywords are `tasks.make`'s."""
+        task = self._reader.task
+        return {
+            "env_name": task.task_id,
+            "type": GYM,
+            "env_kwargs": {
+                "robots": {place: p.robot.name for place, p in task.layout.items()},
+                "control_mode": task.made_from.control_mode,
+                "reward_mode": task.reward_mode,
+                "control_frequency": task.made_from.control_frequency,
+            },
+        }
+
+    def _names(self) -> dict[str, Sequence[str]]:
+        """Return what each number of the datasets is called, by dataset."""
+        names: dict[str, Sequence[str]] = {"actions": self._reader.action_names}
+        for place, placement in self._reader.task.layout.items():
+            joints = placement.robot.joints
+            names |= {f"{place}_qpos": joints, f"{place}_qvel": joints, f"{place}_tcp_pose": POSE}
+        return names | {"object": self._reader.body_names}
+
+
+def state_layout(states: States) -> list[dict[str, Any]]:
+    """Return which numbers of a flat state belong to which entry of the state dict, in order."""
+    layout: list[dict[str, Any]] = []
+    start = 0
+    for kind, entries in states.items():
+        for name, rows in entries.items():
+            stop = start + rows.shape[1]
+            layout.append({"entry": f"{kind}/{name}", "start": start, "stop": stop})
+            start = stop
+    return layout
+
+
+def flat_states(states: States) -> Floats:
+    """Return a state dict as rows, (T + 1, k), in the order of `state_layout`."""
+    return np.concatenate([rows for entries in states.values() for rows in entries.values()], 1)

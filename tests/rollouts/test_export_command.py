@@ -1,0 +1,244 @@
+"""`python -m rollouts export`: what it says, what it refuses, that it leaves nothing half-done."""
+
+import dataclasses
+import json
+import sys
+from pathlib import Path
+
+import duckdb
+import h5py
+import numpy as np
+import pytest
+
+import rollouts.export.pictures as pictures
+import rollouts.export.progress as progress
+import tasks
+from layouts import Layout, Placement
+from robots import RecordingError, RobotRegistry
+from robots.descriptor import ActionSplit
+from rollouts.__main__ import main
+from rollouts.episode import play
+from rollouts.export.columns import ColumnReader
+from rollouts.export.dataset import Export, export
+from rollouts.trajectory import Trajectory, TrajectoryError, TrajectoryFile
+from rollouts.video import video_problem
+from tests.rollouts.recordings import record, succeed
+
+TASK = "PushT-v1"
+
+
+@pytest.fixture
+def recording(tmp_path) -> Path:
+    return record(tmp_path / "recording.h5", TASK, [3, 2, 4])
+
+
+def run(recording: Path, *words: object) -> int:
+    return main(["export", str(recording), *map(str, words)])
+
+
+def episodes(dataset: Path) -> list[int]:
+    """Return the length of each episode of a LeRobot dataset."""
+    text = f"select length from '{dataset}/meta/episodes/*/*.parquet' order by episode_index"
+    return [row[0] for row in duckdb.execute(text).fetchall()]
+
+
+def test_the_command_writes_a_dataset_and_says_so(recording, tmp_path, capsys):
+    out = tmp_path / "new" / "dataset"
+    assert run(recording, "--format", "lerobot", "--out", out) == 0
+    assert capsys.readouterr().out == f"{out}: 3 episodes, 9 steps\n"
+    assert episodes(out) == [3, 2, 4]
+    assert [path.name for path in out.parent.iterdir()] == ["dataset"]
+
+
+def test_an_empty_folder_may_be_there_already(recording, tmp_path):
+    (tmp_path / "out").mkdir()
+    assert run(recording, "--format", "robomimic", "--out", tmp_path / "out") == 0
+    assert (tmp_path / "out/low_dim.hdf5").is_file()
+
+
+def test_failures_can_be_left_out(recording, tmp_path, capsys):
+    succeed(recording, 0, 2)
+    words = ("--format", "lerobot", "--only-successes", "--out", tmp_path / "out")
+    assert run(recording, *words) == 0
+    assert "2 episodes, 7 steps; 1 without success left out" in capsys.readouterr().out
+    assert episodes(tmp_path / "out") == [3, 4]
+    origin = json.loads((tmp_path / "out/meta/recording.json").read_text())
+    assert [episode["episode_id"] for episode in origin["episodes"]] == [0, 2]
+
+
+def test_a_recording_without_a_layout_is_of_the_tasks_own_robots(recording, tmp_path):
+    with h5py.File(recording, "r+") as file:
+        del file.attrs["layout"]  # as in native's files
+    assert run(recording, "--format", "lerobot", "--out", tmp_path / "out") == 0
+    info = json.loads((tmp_path / "out/meta/info.json").read_text())
+    assert info["robot_type"] == "panda_stick"
+
+
+def test_what_was_not_recorded_is_left_out(recording, tmp_path):
+    with h5py.File(recording, "r+") as file:
+        for episode in file.values():
+            del episode["rewards"], episode["success"]
+    assert run(recording, "--format", "lerobot", "--out", tmp_path / "out") == 0
+    assert run(recording, "--format", "robomimic", "--out", tmp_path / "other") == 0
+    features = json.loads((tmp_path / "out/meta/info.json").read_text())["features"]
+    assert "next.done" in features
+    assert not {"next.reward", "next.success"} & set(features)
+
+
+def test_a_long_export_shows_how_far_it_is(recording, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    assert run(recording, "--format", "lerobot", "--out", tmp_path / "out") == 0
+    assert "exporting recording.h5: 1.0 of 3 episodes" in capsys.readouterr().err
+
+
+def test_a_wrong_format_is_told_the_right_ones(recording, tmp_path, capsys):
+    assert run(recording, "--format", "lerobt", "--out", tmp_path / "out") == 2
+    assert capsys.readouterr().err == (
+        "error: unknown export format 'lerobt'. Did you mean 'lerobot'?"
+        " Choices: lerobot, robomimic.\n"
+    )
+
+
+@pytest.mark.parametrize("form", ["lerobot", "robomimic"])
+def test_a_used_folder_is_left_alone(recording, tmp_path, capsys, form):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/mine").write_text("keep")
+    assert run(recording, "--format", form, "--out", tmp_path / "out") == 1
+    assert "out is not empty; choose another folder" in capsys.readouterr().err
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["mine"]
+
+
+def test_a_file_is_no_folder(recording, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert run(recording, "--format", "lerobot", "--out", tmp_path / "file") == 1
+    assert "file is a file; a folder's name is needed" in capsys.readouterr().err
+    assert run(recording, "--format", "lerobot", "--out", tmp_path / "file" / "out") == 1
+    assert "a folder's name is needed" in capsys.readouterr().err
+
+
+def test_a_missing_recording_is_named(tmp_path, capsys):
+    record(tmp_path / "recording.h5", TASK, [1])
+    assert run(tmp_path / "recordin.h5", "--format", "lerobot", "--out", tmp_path / "out") == 1
+    assert "recording.h5" in capsys.readouterr().err
+
+
+def test_an_empty_recording_is_refused(tmp_path, capsys):
+    recording = record(tmp_path / "empty.h5", TASK, [])
+    assert run(recording, "--format", "lerobot", "--out", tmp_path / "out") == 1
+    assert "empty.h5 holds no episodes; there is nothing to export" in capsys.readouterr().err
+
+
+def test_a_recording_without_successes_is_refused(recording, tmp_path, capsys):
+    words = ("--format", "robomimic", "--only-successes", "--out", tmp_path / "out")
+    assert run(recording, *words) == 1
+    assert "none of the 3 episodes" in capsys.readouterr().err
+    assert nothing_was_left(tmp_path)
+
+
+def nothing_was_left(folder: Path) -> bool:
+    return {path.name for path in folder.iterdir()} == {"recording.h5", "recording.json"}
+
+
+@pytest.mark.parametrize("form", ["lerobot", "robomimic"])
+@pytest.mark.parametrize(
+    ("entry", "complaint"),
+    [
+        ("env_states", "episode 1 was recorded without states"),
+        ("env_states/actors/Tee", "episode 1: actors/Tee is missing in its states; PushT-v1 with"),
+        ("rewards", "episode 1 and those before it do not both have rewards"),
+    ],
+)
+def test_an_episode_that_lacks_something_ends_the_export(
+    recording, tmp_path, capsys, form, entry, complaint
+):
+    with h5py.File(recording, "r+") as file:
+        del file[f"traj_1/{entry}"]
+    assert run(recording, "--format", form, "--out", tmp_path / "out") == 1
+    assert complaint in capsys.readouterr().err
+    assert nothing_was_left(tmp_path)
+
+
+def test_whatever_ends_an_export_it_leaves_nothing(recording, tmp_path):
+    def interrupt(done: float, total: int) -> None:
+        if done == 2:
+            raise KeyboardInterrupt
+
+    for form in ("lerobot", "robomimic"):
+        with pytest.raises(KeyboardInterrupt):
+            export(Export(recording, form, tmp_path / "out"), interrupt)
+        assert nothing_was_left(tmp_path)
+
+
+def test_a_full_disk_is_a_clear_error(recording, tmp_path, monkeypatch):
+    def full(*args: object, **kwargs: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(RecordingError, match="cannot write .*out: .*No space left on device"):
+        export(Export(recording, "lerobot", tmp_path / "out"))
+    assert nothing_was_left(tmp_path)
+
+
+def test_without_pyarrow_the_extra_is_named(recording, tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert run(recording, "--format", "lerobot", "--out", tmp_path / "out") == 1
+    assert "need pyarrow: pip install 'robot-layouts[export]'" in capsys.readouterr().err
+    assert run(recording, "--format", "robomimic", "--out", tmp_path / "out") == 0
+
+
+@pytest.mark.parametrize("words", [("--video",), ("--fps", "20")])
+def test_options_of_another_format_are_refused(recording, tmp_path, capsys, words):
+    assert run(recording, "--format", "robomimic", "--out", tmp_path / "out", *words) == 1
+    expected = f"a robomimic dataset has no {words[0][2:]} here"
+    assert expected in capsys.readouterr().err
+
+
+def test_a_rate_is_one_or_more(recording, tmp_path, capsys):
+    assert run(recording, "--format", "lerobot", "--out", tmp_path / "out", "--fps", 0) == 1
+    assert "fps is 0; it must be 1 or more" in capsys.readouterr().err
+
+
+def test_without_a_vulkan_driver_a_video_is_refused(recording, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(pictures, "vulkan_problem", lambda: "no usable Vulkan driver (none)")
+    assert run(recording, "--format", "lerobot", "--out", tmp_path / "out", "--video") == 1
+    assert "no usable Vulkan driver (none); export without video" in capsys.readouterr().err
+    assert nothing_was_left(tmp_path)
+
+
+def test_pictures_follow_the_recorded_states(recording):
+    if problem := video_problem():
+        pytest.skip(problem)
+    with h5py.File(recording, "r+") as file:
+        file["traj_1/env_states/actors/Tee"][1:, 0] += 0.05  # no replay ends there
+    with TrajectoryFile(recording) as file:
+        task = tasks.make(TASK, render_mode="rgb_array")
+        columns = ColumnReader(task).read(file[1])
+        drawn = []
+        for t, _ in enumerate(pictures.draw(task, columns)):
+            drawn.append(task.get_state_dict()["actors"]["Tee"].numpy())
+            recorded = columns.states["actors"]["Tee"][t : t + 1]
+            np.testing.assert_allclose(drawn[-1][:, :7], recorded[:, :7], atol=1e-6)
+        assert len(drawn) == 2
+        with pytest.raises(TrajectoryError, match="episode 1 names no seed"):
+            next(pictures.draw(task, dataclasses.replace(columns, seed=None)))
+
+
+def test_joints_are_in_the_order_of_their_names():
+    so100 = RobotRegistry.load("so100")
+    groups = so100.action_split.groups
+    turned = dataclasses.replace(
+        so100,
+        action_split=ActionSplit(gripper=groups["gripper"], arm=groups["arm"]),
+        keyframes={name: (qpos[-1], *qpos[:-1]) for name, qpos in so100.keyframes.items()},
+    )
+    layout = Layout({"arm": Placement(turned)})
+    task = tasks.make("PickCubeSO100-v1", layout=layout, obs_mode="none")
+    episode = play(task, 0, np.full((2, 6), 0.5, np.float32))
+    reader = ColumnReader(task)
+    columns = reader.read(Trajectory(0, 0, "pd_joint_delta_pos", episode.actions, episode.states))
+    assert reader.joint_names[:2] == ["arm.gripper", "arm.shoulder_pan"]
+    assert reader.action_names[:2] == ["arm.gripper", "arm.shoulder_pan"]
+    rows = episode.states["articulations"]["so100"]  # SAPIEN's order: the gripper last
+    np.testing.assert_array_equal(columns.qpos["arm"][:, 0], rows[:, 18])
+    np.testing.assert_array_equal(columns.qpos["arm"][:, 1:], rows[:, 13:18])
+    np.testing.assert_array_equal(columns.qvel["arm"], np.roll(rows[:, 19:25], 1, axis=1))
