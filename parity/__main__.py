@@ -11,6 +11,8 @@ from robots import unknown_name_message
 # Command -> the module whose ``main(argv)`` runs it, and what it does.
 COMMANDS = {
     "compare": ("parity.compare", "step tasks beside native and compare every bit"),
+    "inventory": ("parity.inventory", "list every task, and what proves it"),
+    "rollout": ("parity.rollout", "play one episode in native and here, and keep its arrays"),
     "readme": ("parity.readme", "write the recorded results into README.md, or check them there"),
 }
 

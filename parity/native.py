@@ -20,12 +20,15 @@ _LOGGER = "mani_skill "  # spelled like this by mani_skill itself
 _VULKAN_WORDS = ("vk::", "vulkan", "rendering device")
 
 
-def make_native(task_id: str, reward_mode: str | None = None) -> Any:
+def make_native(
+    task_id: str, reward_mode: str | None = None, *, picture_size: int | None = None
+) -> Any:
     """Make the native environment of a task: one environment, state observations, CPU physics.
 
     Args:
         task_id: ManiSkill's id, for example ``"PickCube-v1"``.
         reward_mode: One of the task's reward modes; None takes native's default.
+        picture_size: Width and height of its ``render_rgb_array`` (pixels); None takes native's.
 
     Raises:
         MissingPackageError: If mani_skill, or a package that it needs, is not installed.
@@ -35,7 +38,9 @@ def make_native(task_id: str, reward_mode: str | None = None) -> Any:
     with quiet():
         gym = _import_native()
         _expect_task(task_id, reward_mode)
-        chosen = {} if reward_mode is None else {"reward_mode": reward_mode}
+        chosen: dict[str, Any] = {} if reward_mode is None else {"reward_mode": reward_mode}
+        if picture_size is not None:
+            chosen["human_render_camera_configs"] = {"width": picture_size, "height": picture_size}
         try:
             return gym.make(
                 task_id,
@@ -53,6 +58,19 @@ def make_native(task_id: str, reward_mode: str | None = None) -> Any:
                 f" ({error}). A software driver serves: Mesa's lavapipe 24.3 or newer (on Debian,"
                 " mesa-vulkan-drivers)"
             ) from error
+
+
+def native_tasks() -> dict[str, Any]:
+    """Return native's registry: task id → its specification, with ``cls`` and what it downloads.
+
+    Raises:
+        MissingPackageError: If mani_skill, or a package that it needs, is not installed.
+    """
+    with quiet():
+        _import_native()
+        from mani_skill.utils.registration import REGISTERED_ENVS
+
+        return dict(sorted(REGISTERED_ENVS.items()))
 
 
 def native_agents(env: Any) -> list[Any]:

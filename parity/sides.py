@@ -79,9 +79,18 @@ class OurSide:
 class NativeSide:
     """Native environments, one after the other: on the CPU, each holds a single one."""
 
-    def __init__(self, task_id: str, reward_mode: str | None = None, num_envs: int = 1) -> None:
+    def __init__(
+        self,
+        task_id: str,
+        reward_mode: str | None = None,
+        num_envs: int = 1,
+        *,
+        picture_size: int | None = None,
+    ) -> None:
         """Make the environments; see `parity.native.make_native` for what can go wrong."""
-        self.envs = [make_native(task_id, reward_mode) for _ in range(num_envs)]
+        self.envs = [
+            make_native(task_id, reward_mode, picture_size=picture_size) for _ in range(num_envs)
+        ]
         self.num_envs = num_envs
         self.action_dim = native_action_dim(self.envs[0])
 
