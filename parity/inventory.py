@@ -14,7 +14,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from parity.episodes import EpisodeFileError, recorded_task
+from rollouts.trajectory import TrajectoryError, recorded_task
 from parity.native import native_tasks
 from parity.results import RESULTS, read
 from robots import MissingPackageError, RobotLayoutsError, RobotRegistry
@@ -138,16 +138,16 @@ def find_files(folder: Path) -> tuple[dict[str, list[Path]], list[Demonstration]
     """Return the demonstration files below a folder by task id, and those that cannot be read.
 
     Raises:
-        EpisodeFileError: If there is no such folder.
+        TrajectoryError: If there is no such folder.
     """
     if not folder.is_dir():
-        raise EpisodeFileError(f"there is no folder {folder}")
+        raise TrajectoryError(f"there is no folder {folder}")
     found: dict[str, list[Path]] = {}
     unreadable: list[Demonstration] = []
     for path in sorted(folder.rglob("*.h5")):
         try:
             found.setdefault(recorded_task(path), []).append(path)
-        except EpisodeFileError as error:
+        except TrajectoryError as error:
             unreadable.append(Demonstration(path, str(error)))
     return found, unreadable
 

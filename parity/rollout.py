@@ -22,7 +22,8 @@ from rich.table import Table
 from rich.text import Text
 
 import tasks
-from parity.episodes import CONTROL_MODE, Episode, EpisodeFileError, load_episodes
+from parity.episodes import Episode, load_episodes
+from rollouts.trajectory import TrajectoryError
 from parity.native import native_agents
 from parity.progress import LiveLine
 from parity.report import versions
@@ -153,7 +154,7 @@ def find_source(cls: type[MultiRobotTask], demo: Path | None, seed: int | None) 
         seed: Reset seed; None takes the file's first episode, or seed 0.
 
     Raises:
-        EpisodeFileError: If the file cannot be read or has no episode of that seed.
+        TrajectoryError: If the file cannot be read or has no episode of that seed.
         TaskError: If there is no file and the task has no expert.
     """
     if demo is None:
@@ -165,7 +166,7 @@ def find_source(cls: type[MultiRobotTask], demo: Path | None, seed: int | None) 
         if episode.seed == seed:
             return Source(demo.name, episode)
     seeds = ", ".join(str(episode.seed) for episode in episodes)
-    raise EpisodeFileError(f"{demo} has no episode of seed {seed}; it has seeds {seeds}")
+    raise TrajectoryError(f"{demo} has no episode of seed {seed}; it has seeds {seeds}")
 
 
 def expert_source(cls: type[MultiRobotTask], seed: int) -> Source:
