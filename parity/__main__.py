@@ -16,6 +16,7 @@ COMMANDS = {
     "sweep": ("parity.sweep", "rollouts, agreement and clips of every task, into one summary"),
     "report": ("parity.page", "make one HTML page of a sweep and the recorded comparison"),
     "readme": ("parity.readme", "write the recorded results into README.md, or check them there"),
+    "render": ("parity.render", "show native and ours side by side, with their difference"),
 }
 
 

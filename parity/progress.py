@@ -16,9 +16,9 @@ PLAIN_INTERVAL = 10.0  # s between lines where stderr is no terminal
 class LiveLine:
     """A progress bar after two seconds; where stderr is no terminal, a line every ten."""
 
-    def __init__(self, total: int) -> None:
-        """Expect ``total`` steps."""
-        self._total, self._done = total, 0
+    def __init__(self, total: int, unit: str = "steps") -> None:
+        """Expect ``total`` steps, or what else ``unit`` names in the plural."""
+        self._total, self._unit, self._done = total, unit, 0
         self._progress: Progress | None = None
         self._bar: TaskID | None = None
 
@@ -39,7 +39,7 @@ class LiveLine:
             self._progress.stop()
 
     def advance(self, count: int, what: str) -> None:
-        """Note ``count`` more steps of ``what``."""
+        """Note ``count`` more units of ``what``."""
         self._done += count
         if self._progress is not None and self._bar is not None:
             self._progress.update(self._bar, completed=self._done, description=what)
@@ -53,5 +53,5 @@ class LiveLine:
             progress.start()
             self._bar = progress.add_task(what, total=self._total, completed=self._done)
         else:
-            done = f"{self._done} of {self._total} steps"
+            done = f"{self._done} of {self._total} {self._unit}"
             print(f"{what}: {done} ({self._done / self._total:.0%})", file=sys.stderr, flush=True)

@@ -21,6 +21,8 @@ QUANTITIES = (
     "info",
 )
 
+STATE = QUANTITIES[:5]  # what physics moves
+
 Key = tuple[str, str]  # quantity, entry
 Snapshot = dict[Key, NDArray[Any]]
 
@@ -68,6 +70,29 @@ def take(
         found["reward", "reward"] = _rows(reward, count)
         found["info", "terminated"] = _rows(terminated, count)
     return found
+
+
+def state_dict(snapshot: Snapshot) -> dict[str, dict[str, NDArray[np.float32]]]:
+    """Return the state that a snapshot was taken of, in native's format.
+
+    Returns:
+        ``actors`` and ``articulations``: name → one row per environment.
+    """
+    entries = {quantity: _entries(snapshot, quantity) for quantity in STATE}
+    return {
+        "actors": {
+            name: np.concatenate([pose, entries["object velocity"][name]], 1)
+            for name, pose in entries["object pose"].items()
+        },
+        "articulations": {
+            name: np.concatenate([root, entries["qpos"][name], entries["qvel"][name]], 1)
+            for name, root in entries["root"].items()
+        },
+    }
+
+
+def _entries(snapshot: Snapshot, quantity: str) -> dict[str, NDArray[Any]]:
+    return {name: values for (group, name), values in snapshot.items() if group == quantity}
 
 
 def select(snapshot: Snapshot, rows: Sequence[int]) -> Snapshot:

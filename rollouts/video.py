@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from layouts import Layout
-from robots import MissingPackageError, RecordingError
+from robots import MissingPackageError, RecordingError, RobotLayoutsError
 from robots.descriptor import Vector3
 from rollouts.episode import Episode, play
 from simulation.rendering import Cameras, vulkan_problem
 from tasks import MultiRobotTask
+
+Picture = NDArray[np.uint8]  # (H, W, 3)
 
 STILL_FRAMES = 12  # of the last picture of an episode, before the next begins
 INSTALL = "pip install 'robot-layouts[video]'"
@@ -24,10 +28,13 @@ INSTALL = "pip install 'robot-layouts[video]'"
 
 def video_problem() -> str | None:
     """Say in a few words why no video can be made here, or return None."""
+    return package_problem() or vulkan_problem()
+
+
+def package_problem() -> str | None:
+    """Say which packages that write videos are missing here, or return None."""
     missing = [name for name in ("imageio", "imageio_ffmpeg") if find_spec(name) is None]
-    if missing:
-        return f"{' and '.join(missing)} not installed; {INSTALL}"
-    return vulkan_problem()
+    return f"{' and '.join(missing)} not installed; {INSTALL}" if missing else None
 
 
 def film(
@@ -56,20 +63,41 @@ def film(
     """
     eye, target = overview(task.layout) or task.viewpoint
     start, shown = perf_counter(), 0
+    with open_video(path, task.made_from.control_frequency) as append:
+        for episode in episodes:
+            if shown and (perf_counter() - start) * (shown + 1) / shown > seconds:
+                break
+            _film_one(task, episode, (eye, target), append, progress)
+            shown += 1
+    return shown
+
+
+@contextmanager
+def open_video(path: Path, frames_per_second: float) -> Generator[Callable[[Picture], None]]:
+    """Write an mp4 (h264) picture by picture; it appears when it is whole.
+
+    Args:
+        path: The file.
+        frames_per_second: Pictures per second.
+
+    Yields:
+        What takes the next picture, (H, W, 3), H and W multiples of 16.
+
+    Raises:
+        MissingPackageError: If imageio is not installed.
+        RecordingError: If the file cannot be written.
+    """
     partial = path.with_name(f"{path.stem}.{os.getpid()}.partial{path.suffix}")
     try:
-        with _writer(partial, task.made_from.control_frequency) as writer:
-            for episode in episodes:
-                if shown and (perf_counter() - start) * (shown + 1) / shown > seconds:
-                    break
-                _film_one(task, episode, (eye, target), writer, progress)
-                shown += 1
+        with _writer(partial, frames_per_second) as writer:
+            yield writer.append_data
         os.replace(partial, path)
     except OSError as error:
+        if isinstance(error, RobotLayoutsError):
+            raise
         raise RecordingError(f"cannot write {path}: {error}") from error
     finally:
         partial.unlink(missing_ok=True)
-    return shown
 
 
 def overview(layout: Layout) -> tuple[Vector3, Vector3] | None:
@@ -95,7 +123,7 @@ def _film_one(
     task: MultiRobotTask,
     episode: Episode,
     view: tuple[Vector3, Vector3],
-    writer: Any,
+    append: Callable[[Picture], None],
     progress: Callable[[int, int], None],
 ) -> None:
     frames = 0
@@ -106,7 +134,7 @@ def _film_one(
         picture = Cameras(task.simulation, *view).take()[0]
         last = frames == len(episode.actions) + 1
         for _ in range(1 + STILL_FRAMES * last):
-            writer.append_data(picture)
+            append(picture)
         progress(frames, len(episode.actions) + 1)
 
     play(task, episode.seed, episode.actions, watch)
