@@ -14,11 +14,11 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from rollouts.trajectory import TrajectoryError, recorded_task
 from parity.native import native_tasks
 from parity.results import RESULTS, read
 from robots import MissingPackageError, RobotLayoutsError, RobotRegistry
 from rollouts.experts import list_experts
+from rollouts.trajectory import TrajectoryError, recorded_task
 from tasks import get_task_class, list_tasks
 from tasks.description import UNKNOWN, TaskFacts, facts, short_modes
 from tasks.registry import other_names

@@ -14,7 +14,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from parity import clips
+from parity import embedding
+from parity.clip import SideBySide
 from parity.inventory import missing_tasks
 from parity.native import INSTALL
 from parity.results import RESULTS, ResultsError, read
@@ -158,13 +159,13 @@ def make(runs: Path, results: Path = RESULTS, limit: float = LIMIT) -> str:
     }
     if lost := [str(path) for path in paths.values() if not path.is_file()]:
         raise ResultsError(f"{', '.join(lost)} is gone; `python -m parity sweep --again` makes it")
-    posters = {path: clips.poster(path) for path in paths.values()}
+    posters = {path: embedding.poster(path) for path in paths.values()}
     context = _context(runs, swept, recorded)
     bare = len(_render(context, {}).encode()) + sum(_encoded(len(p)) for p in posters.values())
     room = int((limit * 1e6 - bare - MARGIN) * 3 / 4)
     try:
-        fitted = clips.take(list(paths.values()), room, posters) if paths else {}
-    except clips.ClipError as error:
+        fitted = embedding.take(list(paths.values()), room, posters) if paths else {}
+    except embedding.ClipError as error:
         raise TaskError(_too_large(limit, str(error))) from error
     page = _render(context, {task_id: fitted[path] for task_id, path in paths.items()})
     if len(page.encode()) > limit * 1e6:
@@ -242,11 +243,7 @@ def tiles(
 
 def is_verified(entry: Mapping[str, Any] | None) -> bool:
     """Tell whether a clip shows both sides succeed without any difference."""
-    if not entry or not entry["clip"]:
-        return False
-    clip = entry["clip"]
-    succeeds = clip["native_success"] and clip["our_success"]
-    return succeeds and not clip["differing_frames"] and not clip["max_state_difference"]
+    return bool(entry and entry["clip"]) and SideBySide(**entry["clip"]).verified
 
 
 def cells(entry: Mapping[str, Any] | None, result: Mapping[str, Any] | None) -> list[Cell]:
@@ -453,7 +450,7 @@ def _with(found: Mapping[str, Any]) -> str:
 # -- how it is written ---------------------------------------------------------------------------
 
 
-def _render(context: Mapping[str, Any], fitted: Mapping[str, clips.Clip]) -> str:
+def _render(context: Mapping[str, Any], fitted: Mapping[str, embedding.Embedded]) -> str:
     try:
         import jinja2
     except ImportError:
@@ -478,7 +475,7 @@ def _render(context: Mapping[str, Any], fitted: Mapping[str, clips.Clip]) -> str
     )
 
 
-def _clip(task: Mapping[str, Any], clip: clips.Clip | None) -> dict[str, Any] | None:
+def _clip(task: Mapping[str, Any], clip: embedding.Embedded | None) -> dict[str, Any] | None:
     if clip is None:
         return None
     label = f"{task['id']}: native ManiSkill, the clone and their difference, side by side"
@@ -503,7 +500,7 @@ def _policy(style: str, script: str) -> str:
         for name, text in (("style-src", style), ("script-src", script))
     }
     own = "; ".join(f"{name} 'sha256-{digest}'" for name, digest in allowed.items())
-    return f"default-src 'none'; img-src data:; media-src data: blob:; {own}; base-uri 'none'; form-action 'none'"
+    return f"default-src 'none'; img-src data:; media-src data: blob:; {own}; form-action 'none'"
 
 
 def _write(path: Path, page: str) -> None:

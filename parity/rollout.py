@@ -7,8 +7,7 @@ import json
 import os
 import platform
 import sys
-from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,15 +22,17 @@ from rich.text import Text
 
 import tasks
 from parity.episodes import Episode, load_episodes
-from rollouts.trajectory import TrajectoryError
 from parity.native import native_agents
+from parity.pictures import NativeScene
 from parity.progress import LiveLine
 from parity.report import versions
 from parity.sides import NativeSide, OurSide, Side
 from parity.snapshot import Snapshot, largest_difference
 from parity.summary import number_text
-from robots import MissingPackageError, RecordingError, RobotLayoutsError
+from robots import RecordingError, RobotLayoutsError
 from rollouts.experts import find_expert
+from rollouts.trajectory import TrajectoryError
+from rollouts.video import open_video
 from tasks import MultiRobotTask
 from tasks.native_format import articulation_keys
 
@@ -289,10 +290,11 @@ def _play_native(
     try:
         if film is None:
             return play(side, episode, keys, poses, lambda: on_step("native"))
-        with _film(film / VIDEO_FILE, env.made_from.control_frequency) as append:
+        scene = NativeScene(native)
+        with open_video(film / VIDEO_FILE, env.made_from.control_frequency) as append:
 
             def watch() -> None:
-                append(native.render_rgb_array()[0].numpy())
+                append(scene.live())
                 on_step("native")
 
             return play(side, episode, keys, poses, watch)
@@ -310,24 +312,6 @@ def _our_tcp_poses(env: MultiRobotTask) -> Arrays:
     return {robot: state.tcp_pose(robot)[0].numpy().copy() for robot in env.layout}
 
 
-@contextmanager
-def _film(path: Path, frames_per_second: float) -> Generator[Callable[[Any], None]]:
-    """Write an mp4 that appears when it is whole."""
-    try:
-        import imageio.v2 as imageio
-    except ImportError:
-        raise MissingPackageError(
-            "filming needs imageio: pip install 'robot-layouts[video]'; or pass --no-video"
-        ) from None
-    partial = path.with_name(f"{path.stem}.{os.getpid()}.partial{path.suffix}")
-    try:
-        with imageio.get_writer(partial, fps=frames_per_second, quality=7) as writer:
-            yield writer.append_data
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
-
-
 def describe(env: MultiRobotTask, source: Source, name: str) -> dict[str, Any]:
     """Return what a file says about its arrays, as plain data."""
     return {
@@ -336,7 +320,7 @@ def describe(env: MultiRobotTask, source: Source, name: str) -> dict[str, Any]:
         "source": source.name,
         "seed": source.episode.seed,
         "reset": {"seed": source.episode.seed, "options": {"reconfigure": True}},
-        "control_mode": CONTROL_MODE,
+        "control_mode": env.made_from.control_mode,
         "reward_mode": env.reward_mode,
         "control_frequency": env.made_from.control_frequency,
         "robots": {place: p.robot.name for place, p in env.layout.items()},
@@ -352,7 +336,8 @@ def save(path: Path, arrays: Arrays, about: Mapping[str, Any]) -> None:
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     try:
         with partial.open("wb") as file:
-            np.savez_compressed(file, **arrays, **{METADATA: np.array(json.dumps(about))})
+            everything: dict[str, Any] = {**arrays, METADATA: np.array(json.dumps(about))}
+            np.savez_compressed(file, **everything)
         os.replace(partial, path)
     finally:
         partial.unlink(missing_ok=True)

@@ -12,8 +12,9 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from contextlib import closing, contextmanager
+from dataclasses import asdict, dataclass, replace
+from itertools import count
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -24,18 +25,21 @@ from rich.console import Console
 from rich.progress import Progress
 
 import tasks
+from parity.clip import Candidate, Clip
 from parity.comparison import EpisodeResult
-from parity.episodes import Episode, load_episodes, random_episodes
+from parity.episodes import load_episodes, random_episodes
 from parity.inventory import find_files
 from parity.report import versions
 from parity.results import ResultsError
 from parity.rollout import Source, expert_source, roll_out
 from parity.runs import Run, play
+from parity.sides import NativeSide, OurSide
 from parity.summary import number_text
 from robots import RecordingError, RobotLayoutsError, TaskError
 from rollouts.experts import list_experts
 
 SUMMARY, LOG = "summary.json", "sweep.log"
+PANEL = 384  # pixels of each of a clip's three pictures
 STAGES = ("agreement", "rollout", "clip")
 NO_DEMONSTRATION = "there is no demonstration and no expert: random actions show no success"
 NO_VIDEO = "left out by --no-video"
@@ -256,12 +260,12 @@ def sweep_task(plan: Plan, progressed: Progressed, into: Entry) -> None:
     runs, into["source"] = _episodes(plan)
     total, done = sum(run.steps for run in runs), 0
 
-    def count(run: Run, steps: int) -> None:
+    def played(run: Run, steps: int) -> None:
         nonlocal done
         done += steps
         progressed("agreement", done / total)
 
-    results = [result for found in play(runs, count) for result in found.episodes]
+    results = [result for found in play(runs, played) for result in found.episodes]
     into["agreement"] = agreement(results)
     into["equal"] = all(result.equal for result in results)
     source = _shortest_success(runs, results)
@@ -341,8 +345,15 @@ def agreement(results: Sequence[EpisodeResult]) -> dict[str, Any]:
 
 
 def make_clip(plan: Plan, source: Source, progressed: Callable[[float], None]) -> dict[str, Any]:
-    """Show an episode side by side in the task's folder; return what the pictures showed."""
-    raise NotImplementedError
+    """Show an episode side by side in the task's folder; return what was measured."""
+    name = "the expert" if source.name == "expert" else Path(source.name).name
+    with (
+        closing(tasks.make(plan.task_id)) as env,
+        closing(NativeSide(plan.task_id, picture_size=PANEL)) as native,
+    ):
+        clip, drawn = Clip(native, OurSide(env), Candidate(source.episode, name)), count(1)
+        made = clip.write(plan.folder, lambda: progressed(next(drawn) / clip.frames))
+    return asdict(made)
 
 
 def _number(value: float) -> float | str:

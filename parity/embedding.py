@@ -21,7 +21,7 @@ class ClipError(RobotLayoutsError, ValueError):
 
 
 @dataclass(frozen=True)
-class Clip:
+class Embedded:
     """A clip as it goes into a page.
 
     Attributes:
@@ -37,7 +37,7 @@ class Clip:
     height: int
 
 
-def take(paths: Sequence[Path], room: int, posters: Mapping[Path, bytes]) -> dict[Path, Clip]:
+def take(paths: Sequence[Path], room: int, posters: Mapping[Path, bytes]) -> dict[Path, Embedded]:
     """Return clips that take no more room than there is, the small ones as they are.
 
     Args:
@@ -50,7 +50,7 @@ def take(paths: Sequence[Path], room: int, posters: Mapping[Path, bytes]) -> dic
         MissingPackageError: If imageio-ffmpeg, which brings ffmpeg, is not installed.
     """
     shares = share({path: path.stat().st_size for path in paths}, room)
-    return {path: Clip(fit(path, shares[path]), posters[path], *size(path)) for path in paths}
+    return {path: Embedded(fit(path, shares[path]), posters[path], *size(path)) for path in paths}
 
 
 def share(sizes: Mapping[Path, int], room: int) -> dict[Path, int]:
