@@ -7,7 +7,7 @@ import base64
 import hashlib
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from importlib.resources import files
@@ -65,22 +65,21 @@ class Column:
     number: bool = True
 
 
-COLUMNS = (
-    Column("Task", number=False),
-    Column("Robots", number=False),
-    Column("Episodes"),
-    Column("Steps"),
-    Column("Contact steps"),
-    Column("max |Δ| state"),
-    Column("max |Δ| rest"),
-    Column("Success native / here"),
-    Column("Actions", number=False),
-    Column("Episodes equal"),
-    Column("Success native / here"),
-    Column("max |Δ|"),
-    Column("Clip: mean pixel |Δ|"),
-    Column("Clip: frames that differ"),
+COLUMNS = (  # the first six of the record, the others of the sweep; they break where \n is
+    Column("episodes"),
+    Column("steps"),
+    Column("contact\nsteps"),
+    Column("max |Δ|\nstate"),
+    Column("max |Δ|\nrest"),
+    Column("success\nnative / here"),
+    Column("actions", number=False),
+    Column("episodes\nequal"),
+    Column("success\nnative / here"),
+    Column("max |Δ|\nall"),
+    Column("mean |Δ|\nof pixels"),
+    Column("frames\nthat differ"),
 )
+RECORDED_COLUMNS = 6
 
 
 @dataclass(frozen=True)
@@ -95,9 +94,9 @@ class Tile:
 
 @dataclass(frozen=True)
 class Item:
-    """Something that is missing, and why."""
+    """What is missing for one and the same reason."""
 
-    name: str
+    names: tuple[str, ...]
     why: str = ""
 
 
@@ -192,6 +191,7 @@ def _context(runs: Path, swept: Mapping[str, Any], recorded: Mapping[str, Any]) 
     return {
         "tiles": list(tiles(found, recorded["tasks"])),
         "columns": COLUMNS,
+        "recorded_columns": RECORDED_COLUMNS,
         "tasks": [_task(t, entry, recorded["tasks"].get(t), runs) for t, entry in found.items()],
         "missing": list(missing(found)),
         "not_cloned": not_cloned,
@@ -243,11 +243,11 @@ def tiles(
 
 def is_verified(entry: Mapping[str, Any] | None) -> bool:
     """Tell whether a clip shows both sides succeed without any difference."""
-    return bool(entry and entry["clip"]) and SideBySide(**entry["clip"]).verified
+    return entry is not None and bool(entry["clip"]) and SideBySide(**entry["clip"]).verified
 
 
 def cells(entry: Mapping[str, Any] | None, result: Mapping[str, Any] | None) -> list[Cell]:
-    """Return a task's figures, one for each of `COLUMNS` after the first two.
+    """Return a task's figures, one for each of `COLUMNS`.
 
     Args:
         entry: The task's entry in the sweep's summary, or None.
@@ -314,12 +314,12 @@ def _task(
     cls = get_task_class(task_id)
     robots, said = robots_text(cls.layout), read_docstring(cls)
     success = f" Success: {said.success}" if said.success else ""
-    first = Cell(robots, number=False)
     return {
         "id": task_id,
         "robots": robots,
         "summary": f"{said.summary}{success}",
-        "cells": [first, *cells(entry, result)],
+        "numbers": f"{cls.layout.action_dim} action numbers, {cls.max_episode_steps} steps",
+        "cells": cells(entry, result),
         "status": _status(entry),
         "no_clip": _no_clip(entry),
         "problems": list(_problems(entry)),
@@ -344,7 +344,7 @@ def _no_clip(entry: Mapping[str, Any] | None) -> str:
     if entry is None:
         return "This task was not swept."
     reason = entry["no_clip"] or entry["error"] or "the sweep did not come that far"
-    return f"{reason[0].upper()}{reason[1:]}."
+    return f"{reason[0].upper()}{reason[1:].rstrip('.')}."
 
 
 def _problems(entry: Mapping[str, Any] | None) -> Iterator[str]:
@@ -401,8 +401,8 @@ def missing(swept: Mapping[str, Mapping[str, Any] | None]) -> Iterator[Group]:
     experts = list_experts()
     yield Group(
         "Tasks without a verified clip",
-        tuple(
-            Item(task, _why_not_verified(entry))
+        grouped(
+            (task, _why_not_verified(entry))
             for task, entry in swept.items()
             if not is_verified(entry)
         ),
@@ -410,13 +410,21 @@ def missing(swept: Mapping[str, Mapping[str, Any] | None]) -> Iterator[Group]:
     )
     yield Group(
         "Tasks without a scripted expert",
-        tuple(Item(task) for task in swept if task not in experts),
+        grouped((task, "") for task in swept if task not in experts),
     )
     yield Group(
         "Failures and differences",
         tuple(Item(task, problem) for task, entry in swept.items() for problem in _problems(entry)),
         "None in this sweep.",
     )
+
+
+def grouped(found: Iterable[tuple[str, str]]) -> tuple[Item, ...]:
+    """Put what is missing for the same reason together; takes pairs of name and reason."""
+    by_reason: dict[str, list[str]] = {}
+    for name, why in found:
+        by_reason.setdefault(why, []).append(name)
+    return tuple(Item(tuple(names), why) for why, names in by_reason.items())
 
 
 def _why_not_verified(entry: Mapping[str, Any] | None) -> str:
@@ -435,9 +443,9 @@ def _why_not_verified(entry: Mapping[str, Any] | None) -> str:
     return "; ".join(said)
 
 
-def _not_cloned() -> tuple[list[Item] | None, str]:
+def _not_cloned() -> tuple[tuple[Item, ...] | None, str]:
     try:
-        return [Item(task.task_id, task.reason) for task in missing_tasks()], ""
+        return grouped((task.task_id, task.reason) for task in missing_tasks()), ""
     except MissingPackageError:
         return None, f"They are known where mani_skill is installed: {INSTALL}"
 
