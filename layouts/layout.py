@@ -196,6 +196,20 @@ class Layout(Mapping[str, Placement]):
             }
         )
 
+    @property
+    def action_bounds(self) -> tuple[tuple[float, float], ...]:
+        """The least and the largest value of each number of the flat action."""
+        return tuple(b for placement in self.values() for b in placement.robot.action_bounds)
+
+    def in_control_mode(self, mode: str) -> Layout:
+        """Return the layout with robots that take the actions of a control mode.
+
+        Raises:
+            UnknownNameError: If there is no such control mode.
+            DescriptorError: If a robot lacks the joint limits that the mode needs.
+        """
+        return self.replace_robots(**{n: p.robot.in_control_mode(mode) for n, p in self.items()})
+
     def preview(
         self,
         path: str | PathLike[str],

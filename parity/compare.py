@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
+from typing import NamedTuple
 
 import torch
 from rich.console import Console
@@ -20,16 +21,23 @@ from parity.episodes import (
     load_episodes,
     over_range_episodes,
     random_episodes,
+    recorded_control_mode,
 )
 from parity.progress import LiveLine
 from parity.report import document, sentences, table
 from parity.results import RESULTS, record
 from parity.runs import Run, play
 from parity.summary import summarise, summary_table
-from robots import RobotLayoutsError, TaskError, closest_match
+from robots import CONTROL_MODES, RobotLayoutsError, TaskError, closest_match
 from tasks import MultiRobotTask
 
 TABLE_WIDTH = 180  # columns that a table may take; a narrower terminal wraps it
+
+
+class _Source(NamedTuple):
+    name: str
+    control_mode: str
+    episodes: list[Episode]
 
 
 def parser() -> argparse.ArgumentParser:
@@ -60,6 +68,11 @@ def parser() -> argparse.ArgumentParser:
         help="fresh rebuilds both scenes before every episode, reused only resets them (fresh)",
     )
     add("--reward-mode", nargs="+", metavar="MODE", help="reward modes, or 'all' (the default one)")
+    add(
+        "--control-mode",
+        choices=CONTROL_MODES,
+        help=f"a file says itself in which it was recorded ({CONTROL_MODES[0]})",
+    )
     add("--num-envs", type=int, default=1, metavar="N", help="environments that play at once (1)")
     add("--json", type=Path, metavar="FILE", help="write the results to FILE")
     add("--record", action="store_true", help="keep the results of --all in parity/results.json")
@@ -108,10 +121,19 @@ def plan(args: argparse.Namespace) -> list[Run]:
     demonstrations = find_demonstrations(args.demos) if args.demos else {}
     runs: list[Run] = []
     for cls in classes:
-        ways = _ways(cls, args)
-        for source, episodes in _sources(cls, args, demonstrations.get(cls.task_id, [])):
-            for history, mode in ways:
-                runs.append(Run(cls.task_id, source, tuple(episodes), history, mode, args.num_envs))
+        for source in _sources(cls, args, demonstrations.get(cls.task_id, [])):
+            for history, mode in _ways(cls, args):
+                runs.append(
+                    Run(
+                        cls.task_id,
+                        source.name,
+                        tuple(source.episodes),
+                        history,
+                        mode,
+                        args.num_envs,
+                        source.control_mode,
+                    )
+                )
     return runs
 
 
@@ -129,18 +151,28 @@ def _ways(cls: type[MultiRobotTask], args: argparse.Namespace) -> list[tuple[His
 
 def _sources(
     cls: type[MultiRobotTask], args: argparse.Namespace, demonstrations: Sequence[Path]
-) -> list[tuple[str, list[Episode]]]:
-    width = cls.layout.action_dim
+) -> list[_Source]:
     if args.actions:
-        return [(args.actions.name, load_episodes(args.actions, cls.task_id, width))]
-    drawn = [("random", random_episodes(range(args.seeds), args.steps, width))]
+        return [_recorded(cls, args.actions, args.actions.name, args.control_mode)]
+    mode = args.control_mode or CONTROL_MODES[0]
+    layout = cls.layout.in_control_mode(mode)
+    sizes = range(args.seeds), args.steps, layout.action_dim, layout.action_bounds
+    drawn = [_Source("random", mode, random_episodes(*sizes))]
     if args.all:
-        drawn.append(("over-range", over_range_episodes(range(args.seeds), args.steps, width)))
+        drawn.append(_Source("over-range", mode, over_range_episodes(*sizes)))
     recorded = [
-        (f"{path.parent.name}/{path.name.split('.')[0]}", load_episodes(path, cls.task_id, width))
+        _recorded(cls, path, f"{path.parent.name}/{path.name.split('.')[0]}", None)
         for path in demonstrations
     ]
     return [*drawn, *recorded]
+
+
+def _recorded(cls: type[MultiRobotTask], path: Path, name: str, asked: str | None) -> _Source:
+    episodes = load_episodes(path, cls.task_id, cls.layout.action_dim)
+    mode = recorded_control_mode(path) or asked or CONTROL_MODES[0]
+    if asked not in (None, mode):
+        raise TaskError(f"{path} was recorded in {mode}; leave --control-mode {asked} out")
+    return _Source(name, mode, episodes)
 
 
 def _reward_modes(cls: type[MultiRobotTask], asked: Sequence[str] | None) -> tuple[str, ...]:
@@ -166,8 +198,10 @@ def _check(args: argparse.Namespace) -> None:
             raise TaskError(f"--{option} is {getattr(args, name)}; it must be 1 or more")
     if args.actions and (args.all or len(args.task) > 1 or args.demos):
         raise TaskError("--actions holds the episodes of one task: give one --task, no --demos")
-    if args.record and (not args.all or args.history or args.reward_mode):
-        raise TaskError("--record keeps all of --all: give --all, no --history, no --reward-mode")
+    if args.record and (not args.all or args.history or args.reward_mode or args.control_mode):
+        raise TaskError(
+            "--record keeps all of --all: give --all, no --history, --reward-mode, --control-mode"
+        )
     if args.json and not args.json.absolute().parent.is_dir():
         raise TaskError(f"--json {args.json}: there is no folder {args.json.absolute().parent}")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
@@ -19,9 +19,11 @@ from rollouts.trajectory import (
     recorded_task,
 )
 
+Bounds = Sequence[tuple[float, float]]
+
 SUFFIXES = (".h5", ".npz")
 
-_OVER_RANGE = 3.0  # native clips at 1; a clone has to do the same
+_OVER_RANGE = 3.0  # native clips normalised actions; a clone has to do the same
 
 
 @dataclass(frozen=True)
@@ -37,13 +39,16 @@ class Episode:
     actions: NDArray[np.float32]
 
 
-def random_episodes(seeds: Iterable[int], steps: int, action_dim: int) -> list[Episode]:
-    """Return episodes of uniform random actions, the third fifth of each drawn from [-3, 3].
+def random_episodes(
+    seeds: Iterable[int], steps: int, action_dim: int, bounds: Bounds | None = None
+) -> list[Episode]:
+    """Return episodes of uniform random actions, the third fifth of each thrice as wide.
 
     Args:
         seeds: Reset seeds; each also seeds its episode's actions.
         steps: Control steps T of each episode.
         action_dim: Numbers of one action A.
+        bounds: The least and the largest value of each number; [-1, 1] if None.
     """
     wild = slice(2 * steps // 5, 3 * steps // 5)
     episodes: list[Episode] = []
@@ -51,17 +56,19 @@ def random_episodes(seeds: Iterable[int], steps: int, action_dim: int) -> list[E
         rng = np.random.default_rng(seed)
         actions = rng.uniform(-1, 1, (steps, action_dim))
         actions[wild] *= _OVER_RANGE
-        episodes.append(Episode(seed, actions.astype(np.float32)))
+        episodes.append(Episode(seed, _scaled(actions, bounds)))
     return episodes
 
 
-def over_range_episodes(seeds: Iterable[int], steps: int, action_dim: int) -> list[Episode]:
-    """Return episodes of uniform random actions from [-3, 3]; the arguments are the same."""
+def over_range_episodes(
+    seeds: Iterable[int], steps: int, action_dim: int, bounds: Bounds | None = None
+) -> list[Episode]:
+    """Return episodes of uniform random actions thrice as wide; the arguments are the same."""
     episodes: list[Episode] = []
     for seed in seeds:
         rng = np.random.default_rng(seed)
         actions = rng.uniform(-_OVER_RANGE, _OVER_RANGE, (steps, action_dim))
-        episodes.append(Episode(seed, actions.astype(np.float32)))
+        episodes.append(Episode(seed, _scaled(actions, bounds)))
     return episodes
 
 
@@ -93,6 +100,18 @@ def load_episodes(path: Path, task_id: str, action_dim: int) -> list[Episode]:
     return [_checked(path, number, episode, action_dim) for number, episode in enumerate(episodes)]
 
 
+def recorded_control_mode(path: Path) -> str | None:
+    """Return the control mode that a file was recorded in, or None if it does not say.
+
+    Raises:
+        TrajectoryError: If the file cannot be read.
+    """
+    if path.suffix != ".h5":
+        return None
+    with TrajectoryFile(path) as file:
+        return file.control_mode
+
+
 def find_demonstrations(folder: Path) -> dict[str, list[Path]]:
     """Return the demonstration files below a folder, by task id.
 
@@ -105,6 +124,14 @@ def find_demonstrations(folder: Path) -> dict[str, list[Path]]:
     for path in sorted(folder.rglob("*.h5")):
         found.setdefault(recorded_task(path), []).append(path)
     return found
+
+
+def _scaled(actions: NDArray[np.float64], bounds: Bounds | None) -> NDArray[np.float32]:
+    """Map [-1, 1] onto bounds."""
+    if bounds is not None:
+        low, high = np.array(bounds).T
+        actions = (high + low) / 2 + (high - low) / 2 * actions
+    return actions.astype(np.float32)
 
 
 def _read_h5(path: Path, task_id: str, action_dim: int) -> list[Episode]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robots import MissingPackageError, SimulationError, TaskError, closest_match
+from robots import CONTROL_MODES, MissingPackageError, SimulationError, TaskError, closest_match
 
 INSTALL = "pip install 'robot-layouts[parity]'"
 
@@ -21,13 +21,18 @@ _VULKAN_WORDS = ("vk::", "vulkan", "rendering device")
 
 
 def make_native(
-    task_id: str, reward_mode: str | None = None, *, picture_size: int | None = None
+    task_id: str,
+    reward_mode: str | None = None,
+    control_mode: str = CONTROL_MODES[0],
+    *,
+    picture_size: int | None = None,
 ) -> Any:
     """Make the native environment of a task: one environment, state observations, CPU physics.
 
     Args:
         task_id: ManiSkill's id, for example ``"PickCube-v1"``.
         reward_mode: One of the task's reward modes; None takes native's default.
+        control_mode: One of `robots.CONTROL_MODES`.
         picture_size: Width and height of its ``render_rgb_array`` (pixels); None takes native's.
 
     Raises:
@@ -45,7 +50,7 @@ def make_native(
             return gym.make(
                 task_id,
                 obs_mode="state",
-                control_mode="pd_joint_delta_pos",
+                control_mode=control_mode,
                 sim_backend="physx_cpu",
                 render_backend="cpu",
                 **chosen,

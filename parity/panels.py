@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from math import ceil
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -168,7 +169,7 @@ def _two_lines(title: str) -> list[str]:
 
 
 def _multiple_of_16(length: float) -> int:
-    return 16 * max(1, round(length / 16))
+    return 16 * ceil(length / 16)
 
 
 @cache

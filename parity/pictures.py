@@ -65,7 +65,7 @@ class NativeScene:
                 )
             for name, rows in state[group].items():
                 if not np.isfinite(rows).all():
-                    raise PictureError(f"{name} cannot be drawn: its state {rows} is not finite")
+                    raise PictureError(f"{name} cannot be drawn: its state is {rows[0].tolist()}")
 
 
 def expect_same_shapes(env: Any, task: MultiRobotTask) -> None:
@@ -113,4 +113,4 @@ def difference(first: Picture, second: Picture) -> Picture:
 
 def amplified(delta: Picture, gain: float) -> Picture:
     """Return a difference times ``gain``, cut off at 255; what is not 0 stays visible."""
-    return np.ceil(np.minimum(delta * gain, 255.0)).astype(np.uint8)
+    return np.ceil(np.minimum(delta.astype(np.float64) * gain, 255.0)).astype(np.uint8)

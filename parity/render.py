@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import gc
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -15,10 +15,10 @@ from rich.console import Console
 
 import tasks
 from parity.clip import Candidate, Clip, ClipOptions, SideBySide, choose
-from parity.episodes import Episode, load_episodes
+from parity.episodes import Episode, load_episodes, recorded_control_mode
 from parity.progress import LiveLine
 from parity.sides import NativeSide, OurSide
-from robots import MissingPackageError, RecordingError, RobotLayoutsError, TaskError
+from robots import CONTROL_MODES, MissingPackageError, RecordingError, RobotLayoutsError, TaskError
 from rollouts.experts import find_expert
 from rollouts.video import package_problem
 from tasks import MultiRobotTask
@@ -86,10 +86,13 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _render(args: argparse.Namespace) -> int:
     _check(args)
     torch.set_num_threads(1)  # the tensors are small
-    with closing(tasks.make(args.task)) as env:
-        with closing(NativeSide(env.task_id, picture_size=args.size)) as native:
-            candidates = _candidates(args, env)
-            folder = _made_folder(args.out / env.task_id)
+    task_id = tasks.get_task_class(args.task).task_id
+    mode = (recorded_control_mode(args.demo) if args.demo else None) or CONTROL_MODES[0]
+    with closing(tasks.make(task_id, control_mode=mode)) as env:
+        recorded = _recorded(args, env) if args.demo else None
+        with closing(NativeSide(task_id, control_mode=mode, picture_size=args.size)) as native:
+            folder = _made_folder(args.out / task_id)
+            candidates = recorded or _planned(args, env)
             gc.freeze()  # native collects garbage at every rebuild: 0.2 s, unless told what stays
             try:
                 made = _show(args, native, OurSide(env), candidates, folder)
@@ -99,30 +102,33 @@ def _render(args: argparse.Namespace) -> int:
     return 0 if made.verified else 1
 
 
-def _candidates(args: argparse.Namespace, env: MultiRobotTask) -> list[Candidate]:
-    chooses = args.rank_by == "agreement"
-    if args.demo is None:
-        return list(
-            _planned(env, args.seed or 0, (args.episodes or EXPERT_EPISODES) * chooses or 1)
-        )
+def _recorded(args: argparse.Namespace, env: MultiRobotTask) -> list[Candidate]:
     recorded = load_episodes(args.demo, env.task_id, env.layout.action_dim)
+    name = f"{args.demo.absolute().parent.name}/{args.demo.name.split('.')[0]}"
     found = [
-        Candidate(episode, f"{args.demo.name}, episode {number}")
+        Candidate(episode, f"{name} episode {number}")
         for number, episode in enumerate(recorded)
         if args.seed in (None, episode.seed)
     ]
     if not found:
         seeds = ", ".join(str(episode.seed) for episode in recorded)
         raise TaskError(f"{args.demo} has no episode of seed {args.seed}; its seeds: {seeds}")
-    return found[: args.episodes] if chooses else found[:1]
+    return found[: args.episodes] if _chooses(args) else found[:1]
 
 
-def _planned(env: MultiRobotTask, first_seed: int, count: int) -> Iterator[Candidate]:
-    expert = find_expert(env.task_id)
+def _planned(args: argparse.Namespace, env: MultiRobotTask) -> list[Candidate]:
+    expert, first = find_expert(env.task_id), args.seed or 0
+    count = (args.episodes or EXPERT_EPISODES) if _chooses(args) else 1
+    planned: list[Candidate] = []
     with LiveLine(count, "episodes") as line:
-        for seed in range(first_seed, first_seed + count):
-            yield Candidate(Episode(seed, expert(env, seed)), "the expert")
+        for seed in range(first, first + count):
+            planned.append(Candidate(Episode(seed, expert(env, seed)), "the expert"))
             line.advance(1, f"planning {env.task_id}")
+    return planned
+
+
+def _chooses(args: argparse.Namespace) -> bool:
+    return args.rank_by == "agreement"
 
 
 def _show(
@@ -168,6 +174,8 @@ def _check(args: argparse.Namespace) -> None:
         raise TaskError("--episodes says among how many to choose: give --rank-by agreement too")
     if not 0 < args.diff_gain <= 255:
         raise TaskError(f"--diff-gain is {args.diff_gain:g}; it must be above 0, at most 255")
+    if args.seed is not None and args.seed < 0:
+        raise TaskError(f"--seed is {args.seed}; it must be 0 or more")
     if args.truncate_buffer < -1:
         raise TaskError(f"--truncate-buffer is {args.truncate_buffer}; it must be -1 or more")
     smallest, largest = SIZES

@@ -86,6 +86,7 @@ def _run_document(result: RunResult) -> dict[str, Any]:
         "source": run.source,
         "history": run.history,
         "reward_mode": run.reward_mode,
+        "control_mode": run.control_mode,
         "num_envs": run.num_envs,
         "episodes": len(result.episodes),
         "steps": run.steps,
@@ -116,6 +117,7 @@ def _columns(run: Run) -> dict[str, str]:
         "actions": run.source,
         "history": run.history,
         "reward mode": run.reward_mode,
+        "control mode": run.control_mode,
         "environments": str(run.num_envs),
     }
 

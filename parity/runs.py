@@ -11,6 +11,7 @@ from parity.comparison import EpisodeResult, FirstDifference, History, compare
 from parity.episodes import Episode
 from parity.sides import NativeSide, OurSide
 from parity.snapshot import QUANTITIES
+from robots import CONTROL_MODES
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,7 @@ class Run:
         history: ``"fresh"`` or ``"reused"``.
         reward_mode: Reward mode of both sides.
         num_envs: How many environments play at once.
+        control_mode: Control mode of both sides.
     """
 
     task: str
@@ -32,6 +34,7 @@ class Run:
     history: History
     reward_mode: str
     num_envs: int = 1
+    control_mode: str = CONTROL_MODES[0]
 
     @property
     def steps(self) -> int:
@@ -98,8 +101,13 @@ def play(runs: Sequence[Run], on_step: Callable[[Run, int], None]) -> list[RunRe
 
 
 def _play_one(run: Run, on_step: Callable[[Run, int], None]) -> RunResult:
-    env = tasks.make(run.task, num_envs=run.num_envs, reward_mode=run.reward_mode)
-    native = NativeSide(env.task_id, run.reward_mode, run.num_envs)
+    env = tasks.make(
+        run.task,
+        num_envs=run.num_envs,
+        reward_mode=run.reward_mode,
+        control_mode=run.control_mode,
+    )
+    native = NativeSide(env.task_id, run.reward_mode, run.num_envs, run.control_mode)
     gc.freeze()  # native collects garbage at every rebuild: 0.2 s, unless told what stays
     try:
         found = compare(

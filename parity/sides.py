@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from parity.native import make_native, native_action, native_action_dim, quiet
 from parity.snapshot import Snapshot, select, stack, take
+from robots import CONTROL_MODES
 from tasks import MultiRobotTask
 
 Floats = NDArray[np.float32]
@@ -84,12 +85,14 @@ class NativeSide:
         task_id: str,
         reward_mode: str | None = None,
         num_envs: int = 1,
+        control_mode: str = CONTROL_MODES[0],
         *,
         picture_size: int | None = None,
     ) -> None:
         """Make the environments; see `parity.native.make_native` for what can go wrong."""
         self.envs = [
-            make_native(task_id, reward_mode, picture_size=picture_size) for _ in range(num_envs)
+            make_native(task_id, reward_mode, control_mode, picture_size=picture_size)
+            for _ in range(num_envs)
         ]
         self.num_envs = num_envs
         self.action_dim = native_action_dim(self.envs[0])

@@ -4,6 +4,7 @@ Importing this package loads neither a simulator nor torch, and touches no file 
 """
 
 from robots.descriptor import (
+    CONTROL_MODES,
     ActionNumber,
     ActionSplit,
     CameraMount,
@@ -31,6 +32,7 @@ from robots.locator import LocalUrdf, UrdfLocator
 from robots.registry import RobotRegistry
 
 __all__ = [
+    "CONTROL_MODES",
     "ActionError",
     "ActionNumber",
     "ActionSplit",

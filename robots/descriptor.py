@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import NoReturn, Protocol
@@ -16,6 +16,8 @@ Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # wxyz
 
 IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+CONTROL_MODES = ("pd_joint_delta_pos", "pd_joint_pos")  # ManiSkill's names
 
 
 class UrdfSource(Protocol):
@@ -35,9 +37,10 @@ def names(prefix: str, first: int, last: int) -> tuple[str, ...]:
 class JointGroup:
     """Joints that are driven together, and the action numbers that drive them.
 
-    An action number in [-1, 1] is mapped linearly onto [lower, upper]. With ``delta`` the result
-    is added to the joint's current position, otherwise it is the target itself. The drive is
-    PhysX's implicit spring-damper in ``force`` mode.
+    An action number in [-1, 1] is mapped linearly onto [lower, upper], and clipped before; if the
+    group is not ``normalised`` it is taken as it is. With ``delta`` the result is added to the
+    joint's current position, otherwise it is the target itself. The drive is PhysX's implicit
+    spring-damper in ``force`` mode.
 
     Attributes:
         joints: Joint names, in the order of the action numbers.
@@ -52,6 +55,10 @@ class JointGroup:
         unit: ``"rad"`` or ``"m"``.
         friction: Joint friction coefficient (dimensionless).
         reset_noise: Whether a reset adds joint noise to this group.
+        limits: The (lower, upper) limit of each joint, as its URDF has it (``unit``); needed by
+            control modes in which the action asks for positions.
+        normalised: Whether action numbers lie in [-1, 1]; if not, they are in ``unit`` and lie
+            in [lower, upper], but are not clipped.
     """
 
     joints: tuple[str, ...]
@@ -65,6 +72,8 @@ class JointGroup:
     unit: str = "rad"
     friction: float = 0.0
     reset_noise: bool = True
+    limits: tuple[tuple[float, float], ...] = ()
+    normalised: bool = True
 
     def __post_init__(self) -> None:
         """Refuse empty groups, repeated joints, inverted ranges and non-physical drives."""
@@ -83,7 +92,11 @@ class JointGroup:
                 raise DescriptorError(
                     f"{name} has {len(value)} numbers; the group {self.joints} takes {self.size}"
                 )
-        for low, high in self.ranges:
+        if self.limits and len(self.limits) != len(self.joints):
+            raise DescriptorError(
+                f"limits has {len(self.limits)} pairs; the group has joints {self.joints}"
+            )
+        for low, high in (*self.ranges, *self.limits):
             if not (math.isfinite(low) and math.isfinite(high) and low < high):
                 raise DescriptorError(f"range [{low}, {high}] of {self.joints} is not increasing")
 
@@ -98,6 +111,26 @@ class JointGroup:
         lower = self.lower if isinstance(self.lower, tuple) else (self.lower,) * self.size
         upper = self.upper if isinstance(self.upper, tuple) else (self.upper,) * self.size
         return tuple(zip(lower, upper, strict=True))
+
+    @property
+    def bounds(self) -> tuple[tuple[float, float], ...]:
+        """The least and the largest value of each action number: (-1, 1) if normalised."""
+        return ((-1.0, 1.0),) * self.size if self.normalised else self.ranges
+
+    def by_position(self) -> JointGroup:
+        """Return the group with actions that are joint positions (``unit``) within the limits.
+
+        Raises:
+            DescriptorError: If the group has no limits.
+        """
+        if not self.limits:
+            raise DescriptorError(
+                f"the joint group {self.joints} has no limits, which control by position needs;"
+                " give it limits=((lower, upper), ...), one pair per joint"
+            )
+        limits = self.limits[: self.size]
+        lower, upper = (tuple(limit[side] for limit in limits) for side in (0, 1))
+        return replace(self, lower=lower, upper=upper, delta=False, normalised=False)
 
 
 class ActionSplit(Mapping[str, slice]):
@@ -196,9 +229,11 @@ class ActionNumber:
         group: The joint group it belongs to.
         joints: The joints it drives.
         unit: Unit of ``lower`` and ``upper``: rad or m, "per step" when relative.
-        lower: Effect of -1.
-        upper: Effect of +1.
+        lower: Effect of the least value.
+        upper: Effect of the largest value.
         relative: Whether the effect is added to the current joint position.
+        normalised: Whether the number lies in [-1, 1]; if not, it is in ``unit`` itself, from
+            ``lower`` to ``upper``, and not clipped.
     """
 
     index: int
@@ -209,6 +244,7 @@ class ActionNumber:
     lower: float
     upper: float
     relative: bool
+    normalised: bool = True
 
     def __str__(self) -> str:
         """Return one readable line."""
@@ -383,6 +419,30 @@ class RobotDescriptor:
             raise UnknownNameError(f"keyframe of {self.name}", name, self.keyframes)
         return tuple(self.keyframes[name])
 
+    @property
+    def action_bounds(self) -> tuple[tuple[float, float], ...]:
+        """The least and the largest value of each action number."""
+        groups = self.action_split.groups.values()
+        return tuple(bounds for group in groups for bounds in group.bounds)
+
+    def in_control_mode(self, mode: str) -> RobotDescriptor:
+        """Return the robot with the actions of a control mode.
+
+        ``pd_joint_delta_pos`` is the action split as declared. In ``pd_joint_pos`` the numbers of
+        every group that was relative are joint positions, as in ManiSkill.
+
+        Raises:
+            UnknownNameError: If there is no such control mode.
+            DescriptorError: If the mode needs joint limits and a group has none.
+        """
+        if mode not in CONTROL_MODES:
+            raise UnknownNameError("control mode", mode, CONTROL_MODES)
+        relative = {n: group for n, group in self.action_split.groups.items() if group.delta}
+        if mode == CONTROL_MODES[0] or not relative:
+            return self
+        positions = {name: group.by_position() for name, group in relative.items()}
+        return replace(self, action_split=self.action_split.replace(**positions))
+
     def describe_action(self) -> tuple[ActionNumber, ...]:
         """Return name, unit and range of every action number, in order."""
         numbers: list[ActionNumber] = []
@@ -399,6 +459,7 @@ class RobotDescriptor:
                         lower=lower,
                         upper=upper,
                         relative=group.delta,
+                        normalised=group.normalised,
                     )
                 )
         return tuple(numbers)

@@ -26,6 +26,13 @@ SO100 = RobotDescriptor(
             stiffness=1e3,
             damping=1e2,
             force_limit=100.0,
+            limits=(
+                (-2.0, 2.0),
+                (-1.5708, 1.5708),
+                (-1.5708, 1.5708),
+                (-1.8, 1.8),
+                (-3.14159, 3.14159),
+            ),
         ),
         gripper=JointGroup(
             ("gripper",),
@@ -35,6 +42,7 @@ SO100 = RobotDescriptor(
             stiffness=1e3,
             damping=1e2,
             force_limit=100.0,
+            limits=((-1.1, 1.1),),
         ),
     ),
     tcp_link="Fixed_Jaw",

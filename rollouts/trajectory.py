@@ -15,10 +15,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from robots import RobotLayoutsError, closest_match
+from robots import CONTROL_MODES, RobotLayoutsError, closest_match
 from rollouts.episode import States
-
-CONTROL_MODES = ("pd_joint_delta_pos", "pd_joint_pos")
 
 _FLAGS = ("success", "terminated", "truncated")
 

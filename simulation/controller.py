@@ -14,10 +14,6 @@ from simulation.world import World
 Floats = NDArray[np.float32]
 
 
-_LOWEST: Floats = np.array([-1.0], np.float32)  # arrays, which NumPy need not convert
-_HIGHEST: Floats = np.array([1.0], np.float32)
-
-
 class JointPositionController:
     """Turns flat actions into drive targets for every joint of every robot.
 
@@ -31,6 +27,7 @@ class JointPositionController:
         """Lay out the robots' action numbers and joints, one robot after the other."""
         self.action_dim = layout.action_dim
         ranges: list[tuple[float, float]] = []  # of each action number
+        clipped: list[float] = []  # where each action number is clipped
         source: list[int] = []  # action number that drives each joint
         relative: list[bool] = []
         active: list[int] = []  # place of each driven joint in the concatenated qpos
@@ -38,7 +35,9 @@ class JointPositionController:
         for name, placement in layout.items():
             for group in placement.robot.action_split.groups.values():
                 first, count = len(ranges), len(group.joints)
-                ranges.extend(group.ranges)
+                # One that is not normalised is its own target: 0 + 1 · number.
+                ranges.extend(group.ranges if group.normalised else [(-1.0, 1.0)] * group.size)
+                clipped.extend([1.0 if group.normalised else np.inf] * group.size)
                 source.extend([first] * count if group.mimic else range(first, first + count))
                 relative.extend([group.delta] * count)
             robot = worlds[0].robots[name]
@@ -46,6 +45,8 @@ class JointPositionController:
             joints_before += len(robot.joints)
         low, high = np.array(ranges, np.float32).T
         half = np.float32(0.5)
+        self._highest: Floats = np.array(clipped, np.float32)
+        self._lowest: Floats = -self._highest
         self._source = np.array(source)
         self._one_to_one = source == list(range(len(ranges)))
         self._centre: Floats = (half * (high + low))[self._source]
@@ -61,13 +62,13 @@ class JointPositionController:
         """Return the drive targets of a batch of actions.
 
         Args:
-            action: Shape (N, A); clipped to [-1, 1].
+            action: Shape (N, A); normalised numbers are clipped to [-1, 1].
             qpos: Current joint positions of all robots, shape (N, dof) (rad, m).
 
         Returns:
             Targets in the order of the robots' driven joints, shape (N, dof) (rad, m).
         """
-        clipped = np.minimum(np.maximum(action, _LOWEST), _HIGHEST)
+        clipped = np.minimum(np.maximum(action, self._lowest), self._highest)
         driving = clipped if self._one_to_one else clipped.take(self._source, 1)
         target = self._centre + self._half_range * driving
         np.add(qpos[:, self._active], target, out=target, where=self._relative)

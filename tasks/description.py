@@ -168,15 +168,23 @@ def describe(env: MultiRobotTask) -> Iterator[RenderableType]:
         rows.add_row(name, value or UNKNOWN)
     yield rows
     yield f"\nLayout: {env.layout}\n"
-    yield "Action, each number from -1 to 1; numbers beyond are clipped"
+    yield action_sentence(env.layout)
     yield action_table(env.layout)
     yield f"Observation, {env.single_observation_space.shape[0]} numbers"
     yield observation_table(env.observation_slices)
 
 
+def action_sentence(layout: Layout) -> str:
+    """Return how action numbers are to be read."""
+    robots = (placement.robot for placement in layout.values())
+    if all(number.normalised for robot in robots for number in robot.describe_action()):
+        return "Action, each number from -1 to 1; numbers beyond are clipped"
+    return "Action, joint positions in their units, not clipped; grippers from -1 to 1, clipped"
+
+
 def action_table(layout: Layout) -> Table:
-    """Return one row per action number: whose it is, and what -1 and +1 mean."""
-    rows = _table("#", "robot", "number", "at -1", "at +1", "unit", numbers=(0, 3, 4))
+    """Return one row per action number: whose it is, and what its extremes do."""
+    rows = _table("#", "robot", "number", "lowest", "highest", "unit", numbers=(0, 3, 4))
     for place, part in layout.action_split.items():
         for number in layout[place].robot.describe_action():
             sign = "+" if number.relative else ""

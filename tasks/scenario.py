@@ -7,11 +7,10 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from layouts import Layout
-from robots import TaskError, UnknownNameError
+from robots import CONTROL_MODES, TaskError, UnknownNameError
 from simulation import PhysicsSettings
 
 SIMULATORS = ("sapien3",)
-CONTROL_MODES = ("pd_joint_delta_pos",)
 OBS_MODES = ("state", "state_dict", "none")
 RENDER_MODES = (None, "rgb_array")
 
@@ -26,7 +25,8 @@ class Scenario:
         physics: Solver settings; None keeps SAPIEN's own defaults.
         obs_mode: ``"state"`` (flat), ``"state_dict"`` (named parts) or ``"none"``.
         reward_mode: One of the task's modes; None takes its first.
-        control_mode: ``"pd_joint_delta_pos"``.
+        control_mode: ``"pd_joint_delta_pos"``, or ``"pd_joint_pos"`` for actions that are joint
+            positions.
         control_frequency: Control steps per second (Hz).
         render_mode: ``"rgb_array"`` to draw pictures (needs a Vulkan driver), or None.
         headless: No window is opened; the only choice.
@@ -39,7 +39,7 @@ class Scenario:
     physics: PhysicsSettings | None = None
     obs_mode: str = "state"
     reward_mode: str | None = None
-    control_mode: str = "pd_joint_delta_pos"
+    control_mode: str = CONTROL_MODES[0]
     control_frequency: float = 20.0
     render_mode: str | None = None
     headless: bool = True

@@ -60,7 +60,8 @@ class MultiRobotTask:
         rebuilds: Whether every reset builds the worlds anew, with a new `design`.
         viewpoint: Camera position and target of `render` (m, world).
         num_envs: Number of environments N.
-        single_action_space: Action of one environment, (A,) in [-1, 1].
+        single_action_space: Action of one environment, (A,); joint limits (rad) where the control
+            mode asks for positions, else [-1, 1].
         action_space: Actions of all environments, (N, A).
         action_split: Robot name → slice of the flat action, in declared order.
         made_from: The scenario it was made from.
@@ -160,14 +161,15 @@ class MultiRobotTask:
                 f" the layout has {list(scenario.layout)}"
             )
         self.made_from = scenario
-        self.layout = scenario.layout
+        self.layout = scenario.layout.in_control_mode(scenario.control_mode)
         self.num_envs = scenario.num_envs
         self.obs_mode = scenario.obs_mode
         self.reward_mode = scenario.reward_mode or self.reward_modes[0]
         self.action_split = self.layout.action_split
-        size = self.layout.action_dim
-        self.single_action_space = Box(-1.0, 1.0, (size,), np.float32)
-        self.action_space = Box(-1.0, 1.0, (self.num_envs, size), np.float32)
+        low, high = np.array(self.layout.action_bounds, np.float32).T
+        rows = self.num_envs, 1
+        self.single_action_space = Box(low, high, dtype=np.float32)
+        self.action_space = Box(np.tile(low, rows), np.tile(high, rows), dtype=np.float32)
         self._reader = ActionReader(self.layout, self.num_envs)
         self._observation_keys = observation_keys(self.layout)
         self._robots = tuple(self.layout)
@@ -250,7 +252,8 @@ class MultiRobotTask:
 
         Args:
             action: (N, A) tensor or array in the order of ``action_split``, or a mapping
-                robot name → (N, a); numbers beyond [-1, 1] are clipped.
+                robot name → (N, a); normalised numbers beyond [-1, 1] are clipped, joint
+                positions beyond their limits are not.
 
         Returns:
             Observation, reward (N,) float32, terminated (N,), truncated (N,), info. An

@@ -40,10 +40,17 @@ class Pair(NamedTuple):
 
 
 @functools.cache
-def pair(task_id: str, reward_mode: str | None = None, num_envs: int = 1) -> Pair:
+def pair(
+    task_id: str,
+    reward_mode: str | None = None,
+    num_envs: int = 1,
+    control_mode: str = "pd_joint_delta_pos",
+) -> Pair:
     """Return the pair of this process for a task."""
-    ours = tasks.make(task_id, num_envs=num_envs, reward_mode=reward_mode)
-    native = NativeSide(task_id, reward_mode, num_envs)
+    ours = tasks.make(
+        task_id, num_envs=num_envs, reward_mode=reward_mode, control_mode=control_mode
+    )
+    native = NativeSide(task_id, reward_mode, num_envs, control_mode)
     gc.freeze()  # native collects garbage at every rebuild: 0.2 s, unless told what stays
     return Pair(native, OurSide(ours))
 

@@ -12,6 +12,7 @@ import torch
 
 import tasks
 from parity.__main__ import main
+from robots import TaskError
 from tests.native import NATIVE, TASKS
 
 ROOT = Path(__file__).parents[2]
@@ -111,6 +112,13 @@ class TestComparing:
         printed = capsys.readouterr().out
         assert "actions: actions.npz" in printed
         assert "2 episodes, 6 steps" in printed
+
+    def test_another_control_mode(self, capsys, tmp_path):
+        arguments = ("--task", "PushT-v1", "--seeds", 1, "--steps", 3)
+        written = tmp_path / "found.json"
+        assert run(*arguments, "--control-mode", "pd_joint_pos", "--json", written) == 0
+        assert "control mode: pd_joint_pos" in capsys.readouterr().out
+        assert json.loads(written.read_text())["runs"][0]["control_mode"] == "pd_joint_pos"
 
     def test_a_long_comparison_says_how_far_it_is(self, capsys, monkeypatch):
         monkeypatch.setattr("parity.progress.PATIENCE", 0.0)
@@ -217,6 +225,33 @@ def test_all_means_every_task(monkeypatch):
     runs = plan(parser().parse_args(["--all", "--seeds", "2", "--steps", "3"]))
     assert list(dict.fromkeys(run.task for run in runs)) == list(TASKS)
     assert {run.steps for run in runs} == {6}
+
+
+def test_a_file_says_in_which_control_mode_it_was_recorded(tmp_path):
+    from parity.compare import parser, plan
+    from tests.parity.test_episodes import demonstration
+
+    path = demonstration(tmp_path, control_mode="pd_joint_pos")
+    arguments = ["--task", "PickCube-v1", "--actions", str(path)]
+    (found,) = plan(parser().parse_args(arguments))
+    assert found.control_mode == "pd_joint_pos"
+    assert len(plan(parser().parse_args([*arguments, "--control-mode", "pd_joint_pos"]))) == 1
+    with pytest.raises(TaskError, match=r"recorded in pd_joint_pos; leave --control-mode pd_joi"):
+        plan(parser().parse_args([*arguments, "--control-mode", "pd_joint_delta_pos"]))
+
+
+def test_random_positions_lie_within_the_limits_and_partly_beyond():
+    from parity.compare import parser, plan
+
+    layout = tasks.get_task_class("PickCube-v1").layout.in_control_mode("pd_joint_pos")
+    low, high = np.array(layout.action_bounds).T
+    (found,) = plan(
+        parser().parse_args(["--task", "PickCube-v1", "--control-mode", "pd_joint_pos"])
+    )
+    for episode in found.episodes:
+        beyond = np.any((episode.actions < low) | (episode.actions > high), axis=1)
+        assert beyond[40:60].any()
+        assert not np.delete(beyond, slice(40, 60)).any()
 
 
 def test_demonstrations_are_played_beside_random_actions(tmp_path):

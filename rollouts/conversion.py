@@ -1,0 +1,52 @@
+"""The same episode in another control mode: what the arms were told, as joint positions."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots import TaskError
+from rollouts.episode import REBUILT
+from tasks import MultiRobotTask
+
+
+def as_positions(
+    task: MultiRobotTask, seed: int, actions: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Return the actions in ``pd_joint_pos`` that move everything as these do, to the last bit.
+
+    The episode is played once, and what the drives were told is written down.
+
+    Args:
+        task: A task with one environment in ``pd_joint_delta_pos``.
+        seed: The episode.
+        actions: Shape (T, A).
+
+    Returns:
+        Shape (T, A): joint positions for every group that was relative (rad, m), the other
+        numbers as they are.
+
+    Raises:
+        TaskError: If the task is in another control mode.
+    """
+    if task.made_from.control_mode != "pd_joint_delta_pos":
+        raise TaskError(
+            f"actions of pd_joint_delta_pos are converted; the task has"
+            f" {task.made_from.control_mode}"
+        )
+    positions = np.array(actions, np.float32)
+    task.reset(seed, options=REBUILT)
+    for row in positions:
+        task.step(row[None])
+        for robot, part in task.action_split.items():
+            _write_targets(task, robot, row[part])
+    return positions
+
+
+def _write_targets(task: MultiRobotTask, robot: str, numbers: NDArray[np.float32]) -> None:
+    driven = iter(task.simulation.worlds[0].robots[robot].driven)
+    split = task.layout[robot].robot.action_split
+    for name, group in split.groups.items():
+        targets = [float(next(driven).drive_target[0]) for _ in group.joints]
+        if group.delta:
+            numbers[split[name]] = targets[: group.size]

@@ -1,0 +1,133 @@
+"""Joint positions as actions are native's to the last bit, and the same motion as deltas."""
+
+import numpy as np
+import pytest
+
+import tasks
+from layouts import single
+from parity.comparison import HISTORIES
+from parity.episodes import Episode, random_episodes
+from robots import CONTROL_MODES, DescriptorError, RobotRegistry, TaskError, UnknownNameError
+from rollouts.conversion import as_positions
+from rollouts.episode import play
+from simulation.world import World
+from tests.motions import touching_episode
+from tests.native import NATIVE, TASKS, complaints, pair
+
+MODE = "pd_joint_pos"
+SOME_TASKS = ("PickCube-v1", "PickCubeSO100-v1", "PushT-v1", "TwoRobotPickCube-v1")
+SEEDS = (1, 2)
+
+
+def both_sides(task_id):
+    return pair(task_id, control_mode=MODE)
+
+
+def over_range_episodes(task_id, steps):
+    layout = both_sides(task_id).ours.env.layout
+    return random_episodes(SEEDS, steps, layout.action_dim, layout.action_bounds)
+
+
+def touching(task_id, seed):
+    """The scripted contact of a task as joint positions."""
+    episode = touching_episode(task_id, seed)
+    env = tasks.make(task_id, obs_mode="none")
+    return Episode(seed, as_positions(env, seed, episode.actions))
+
+
+def expect_native(task_id, history, episodes):
+    results = both_sides(task_id).play(episodes, history)
+    assert complaints(results) == []
+    return sum(result.contact_steps for result in results)
+
+
+class TestNative:
+    pytestmark = NATIVE
+
+    @pytest.mark.parametrize("history", HISTORIES)
+    @pytest.mark.parametrize("task_id", SOME_TASKS)
+    def test_random_and_over_range_positions(self, task_id, history):
+        expect_native(task_id, history, over_range_episodes(task_id, 40))
+
+    @pytest.mark.parametrize("task_id", SOME_TASKS)
+    def test_scripted_contact(self, task_id):
+        contacts = expect_native(task_id, "reused", [touching(task_id, seed) for seed in SEEDS])
+        assert contacts >= 10, "hardly anything was touched"
+
+    @pytest.mark.parametrize("task_id", SOME_TASKS)
+    def test_the_action_space_is_natives(self, task_id):
+        native, ours = both_sides(task_id)
+        theirs = native.envs[0].single_action_space
+        spaces = list(theirs.values()) if hasattr(theirs, "values") else [theirs]
+        space = ours.env.single_action_space
+        np.testing.assert_array_equal(space.low, np.concatenate([s.low for s in spaces]))
+        np.testing.assert_array_equal(space.high, np.concatenate([s.high for s in spaces]))
+        assert space.dtype == spaces[0].dtype
+
+    @pytest.mark.long
+    @pytest.mark.parametrize("history", HISTORIES)
+    @pytest.mark.parametrize("task_id", TASKS)
+    def test_every_task(self, task_id, history):
+        episodes = over_range_episodes(task_id, 100)
+        episodes += [touching(task_id, seed) for seed in SEEDS]
+        expect_native(task_id, history, episodes)
+
+
+@pytest.mark.parametrize("task_id", ["PushT-v1", "TwoRobotPickCube-v1"])
+def test_positions_move_everything_as_the_deltas_they_come_from(task_id):
+    deltas = touching_episode(task_id, 0).actions
+    first = tasks.make(task_id)
+    second = tasks.make(task_id, control_mode=MODE)
+    one, other = play(first, 0, deltas), play(second, 0, as_positions(first, 0, deltas))
+    for kind, entries in one.states.items():
+        for name, rows in entries.items():
+            np.testing.assert_array_equal(rows, other.states[kind][name])
+    assert not np.array_equal(one.actions, other.actions)
+    with pytest.raises(TaskError, match="the task has pd_joint_pos"):
+        as_positions(second, 0, deltas)
+
+
+@pytest.mark.parametrize("robot", RobotRegistry.names())
+def test_the_limits_are_those_of_the_robot_files(robot):
+    simulated = World(single({"arm": robot})).robots["arm"]
+    limits = {j.name: j.limits[0] for j in simulated.driven}
+    descriptor = simulated.descriptor
+    relative = [g for g in descriptor.action_split.groups.values() if g.delta]
+    assert relative
+    for group in relative:
+        expected = np.array([limits[joint] for joint in group.joints])
+        np.testing.assert_array_equal(np.array(group.limits, np.float32), expected)
+
+
+@pytest.mark.parametrize("robot", RobotRegistry.names())
+def test_a_robot_in_another_control_mode(robot):
+    deltas = RobotRegistry.load(robot)
+    assert deltas.in_control_mode(CONTROL_MODES[0]) == deltas
+    positions = deltas.in_control_mode(MODE)
+    assert positions.action_dim == deltas.action_dim
+    assert list(positions.action_split) == list(deltas.action_split)
+    for before, after in zip(deltas.describe_action(), positions.describe_action(), strict=True):
+        assert after.name == before.name
+        assert not after.relative
+        if before.relative:
+            assert (after.unit, after.normalised) == ("rad", False)
+            assert positions.action_bounds[after.index] == (after.lower, after.upper)
+        else:
+            assert after == before
+            assert positions.action_bounds[after.index] == (-1, 1)
+
+
+def test_a_robot_without_limits_says_so():
+    panda = RobotRegistry.load("panda")
+    arm = panda.action_split.groups["arm"]
+    split = panda.action_split.replace(arm=type(arm)(**{**vars(arm), "limits": ()}))
+    unlimited = type(panda)(**{**vars(panda), "action_split": split})
+    with pytest.raises(DescriptorError, match=r"panda_joint1.*has no limits.*limits=\(\(lower"):
+        unlimited.in_control_mode(MODE)
+
+
+def test_an_unknown_control_mode():
+    with pytest.raises(UnknownNameError, match="Did you mean 'pd_joint_pos'"):
+        RobotRegistry.load("panda").in_control_mode("pd_joint_pose")
+    with pytest.raises(TaskError, match=r"'pd_ee_pose' is not offered; choices: 'pd_joint_delta"):
+        tasks.make("PickCube-v1", control_mode="pd_ee_pose")
