@@ -65,6 +65,19 @@ def make_native(
             ) from error
 
 
+def native_tasks() -> dict[str, Any]:
+    """Return native's registry: task id → its specification, with ``cls`` and what it downloads.
+
+    Raises:
+        MissingPackageError: If mani_skill, or a package that it needs, is not installed.
+    """
+    with quiet():
+        _import_native()
+        from mani_skill.utils.registration import REGISTERED_ENVS
+
+        return dict(sorted(REGISTERED_ENVS.items()))
+
+
 def native_agents(env: Any) -> list[Any]:
     """Return the robots of a native environment, in native's order."""
     return list(getattr(env.agent, "agents", None) or [env.agent])

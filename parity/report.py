@@ -72,7 +72,7 @@ def document(results: Sequence[RunResult]) -> dict[str, Any]:
     """Return the results as plain data for JSON; a difference that is no number is ``"inf"``."""
     return {
         "equal": all(result.equal for result in results),
-        "versions": {"python": platform.python_version(), **_versions()},
+        "versions": versions(),
         "machine": platform.machine(),
         "runs": [_run_document(result) for result in results],
     }
@@ -136,8 +136,9 @@ def _number(value: float) -> float | str:
     return value if math.isfinite(value) else "inf"
 
 
-def _versions() -> dict[str, str | None]:
-    found: dict[str, str | None] = {}
+def versions() -> dict[str, str | None]:
+    """Return the versions of Python and of packages that results depend on; None if missing."""
+    found: dict[str, str | None] = {"python": platform.python_version()}
     for package in _PACKAGES:
         try:
             found[package] = version(package)

@@ -1,13 +1,15 @@
-"""One thread per test process, and the rule for tests that compare with native ManiSkill.
+"""One thread per test process, and the rule for tests that need what not every machine has.
 
-A test marked ``native`` needs the ``parity`` extra and a Vulkan driver. Where either is missing it
-is skipped and the summary says why; with ``ROBOT_LAYOUTS_REQUIRE_NATIVE=1`` (as in CI) a skip is a
-failure, and so is a run in which no such test passed.
+A test marked ``native`` needs the ``parity`` extra and a Vulkan driver, one marked ``browser``
+needs playwright and Debian's chromium. Where either is missing it is skipped and the summary says
+why; with ``ROBOT_LAYOUTS_REQUIRE_NATIVE=1`` (as in CI) a skip is a failure, and so is a run in
+which no native test passed.
 """
 
 import functools
 import importlib.util
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -32,15 +34,33 @@ def native_problem() -> str | None:
     return None
 
 
+@functools.cache
+def browser_problem() -> str | None:
+    """Say why no browser can be driven here, or None if one can."""
+    if importlib.util.find_spec("playwright") is None:
+        return "playwright is not installed; pip install playwright"
+    if shutil.which("chromium") is None:
+        return "there is no chromium; apt-get install chromium"
+    return None
+
+
+PROBLEMS = {"native": lambda: native_problem(), "browser": lambda: browser_problem()}
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "browser: needs playwright and chromium")
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    if item.get_closest_marker("native") and (problem := native_problem()):
-        pytest.skip(problem)
+    for marker, find_problem in PROBLEMS.items():
+        if item.get_closest_marker(marker) and (problem := find_problem()):
+            pytest.skip(problem)
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
     report = yield
-    if REQUIRED and report.skipped and item.get_closest_marker("native"):
+    if REQUIRED and report.skipped and any(map(item.get_closest_marker, PROBLEMS)):
         _turn_skip_into_failure(report)
     return report
 
@@ -81,4 +101,5 @@ def _is_native(report: pytest.TestReport | pytest.CollectReport) -> bool:
 def _turn_skip_into_failure(report: pytest.TestReport | pytest.CollectReport) -> None:
     reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr
     report.outcome = "failed"
-    report.longrepr = f"the native comparison is required here, but: {reason}"
+    what = "browser test" if "browser" in report.keywords else "native comparison"
+    report.longrepr = f"the {what} is required here, but: {reason}"

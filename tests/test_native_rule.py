@@ -42,6 +42,15 @@ def test_without_vulkan_it_fails_if_required(run):
     result.stdout.fnmatch_lines(["*native comparison is required here, but: *"])
 
 
+@pytest.mark.parametrize("required", [False, True])
+def test_without_a_browser_it_is_skipped_or_fails_if_required(run, monkeypatch, tmp_path, required):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    browser = "import pytest\n@pytest.mark.browser\ndef test_page(): pass\n"
+    result = run(browser + "@pytest.mark.native\ndef test_native(): pass\n", required=required)
+    result.assert_outcomes(passed=1, skipped=not required, errors=required)
+    result.stdout.re_match_lines([r".*(there is no chromium|playwright is not installed)"])
+
+
 @pytest.mark.parametrize("how", ["pytest.skip('later')", "pytest.importorskip('no_such_package')"])
 def test_a_skip_inside_the_test_fails_if_required(run, how):
     pass_first = "import pytest\n@pytest.mark.native\ndef test_other(): pass\n"
