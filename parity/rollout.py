@@ -309,7 +309,7 @@ def _native_tcp_pose(agent: Any) -> NDArray[np.float32]:
 
 def _our_tcp_poses(env: MultiRobotTask) -> Arrays:
     state = env.simulation.read()
-    return {robot: state.tcp_pose(robot)[0].numpy().copy() for robot in env.layout}
+    return {robot: state.tcp_pose(robot)[0].copy() for robot in env.layout}
 
 
 def describe(env: MultiRobotTask, source: Source, name: str) -> dict[str, Any]:

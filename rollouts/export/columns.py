@@ -125,7 +125,7 @@ class ColumnReader:
             self.task.set_state_dict(state_row(columns.states, t))
             state = self.task.simulation.read()
             for place, found in poses.items():
-                found.append(state.tcp_pose(place)[0].numpy().copy())
+                found.append(state.tcp_pose(place)[0].copy())
         return {place: np.stack(found) for place, found in poses.items()}
 
     def _checked(self, trajectory: Trajectory) -> States:
