@@ -11,6 +11,7 @@ from robots import unknown_name_message
 # Command -> the module whose ``main(argv)`` runs it, and what it does.
 COMMANDS = {
     "compare": ("parity.compare", "step tasks beside native and compare every bit"),
+    "replay": ("parity.replay", "play recorded actions beside native, episode by episode"),
     "inventory": ("parity.inventory", "list every task, and what proves it"),
     "rollout": ("parity.rollout", "play one episode in native and here, and keep its arrays"),
     "sweep": ("parity.sweep", "rollouts, agreement and clips of every task, into one summary"),

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from robots import RobotLayoutsError, UnknownNameError
-from rollouts import record_command
+from rollouts import record_command, replay_command
 from rollouts.export import command as export_command
 
 
@@ -48,7 +48,11 @@ def _parser() -> argparse.ArgumentParser:
     add("--out", type=Path, default=Path("runs/demo"), metavar="DIR", help="default %(default)s")
     add("--no-video", action="store_true", help="make no video")
     demo.set_defaults(run=_demo)
-    for name, module in (("record", record_command), ("export", export_command)):
+    for name, module in (
+        ("record", record_command),
+        ("replay", replay_command),
+        ("export", export_command),
+    ):
         command = commands.add_parser(
             name, help=module.DESCRIPTION, description=module.DESCRIPTION, epilog=module.EPILOG
         )

@@ -179,9 +179,6 @@ def _expect_alive(event: Event, deaths: int) -> None:
 
 def _work(connection: Connection, prepare: Callable[[], Play]) -> None:
     """Be a worker: say None when ready, then answer each seed with a result and an error."""
-    import torch
-
-    torch.set_num_threads(1)
     try:
         play = prepare()
     except Exception as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
@@ -206,8 +207,15 @@ def disk_errors(path: Path) -> Generator[None]:
     except RecordingError:
         raise
     except (OSError, RuntimeError, ValueError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else None) or error
-        raise RecordingError(f"cannot write {path}: {reason}") from error
+        raise RecordingError(f"cannot write {path}: {_reason(error)}") from error
+
+
+def _reason(error: Exception) -> str:
+    """Return what the operating system said, out of the page that HDF5 makes of it."""
+    number = re.search(r"errno = (\d+)", str(error))
+    if number is not None:
+        return os.strerror(int(number[1]))
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)
 
 
 def _sync(path: Path) -> None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 import tasks
@@ -59,6 +60,7 @@ class EpisodeJob:
 
     def __call__(self) -> Callable[[int], Played]:
         """Make the task in a worker, and return what plays and records the episode of a seed."""
+        torch.set_num_threads(1)  # the tensors are small, and other workers want the cores
         env = planned = self.task(self.scenario)
         if self.scenario.control_mode != DELTAS:
             planned = self.task(replace(self.scenario, control_mode=DELTAS))
@@ -139,10 +141,13 @@ def record(
         summary.already, summary.recorded = len(seeds) - len(missing), len(there)
         on_event(summary, None)
         job = EpisodeJob(cls, scenario, expert, recorder.writer, os.getpid())
-        with closing(executor.run(job, missing)) as events:
-            for event in events:
-                _note(summary, event)
-                on_event(summary, event)
+        try:
+            with closing(executor.run(job, missing)) as events:
+                for event in events:
+                    _note(summary, event)
+                    on_event(summary, event)
+        finally:  # workers may have written more than they came to tell
+            summary.recorded = len(recorder)
     return summary
 
 

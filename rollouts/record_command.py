@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from robots import CONTROL_MODES
+from robots import CONTROL_MODES, RecordingError
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         RobotLayoutsError: If it makes no sense, or cannot go on; finished episodes are kept.
     """
-    from rollouts.executor import ProcessExecutor
+    from rollouts.executor import ProcessExecutor, WorkerError
     from rollouts.record import FILE, record
 
     seeds = range(options.seed, options.seed + options.episodes)
@@ -64,8 +64,8 @@ def run(options: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         print(f"stopped; {line.kept}; the same command goes on from there", file=sys.stderr)
         return INTERRUPTED
-    except BaseException:
-        print(line.kept, file=sys.stderr)
+    except (RecordingError, WorkerError):
+        print(f"stopped; {line.kept}", file=sys.stderr)
         raise
     _report(summary, options.out / FILE)
     return 1 if summary.failed else 0
@@ -79,7 +79,12 @@ class _Line:
         self._progress: Progress | None = None
         self._bar: TaskID | None = None
         self._next = time.monotonic() + _PLAIN_INTERVAL
-        self.kept = "nothing was recorded"
+        self._summary: Summary | None = None
+
+    @property
+    def kept(self) -> str:
+        """How many episodes are on the disk, in words."""
+        return f"{self._summary.recorded if self._summary else 0} episodes are recorded"
 
     def __enter__(self) -> _Line:
         if sys.stderr.isatty():
@@ -98,7 +103,7 @@ class _Line:
     def show(self, summary: Summary, event: Event | None) -> None:
         """Tell what has come of the episodes so far."""
         done = summary.already + len(summary.played)
-        self.kept = f"{done} of {self._total} episodes are recorded"
+        self._summary = summary
         if event is None and summary.already:
             self._say(f"{summary.already} of {self._total} episodes were recorded before")
         if event is not None and event.died is not None:

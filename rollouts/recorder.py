@@ -6,6 +6,7 @@ import fcntl
 import glob
 import os
 import shutil
+import weakref
 from collections.abc import Container, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -87,14 +88,15 @@ class Recorder:
         self._header = _header(task, source, source_desc)
         with disk_errors(self.path):
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._lock = _lock(self.parts)
+            lock = _lock(self.parts)
             try:
                 self._joined = self._begin(overwrite=overwrite, resume=resume)
             except BaseException:
                 with suppress(OSError):  # not empty
                     self.parts.rmdir()
-                os.close(self._lock)
+                os.close(lock)
                 raise
+        self._release = weakref.finalize(self, os.close, lock)
         split = {name: [part.start, part.stop] for name, part in task.action_split.items()}
         self.writer = PartWriter(self.parts.absolute(), self._header, _control_mode(task), split)
         self._closed = False
@@ -150,7 +152,7 @@ class Recorder:
         try:
             self._join()
         finally:
-            os.close(self._lock)
+            self._release()
 
     def _begin(self, *, overwrite: bool, resume: bool) -> dict[int, Stored]:
         """Check and tidy what is there; returns the episodes of the h5 file by seed."""
@@ -179,7 +181,7 @@ class Recorder:
             return {}
         header, stored = read_stored(self.path)
         self._expect_same(self.path, header)
-        return {episode.about["episode_seed"]: episode for episode in stored}
+        return {e.about["episode_seed"]: e for e in sorted(stored, key=_seed)}
 
     def _check_part(self, part: Path, joined: Container[int]) -> None:
         """Refuse a part of another recording; remove one that is damaged or already joined."""
@@ -246,6 +248,10 @@ def _header(task: MultiRobotTask, source: str, source_desc: str | None) -> dict[
         "layout": describe_layout(task.layout),
         "simulation": describe_simulation(task),
     }
+
+
+def _seed(stored: Stored) -> int:
+    return stored.about["episode_seed"]
 
 
 def _control_mode(task: MultiRobotTask) -> str | dict[str, str]:
