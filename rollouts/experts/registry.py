@@ -26,6 +26,7 @@ CATALOGUE = {
     "PullCube-v1": "rollouts.experts.slide_cube:slide",
     "PullCubeTool-v1": "rollouts.experts.pull_cube_tool:pull",
     "PushCube-v1": "rollouts.experts.slide_cube:slide",
+    "RollBall-v1": "rollouts.experts.roll_ball:roll",
     "TwoRobotPickCube-v1": "rollouts.experts.two_robot_pick_cube:hand_over",
 }
 
