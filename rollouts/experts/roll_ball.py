@@ -10,7 +10,14 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from rollouts.experts.geometry import Floats, gripper_facing, heading, planar_distance
+from rollouts.experts.geometry import (
+    Floats,
+    gripper_facing,
+    heading,
+    multiply,
+    planar_distance,
+    turn,
+)
 from rollouts.experts.rehearsal import Attempt, Rehearsal, search
 from rollouts.experts.script import CLOSED, Pose, Scene, Script, Waypoint
 from simulation.kinematics import InverseKinematics
@@ -19,10 +26,11 @@ from tasks import MultiRobotTask
 ARM, BALL, TARGET = "arm", "ball", "goal_region"
 
 ABOVE = 0.07  # of the TCP over where the swing begins, on the way there (m)
+SIDES = np.radians((0, 90, 180, -90))  # turns of the gripper about its approach; any side may hit
 SWING = 0.35  # of every joint that takes part (rad)
 LEVER = 0.1  # of joints that take part, at least: TCP speed by joint speed (m)
 SHOTS = 5  # with one style
-CORRECTION = 0.4  # of the aim, by the error of the last shot: a small ball exaggerates
+CORRECTION = 0.4  # of the aim, by the error of the shot: a round ball exaggerates
 MISSED = 0.1  # a ball that came less far was not hit (m)
 
 
@@ -70,7 +78,7 @@ def _shots(rehearsal: Rehearsal, seed: int) -> Iterator[Attempt]:
     """Shoot in every style, a few times each, the aim corrected by where the ball went."""
     kinematics = InverseKinematics(rehearsal.task.simulation.worlds[0], ARM)
     for style in STYLES:
-        aim = 0.0
+        aim, correction, last_error = 0.0, CORRECTION, 0.0
         for _ in range(SHOTS):
             before = rehearsal.begin(seed)
             yield rehearsal.play(_Shot(style, kinematics, before, aim).script())
@@ -78,7 +86,10 @@ def _shots(rehearsal: Rehearsal, seed: int) -> Iterator[Attempt]:
             if planar_distance(start, end) < MISSED:
                 break
             target, _ = before.body(TARGET)
-            aim -= CORRECTION * _turn(heading(start, target), heading(start, end))
+            error = _angle(heading(start, target), heading(start, end))
+            if error * last_error < 0:
+                correction /= 2
+            aim, last_error = aim - correction * error, error
 
 
 class _Shot:
@@ -104,7 +115,8 @@ class _Shot:
     def behind(self, scene: Scene, above: float) -> list[Pose]:
         x, y, _ = self.ball - self.style.gap * self.ahead
         place = np.array([x, y, self.style.height + above])
-        return [(place, gripper_facing(self.direction, self.style.tilt))]
+        facing = gripper_facing(self.direction, self.style.tilt)
+        return [(place, multiply(facing, turn("z", side))) for side in SIDES]
 
     def swing(self, arm: Floats) -> Floats:
         """Turn all joints that move the TCP ahead, as fast as each can."""
@@ -114,7 +126,7 @@ class _Shot:
         return SWING * np.sign(levers) * (np.abs(levers) > LEVER)
 
 
-def _turn(start: float, end: float) -> float:
+def _angle(start: float, end: float) -> float:
     """Return the angle from one heading to another, in [-π, π)."""
     return (end - start + np.pi) % (2 * np.pi) - np.pi
 
