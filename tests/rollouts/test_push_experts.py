@@ -69,7 +69,9 @@ def test_an_expert_solves_48_of_50_seeds(name):
 
 @pytest.mark.long
 @pytest.mark.native
-@pytest.mark.filterwarnings("ignore:__array_wrap__:DeprecationWarning")  # mani_skill's own
+# mani_skill's own
+@pytest.mark.filterwarnings("ignore:__array_wrap__:DeprecationWarning")
+@pytest.mark.filterwarnings("ignore:The 'warn' method:DeprecationWarning")
 @pytest.mark.parametrize("name", TASKS)
 def test_the_same_actions_succeed_in_native(name):
     native = make_native(name)
