@@ -20,8 +20,14 @@ of their own. The actions hold for freshly built worlds, ``reset(seed, {"reconfi
 
 # One line per task, sorted by id: id -> module:function.
 CATALOGUE = {
+    "DrawTriangle-v1": "rollouts.experts.draw_triangle:draw_outline",
+    "LiftPegUpright-v1": "rollouts.experts.lift_peg_upright:stand_up",
     "PickCube-v1": "rollouts.experts.pick_cube:pick_cube",
     "PlaceSphere-v1": "rollouts.experts.place_sphere:place_sphere",
+    "PokeCube-v1": "rollouts.experts.poke_cube:poke",
+    "PullCube-v1": "rollouts.experts.slide_cube:slide",
+    "PullCubeTool-v1": "rollouts.experts.pull_cube_tool:pull",
+    "PushCube-v1": "rollouts.experts.slide_cube:slide",
     "StackCube-v1": "rollouts.experts.stack_cube:stack_cube",
     "StackPyramid-v1": "rollouts.experts.stack_pyramid:stack_pyramid",
     "TwoRobotPickCube-v1": "rollouts.experts.two_robot_pick_cube:hand_over",
