@@ -22,8 +22,10 @@ of their own. The actions hold for freshly built worlds, ``reset(seed, {"reconfi
 CATALOGUE = {
     "DrawTriangle-v1": "rollouts.experts.draw_triangle:draw_outline",
     "LiftPegUpright-v1": "rollouts.experts.lift_peg_upright:stand_up",
+    "PegInsertionSide-v1": "rollouts.experts.peg_insertion_side:insert_peg",
     "PickCube-v1": "rollouts.experts.pick_cube:pick_cube",
     "PlaceSphere-v1": "rollouts.experts.place_sphere:place_sphere",
+    "PlugCharger-v1": "rollouts.experts.plug_charger:plug_in",
     "PokeCube-v1": "rollouts.experts.poke_cube:poke",
     "PullCube-v1": "rollouts.experts.slide_cube:slide",
     "PullCubeTool-v1": "rollouts.experts.pull_cube_tool:pull",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +19,16 @@ Pose = tuple[Floats, Floats]  # position (m) and quaternion wxyz, world
 
 
 class Scene:
-    """What a script sees of one world, as numpy arrays in the world frame."""
+    """What a script sees of one world, as numpy arrays in the world frame.
+
+    Attributes:
+        design: Geometry that the task drew for this episode, if it draws any.
+    """
 
     def __init__(self, task: MultiRobotTask) -> None:
         """Look at the first world of a task as it is now."""
         self._state: State = task.simulation.read()
+        self.design: Any = task.simulation.worlds[0].design
 
     def body(self, name: str) -> Pose:
         """Return the pose of a body."""
