@@ -108,6 +108,20 @@ def holding(scene: Scene, robot: str, body: str, place: Floats, quaternion: Floa
     return place + arm, quaternion
 
 
+def bringing(scene: Scene, robot: str, body: str, goal: Pose) -> Pose:
+    """Return the gripper's pose that brings the body it holds to a pose.
+
+    Args:
+        scene: As it is now.
+        robot: Whose gripper.
+        body: What it holds.
+        goal: Pose that the body is to have.
+    """
+    place, quaternion = goal
+    turned = multiply(quaternion, inverse(scene.body(body)[1]))
+    return holding(scene, robot, body, place, multiply(turned, scene.tcp(robot)[1]))
+
+
 def held_at(
     scene: Scene,
     robot: str,
@@ -145,17 +159,3 @@ def is_near(scene: Scene, body: str, other: str, offset: Numbers, limit: float) 
     """
     error = scene.body(body)[0] - scene.body(other)[0] - np.array(offset)
     return bool(np.abs(error).max() < limit)
-
-
-def bringing(scene: Scene, robot: str, body: str, goal: Pose) -> Pose:
-    """Return the gripper's pose that brings the body it holds to a pose.
-
-    Args:
-        scene: As it is now.
-        robot: Whose gripper.
-        body: What it holds.
-        goal: Pose that the body is to have.
-    """
-    place, quaternion = goal
-    turned = multiply(quaternion, inverse(scene.body(body)[1]))
-    return holding(scene, robot, body, place, multiply(turned, scene.tcp(robot)[1]))

@@ -24,6 +24,7 @@ CATALOGUE = {
     "LiftPegUpright-v1": "rollouts.experts.lift_peg_upright:stand_up",
     "PegInsertionSide-v1": "rollouts.experts.peg_insertion_side:insert_peg",
     "PickCube-v1": "rollouts.experts.pick_cube:pick_cube",
+    "PickCubeSO100-v1": "rollouts.experts.pick_cube_so100:pick_small_cube",
     "PlaceSphere-v1": "rollouts.experts.place_sphere:place_sphere",
     "PlugCharger-v1": "rollouts.experts.plug_charger:plug_in",
     "PokeCube-v1": "rollouts.experts.poke_cube:poke",

@@ -94,7 +94,7 @@ class _Player:
         world = task.simulation.worlds[0]
         self._robot, self._waypoints = robot, list(waypoints)
         self._driver = ArmDriver(task.layout[robot].robot, world.robots[robot].active_index)
-        if waypoints:
+        if any(waypoint.to is not None for waypoint in waypoints):
             self._kinematics = InverseKinematics(world, robot)
         self._goal = self._driver.arm(scene.qpos(robot))
         self._gripper = OPEN
