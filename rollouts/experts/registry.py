@@ -23,6 +23,7 @@ CATALOGUE = {
     "DrawTriangle-v1": "rollouts.experts.draw_triangle:draw_outline",
     "PegInsertionSide-v1": "rollouts.experts.peg_insertion_side:insert_peg",
     "PlugCharger-v1": "rollouts.experts.plug_charger:plug_in",
+    "PushT-v1": "rollouts.experts.push_t:push_onto_outline",
     "TwoRobotPickCube-v1": "rollouts.experts.two_robot_pick_cube:hand_over",
 }
 
