@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from robots import TaskError
 from rollouts.experts.driver import ArmDriver
 from rollouts.experts.geometry import Floats, gripper_facing, heading, yaw_of
 from rollouts.experts.push_plans import APPROACH, Push, PushPlanner, Situation
-from rollouts.experts.rehearsal import Attempt, Rehearsal
+from rollouts.experts.rehearsal import Attempt, Rehearsal, search
 from rollouts.experts.script import OPEN, Scene
 from rollouts.experts.sliding import SlidingBody, to_body
 from simulation.kinematics import InverseKinematics
@@ -38,8 +37,6 @@ FEW = 5  # plans in a row that may come to nothing
 def push_onto_outline(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
     """Return the actions that push the T onto its outline, (T, A).
 
-    If no attempt succeeds, the actions of the last are returned: they fail as honestly.
-
     Args:
         task: A PushT; says layout and physics.
         seed: The episode.
@@ -47,17 +44,14 @@ def push_onto_outline(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
     Raises:
         TaskError: If the arm cannot reach the T at all.
     """
-    rehearsal = Rehearsal(task)
-    attempt = Attempt(np.empty((0, task.layout.action_dim), np.float32), False)
-    for chance in range(ATTEMPTS):
-        scene = rehearsal.begin(seed)
-        attempt = _Pusher(rehearsal.task, scene, np.random.default_rng((seed, chance))).play()
-        if attempt.success:
-            break
-    rehearsal.task.close()
-    if not len(attempt.actions):
-        raise TaskError(f"{task.task_id}, seed {seed}: no plan: {attempt.reason}")
-    return attempt.actions
+
+    def attempts(rehearsal: Rehearsal) -> Iterator[Attempt]:
+        for chance in range(ATTEMPTS):
+            scene = rehearsal.begin(seed)
+            random = np.random.default_rng((seed, chance))
+            yield _Pusher(rehearsal.task, scene, random).play()
+
+    return search(task, seed, attempts)
 
 
 class _EndedError(Exception):

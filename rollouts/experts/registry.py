@@ -21,9 +21,15 @@ of their own. The actions hold for freshly built worlds, ``reset(seed, {"reconfi
 # One line per task, sorted by id: id -> module:function.
 CATALOGUE = {
     "DrawTriangle-v1": "rollouts.experts.draw_triangle:draw_outline",
+    "LiftPegUpright-v1": "rollouts.experts.lift_peg_upright:stand_up",
     "PegInsertionSide-v1": "rollouts.experts.peg_insertion_side:insert_peg",
     "PlugCharger-v1": "rollouts.experts.plug_charger:plug_in",
+    "PokeCube-v1": "rollouts.experts.poke_cube:poke",
+    "PullCube-v1": "rollouts.experts.slide_cube:slide",
+    "PullCubeTool-v1": "rollouts.experts.pull_cube_tool:pull",
+    "PushCube-v1": "rollouts.experts.slide_cube:slide",
     "PushT-v1": "rollouts.experts.push_t:push_onto_outline",
+    "RollBall-v1": "rollouts.experts.roll_ball:roll",
     "TwoRobotPickCube-v1": "rollouts.experts.two_robot_pick_cube:hand_over",
 }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,6 +46,10 @@ class Rehearsal:
     def begin(self, seed: int) -> Scene:
         """Start the episode of a seed in a freshly built world, and return what it looks like."""
         self.task.reset(seed, options=REBUILT)
+        return self.scene()
+
+    def scene(self) -> Scene:
+        """Return what the episode looks like now."""
         return Scene(self.task)
 
     def play(self, script: Script) -> Attempt:
@@ -57,7 +61,7 @@ class Rehearsal:
         Raises:
             UnknownNameError: If the layout has no such robot, or the script no such waypoint.
         """
-        task, scene = self.task, Scene(self.task)
+        task, scene = self.task, self.scene()
         _check_names(script, task)
         players = [_Player(task, name, script.get(name, ()), scene) for name in task.layout]
         done: set[str] = set()
@@ -69,7 +73,7 @@ class Rehearsal:
                 return Attempt(_stack(actions, task), False, str(error))
             actions.append(np.concatenate(parts).astype(np.float32))
             *_, info = task.step(actions[-1])
-            scene = Scene(task)
+            scene = self.scene()
             if bool(info["success"][0]):
                 return Attempt(_stack(actions, task), True)
         places = ", ".join(player.place for player in players)
@@ -117,7 +121,7 @@ class _Player:
     def _is_done(self, waypoint: Waypoint, scene: Scene) -> bool:
         if self._elapsed < waypoint.steps:
             return False
-        if waypoint.to is not None:
+        if waypoint.to is not None or waypoint.turn is not None:
             away = np.abs(self._driver.arm(scene.qpos(self._robot)) - self._goal).max()
             if away > waypoint.near:
                 return False
@@ -135,6 +139,9 @@ class _Player:
         self._begun, self._elapsed = self._begun + 1, 0
         if waypoint.to is not None:
             self._goal = self._nearest(waypoint.to(scene), scene.qpos(self._robot))
+        elif waypoint.turn is not None:
+            arm = self._driver.arm(scene.qpos(self._robot))
+            self._goal = arm + waypoint.turn(arm)
 
     def _nearest(self, poses: Sequence[Pose], qpos: Floats) -> Floats:
         goals = [self._kinematics.solve(*pose, qpos) for pose in poses]
@@ -150,29 +157,53 @@ def first_success(
 ) -> NDArray[np.float32]:
     """Try scripts one after the other and return the actions of the first that succeeds.
 
-    If none does, the actions of the longest attempt are returned: they fail as honestly.
-
     Args:
         task: Says layout and physics; left alone.
         seed: The episode.
         scripts: Makes the scripts to try from the episode's first scene, the best first.
 
     Returns:
-        Actions (T, A) with T at most the task's ``max_episode_steps``.
+        What `search` returns.
 
     Raises:
         TaskError: If no script could even be begun.
     """
+
+    def attempts(rehearsal: Rehearsal) -> Iterator[Attempt]:
+        for i, script in enumerate(scripts(rehearsal.begin(seed))):
+            if i > 0:
+                rehearsal.begin(seed)
+            yield rehearsal.play(script)
+
+    return search(task, seed, attempts)
+
+
+def search(
+    task: MultiRobotTask, seed: int, attempts: Callable[[Rehearsal], Iterable[Attempt]]
+) -> NDArray[np.float32]:
+    """Make attempts until one succeeds and return its actions.
+
+    If none does, the actions of the longest attempt are returned: they fail as honestly.
+
+    Args:
+        task: Says layout and physics; left alone.
+        seed: The episode.
+        attempts: Makes them one by one, each in an episode begun anew.
+
+    Returns:
+        Actions (T, A) with T at most the task's ``max_episode_steps``.
+
+    Raises:
+        TaskError: If no attempt could even be begun.
+    """
     rehearsal = Rehearsal(task)
-    attempts: list[Attempt] = []
-    for script in scripts(rehearsal.begin(seed)):
-        if attempts:
-            rehearsal.begin(seed)
-        attempts.append(rehearsal.play(script))
-        if attempts[-1].success:
+    made: list[Attempt] = []
+    for attempt in attempts(rehearsal):
+        made.append(attempt)
+        if attempt.success:
             break
     rehearsal.task.close()
-    best = max(attempts, key=lambda attempt: (attempt.success, len(attempt.actions)))
+    best = max(made, key=lambda attempt: (attempt.success, len(attempt.actions)))
     if not len(best.actions):
         raise TaskError(f"{task.task_id}, seed {seed}: no plan: {best.reason}")
     return best.actions

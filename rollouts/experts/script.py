@@ -54,13 +54,15 @@ class Waypoint:
     Attributes:
         name: What it is called in the script of its robot.
         to: Poses of the TCP, worked out from the scene when the waypoint begins; of those in
-            reach the one with the shortest way there is taken. None stays.
+            reach the one with the shortest way there is taken. Without it and ``turn`` it stays.
         gripper: Action number of the gripper meanwhile, `OPEN` … `CLOSED`.
         after: Waypoints of other robots, ``"robot.name"``, that must be done before it begins;
             until then the robot keeps the previous one.
         near: Arm joints count as arrived when all are this near (rad).
         steps: Least number of control steps it takes.
         until: What else must hold for it to be done.
+        turn: Instead of ``to``, how far the arm's joints turn, (arm joints,) (rad), worked out from
+            where they are when the waypoint begins; both in the order of the robot's arm joints.
     """
 
     name: str
@@ -70,6 +72,7 @@ class Waypoint:
     near: float = 0.05
     steps: int = 0
     until: Callable[[Scene], bool] | None = None
+    turn: Callable[[Floats], Floats] | None = None
 
 
 Script = Mapping[str, Sequence[Waypoint]]
