@@ -51,4 +51,5 @@ def run(options: argparse.Namespace) -> int:
 
 def _summary(done: Exported) -> str:
     left_out = f"; {done.left_out} without success left out" if done.left_out else ""
-    return f"{done.folder}: {done.episodes} episodes, {done.steps} steps{left_out}"
+    episodes = "1 episode" if done.episodes == 1 else f"{done.episodes} episodes"
+    return f"{done.folder}: {episodes}, {done.steps} steps{left_out}"

@@ -16,15 +16,14 @@ def new_folder(path: Path) -> Generator[Path]:
     """Make a folder whose content is complete.
 
     Args:
-        path: The folder; it may be there already if it is empty.
+        path: The folder; it may be there already if it is empty; see `refuse_used`.
 
     Yields:
         A folder beside it to write into, which takes its place at the end.
 
     Raises:
-        RecordingError: If the folder holds something already, or cannot be written.
+        RecordingError: If the folder cannot be written.
     """
-    refuse_used(path)
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
         partial.mkdir(parents=True)
