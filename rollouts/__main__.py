@@ -1,4 +1,4 @@
-"""Many episodes: `demo` lets an expert play a task, `export` makes a dataset of a recording."""
+"""`python -m rollouts COMMAND`: let experts play tasks, record them, and play recordings again."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from robots import RobotLayoutsError, UnknownNameError
+from rollouts import record_command
 from rollouts.export import command as export_command
 
 
@@ -47,9 +48,12 @@ def _parser() -> argparse.ArgumentParser:
     add("--out", type=Path, default=Path("runs/demo"), metavar="DIR", help="default %(default)s")
     add("--no-video", action="store_true", help="make no video")
     demo.set_defaults(run=_demo)
-    export = commands.add_parser("export", help=export_command.DESCRIPTION)
-    export_command.add_arguments(export)
-    export.set_defaults(run=export_command.run)
+    for name, module in (("record", record_command), ("export", export_command)):
+        command = commands.add_parser(
+            name, help=module.DESCRIPTION, description=module.DESCRIPTION, epilog=module.EPILOG
+        )
+        module.add_arguments(command)
+        command.set_defaults(run=module.run)
     return parser
 
 

@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from rollouts.export.dataset import Exported
 
 DESCRIPTION = "write a recording as a dataset: LeRobot v3.0 or robomimic hdf5"
+EPILOG = (
+    "The dataset appears when it is complete. Exit code: 0 if it was written, 1 if not, 2 for bad"
+    " usage."
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

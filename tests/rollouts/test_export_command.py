@@ -20,6 +20,7 @@ from rollouts.__main__ import main
 from rollouts.episode import play
 from rollouts.export.columns import ColumnReader
 from rollouts.export.dataset import Export, export
+from rollouts.recorder import Recorder
 from rollouts.trajectory import Trajectory, TrajectoryError, TrajectoryFile
 from rollouts.video import video_problem
 from tests.rollouts.recordings import record, succeed
@@ -72,6 +73,36 @@ def test_a_recording_without_a_layout_is_of_the_tasks_own_robots(recording, tmp_
     assert run(recording, "--format", "lerobot", "--out", tmp_path / "out") == 0
     info = json.loads((tmp_path / "out/meta/info.json").read_text())
     assert info["robot_type"] == "panda_stick"
+
+
+def test_a_rate_of_the_task_is_the_datasets(tmp_path):
+    task = tasks.make(TASK, obs_mode="none", control_frequency=10)
+    with Recorder(tmp_path / "slow.h5", task) as recorder:
+        recorder.add(play(task, 0, np.zeros((2, 7), np.float32)))
+    assert run(tmp_path / "slow.h5", "--format", "lerobot", "--out", tmp_path / "out") == 0
+    assert json.loads((tmp_path / "out/meta/info.json").read_text())["fps"] == 10
+
+
+def test_a_recording_of_other_robots_is_refused(recording, tmp_path, capsys):
+    with h5py.File(recording, "r+") as file:
+        layout = json.loads(file.attrs["layout"])
+        layout["arm"]["joint_groups"]["arm"]["stiffness"] = 1.0
+        file.attrs["layout"] = json.dumps(layout)
+    assert run(recording, "--format", "lerobot", "--out", tmp_path / "out") == 1
+    assert "arm.joint_groups.arm.stiffness: recorded 1.0, here 1000.0" in capsys.readouterr().err
+    assert nothing_was_left(tmp_path)
+
+
+def test_joint_positions_as_actions_are_exported_too(tmp_path):
+    task = tasks.make(TASK, obs_mode="none", control_mode="pd_joint_pos")
+    actions = np.tile(task.simulation.read().qpos("arm")[0].numpy(), (2, 1))
+    with Recorder(tmp_path / "positions.h5", task) as recorder:
+        recorder.add(play(task, 0, actions))
+    assert run(tmp_path / "positions.h5", "--format", "lerobot", "--out", tmp_path / "out") == 0
+    rows = duckdb.execute(f"select action from '{tmp_path}/out/data/*/*.parquet'").fetchall()
+    np.testing.assert_array_equal(np.array(rows, np.float32)[:, 0], actions)
+    origin = json.loads((tmp_path / "out/meta/recording.json").read_text())
+    assert origin["control_mode"] == "pd_joint_pos"
 
 
 def test_what_was_not_recorded_is_left_out(recording, tmp_path):
