@@ -32,7 +32,7 @@ def new_folder(path: Path) -> Generator[Path]:
     except RobotLayoutsError:
         raise
     except OSError as error:
-        raise RecordingError(f"cannot write {path}: {error}") from error
+        raise RecordingError(f"cannot write {path}: {_reason(error)}") from error
     finally:
         shutil.rmtree(partial, ignore_errors=True)
 
@@ -50,6 +50,11 @@ def refuse_used(path: Path) -> None:
     except NotADirectoryError as error:
         raise RecordingError(f"{path} is a file; a folder's name is needed") from error
     except OSError as error:
-        raise RecordingError(f"cannot write {path}: {error}") from error
+        raise RecordingError(f"cannot write {path}: {_reason(error)}") from error
     if used:
         raise RecordingError(f"{path} is not empty; choose another folder, or empty it")
+
+
+def _reason(error: OSError) -> str:
+    """Return why in a few words; HDF5 and Arrow use many."""
+    return os.strerror(error.errno) if error.errno else str(error)
