@@ -197,18 +197,24 @@ def make_task(file: TrajectoryFile, *, pictures: bool = False) -> MultiRobotTask
         UnknownNameError: If there is no such task or robot.
         TaskError: If the task cannot be made like that.
         AssetError: If robot files cannot be found.
+        TrajectoryError: If it is not the world of the recording even so.
     """
-    return tasks.make(
+    recorded = file.simulation or {}
+    task = tasks.make(
         file.task_id,
         layout=recorded_layout(file.layout) if file.layout else None,
         obs_mode="none",
         control_mode=file.control_mode,
         render_mode="rgb_array" if pictures else None,
+        **{name: recorded[name] for name in ("control_frequency",) if name in recorded},
     )
+    file.expect(task.task_id, task.layout.action_dim)
+    file.expect_world(task)
+    return task
 
 
 def recorded_layout(described: Mapping[str, Mapping[str, Any]]) -> Layout:
-    """Return the layout that `rollouts.recorder.describe_layout` described."""
+    """Return the layout that `rollouts.provenance.describe_layout` described."""
     return Layout(
         {
             place: Placement(

@@ -10,7 +10,10 @@ if TYPE_CHECKING:
     from rollouts.export.dataset import Exported
 
 DESCRIPTION = "write a recording as a dataset: LeRobot v3.0 or robomimic hdf5"
-EPILOG = "Exit code: 0 if the dataset was written, 1 if not, 2 for bad usage."
+EPILOG = (
+    "The dataset appears when it is complete. Exit code: 0 if it was written, 1 if not, 2 for bad"
+    " usage."
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -52,4 +55,5 @@ def run(options: argparse.Namespace) -> int:
 
 def _summary(done: Exported) -> str:
     left_out = f"; {done.left_out} without success left out" if done.left_out else ""
-    return f"{done.folder}: {done.episodes} episodes, {done.steps} steps{left_out}"
+    episodes = "1 episode" if done.episodes == 1 else f"{done.episodes} episodes"
+    return f"{done.folder}: {episodes}, {done.steps} steps{left_out}"

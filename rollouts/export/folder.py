@@ -16,15 +16,14 @@ def new_folder(path: Path) -> Generator[Path]:
     """Make a folder whose content is complete.
 
     Args:
-        path: The folder; it may be there already if it is empty.
+        path: The folder; it may be there already if it is empty; see `refuse_used`.
 
     Yields:
         A folder beside it to write into, which takes its place at the end.
 
     Raises:
-        RecordingError: If the folder holds something already, or cannot be written.
+        RecordingError: If the folder cannot be written.
     """
-    refuse_used(path)
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
         partial.mkdir(parents=True)
@@ -33,7 +32,7 @@ def new_folder(path: Path) -> Generator[Path]:
     except RobotLayoutsError:
         raise
     except OSError as error:
-        raise RecordingError(f"cannot write {path}: {error}") from error
+        raise RecordingError(f"cannot write {path}: {_reason(error)}") from error
     finally:
         shutil.rmtree(partial, ignore_errors=True)
 
@@ -51,6 +50,11 @@ def refuse_used(path: Path) -> None:
     except NotADirectoryError as error:
         raise RecordingError(f"{path} is a file; a folder's name is needed") from error
     except OSError as error:
-        raise RecordingError(f"cannot write {path}: {error}") from error
+        raise RecordingError(f"cannot write {path}: {_reason(error)}") from error
     if used:
         raise RecordingError(f"{path} is not empty; choose another folder, or empty it")
+
+
+def _reason(error: OSError) -> str:
+    """Return why in a few words; HDF5 and Arrow use many."""
+    return os.strerror(error.errno) if error.errno else str(error)
