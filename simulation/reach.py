@@ -17,7 +17,7 @@ _MAX_ITERATIONS = 40
 _DIFFERENCE = 1e-4  # of a joint, for the derivative (rad)
 _LONGEST_STEP = 0.3  # of a joint, per iteration (rad)
 _CONVERGED = 1e-3  # m
-_SHORT_WAY = 0.002  # m of error that one rad of a joint's way is worth
+_SHORT_WAY, _LONG_WAY = 0.001, 0.5  # m of error that a joint's way of so many rad is worth
 
 
 class PointReach:
@@ -100,7 +100,7 @@ class PointReach:
         free = [i for i, joint in enumerate(self.joints) if joint not in fixed]
 
         def errors(arm: Floats) -> Floats:
-            way = _SHORT_WAY * (arm - start)[free]
+            way = _SHORT_WAY * ((arm - start)[free] / _LONG_WAY) ** 3  # the longest counts most
             return np.concatenate([self.place_of(point, arm) - place, way])
 
         arm = start.astype(float)
