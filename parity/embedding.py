@@ -111,7 +111,7 @@ def size(path: Path) -> tuple[int, int]:
     done = subprocess.run(
         [_executable(), "-hide_banner", "-i", str(path)], capture_output=True, check=False
     )
-    found = re.search(r"Video:.*? (\d+)x(\d+)", done.stderr.decode(errors="replace"))
+    found = re.search(r"Video:.*?, ([1-9]\d*)x([1-9]\d*)[ ,]", done.stderr.decode(errors="replace"))
     if found is None:
         raise ClipError(f"{path} is no video")
     return int(found[1]), int(found[2])

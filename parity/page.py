@@ -6,6 +6,7 @@ import argparse
 import base64
 import hashlib
 import os
+import shlex
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -384,7 +385,7 @@ def _commands(task_id: str, entry: Mapping[str, Any] | None, runs: Path) -> Iter
         yield f"python -m parity sweep --tasks {task_id} --out {runs}"
         return
     source, seed = entry["rollout"]["source"], entry["rollout"]["seed"]
-    demo = {"expert": "", "random": None}.get(source, f" --demo {source}")
+    demo = {"expert": "", "random": None}.get(source, f" --demo {shlex.quote(source)}")
     if demo is None:
         yield f"python -m parity sweep --tasks {task_id} --out {runs}"
         return
@@ -414,7 +415,7 @@ def missing(swept: Mapping[str, Mapping[str, Any] | None]) -> Iterator[Group]:
     )
     yield Group(
         "Failures and differences",
-        tuple(Item(task, problem) for task, entry in swept.items() for problem in _problems(entry)),
+        grouped((task, problem) for task, entry in swept.items() for problem in _problems(entry)),
         "None in this sweep.",
     )
 

@@ -27,7 +27,7 @@ from rich.progress import Progress
 import tasks
 from parity.clip import Candidate, Clip
 from parity.comparison import EpisodeResult
-from parity.episodes import load_episodes, random_episodes
+from parity.episodes import load_episodes, random_episodes, recorded_control_mode
 from parity.inventory import find_files
 from parity.report import versions
 from parity.results import ResultsError
@@ -35,7 +35,7 @@ from parity.rollout import Source, expert_source, roll_out
 from parity.runs import Run, play
 from parity.sides import NativeSide, OurSide
 from parity.summary import number_text
-from robots import RecordingError, RobotLayoutsError, TaskError
+from robots import CONTROL_MODES, RecordingError, RobotLayoutsError, TaskError
 from rollouts.experts import list_experts
 
 SUMMARY, LOG = "summary.json", "sweep.log"
@@ -306,8 +306,10 @@ def _episodes(plan: Plan) -> tuple[list[Run], str]:
         for path in map(Path, plan.demos):
             episodes = load_episodes(path, cls.task_id, cls.layout.action_dim)[:left]
             left -= len(episodes)
+            mode = recorded_control_mode(path) or CONTROL_MODES[0]
             if episodes:
-                runs.append(replace(blank, source=str(path), episodes=tuple(episodes)))
+                run = replace(blank, source=str(path), episodes=tuple(episodes), control_mode=mode)
+                runs.append(run)
         return runs, "demonstrations"
     if plan.task_id in list_experts():
         played = [expert_source(cls, seed).episode for seed in range(plan.episodes)]
@@ -318,7 +320,9 @@ def _episodes(plan: Plan) -> tuple[list[Run], str]:
 
 def _shortest_success(runs: Sequence[Run], results: Sequence[EpisodeResult]) -> Source:
     """Return the shortest episode that succeeds on both sides, else the shortest of all."""
-    sources = [Source(run.source, episode) for run in runs for episode in run.episodes]
+    sources = [
+        Source(run.source, episode, run.control_mode) for run in runs for episode in run.episodes
+    ]
 
     def rank(number: int) -> tuple[bool, int]:
         result = results[number]
@@ -347,9 +351,10 @@ def agreement(results: Sequence[EpisodeResult]) -> dict[str, Any]:
 def make_clip(plan: Plan, source: Source, progressed: Callable[[float], None]) -> dict[str, Any]:
     """Show an episode side by side in the task's folder; return what was measured."""
     name = "the expert" if source.name == "expert" else Path(source.name).name
+    task_id, mode = plan.task_id, source.control_mode
     with (
-        closing(tasks.make(plan.task_id)) as env,
-        closing(NativeSide(plan.task_id, picture_size=PANEL)) as native,
+        closing(tasks.make(task_id, control_mode=mode)) as env,
+        closing(NativeSide(task_id, control_mode=mode, picture_size=PANEL)) as native,
     ):
         clip, drawn = Clip(native, OurSide(env), Candidate(source.episode, name)), count(1)
         made = clip.write(plan.folder, lambda: progressed(next(drawn) / clip.frames))

@@ -130,7 +130,9 @@ class TestNative:
         cloned = set(tasks.list_tasks())
         assert cloned.isdisjoint(missing)
         assert cloned | set(missing) == set(native_tasks())
-        assert missing["TurnFaucet-v1"] == "needs files that native downloads: partnet_mobility_faucet"
+        assert (
+            missing["TurnFaucet-v1"] == "needs files that native downloads: partnet_mobility_faucet"
+        )
         assert missing["DrawSVG-v1"] == "needs the packages svgpathtools and svgwrite"
         assert all(missing.values())
 
