@@ -88,6 +88,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     add = parser.add_argument
     add("--tasks", nargs="+", metavar="TASK", help="task ids (all)")
     add("--demos", type=Path, metavar="DIR", help="play the demonstrations below DIR")
+    add("--experts", action="store_true", help="where there is an expert, play it, not --demos")
     add("--episodes", type=int, default=3, metavar="N", help="episodes of each task (3)")
     add("--out", type=Path, default=Path("runs"), metavar="DIR", help="default %(default)s")
     add("--workers", type=int, default=1, metavar="W", help="tasks at a time (1)")
@@ -145,6 +146,8 @@ def plan(args: argparse.Namespace) -> list[Plan]:
     for file in unreadable:
         print(f"{file.path} is left out: {file.problem}", file=sys.stderr)
     task_ids = dict.fromkeys(cls.task_id for cls in classes)
+    for task_id in list_experts() if args.experts else ():
+        demos.pop(task_id, None)
     return [
         Plan(
             task_id,

@@ -83,6 +83,7 @@ def entries() -> dict[str, dict]:
     different["agreement"]["differing"] = [{"seed": 4, "where": "from step 7 in qpos of panda"}]
     different["clip"] = a_clip(
         task=DIFFERENT,
+        steps=51,
         our_success=False,
         max_state_difference=2.5e-6,
         differing_frames=6,
@@ -277,6 +278,10 @@ class TestInABrowser:
         page.locator(f"#{VERIFIED} summary").click()
         assert page.locator(f"#{VERIFIED} pre").is_visible()
 
+    def test_on_a_desktop_the_table_is_seen_whole(self, visit):
+        box = visit().page.locator(".scroll")
+        assert box.evaluate("b => b.scrollWidth <= b.clientWidth")
+
     @pytest.mark.parametrize("window", [PHONE, DESKTOP, (320, 640), (820, 1180)])
     def test_nothing_is_wider_than_the_window(self, visit, window):
         page = visit(window).page
@@ -388,14 +393,29 @@ class TestInABrowser:
     def test_what_is_missing_is_said(self, visit):
         page = visit().page
         text = page.locator("#missing").inner_text()
-        assert f"{RANDOM} — There is no demonstration." in text
-        assert "This task was not swept" in text
+        assert f"{RANDOM} — there is no demonstration" in text
+        assert "TwoRobotStackCube-v1 — not swept" in text
         assert "it broke" in text
         assert "seed 4 differs from step 7 in qpos of panda" in text.lower()
         assert "the clone does not succeed; 6 of 20 frames differ" in text
         unverified = re.split(r"[\s,]+", text.split("without a scripted expert")[0])
         assert VERIFIED not in unverified
         assert RANDOM in unverified
+
+    def test_what_a_clip_shows_is_said(self, visit):
+        page = visit().page
+        assert page.locator(f"#{VERIFIED} figcaption").inner_text() == (
+            "Seed 3, 19 steps of trajectory.h5: native succeeds and the clone succeeds;"
+            " all 20 frames equal in every pixel; max |Δ| of the state 0."
+        )
+        assert page.locator(f"#{DIFFERENT} figcaption").inner_text() == (
+            "Seed 3, 51 steps (the task allows 50) of trajectory.h5: native succeeds and the clone"
+            " does not succeed; 6 of 20 frames differ, mean pixel difference 0.25 of 255;"
+            " max |Δ| of the state 2.5e-06."
+        )
+        assert page.locator(f"#{RANDOM} .absent").inner_text() == (
+            "No clip. There is no demonstration."
+        )
 
     def test_how_to_reproduce_a_task(self, visit):
         page = visit().page

@@ -54,6 +54,7 @@ def record(folder: Path, task_id: str, lengths: tuple[int, ...] = (3, 2)) -> Pat
 
 def planned(tmp_path, **changes) -> list[Plan]:
     options = {"tasks": None, "demos": None, "episodes": 3, "workers": 1, "no_video": False}
+    options["experts"] = False
     return plan(argparse.Namespace(out=tmp_path, **{**options, **changes}))
 
 
@@ -71,6 +72,13 @@ class TestPlan:
         (one,) = planned(tmp_path, tasks=["maniskill.pick_cube_native"], demos=tmp_path / "demos")
         assert (one.task_id, one.demos) == (TASK, (str(path),))
         assert f"{foreign} is left out" in capsys.readouterr().err
+
+    def test_the_expert_comes_first_if_asked_for(self, tmp_path, monkeypatch):
+        path = record(tmp_path, TASK)
+        monkeypatch.setattr("parity.sweep.list_experts", lambda: (TASK,))
+        options = {"tasks": [TASK], "demos": tmp_path}
+        assert planned(tmp_path, **options)[0].demos == (str(path),)
+        assert planned(tmp_path, **options, experts=True)[0].demos == ()
 
     def test_twice_the_same_is_once(self, tmp_path):
         assert len(planned(tmp_path, tasks=[TASK, TASK.lower()])) == 1
