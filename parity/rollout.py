@@ -22,10 +22,10 @@ from rich.text import Text
 
 import tasks
 from parity.episodes import Episode, load_episodes, recorded_control_mode
+from parity.findings import versions
 from parity.native import native_agents
 from parity.pictures import NativeScene
 from parity.progress import LiveLine
-from parity.report import versions
 from parity.sides import NativeSide, OurSide, Side
 from parity.snapshot import Snapshot, largest_difference
 from parity.summary import number_text

@@ -28,8 +28,8 @@ import tasks
 from parity.clip import Candidate, Clip
 from parity.comparison import EpisodeResult
 from parity.episodes import load_episodes, random_episodes, recorded_control_mode
+from parity.findings import versions
 from parity.inventory import find_files
-from parity.report import versions
 from parity.results import ResultsError
 from parity.rollout import Source, expert_source, roll_out
 from parity.runs import Run, play

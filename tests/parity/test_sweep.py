@@ -3,6 +3,10 @@
 import argparse
 import json
 import multiprocessing
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +40,7 @@ from rollouts.episode import play
 from rollouts.recorder import Recorder
 from tests.native import NATIVE
 
+ROOT = Path(__file__).parents[2]
 TASK, OTHER = "PickCube-v1", "PushCube-v1"
 
 
@@ -188,6 +193,21 @@ class TestSummary:
         assert not is_done(entry, Plan(TASK, ("a.h5",), 2, tmp_path, False))
 
 
+def children_of(process: int) -> list[int]:
+    """Return the processes that a process has started, and those that they have."""
+    path = Path(f"/proc/{process}/task/{process}/children")
+    own = [int(child) for child in path.read_text().split()] if path.exists() else []
+    return [*own, *(grandchild for child in own for grandchild in children_of(child))]
+
+
+def is_running(process: int) -> bool:
+    stat = Path(f"/proc/{process}/stat")
+    try:
+        return stat.read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
 class TestSweeping:
     pytestmark = NATIVE
 
@@ -241,6 +261,29 @@ class TestSweeping:
             f"its process ended with SIGKILL; {tmp_path / 'runs' / LOG} holds what it said"
         )
         assert entry["equal"] is False
+
+    @pytest.mark.long
+    @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+    def test_a_sweep_that_is_stopped_leaves_no_process_behind(self, number, tmp_path):
+        words = ("--tasks", TASK, "--episodes", "500", "--no-video", "--out", str(tmp_path))
+        command = [sys.executable, "-m", "parity", "sweep", *words]
+        with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as parent:
+            deadline = time.monotonic() + 120
+            while not (children := children_of(parent.pid)) and time.monotonic() < deadline:
+                time.sleep(0.1)
+            while not (tmp_path / TASK / LOG).exists() and time.monotonic() < deadline:
+                time.sleep(0.1)
+            time.sleep(10)  # it plays by now
+            parent.send_signal(number)
+            said = parent.communicate(timeout=60)[1]
+        assert children
+        if number == signal.SIGINT:
+            assert parent.returncode == 130
+            assert "the same command goes on from here" in said
+            assert "Traceback" not in said
+        while any(map(is_running, children)) and time.monotonic() < deadline:
+            time.sleep(0.1)
+        assert not any(map(is_running, children))
 
     @pytest.mark.long
     def test_a_clip(self, tmp_path, monkeypatch):
