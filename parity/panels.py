@@ -186,6 +186,6 @@ class _Pillow(NamedTuple):
 def _pillow() -> _Pillow:
     try:
         from PIL import Image, ImageDraw, ImageFont
-    except ImportError:  # imageio brings it
+    except ImportError:
         raise MissingPackageError(f"pictures side by side need pillow: {INSTALL}") from None
     return _Pillow(Image, ImageDraw, ImageFont)

@@ -120,10 +120,10 @@ def _planned(args: argparse.Namespace, env: MultiRobotTask) -> list[Candidate]:
     expert, first = find_expert(env.task_id), args.seed or 0
     count = (args.episodes or EXPERT_EPISODES) if _chooses(args) else 1
     planned: list[Candidate] = []
-    with LiveLine(count, "episodes") as line:
+    with Console(stderr=True).status("") as status:
         for seed in range(first, first + count):
+            status.update(f"planning {env.task_id}, seed {seed}")
             planned.append(Candidate(Episode(seed, expert(env, seed)), "the expert"))
-            line.advance(1, f"planning {env.task_id}")
     return planned
 
 
