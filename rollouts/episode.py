@@ -74,14 +74,15 @@ def play(
     if not len(actions):
         raise TaskError("an episode needs at least one action")
     task.reset(seed, options=REBUILT)
-    states, outcomes, seconds = [task.get_state_dict()], list[tuple[Tensor, ...]](), 0.0
+    tape, outcomes, seconds = task.begin_tape(), list[tuple[Tensor, ...]](), 0.0
+    task.write_tape(tape)
     watch()
     for action in actions:
         start = perf_counter()
         _, reward, terminated, truncated, info = task.step(action)
         seconds += perf_counter() - start
         outcomes.append((reward, info["success"], terminated, truncated))
-        states.append(task.get_state_dict())
+        task.write_tape(tape)
         watch()
     rewards, success, terminated, truncated = (
         torch.cat(column).numpy() for column in zip(*outcomes, strict=True)
@@ -89,20 +90,13 @@ def play(
     return Episode(
         seed=seed,
         actions=np.asarray(actions, np.float32),
-        states=_stack(states),
+        states={
+            kind: {name: rows[:, 0] for name, rows in entries.items()}
+            for kind, entries in tape.read().items()
+        },
         rewards=rewards,
         success=success,
         terminated=terminated,
         truncated=truncated,
         seconds=seconds,
     )
-
-
-def _stack(states: list[dict[str, Any]]) -> States:
-    return {
-        group: {
-            name: np.concatenate([state[group][name].numpy() for state in states])
-            for name in entries
-        }
-        for group, entries in states[0].items()
-    }
