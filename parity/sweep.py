@@ -22,7 +22,7 @@ from typing import Any
 
 import torch
 from rich.console import Console
-from rich.progress import Progress
+from rich.progress import Progress, TimeElapsedColumn
 
 import tasks
 from parity.clip import Candidate, Clip
@@ -45,7 +45,7 @@ NO_DEMONSTRATION = "there is no demonstration and no expert: random actions show
 NO_VIDEO = "left out by --no-video"
 
 Entry = dict[str, Any]  # what summary.json says about one task
-Progressed = Callable[[str, float], None]  # stage, share of it that is done
+Progressed = Callable[[str, str, float], None]  # task, stage, share of it that is done
 
 
 @dataclass(frozen=True)
@@ -111,25 +111,51 @@ def _run(args: argparse.Namespace) -> int:
     known = {} if args.again and args.tasks is None else read_summary(path)["tasks"]
     waiting = [p for p in plans if args.again or not is_done(known.get(p.task_id), p)]
     found: dict[str, Entry] = dict(known)
-    console = Console(stderr=True, highlight=False, soft_wrap=True)
     for done in [p for p in plans if p not in waiting]:
         print(f"{line(found[done.task_id])}  (done before)")
-    with Progress(console=console, disable=not sys.stderr.isatty()) as progress:
-        bars = {p.task_id: progress.add_task(p.task_id, total=len(STAGES)) for p in waiting}
-
-        def show(task_id: str, stage: str, share: float) -> None:
-            completed = STAGES.index(stage) + share
-            progress.update(bars[task_id], completed=completed, description=f"{task_id} {stage}")
-
+    with _bars(waiting) as (show, hide):
         for entry in sweep(waiting, args.workers, show):
             found[entry["task"]] = entry
             write_summary(path, found)
-            progress.remove_task(bars[entry["task"]])
+            hide(entry["task"])
             print(line(entry), flush=True)
     entries = [found[p.task_id] for p in plans]
     good = sum(entry["error"] is None and entry["equal"] for entry in entries)
     print(f"{good} of {len(entries)} tasks swept and equal to native. Written to {path}")
     return 0 if good == len(entries) else 1
+
+
+@contextmanager
+def _bars(plans: Sequence[Plan]) -> Generator[tuple[Progressed, Callable[[str], None]]]:
+    """Show how far the sweep is, and every task that runs, where someone watches.
+
+    Yields:
+        What to call with task, stage and its share that is done, and what to call with a task
+        that is over.
+    """
+    watched = sys.stderr.isatty()
+    with Progress(
+        *Progress.get_default_columns(),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+        disable=not watched,
+        redirect_stdout=sys.stdout.isatty(),  # else the lines would go to stderr
+    ) as progress:
+        everything = progress.add_task("sweep", total=len(plans))
+        bars = {
+            p.task_id: progress.add_task(p.task_id, total=len(STAGES), visible=False) for p in plans
+        }
+
+        def show(task_id: str, stage: str, share: float) -> None:
+            completed = STAGES.index(stage) + share
+            text = f"{task_id} {stage}"
+            progress.update(bars[task_id], completed=completed, description=text, visible=True)
+
+        def hide(task_id: str) -> None:
+            progress.remove_task(bars[task_id])
+            progress.advance(everything)
+
+        yield show, hide
 
 
 def plan(args: argparse.Namespace) -> list[Plan]:
@@ -254,7 +280,7 @@ def blank(task_id: str, options: Mapping[str, Any]) -> Entry:
 # -- one task ------------------------------------------------------------------------------------
 
 
-def sweep_task(plan: Plan, progressed: Progressed, into: Entry) -> None:
+def sweep_task(plan: Plan, progressed: Callable[[str, float], None], into: Entry) -> None:
     """Carry out a plan, stage by stage, and note in ``into`` what each found.
 
     Raises:
@@ -382,7 +408,7 @@ class _Worker:
 def sweep(
     plans: Iterable[Plan],
     workers: int = 1,
-    progressed: Callable[[str, str, float], None] = lambda task_id, stage, share: None,
+    progressed: Progressed = lambda task_id, stage, share: None,
 ) -> Generator[Entry]:
     """Carry out plans, each in a process of its own, and yield an entry as each is done.
 
@@ -423,7 +449,7 @@ def _start(plan: Plan) -> _Worker:
     return _Worker(plan, process, reports)
 
 
-def _hear(worker: _Worker, progressed: Callable[[str, str, float], None]) -> bool:
+def _hear(worker: _Worker, progressed: Progressed) -> bool:
     """Take in what a worker says; return whether it may say more."""
     try:
         while worker.reports.poll():
