@@ -23,8 +23,8 @@ from parity.episodes import (
     random_episodes,
     recorded_control_mode,
 )
+from parity.findings import document, sentences, table
 from parity.progress import LiveLine
-from parity.report import document, sentences, table
 from parity.results import RESULTS, record
 from parity.runs import Run, play
 from parity.summary import summarise, summary_table

@@ -13,7 +13,7 @@ from rollouts.video import INSTALL
 
 POSTER_WIDTH = 960  # pixels
 # Width (pixels, at most) and quality (h264's CRF; larger is coarser), tried in this order.
-ENCODINGS = ((1184, 27), (1184, 31), (960, 32), (800, 34), (640, 36), (480, 38))
+ENCODINGS = ((1184, 22), (1184, 25), (1184, 28), (960, 30), (800, 32), (640, 35), (480, 38))
 
 
 class ClipError(RobotLayoutsError, ValueError):
@@ -111,7 +111,7 @@ def size(path: Path) -> tuple[int, int]:
     done = subprocess.run(
         [_executable(), "-hide_banner", "-i", str(path)], capture_output=True, check=False
     )
-    found = re.search(r"Video:.*? (\d+)x(\d+)", done.stderr.decode(errors="replace"))
+    found = re.search(r"Video:.*?, ([1-9]\d*)x([1-9]\d*)[ ,]", done.stderr.decode(errors="replace"))
     if found is None:
         raise ClipError(f"{path} is no video")
     return int(found[1]), int(found[2])

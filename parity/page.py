@@ -6,6 +6,7 @@ import argparse
 import base64
 import hashlib
 import os
+import shlex
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,7 +25,7 @@ from parity.summary import REWARD, number_text, success_text
 from parity.sweep import SUMMARY, read_summary
 from robots import MissingPackageError, RecordingError, RobotLayoutsError, TaskError
 from rollouts.experts import list_experts
-from tasks import get_task_class, list_tasks
+from tasks import MultiRobotTask, get_task_class, list_tasks
 from tasks.description import read_docstring, robots_text
 
 LIMIT = 25.0  # MB
@@ -321,10 +322,10 @@ def _task(
         "numbers": f"{cls.layout.action_dim} action numbers, {cls.max_episode_steps} steps",
         "cells": cells(entry, result),
         "status": _status(entry),
-        "no_clip": _no_clip(entry),
+        "no_clip": _sentence(_no_clip(entry)),
         "problems": list(_problems(entry)),
         "commands": list(_commands(task_id, entry, runs)),
-        "caption": _caption(entry["clip"]) if entry and entry["clip"] else "",
+        "caption": _caption(entry["clip"], cls) if entry and entry["clip"] else "",
     }
 
 
@@ -342,9 +343,12 @@ def _status(entry: Mapping[str, Any] | None) -> dict[str, str]:
 
 def _no_clip(entry: Mapping[str, Any] | None) -> str:
     if entry is None:
-        return "This task was not swept."
-    reason = entry["no_clip"] or entry["error"] or "the sweep did not come that far"
-    return f"{reason[0].upper()}{reason[1:].rstrip('.')}."
+        return "not swept"
+    return entry["no_clip"] or entry["error"] or "the sweep did not come that far"
+
+
+def _sentence(words: str) -> str:
+    return f"{words[0].upper()}{words[1:].rstrip('.')}."
 
 
 def _problems(entry: Mapping[str, Any] | None) -> Iterator[str]:
@@ -359,7 +363,7 @@ def _problems(entry: Mapping[str, Any] | None) -> Iterator[str]:
         yield f"Arrays of the rollout differ by up to {number_text(rollout['max_difference'])}."
 
 
-def _caption(clip: Mapping[str, Any]) -> str:
+def _caption(clip: Mapping[str, Any], cls: type[MultiRobotTask]) -> str:
     sides = [
         f"{name} {'succeeds' if clip[key] else 'does not succeed'}"
         for name, key in (("native", "native_success"), ("the clone", "our_success"))
@@ -371,9 +375,11 @@ def _caption(clip: Mapping[str, Any]) -> str:
         else f"{differing} of {frames} frames differ, mean pixel difference"
         f" {clip['mean_pixel_difference']:.2g} of 255"
     )
-    state = number_text(clip["max_state_difference"])
+    state, steps = number_text(clip["max_state_difference"]), clip["steps"]
+    own = cls.max_episode_steps
+    beyond = f" (the task allows {own})" if steps > own else ""
     return (
-        f"Seed {clip['seed']}, {clip['steps']} steps of {clip['source']}: {' and '.join(sides)};"
+        f"Seed {clip['seed']}, {steps} steps{beyond} of {clip['source']}: {' and '.join(sides)};"
         f" {pixels}; max |Δ| of the state {state}."
     )
 
@@ -384,7 +390,7 @@ def _commands(task_id: str, entry: Mapping[str, Any] | None, runs: Path) -> Iter
         yield f"python -m parity sweep --tasks {task_id} --out {runs}"
         return
     source, seed = entry["rollout"]["source"], entry["rollout"]["seed"]
-    demo = {"expert": "", "random": None}.get(source, f" --demo {source}")
+    demo = {"expert": "", "random": None}.get(source, f" --demo {shlex.quote(source)}")
     if demo is None:
         yield f"python -m parity sweep --tasks {task_id} --out {runs}"
         return
@@ -414,7 +420,7 @@ def missing(swept: Mapping[str, Mapping[str, Any] | None]) -> Iterator[Group]:
     )
     yield Group(
         "Failures and differences",
-        tuple(Item(task, problem) for task, entry in swept.items() for problem in _problems(entry)),
+        grouped((task, problem) for task, entry in swept.items() for problem in _problems(entry)),
         "None in this sweep.",
     )
 

@@ -22,7 +22,7 @@ def record(found: Mapping[str, Any], summaries: Mapping[str, Summary]) -> str:
     """Return the record's text; makes each task once, to count its observation.
 
     Args:
-        found: `parity.report.document` of the comparison.
+        found: `parity.findings.document` of the comparison.
         summaries: `parity.summary.summarise` of it.
     """
     entries: dict[str, Any] = {}

@@ -21,15 +21,15 @@ from rich.table import Table
 from rich.text import Text
 
 import tasks
-from parity.episodes import Episode, load_episodes
+from parity.episodes import Episode, load_episodes, recorded_control_mode
+from parity.findings import versions
 from parity.native import native_agents
 from parity.pictures import NativeScene
 from parity.progress import LiveLine
-from parity.report import versions
 from parity.sides import NativeSide, OurSide, Side
 from parity.snapshot import Snapshot, largest_difference
 from parity.summary import number_text
-from robots import RecordingError, RobotLayoutsError
+from robots import CONTROL_MODES, RecordingError, RobotLayoutsError
 from rollouts.experts import find_expert
 from rollouts.trajectory import TrajectoryError
 from rollouts.video import open_video
@@ -62,10 +62,12 @@ class Source:
     Attributes:
         name: In a few words, for example ``"expert"``.
         episode: What to play.
+        control_mode: What its actions mean, one of `robots.CONTROL_MODES`.
     """
 
     name: str
     episode: Episode
+    control_mode: str = CONTROL_MODES[0]
 
 
 @dataclass(frozen=True)
@@ -161,11 +163,10 @@ def find_source(cls: type[MultiRobotTask], demo: Path | None, seed: int | None) 
     if demo is None:
         return expert_source(cls, 0 if seed is None else seed)
     episodes = load_episodes(demo, cls.task_id, cls.layout.action_dim)
-    if seed is None:
-        return Source(demo.name, episodes[0])
+    mode = recorded_control_mode(demo) or CONTROL_MODES[0]
     for episode in episodes:
-        if episode.seed == seed:
-            return Source(demo.name, episode)
+        if seed in (None, episode.seed):
+            return Source(demo.name, episode, mode)
     seeds = ", ".join(str(episode.seed) for episode in episodes)
     raise TrajectoryError(f"{demo} has no episode of seed {seed}; it has seeds {seeds}")
 
@@ -204,7 +205,7 @@ def roll_out(
     Raises:
         RobotLayoutsError: If a side cannot be made or a file not be written.
     """
-    env = tasks.make(task_id)
+    env = tasks.make(task_id, control_mode=source.control_mode)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         native = _play_native(env, source.episode, folder if video else None, on_step)
@@ -281,7 +282,8 @@ def _named(snapshot: Snapshot, robots: Mapping[str, str]) -> Arrays:
 def _play_native(
     env: MultiRobotTask, episode: Episode, film: Path | None, on_step: Callable[[str], None]
 ) -> Arrays:
-    side = NativeSide(env.task_id, picture_size=PICTURE_SIZE if film else None)
+    mode, size = env.made_from.control_mode, PICTURE_SIZE if film else None
+    side = NativeSide(env.task_id, control_mode=mode, picture_size=size)
     native, keys = side.envs[0], articulation_keys(env.layout)
 
     def poses() -> Arrays:

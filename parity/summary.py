@@ -22,7 +22,7 @@ def summarise(runs: Iterable[Mapping[str, Any]]) -> dict[str, Summary]:
     """Return what was found by task id, in the order of the runs.
 
     Args:
-        runs: The ``"runs"`` of `parity.report.document`.
+        runs: The ``"runs"`` of `parity.findings.document`.
 
     Returns:
         By task: ``equal``, ``episodes``, ``steps``, ``contact_steps``, ``success`` (episodes

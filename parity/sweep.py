@@ -22,20 +22,20 @@ from typing import Any
 
 import torch
 from rich.console import Console
-from rich.progress import Progress
+from rich.progress import Progress, TimeElapsedColumn
 
 import tasks
 from parity.clip import Candidate, Clip
 from parity.comparison import EpisodeResult
-from parity.episodes import load_episodes, random_episodes
+from parity.episodes import load_episodes, random_episodes, recorded_control_mode
+from parity.findings import versions
 from parity.inventory import find_files
-from parity.report import versions
 from parity.results import ResultsError
 from parity.rollout import Source, expert_source, roll_out
 from parity.runs import Run, play
 from parity.sides import NativeSide, OurSide
 from parity.summary import number_text
-from robots import RecordingError, RobotLayoutsError, TaskError
+from robots import CONTROL_MODES, RecordingError, RobotLayoutsError, TaskError
 from rollouts.experts import list_experts
 
 SUMMARY, LOG = "summary.json", "sweep.log"
@@ -45,7 +45,7 @@ NO_DEMONSTRATION = "there is no demonstration and no expert: random actions show
 NO_VIDEO = "left out by --no-video"
 
 Entry = dict[str, Any]  # what summary.json says about one task
-Progressed = Callable[[str, float], None]  # stage, share of it that is done
+Progressed = Callable[[str, str, float], None]  # task, stage, share of it that is done
 
 
 @dataclass(frozen=True)
@@ -88,6 +88,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     add = parser.add_argument
     add("--tasks", nargs="+", metavar="TASK", help="task ids (all)")
     add("--demos", type=Path, metavar="DIR", help="play the demonstrations below DIR")
+    add("--experts", action="store_true", help="where there is an expert, play it, not --demos")
     add("--episodes", type=int, default=3, metavar="N", help="episodes of each task (3)")
     add("--out", type=Path, default=Path("runs"), metavar="DIR", help="default %(default)s")
     add("--workers", type=int, default=1, metavar="W", help="tasks at a time (1)")
@@ -110,25 +111,51 @@ def _run(args: argparse.Namespace) -> int:
     known = {} if args.again and args.tasks is None else read_summary(path)["tasks"]
     waiting = [p for p in plans if args.again or not is_done(known.get(p.task_id), p)]
     found: dict[str, Entry] = dict(known)
-    console = Console(stderr=True, highlight=False, soft_wrap=True)
     for done in [p for p in plans if p not in waiting]:
         print(f"{line(found[done.task_id])}  (done before)")
-    with Progress(console=console, disable=not sys.stderr.isatty()) as progress:
-        bars = {p.task_id: progress.add_task(p.task_id, total=len(STAGES)) for p in waiting}
-
-        def show(task_id: str, stage: str, share: float) -> None:
-            completed = STAGES.index(stage) + share
-            progress.update(bars[task_id], completed=completed, description=f"{task_id} {stage}")
-
+    with _bars(waiting) as (show, hide):
         for entry in sweep(waiting, args.workers, show):
             found[entry["task"]] = entry
             write_summary(path, found)
-            progress.remove_task(bars[entry["task"]])
+            hide(entry["task"])
             print(line(entry), flush=True)
     entries = [found[p.task_id] for p in plans]
     good = sum(entry["error"] is None and entry["equal"] for entry in entries)
     print(f"{good} of {len(entries)} tasks swept and equal to native. Written to {path}")
     return 0 if good == len(entries) else 1
+
+
+@contextmanager
+def _bars(plans: Sequence[Plan]) -> Generator[tuple[Progressed, Callable[[str], None]]]:
+    """Show how far the sweep is, and every task that runs, where someone watches.
+
+    Yields:
+        What to call with task, stage and its share that is done, and what to call with a task
+        that is over.
+    """
+    watched = sys.stderr.isatty()
+    with Progress(
+        *Progress.get_default_columns(),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+        disable=not watched,
+        redirect_stdout=sys.stdout.isatty(),  # else the lines would go to stderr
+    ) as progress:
+        everything = progress.add_task("sweep", total=len(plans))
+        bars = {
+            p.task_id: progress.add_task(p.task_id, total=len(STAGES), visible=False) for p in plans
+        }
+
+        def show(task_id: str, stage: str, share: float) -> None:
+            completed = STAGES.index(stage) + share
+            text = f"{task_id} {stage}"
+            progress.update(bars[task_id], completed=completed, description=text, visible=True)
+
+        def hide(task_id: str) -> None:
+            progress.remove_task(bars[task_id])
+            progress.advance(everything)
+
+        yield show, hide
 
 
 def plan(args: argparse.Namespace) -> list[Plan]:
@@ -145,6 +172,8 @@ def plan(args: argparse.Namespace) -> list[Plan]:
     for file in unreadable:
         print(f"{file.path} is left out: {file.problem}", file=sys.stderr)
     task_ids = dict.fromkeys(cls.task_id for cls in classes)
+    for task_id in list_experts() if args.experts else ():
+        demos.pop(task_id, None)
     return [
         Plan(
             task_id,
@@ -251,7 +280,7 @@ def blank(task_id: str, options: Mapping[str, Any]) -> Entry:
 # -- one task ------------------------------------------------------------------------------------
 
 
-def sweep_task(plan: Plan, progressed: Progressed, into: Entry) -> None:
+def sweep_task(plan: Plan, progressed: Callable[[str, float], None], into: Entry) -> None:
     """Carry out a plan, stage by stage, and note in ``into`` what each found.
 
     Raises:
@@ -306,8 +335,10 @@ def _episodes(plan: Plan) -> tuple[list[Run], str]:
         for path in map(Path, plan.demos):
             episodes = load_episodes(path, cls.task_id, cls.layout.action_dim)[:left]
             left -= len(episodes)
+            mode = recorded_control_mode(path) or CONTROL_MODES[0]
             if episodes:
-                runs.append(replace(blank, source=str(path), episodes=tuple(episodes)))
+                run = replace(blank, source=str(path), episodes=tuple(episodes), control_mode=mode)
+                runs.append(run)
         return runs, "demonstrations"
     if plan.task_id in list_experts():
         played = [expert_source(cls, seed).episode for seed in range(plan.episodes)]
@@ -318,7 +349,9 @@ def _episodes(plan: Plan) -> tuple[list[Run], str]:
 
 def _shortest_success(runs: Sequence[Run], results: Sequence[EpisodeResult]) -> Source:
     """Return the shortest episode that succeeds on both sides, else the shortest of all."""
-    sources = [Source(run.source, episode) for run in runs for episode in run.episodes]
+    sources = [
+        Source(run.source, episode, run.control_mode) for run in runs for episode in run.episodes
+    ]
 
     def rank(number: int) -> tuple[bool, int]:
         result = results[number]
@@ -347,9 +380,10 @@ def agreement(results: Sequence[EpisodeResult]) -> dict[str, Any]:
 def make_clip(plan: Plan, source: Source, progressed: Callable[[float], None]) -> dict[str, Any]:
     """Show an episode side by side in the task's folder; return what was measured."""
     name = "the expert" if source.name == "expert" else Path(source.name).name
+    task_id, mode = plan.task_id, source.control_mode
     with (
-        closing(tasks.make(plan.task_id)) as env,
-        closing(NativeSide(plan.task_id, picture_size=PANEL)) as native,
+        closing(tasks.make(task_id, control_mode=mode)) as env,
+        closing(NativeSide(task_id, control_mode=mode, picture_size=PANEL)) as native,
     ):
         clip, drawn = Clip(native, OurSide(env), Candidate(source.episode, name)), count(1)
         made = clip.write(plan.folder, lambda: progressed(next(drawn) / clip.frames))
@@ -374,7 +408,7 @@ class _Worker:
 def sweep(
     plans: Iterable[Plan],
     workers: int = 1,
-    progressed: Callable[[str, str, float], None] = lambda task_id, stage, share: None,
+    progressed: Progressed = lambda task_id, stage, share: None,
 ) -> Generator[Entry]:
     """Carry out plans, each in a process of its own, and yield an entry as each is done.
 
@@ -415,7 +449,7 @@ def _start(plan: Plan) -> _Worker:
     return _Worker(plan, process, reports)
 
 
-def _hear(worker: _Worker, progressed: Callable[[str, str, float], None]) -> bool:
+def _hear(worker: _Worker, progressed: Progressed) -> bool:
     """Take in what a worker says; return whether it may say more."""
     try:
         while worker.reports.poll():

@@ -52,6 +52,10 @@ class TestWheel:
     def test_is_typed(self, wheel, room):
         assert f"{room}/py.typed" in wheel.namelist()
 
+    def test_carries_what_the_report_page_is_made_of(self, wheel):
+        names = {f"parity/templates/report.{suffix}" for suffix in ("html.jinja", "css", "js")}
+        assert names <= {*wheel.namelist()}
+
     def test_carries_the_asset_manifest_unchanged(self, wheel):
         manifest = (ROOT / "assets_cache" / "manifest.json").read_bytes()
         assert wheel.read("robots/manifest.json") == manifest

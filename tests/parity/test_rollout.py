@@ -20,6 +20,8 @@ from parity.rollout import (
     load,
 )
 from robots import TaskError
+from rollouts.episode import play
+from rollouts.recorder import Recorder
 from rollouts.trajectory import TrajectoryError
 from tests.native import NATIVE
 
@@ -108,6 +110,18 @@ class TestRolling:
         assert main(["rollout", *words]) == 0
         found, _ = load(tmp_path / task / NATIVE_FILE)
         assert found["arm.tcp_pose"].shape == (3, 7)
+
+    def test_a_file_says_in_which_control_mode_it_is(self, tmp_path):
+        env = tasks.make("PickCube-v1", control_mode="pd_joint_pos")
+        rest = np.array([*env.layout["arm"].start_qpos[:7], 1], np.float32)
+        path = tmp_path / "trajectory.h5"
+        with Recorder(path, env) as recorder:
+            recorder.add(play(env, 7, np.stack([rest, rest])))
+        words = ("--task", "PickCube-v1", "--demo", str(path), "--out", str(tmp_path))
+        assert main(["rollout", *words, "--no-video"]) == 0
+        found, about = load(tmp_path / "PickCube-v1" / NATIVE_FILE)
+        assert about["control_mode"] == "pd_joint_pos"
+        np.testing.assert_allclose(found["arm.qpos"][-1][:7], rest[:7], atol=0.05)
 
     def test_native_is_filmed(self, file, tmp_path):
         imageio = pytest.importorskip("imageio.v2")
