@@ -47,10 +47,6 @@ def browser_problem() -> str | None:
 PROBLEMS = {"native": lambda: native_problem(), "browser": lambda: browser_problem()}
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "browser: needs playwright and chromium")
-
-
 def pytest_runtest_setup(item: pytest.Item) -> None:
     for marker, find_problem in PROBLEMS.items():
         if item.get_closest_marker(marker) and (problem := find_problem()):
