@@ -134,6 +134,13 @@ def _read_joint(joint: ElementTree.Element) -> UrdfJoint:
 
 
 def resolve_reference(filename: str, folder: str, exists: Callable[[str], bool]) -> str:
+    """Return the path of a file that a URDF refers to, as `read_references` explains.
+
+    Args:
+        filename: The reference as written.
+        folder: Folder of the URDF.
+        exists: Whether a path exists.
+    """
     if filename.startswith("file://"):
         return posixpath.normpath(filename.removeprefix("file://"))
     reference = filename.removeprefix("package://")

@@ -7,6 +7,7 @@ import posixpath
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib import import_module
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -76,8 +77,8 @@ def require_packages() -> None:
         MissingPackageError: If trimesh or python-fcl is not installed.
     """
     try:
-        import fcl  # noqa: F401
-        import trimesh  # noqa: F401
+        for package in ("fcl", "trimesh"):
+            import_module(package)
     except ImportError as error:
         raise MissingPackageError(
             "checking a layout needs trimesh and python-fcl: pip install 'robot-layouts[checks]'"
@@ -110,9 +111,7 @@ def _load(urdf: Path, joints: tuple[str, ...], _modified: int) -> RobotModel:
     return RobotModel(kinematics, hulls, pairs)
 
 
-def _may_touch(
-    kinematics: Kinematics, one: int, other: int, excused: set[frozenset[str]]
-) -> bool:
+def _may_touch(kinematics: Kinematics, one: int, other: int, excused: set[frozenset[str]]) -> bool:
     """Tell whether two links can move into each other, and it would matter."""
     first, second = kinematics.bodies[one], kinematics.bodies[other]
     adjacent = kinematics.carrier(first) == second or kinematics.carrier(second) == first

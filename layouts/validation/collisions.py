@@ -179,5 +179,6 @@ def _measure(one: Postures, other: Postures, posture: int, a: int, b: int) -> Ap
         place = fcl.Transform(pose[:3, :3], pose[:3, 3])
         bodies.append(fcl.CollisionObject(body.hulls[hull].geometry, place))
     distance = float(fcl.distance(*bodies, request, result))
-    near, far = (tuple(float(x) for x in point) for point in result.nearest_points)
+    points: Any = result.nearest_points
+    near, far = (tuple(float(x) for x in point) for point in points)
     return Approach((one.links[a], other.links[b]), posture, distance, (near, far))

@@ -253,7 +253,7 @@ def _read_joint(element: Element, urdf: str) -> Joint:
         raise AssetError(f"{urdf}: joint {name!r} is {kind!r}; it must be one of {choices}")
     axis = np.array([1.0, 0.0, 0.0])
     if (found := element.find("axis")) is not None:
-        axis = read_numbers(found, "xyz", axis, urdf)
+        axis = read_numbers(found, "xyz", (1.0, 0.0, 0.0), urdf)
     length = float(np.linalg.norm(axis))
     if kind != FIXED and length < 1e-3:
         raise AssetError(f"{urdf}: the axis of joint {name!r} has no direction")

@@ -12,6 +12,7 @@ from layouts import Placement
 from layouts.validation.bodies import RobotModel
 from layouts.validation.kinematics import Floats, pose_matrix
 from robots import RobotDescriptor
+from robots.descriptor import IDENTITY
 
 STARTS = 24  # places that inverse kinematics starts from, besides the keyframes
 ITERATIONS = 80
@@ -76,9 +77,9 @@ class Reach:
             position: Of the tool centre point in the world, (3,) (m).
             quaternion: Of the TCP link in the world, wxyz, or None if any will do.
         """
-        pose = pose_matrix(position.tolist(), (1, 0, 0, 0) if quaternion is None else quaternion)
-        target = np.linalg.inv(self._base) @ pose
         turns = quaternion is not None
+        pose = pose_matrix(position.tolist(), quaternion.tolist() if turns else IDENTITY)
+        target = np.linalg.inv(self._base) @ pose
         qpos = self._descend(target, turns)
         errors, _ = self._errors(qpos, target, turns)
         missing = np.linalg.norm(errors[:, :3], axis=1)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 Point = tuple[float, ...]  # (3,) (m), world
 
 SPOKEN_LINKS = 3  # pairs of links that a finding names in its text
+SPOKEN_PAIRS = 12  # pairs of robots that the text tells distances and shared workspaces of
 
 
 @dataclass(frozen=True)
@@ -210,7 +211,7 @@ def _lines(report: Report) -> Iterator[str]:
     )
     for finding in report.findings:
         yield f"{'problem' if finding.serious else 'warning'}, {finding}"
-    yield from _section("distances (at the keyframes; with joint noise)", map(_near, report.clearances))
+    yield from _section("distances (at the keyframes; with joint noise)", _distances(report))
     yield from _section("tool centre points reach", _spaces(report))
     yield from _section("targets", _targets(report))
 
@@ -219,11 +220,18 @@ def _count(number: int, noun: str) -> str:
     return f"{number} {noun}{'s' * (number != 1)}"
 
 
-def _section(title: str, rows: Iterator[str] | map[str]) -> Iterator[str]:
+def _section(title: str, rows: Iterator[str]) -> Iterator[str]:
     lines = list(rows)
     if lines:
         yield f"{title}:"
         yield from (f"  {line}" for line in lines)
+
+
+def _distances(report: Report) -> Iterator[str]:
+    ordered = sorted(report.clearances, key=lambda clearance: clearance.noisy_distance)
+    yield from map(_near, ordered[:SPOKEN_PAIRS])
+    if len(ordered) > SPOKEN_PAIRS:
+        yield f"and {len(ordered) - SPOKEN_PAIRS} pairs that stay farther apart"
 
 
 def _near(clearance: Clearance) -> str:
@@ -240,12 +248,15 @@ def _spaces(report: Report) -> Iterator[str]:
     if not report.workspaces:
         return
     yield ", ".join(f"{n} {volume:.2f} m³" for n, volume in report.workspaces.items())
-    for shared in report.shared:
+    ordered = sorted(report.shared, key=lambda shared: -shared.volume)
+    for shared in ordered[:SPOKEN_PAIRS]:
         (one, other), (share, other_share) = shared.robots, shared.shares
         yield (
             f"{one} and {other} share {shared.volume:.2f} m³:"
             f" {share:.0%} of {one}'s, {other_share:.0%} of {other}'s"
         )
+    if len(ordered) > SPOKEN_PAIRS:
+        yield f"and {len(ordered) - SPOKEN_PAIRS} pairs that share less"
 
 
 def _targets(report: Report) -> Iterator[str]:
