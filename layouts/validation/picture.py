@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,8 +24,7 @@ GOOD, BAD, NARROW = "#1B7837", "#B2182B", "#B35806"
 WIDTH, HEIGHT = 10.0, 8.5  # inches; 1500 × 1275 pixels
 DOTS_PER_INCH = 150
 MARGIN = 0.08  # free space around the robots, in shares of the plan's larger side
-NAME_ROOM = 0.1  # m, below a base, for its name
-SHOWN_CLEARANCES = 12  # the smallest
+NAME_GAP = 0.05  # m, between a robot and its name
 SHOWN_FINDINGS = 3
 
 
@@ -63,7 +61,7 @@ def draw(report: Report) -> Figure:
     _draw_table(plan, report)
     for index, name in enumerate(report.layout):
         _draw_robot(plan, report, index, name)
-    for clearance in sorted(report.clearances, key=lambda c: c.distance)[:SHOWN_CLEARANCES]:
+    for clearance in _nearest_neighbours(report):
         _draw_clearance(plan, clearance)
     _draw_overlaps(plan, report)
     for name, position in report.targets.items():
@@ -95,19 +93,40 @@ def _draw_robot(plan: Axes, report: Report, index: int, name: str) -> None:
         plan.add_patch(Polygon(outline, fill=False, edgecolor=colour, linewidth=0.9, zorder=3))
     x, y, _ = report.layout[name].base_position
     plan.plot(x, y, "o", color="white", markeredgecolor=colour, markersize=8, zorder=4)
-    _write(plan, x, y - NAME_ROOM, name, colour, size=11, weight="bold")
+    place, behind = _behind(report, name)
+    side = "right" if behind[0] < -0.5 else "left" if behind[0] > 0.5 else "center"
+    _write(plan, *place, name, colour, size=11, weight="bold", side=side)
+
+
+def _behind(report: Report, name: str) -> tuple[Floats, Floats]:
+    """Return a place behind a robot's back (m), and the direction from its base to there."""
+    base = np.array(report.layout[name].base_position[:2])
+    corners = np.array([c[:2] for hull in report.outlines[name] for c in hull]) - base
+    ahead = corners.mean(axis=0)
+    length = float(np.linalg.norm(ahead))
+    behind = -ahead / length if length > 0.02 else np.array([0.0, -1.0])
+    return base + behind * (float((corners @ behind).max()) + NAME_GAP), behind
+
+
+def _nearest_neighbours(report: Report) -> list[Clearance]:
+    """Return, without repetition, the least clearance that each robot has from another."""
+    chosen: list[Clearance] = []
+    for name in report.layout:
+        own = [c for c in report.clearances if name in c.between and "table" not in c.between]
+        least = min(own, key=lambda clearance: clearance.distance, default=None)
+        if least is not None and least.distance > 0 and least not in chosen:
+            chosen.append(least)
+    return chosen
 
 
 def _draw_clearance(plan: Axes, clearance: Clearance) -> None:
-    """Join the nearest points of two robots; overlaps are drawn by `_draw_overlaps`."""
-    if clearance.distance <= 0 or "table" in clearance.between:
-        return
+    """Join the nearest points of two robots."""
     (x, y, _), (to_x, to_y, _) = clearance.points
     colour = NARROW if clearance.noisy_distance < 0.02 else INK
     plan.plot([x, to_x], [y, to_y], "-", color=colour, linewidth=1.4, zorder=6)
     plan.plot([x, to_x], [y, to_y], "o", color=colour, markersize=3, zorder=6)
-    middle = (x + to_x) / 2, (y + to_y) / 2
-    _write(plan, *middle, length_text(clearance.distance), colour, size=9)
+    text = length_text(clearance.distance)
+    _write(plan, (x + to_x) / 2, (y + to_y) / 2, f"  {text}", colour, size=9, side="left")
 
 
 def _draw_overlaps(plan: Axes, report: Report) -> None:
@@ -132,7 +151,7 @@ def _draw_target(plan: Axes, report: Report, name: str, position: tuple[float, .
     reached = any(reach.reached for reach in told)
     colour = GOOD if reached else BAD
     plan.plot(*position[:2], "*", color=colour, markeredgecolor="white", markersize=15, zorder=8)
-    _write(plan, position[0], position[1] + NAME_ROOM / 2, name, colour, size=9)
+    _write(plan, position[0], position[1] + NAME_GAP, name, colour, size=9)
     for reach in told:
         if reach.reached:
             x, y, _ = report.layout[reach.robot].base_position
@@ -140,7 +159,15 @@ def _draw_target(plan: Axes, report: Report, name: str, position: tuple[float, .
 
 
 def _write(
-    plan: Axes, x: float, y: float, text: str, colour: str, *, size: float, weight: str = "normal"
+    plan: Axes,
+    x: float,
+    y: float,
+    text: str,
+    colour: str,
+    *,
+    size: float,
+    weight: str = "normal",
+    side: str = "center",
 ) -> None:
     from matplotlib.patheffects import withStroke
 
@@ -151,7 +178,7 @@ def _write(
         color=colour,
         fontsize=size,
         fontweight=weight,
-        ha="center",
+        ha=side,
         va="center",
         path_effects=[withStroke(linewidth=3, foreground="white", alpha=0.85)],
         zorder=9,
@@ -159,17 +186,18 @@ def _write(
 
 
 def _frame(plan: Axes, report: Report) -> None:
-    """Show everything drawn, with a margin, to scale, under a title with the verdict."""
+    """Show robots and targets with a margin, to scale, under a title with the verdict."""
     points = [corner[:2] for hulls in report.outlines.values() for hull in hulls for corner in hull]
     points += [position[:2] for position in report.targets.values()]
-    points += [(x, y - 1.5 * NAME_ROOM) for x, y, _ in _bases(report)]
-    if report.table is not None:
-        points += [report.table[:2], report.table[2:]]
+    points += [tuple(_behind(report, name)[0]) for name in report.layout]
     low, high = np.min(points, axis=0), np.max(points, axis=0)
     margin = MARGIN * float((high - low).max())
-    plan.set_xlim(low[0] - margin, high[0] + margin)
-    plan.set_ylim(low[1] - margin, high[1] + margin)
-    plan.set_aspect("equal", adjustable="datalim")
+    middle, half = (low + high) / 2, (high - low) / 2 + margin
+    box = plan.get_window_extent()
+    half = np.maximum(half, half[::-1] * (box.width / box.height, box.height / box.width))
+    plan.set_xlim(middle[0] - half[0], middle[0] + half[0])
+    plan.set_ylim(middle[1] - half[1], middle[1] + half[1])
+    plan.set_aspect("equal")
     verdict = "ok" if report.ok else "not ok"
     colour = GOOD if report.ok else BAD
     plan.set_title(headline(report.layout), loc="left", color=INK, fontsize=13, fontweight="bold")
@@ -183,10 +211,6 @@ def _frame(plan: Axes, report: Report) -> None:
         spine.set_color("#BBBBBB")
 
 
-def _bases(report: Report) -> Iterator[tuple[float, float, float]]:
-    return (placement.base_position for placement in report.layout.values())
-
-
 def _captions(report: Report) -> list[tuple[str, str]]:
     """Return the first findings and what the marks mean, each with its colour."""
     lines = [
@@ -196,7 +220,7 @@ def _captions(report: Report) -> list[tuple[str, str]]:
     hidden = len(report.findings) - len(lines)
     if hidden:
         lines.append((f"and {decimal(hidden)} more", FAINT))
-    marks = "links' hulls at the keyframes; lines: least distances"
+    marks = "links' hulls at the keyframes; lines: to the nearest neighbour"
     marks += "; ✕: overlaps" * any(finding.links for finding in report.findings)
     marks += "; stars: targets, dotted to who reaches them" * bool(report.targets)
     return [*lines, (marks, FAINT)]
