@@ -93,9 +93,9 @@ def _draw_robot(plan: Axes, report: Report, index: int, name: str) -> None:
         plan.add_patch(Polygon(outline, fill=False, edgecolor=colour, linewidth=0.9, zorder=3))
     x, y, _ = report.layout[name].base_position
     plan.plot(x, y, "o", color="white", markeredgecolor=colour, markersize=8, zorder=4)
-    place, behind = _behind(report, name)
+    (x, y), behind = _behind(report, name)
     side = "right" if behind[0] < -0.5 else "left" if behind[0] > 0.5 else "center"
-    _write(plan, *place, name, colour, size=11, weight="bold", side=side)
+    _write(plan, x, y, name, colour, size=11, weight="bold", side=side)
 
 
 def _behind(report: Report, name: str) -> tuple[Floats, Floats]:
