@@ -183,14 +183,11 @@ def _mesh_corners(reference: str, urdf: Path, where: str) -> Floats:
 def _hull(link: int, corners: Floats, where: str) -> Hull:
     import fcl
     import trimesh
-    from scipy.spatial import QhullError
 
-    if len(corners) < 4 or not np.isfinite(corners).all():
+    solid = len(corners) > 3 and np.isfinite(corners).all()
+    if not solid or np.linalg.matrix_rank(corners - corners.mean(axis=0), tol=1e-6) < 3:
         raise AssetError(f"{where}: a collision shape without a volume")
-    try:
-        hull: Any = trimesh.convex.convex_hull(corners)
-    except QhullError as error:
-        raise AssetError(f"{where}: a collision shape without a volume") from error
+    hull: Any = trimesh.convex.convex_hull(corners)
     vertices, triangles = np.asarray(hull.vertices, float), np.asarray(hull.faces, int)
     faces = np.concatenate([np.full((len(triangles), 1), 3), triangles], axis=1)
     return Hull(link, vertices, fcl.Convex(vertices, len(triangles), faces.flatten()))

@@ -242,8 +242,8 @@ class _Check:
         if move is None:
             return f"even {FARTHEST_MOVE:g} m farther apart they collide; use another keyframe"
         return (
-            f"stand {one.name} and {other.name} {move:.2f} m farther apart"
-            f" ({now + move:.2f} m between their bases instead of {now:.2f} m), which leaves"
+            f"stand {one.name} and {other.name} {move:.3f} m farther apart"
+            f" ({now + move:.3f} m between their bases instead of {now:.3f} m), which leaves"
             f" {length_text(NARROW)} or more"
         )
 
