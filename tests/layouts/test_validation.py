@@ -232,7 +232,7 @@ class TestTable:
         assert finding.kind == "table"
         assert finding.links[0].links == ("panda_link1", "table")
         assert finding.amount == pytest.approx(0.2 - 0.141, abs=0.001)
-        assert "raise the base of arm by 0.08 m" in finding.advice
+        assert "raise the base of arm by 0.069 m" in finding.advice
 
     def test_beside_it_there_is_none(self):
         assert self.validate(position=(2.0, 0.0, -0.2)).ok
