@@ -9,7 +9,7 @@ from pathlib import Path
 
 from robots.asset_sources import SourceError, find_mani_skill
 from robots.asset_store import AssetStore, FileState, default_root
-from robots.descriptor import RobotDescriptor
+from robots.descriptor import JointGroup, RobotDescriptor
 from robots.errors import AssetError, RobotLayoutsError, UnknownNameError
 from robots.fetch_assets import describe_file
 from robots.locator import LocalUrdf, UrdfLocator
@@ -140,14 +140,24 @@ def _drives(robot: RobotDescriptor) -> Iterator[str]:
         rows.append(
             (
                 name,
-                str(len(group.joints)) + (" on one number" if group.mimic else ""),
-                f"{group.stiffness:g} {per}",
-                f"{group.damping:g} {per.replace('/', '·s/')}",
-                f"{group.force_limit:g} {force}",
+                str(len(group.joints)) + _how_driven(group),
+                f"{_numbers(group.stiffness)} {per}",
+                f"{_numbers(group.damping)} {per.replace('/', '·s/')}",
+                f"{_numbers(group.force_limit)} {force}",
                 f"{group.friction:g}",
             )
         )
     return _table(rows)
+
+
+def _how_driven(group: JointGroup) -> str:
+    if group.held:
+        return " held still"
+    return " on one number" if group.mimic else ""
+
+
+def _numbers(value: float | tuple[float, ...]) -> str:
+    return "/".join(f"{number:g}" for number in (value if isinstance(value, tuple) else (value,)))
 
 
 def _keyframes(robot: RobotDescriptor, urdf: Path | None) -> Iterator[str]:

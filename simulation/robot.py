@@ -11,6 +11,7 @@ from sapien.wrapper.urdf_loader import URDFLoader
 
 from layouts import Placement
 from robots import DescriptorError, RobotDescriptor, UnknownNameError
+from simulation.arrays import Floats
 
 
 class _PhysicsOnlyLoader(URDFLoader):
@@ -32,6 +33,8 @@ class SimulatedRobot:
         joints: Active joints, in SAPIEN's order, which is the order of qpos and qvel.
         driven: Active joints in the order of the descriptor's joints.
         active_index: For each joint of the descriptor, its place in qpos.
+        targets: Last drive targets, in the order of ``driven``; after a reset the positions
+            themselves (rad, m).
     """
 
     def __init__(
@@ -51,6 +54,7 @@ class SimulatedRobot:
         self.joints: list[Any] = list(self.articulation.active_joints)
         self.active_index = _active_index(descriptor, [joint.name for joint in self.joints])
         self.driven = [self.joints[i] for i in self.active_index]
+        self.targets: Floats = np.zeros(len(self.driven), np.float32)
         self._set_drives()
         for link in self.links.values():
             link.disable_gravity = True
@@ -74,6 +78,7 @@ class SimulatedRobot:
         still = np.zeros(len(self.joints), np.float32)
         active = np.zeros(len(self.joints))
         active[self.active_index] = qpos
+        self.targets = np.array(qpos, np.float32)
         self.articulation.set_qpos(active)
         self.articulation.set_qvel(still)
         self.articulation.set_qf(still)
@@ -105,11 +110,9 @@ class SimulatedRobot:
     def _set_drives(self) -> None:
         joints = iter(self.driven)
         for group in self.descriptor.action_split.groups.values():
-            for _ in group.joints:
+            for drive in group.drives:
                 joint = next(joints)
-                joint.set_drive_properties(
-                    group.stiffness, group.damping, group.force_limit, "force"
-                )
+                joint.set_drive_properties(*drive, "force")
                 joint.set_friction(group.friction)
 
 
