@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import os
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NoReturn, Protocol
+from typing import Any, NoReturn, Protocol
 
 from robots.action_split import ActionNumber, ActionSplit, JointGroup, names
 from robots.errors import DescriptorError, UnknownNameError
@@ -179,6 +181,33 @@ class RobotDescriptor:
                 raise DescriptorError(f"{self.name}: keyframe {key!r} is not finite: {qpos}")
         object.__setattr__(self, "keyframes", _Frozen(frozen))
         self.keyframe(self.home.keyframe)
+
+    @classmethod
+    def from_urdf(
+        cls,
+        path_or_name: str | os.PathLike[str],
+        name: str | None = None,
+        *,
+        quiet: bool = False,
+        **overrides: Any,
+    ) -> RobotDescriptor:
+        """Guess a robot from its URDF, and say on stderr what was guessed and why.
+
+        See `robots.from_urdf.guess_descriptor` for the arguments, the errors, and the guess with
+        its reasons and the data module to paste.
+
+        Args:
+            path_or_name: A URDF on this machine, or a name of the package robot_descriptions.
+            name: Registry name; None takes that of the URDF.
+            quiet: Whether to say nothing.
+            **overrides: Fields that are known better than guessed.
+        """
+        from robots.from_urdf import guess_descriptor
+
+        found = guess_descriptor(path_or_name, name, **overrides)
+        if not quiet:
+            print(found, file=sys.stderr)
+        return found.descriptor
 
     @property
     def joints(self) -> tuple[str, ...]:
