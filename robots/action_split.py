@@ -33,8 +33,6 @@ class JointGroup:
         damping: Drive damping (N·m·s/rad or N·s/m), same form.
         force_limit: Largest drive force (N·m or N), same form.
         delta: Whether the action moves the target relative to the current position.
-        from_target: With ``delta``, whether it moves relative to the last target instead; after
-            a reset that is the current position.
         mimic: Whether one action number drives every joint of the group (a parallel gripper).
         multipliers: In a mimic group, what each joint multiplies the value by; 1 if empty.
         offsets: In a mimic group that is not ``delta``, what each joint adds to it then
@@ -63,7 +61,6 @@ class JointGroup:
     reset_noise: bool = True
     limits: tuple[tuple[float, float], ...] = ()
     normalised: bool = True
-    from_target: bool = False
     multipliers: tuple[float, ...] = ()
     offsets: tuple[float, ...] = ()
     held: bool = False
@@ -127,8 +124,6 @@ class JointGroup:
                 )
             if not all(map(math.isfinite, given)):
                 raise DescriptorError(f"{name} of {self.joints} are not finite: {given}")
-        if self.from_target and not self.delta:
-            raise DescriptorError(f"from_target needs delta, which {self.joints} has not")
 
     def _refuse_bad_ranges(self) -> None:
         for name, value in (("lower", self.lower), ("upper", self.upper)):
@@ -187,9 +182,7 @@ class JointGroup:
             )
         limits = self.limits[: self.size]
         lower, upper = (tuple(limit[side] for limit in limits) for side in (0, 1))
-        return replace(
-            self, lower=lower, upper=upper, delta=False, from_target=False, normalised=False
-        )
+        return replace(self, lower=lower, upper=upper, delta=False, normalised=False)
 
 
 def _spread(value: float | tuple[float, ...], count: int) -> tuple[float, ...]:

@@ -16,6 +16,8 @@ from robots.locator import LocalUrdf, UrdfLocator
 from robots.manifest import AssetFile, AssetPackage, load_manifest
 from robots.progress import size
 from robots.registry import RobotRegistry
+from robots.urdf_model import read_model
+from robots.urdf_reach import link_frame
 from robots.urdf_xml import UrdfJoint, read_joints
 
 
@@ -169,16 +171,11 @@ def _keyframes(robot: RobotDescriptor, urdf: Path | None) -> Iterator[str]:
 
 def _tcp_places(robot: RobotDescriptor, urdf: Path) -> dict[str, Sequence[float]]:
     """Return the TCP link's position at each keyframe, in the base frame (m)."""
-    from yourdfpy import URDF
-
-    model = URDF.load(str(urdf), build_scene_graph=True, load_meshes=False)
-    places: dict[str, Sequence[float]] = {}
-    for name, qpos in robot.keyframes.items():
-        # By name: yourdfpy moves a mimic joint by itself, and counts it not.
-        by_name = dict(zip(robot.joints, qpos, strict=True))
-        model.update_cfg([by_name.get(joint, 0.0) for joint in model.actuated_joint_names])
-        places[name] = model.get_transform(robot.tcp_link)[:3, 3].tolist()
-    return places
+    model = read_model(_read(urdf), urdf.name)
+    return {
+        name: link_frame(model, robot.tcp_link, dict(zip(robot.joints, qpos, strict=True))).position
+        for name, qpos in robot.keyframes.items()
+    }
 
 
 def _gripper(robot: RobotDescriptor) -> Iterator[str]:

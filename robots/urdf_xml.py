@@ -99,9 +99,9 @@ def read_references(
     found: dict[str, set[str]] = {"collision": set(), "visual": set()}
     for kind, paths in found.items():
         for element in (*root.iterfind(f".//{kind}//mesh"), *root.iterfind(f".//{kind}//texture")):
-            paths.add(_resolve(element.get("filename", ""), folder, exists))
+            paths.add(resolve(element.get("filename", ""), folder, exists))
     for texture in root.iterfind("./material/texture"):
-        found["visual"].add(_resolve(texture.get("filename", ""), folder, exists))
+        found["visual"].add(resolve(texture.get("filename", ""), folder, exists))
     return UrdfReferences(
         collision=tuple(sorted(found["collision"])),
         visual=tuple(sorted(found["visual"] - found["collision"])),
@@ -182,7 +182,14 @@ def numbers_of(
 _LIMITS = ("lower", "upper", "effort", "velocity")
 
 
-def _resolve(filename: str, folder: str, exists: Callable[[str], bool]) -> str:
+def resolve(filename: str, folder: str, exists: Callable[[str], bool]) -> str:
+    """Return the path of a file that a URDF refers to; see `read_references`.
+
+    Args:
+        filename: The reference.
+        folder: Folder of the URDF.
+        exists: Whether a path exists.
+    """
     if filename.startswith("file://"):
         return posixpath.normpath(filename.removeprefix("file://"))
     reference = filename.removeprefix("package://")

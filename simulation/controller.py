@@ -51,9 +51,6 @@ class JointPositionController:
         self._centre: Floats = multipliers * (half * (high + low))[self._source] + offsets
         self._half_range: Floats = multipliers * (half * (high - low))[self._source]
         self._relative = np.array([drive.relative for drive in drives])
-        self._from_target = np.array([drive.from_target for drive in drives])
-        self._remembers = bool(self._from_target.any())
-        self._robots = [list(world.robots.values()) for world in worlds]
         self._active = slice(None) if active == sorted(active) else np.array(active)
         self._setters: list[list[Any]] = [
             [joint.set_drive_target for robot in world.robots.values() for joint in robot.driven]
@@ -73,10 +70,7 @@ class JointPositionController:
         clipped = np.minimum(np.maximum(action, self._lowest), self._highest)
         driving = clipped if self._one_to_one else clipped.take(self._source, 1)
         target = self._centre + self._half_range * driving
-        now = qpos[:, self._active]
-        if self._remembers:
-            now = np.where(self._from_target, self._last_targets(), now)
-        np.add(now, target, out=target, where=self._relative)
+        np.add(qpos[:, self._active], target, out=target, where=self._relative)
         return target
 
     def drive(self, targets: Floats, index: int) -> None:
@@ -88,14 +82,6 @@ class JointPositionController:
         """
         for set_target, target in zip(self._setters[index], targets[index].tolist(), strict=True):
             set_target(target)
-        if self._remembers:
-            first = 0
-            for robot in self._robots[index]:
-                robot.targets = targets[index, first : first + len(robot.driven)]
-                first += len(robot.driven)
-
-    def _last_targets(self) -> Floats:
-        return np.array([np.concatenate([r.targets for r in robots]) for robots in self._robots])
 
 
 class _Drive(NamedTuple):
@@ -105,7 +91,6 @@ class _Drive(NamedTuple):
     multiplier: float
     offset: float
     relative: bool
-    from_target: bool
 
 
 def _drives(group: JointGroup, first: int, start: Sequence[float]) -> Iterator[_Drive]:
@@ -118,8 +103,8 @@ def _drives(group: JointGroup, first: int, start: Sequence[float]) -> Iterator[_
     """
     for i, (multiplier, offset) in enumerate(group.followers):
         if group.held:
-            yield _Drive(first, 0.0, start[i], relative=False, from_target=False)
+            yield _Drive(first, 0.0, start[i], relative=False)
         else:
             source = first if group.mimic else first + i
             shift = 0.0 if group.delta else offset
-            yield _Drive(source, multiplier, shift, group.delta, group.from_target)
+            yield _Drive(source, multiplier, shift, group.delta)

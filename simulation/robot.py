@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,14 +12,27 @@ from sapien.wrapper.urdf_loader import URDFLoader
 
 from layouts import Placement
 from robots import DescriptorError, RobotDescriptor, UnknownNameError
-from simulation.arrays import Floats
+from robots.urdf_xml import resolve
 
 
-class _PhysicsOnlyLoader(URDFLoader):
-    """A URDF loader that drops visuals while parsing, so that no render device is needed."""
+class _Loader(URDFLoader):
+    """A URDF loader that finds every mesh that a locator found.
+
+    SAPIEN's own drops meshes of a ``package://`` whose folder has another name, saying so only in
+    its log. Visuals are dropped while parsing, so that no render device is needed.
+    """
+
+    def __init__(self, *, visuals: bool) -> None:
+        super().__init__()
+        self._visuals = visuals
 
     def _build_link(self, link: Any, link_builder: Any) -> None:
-        link.visuals = []
+        if not self._visuals:
+            link.visuals = []
+        for part in (*link.collisions, *link.visuals):
+            mesh = part.geometry.mesh
+            if mesh is not None and mesh.filename.startswith("package://"):
+                mesh.filename = resolve(mesh.filename, str(self.urdf_dir), os.path.isfile)
         super()._build_link(link, link_builder)
 
 
@@ -33,8 +47,6 @@ class SimulatedRobot:
         joints: Active joints, in SAPIEN's order, which is the order of qpos and qvel.
         driven: Active joints in the order of the descriptor's joints.
         active_index: For each joint of the descriptor, its place in qpos.
-        targets: Last drive targets, in the order of ``driven``; after a reset the positions
-            themselves (rad, m).
     """
 
     def __init__(
@@ -54,7 +66,6 @@ class SimulatedRobot:
         self.joints: list[Any] = list(self.articulation.active_joints)
         self.active_index = _active_index(descriptor, [joint.name for joint in self.joints])
         self.driven = [self.joints[i] for i in self.active_index]
-        self.targets: Floats = np.zeros(len(self.driven), np.float32)
         self._set_drives()
         for link in self.links.values():
             link.disable_gravity = True
@@ -78,7 +89,6 @@ class SimulatedRobot:
         still = np.zeros(len(self.joints), np.float32)
         active = np.zeros(len(self.joints))
         active[self.active_index] = qpos
-        self.targets = np.array(qpos, np.float32)
         self.articulation.set_qpos(active)
         self.articulation.set_qvel(still)
         self.articulation.set_qf(still)
@@ -119,7 +129,7 @@ class SimulatedRobot:
 def _load(
     scene: sapien.Scene, descriptor: RobotDescriptor, pose: sapien.Pose, *, visuals: bool
 ) -> Any:
-    loader: Any = URDFLoader() if visuals else _PhysicsOnlyLoader()
+    loader: Any = _Loader(visuals=visuals)
     loader.set_scene(scene)
     loader.fix_root_link = True
     if material := descriptor.gripper_material:

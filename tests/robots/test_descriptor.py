@@ -33,7 +33,6 @@ def group(**changes) -> JointGroup:
         ({"multipliers": (1.0, -1.0)}, "only a mimic group has multipliers; ('a', 'b') is none"),
         ({"mimic": True, "offsets": (0.0,)}, "offsets has 1 numbers; the group has joints"),
         ({"mimic": True, "offsets": (0.0, math.nan)}, "offsets of ('a', 'b') are not finite"),
-        ({"from_target": True}, "from_target needs delta, which ('a', 'b') has not"),
         ({"lower": (-1.0,)}, "lower has 1 numbers; the group ('a', 'b') takes 2"),
         ({"upper": (1.0, 2.0), "mimic": True}, "upper has 2 numbers; the group ('a', 'b') takes 1"),
         ({"upper": -1.0}, "range [-1.0, -1.0] of ('a', 'b') is not increasing"),

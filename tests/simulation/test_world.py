@@ -241,20 +241,3 @@ def test_a_held_group_stays_where_the_layout_starts_it_whatever_the_action():
         np.testing.assert_allclose(
             targets(simulation, controller, number), [[0.04, 0.04]] * 2, atol=1e-7
         )
-
-
-def test_actions_relative_to_the_last_target_add_up_until_a_reset():
-    change = {"lower": -0.01, "upper": 0.01, "delta": True}
-    simulation, controller = controlled(**change, from_target=True)
-    for expected in (0.03, 0.02, 0.01):
-        np.testing.assert_allclose(
-            targets(simulation, controller, -1.0), [[expected] * 2] * 2, atol=1e-7
-        )
-    simulation.worlds[1].robots["arm"].reset(simulation.layout["arm"].start_qpos)
-    found = targets(simulation, controller, -1.0)
-    np.testing.assert_allclose(found, [[0.0] * 2, [0.03] * 2], atol=1e-7)
-    simulation, controller = controlled(**change)
-    for _ in range(3):
-        np.testing.assert_allclose(
-            targets(simulation, controller, -1.0), [[0.03] * 2] * 2, atol=1e-7
-        )
