@@ -79,7 +79,8 @@ class _Check:
     ) -> None:
         self._layout, self._targets, self._table = layout, targets, table
         self._draws = samples
-        self._models = {name: load_model(p.robot) for name, p in layout.items()}
+        self._progress = _Progress()
+        self._models = dict(self._load())
         random = np.random.default_rng(seed)
         self._robots = {
             name: stand(name, p, self._models[name], _noisy(p, samples, random))
@@ -89,7 +90,11 @@ class _Check:
         if table is not None:
             low, high = (*table[:2], -TABLE_DEPTH), (*table[2:], 0.0)
             self._surface = fixed("table", box_hull(np.array(low), np.array(high)), samples + 1)
-        self._progress = _Progress()
+
+    def _load(self) -> Iterator[tuple[str, RobotModel]]:
+        for name, placement in self._layout.items():
+            self._progress.tell(f"files of {name}")
+            yield name, load_model(placement.robot)
 
     def run(self, workspaces: bool) -> Report:
         findings = [*self._limits(), *self._self_collisions()]
