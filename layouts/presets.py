@@ -123,12 +123,9 @@ def ring(
         raise UnknownNameError("way to face", facing, FACING)
     loaded = _loaded(robots)
     around = list(loaded.values())
-    if radius == "auto" and len(around) == 1:
-        radius = HAND_OVER * around[0].reach
-    elif radius == "auto":
-        chord = _distance("radius", radius, pairwise([*around, around[0]]))
-        radius = chord / (2 * math.sin(math.pi / len(around)))
-    check_positive("radius", radius)
+    if radius == "auto":
+        radius = _ring_radius(around)
+    radius = _distance("radius", radius, [])
     placements: dict[str, Placement] = {}
     for i, (name, robot) in enumerate(loaded.items()):
         angle = 2 * math.pi * i / len(around)
@@ -262,6 +259,14 @@ def _distance(
         raise LayoutError(f"{what} is {distance!r}; it takes a number (m) or 'auto'")
     check_positive(what, distance)
     return distance
+
+
+def _ring_radius(robots: Sequence[RobotDescriptor]) -> float:
+    """Return the radius (m) that puts neighbours at hand-over distance."""
+    if len(robots) == 1:
+        return HAND_OVER * robots[0].reach
+    chord = _distance("radius", "auto", pairwise([*robots, robots[0]]))
+    return chord / (2 * math.sin(math.pi / len(robots)))
 
 
 def _edges(

@@ -1,18 +1,47 @@
 """Presets: where each puts its robots, which way they face, and what it refuses."""
 
+import dataclasses
 import math
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from layouts import face_to_face, side_by_side, single, yaw_quaternion
-from layouts.orientation import forward, upward, yaw_degrees
-from layouts.presets import PRESETS
-from robots import LayoutError, UnknownNameError
+from layouts import (
+    Layout,
+    around_table,
+    face_to_face,
+    grid,
+    ring,
+    side_by_side,
+    single,
+    yaw_quaternion,
+)
+from layouts.frames import EDGES, table_outlines
+from layouts.orientation import forward, multiplied, rotated, upward, yaw_degrees
+from layouts.presets import CLEAR, HAND_OVER, PRESETS
+from robots import LayoutError, RobotRegistry, UnknownNameError
 
 spacings = st.floats(min_value=1e-3, max_value=100.0)
-counts = {"single": 1, "side_by_side": 3, "face_to_face": 2}
+counts = {
+    "single": 1,
+    "side_by_side": 3,
+    "face_to_face": 2,
+    "ring": 5,
+    "around_table": 6,
+    "grid": 5,
+}
+mixed = st.lists(st.sampled_from(RobotRegistry.names()), min_size=1, max_size=9).map(
+    lambda robots: {f"arm_{i}": robot for i, robot in enumerate(robots)}
+)
+
+
+def distance(layout, first, second):
+    return math.dist(layout[first].base_position, layout[second].base_position)
+
+
+def reaches(layout, *names):
+    return [layout[name].robot.reach for name in names]
 
 
 def build(preset, **options):
@@ -86,7 +115,7 @@ def test_a_wrong_number_of_robots(preset, names, message):
 @pytest.mark.parametrize("preset", PRESETS)
 class TestEveryPreset:
     def options(self, preset):
-        return {} if preset == "single" else {"spacing": 1.0}
+        return {"spacing": 1.0} if preset in ("side_by_side", "face_to_face") else {}
 
     def test_keeps_names_and_order(self, preset):
         layout = build(preset, **self.options(preset))
@@ -95,7 +124,41 @@ class TestEveryPreset:
     def test_robots_stand_upright_on_the_ground(self, preset):
         for placement in build(preset, **self.options(preset)).values():
             assert placement.base_position[2] == 0.0
-            assert upward(placement.base_quaternion) == (0.0, 0.0, 1.0)
+            assert upward(placement.base_quaternion) == pytest.approx((0.0, 0.0, 1.0), abs=1e-12)
+
+    def test_is_pure(self, preset):
+        robots = {f"arm_{i}": "panda" for i in range(counts[preset])}
+        given = dict(robots)
+        one, other = (PRESETS[preset](robots, **self.options(preset)) for _ in range(2))
+        assert one == other
+        assert list(robots.items()) == list(given.items())
+
+    def test_permuting_robots_permutes_slices_and_leaves_every_base_in_its_place(self, preset):
+        robots = {f"arm_{i}": "panda" for i in range(counts[preset])}
+        backwards = dict(reversed(robots.items()))
+        layout = PRESETS[preset](robots, **self.options(preset))
+        permuted = PRESETS[preset](backwards, **self.options(preset))
+        assert list(permuted) == list(backwards)
+        assert [p.base_pose for p in permuted.values()] == [p.base_pose for p in layout.values()]
+        reordered = Layout({name: layout[name] for name in backwards}, layout.frames)
+        assert reordered.action_split == permuted.action_split
+        assert {n: p.base_pose for n, p in reordered.items()} == {
+            n: p.base_pose for n, p in layout.items()
+        }
+
+    def test_no_robot(self, preset):
+        with pytest.raises(LayoutError, match="at least one robot|places . robots?; 0 given"):
+            PRESETS[preset]({}, **self.options(preset))
+
+    def test_a_robot_with_another_front_faces_as_a_panda_would(self, preset):
+        names = [f"arm_{i}" for i in range(counts[preset])]
+        pandas, others = (
+            PRESETS[preset](dict.fromkeys(names, robot), **self.options(preset))
+            for robot in ("panda", "so100")
+        )
+        for name in names:
+            ahead = forward(others[name].facing)
+            assert ahead == pytest.approx(forward(pandas[name].facing), abs=1e-12)
 
     def test_unknown_robot(self, preset):
         robots = {f"arm_{i}": "pandaa" for i in range(counts[preset])}
@@ -105,6 +168,222 @@ class TestEveryPreset:
     def test_unknown_keyframe(self, preset):
         with pytest.raises(UnknownNameError, match="keyframe of panda 'folded'"):
             build(preset, keyframe="folded", **self.options(preset))
+
+
+def test_native_poses_are_exact_to_the_last_bit():
+    layout = face_to_face({"left": "panda_wristcam", "right": "panda_wristcam"}, spacing=1.5)
+    for name, sign in (("left", 1), ("right", -1)):
+        half = sign * math.pi / 4
+        assert layout[name].base_quaternion == (math.cos(half), 0.0, 0.0, math.sin(half))
+        assert str(layout[name].base_position[0]) == "0.0"
+
+
+class TestAutomaticDistances:
+    @given(mixed)
+    def test_in_a_row_every_pair_of_neighbours_can_hand_over(self, robots):
+        layout = side_by_side(robots, spacing="auto")
+        names = list(layout)
+        for pair in zip(names, names[1:], strict=False):
+            apart, summed = distance(layout, *pair), sum(reaches(layout, *pair))
+            assert apart == pytest.approx(HAND_OVER * summed)
+            assert CLEAR * summed < apart < summed, "bases are clear, workspaces overlap"
+        ys = [placement.base_position[1] for placement in layout.values()]
+        assert ys[0] == pytest.approx(-ys[-1])
+
+    @given(mixed.filter(lambda robots: len(robots) > 1))
+    def test_in_a_ring_neighbours_overlap_and_bases_are_clear(self, robots):
+        layout = ring(robots, radius="auto")
+        names = list(layout)
+        around = list(zip(names, [*names[1:], names[0]], strict=True))
+        apart = {pair: distance(layout, *pair) for pair in around}
+        assert min(apart.values()) == pytest.approx(max(apart.values()))
+        assert any(
+            length == pytest.approx(HAND_OVER * sum(reaches(layout, *pair)))
+            for pair, length in apart.items()
+        )
+        for pair, length in apart.items():
+            assert CLEAR * sum(reaches(layout, *pair)) <= length < sum(reaches(layout, *pair))
+
+    def test_two_pandas_stand_as_far_apart_as_in_native_to_within_a_centimetre(self):
+        layout = face_to_face({"a": "panda", "b": "panda"}, spacing="auto")
+        assert distance(layout, "a", "b") == pytest.approx(1.5, abs=0.01)
+
+    def test_tiny_robots_beside_a_large_one_stay_clear_of_its_base(self):
+        large = dataclasses.replace(RobotRegistry.load("panda"), name="large", reach=3.0)
+        tiny = dataclasses.replace(large, name="tiny", reach=0.1)
+        layout = ring({"large": large, "a": tiny, "b": tiny}, radius="auto")
+        assert distance(layout, "large", "a") == pytest.approx(CLEAR * 3.1)
+
+    @given(mixed)
+    def test_one_robot_at_a_table_or_in_a_ring_reaches_the_middle(self, robots):
+        name, robot = next(iter(robots.items()))
+        for layout in (ring({name: robot}), around_table({name: robot})):
+            assert math.hypot(*layout[name].base_position) == pytest.approx(
+                HAND_OVER * layout[name].robot.reach
+            )
+
+    @pytest.mark.parametrize("preset", [side_by_side, face_to_face, grid, ring])
+    def test_another_word_is_refused(self, preset):
+        word = {"radius" if preset is ring else "spacing": "automatic"}
+        with pytest.raises(LayoutError, match="is 'automatic'; it takes a number .* or 'auto'"):
+            preset({"a": "panda", "b": "panda"}, **word)
+
+
+class TestRing:
+    @given(mixed, spacings, st.sampled_from(["centre", "out", "tangent"]))
+    def test_turned_by_one_place_it_is_itself(self, robots, radius, facing):
+        layout = ring(robots, radius=radius, facing=facing)
+        turn = yaw_quaternion(2 * math.pi / len(layout))
+        placements = list(layout.values())
+        for one, following in zip(placements, [*placements[1:], placements[0]], strict=True):
+            turned = rotated(turn, one.base_position)
+            assert turned == pytest.approx(following.base_position, abs=1e-9 * (1 + radius))
+            ahead = forward(multiplied(turn, one.facing))
+            assert ahead == pytest.approx(forward(following.facing), abs=1e-9)
+
+    @given(mixed, spacings, st.integers(1, 8))
+    def test_robots_given_from_another_one_on_stand_in_the_same_ring_turned(
+        self, robots, radius, shift
+    ):
+        names = list(robots)
+        shift %= len(names)
+        shifted = {name: robots[name] for name in [*names[shift:], *names[:shift]]}
+        turned = ring(shifted, radius=radius).moved(yaw=shift * 2 * math.pi / len(names))
+        for name, placement in ring(robots, radius=radius).items():
+            expected = pytest.approx(placement.base_position, abs=1e-9 * (1 + radius))
+            assert turned[name].base_position == expected
+            ahead = pytest.approx(forward(placement.facing), abs=1e-9)
+            assert forward(turned[name].facing) == ahead
+
+    @pytest.mark.parametrize(("facing", "sign"), [("centre", -1), ("out", 1)])
+    def test_robots_face_the_centre_or_away(self, facing, sign):
+        layout = ring({f"arm_{i}": "so100" for i in range(5)}, radius=2.0, facing=facing)
+        for placement in layout.values():
+            outwards = [sign * x / 2.0 for x in placement.base_position]
+            assert forward(placement.facing) == pytest.approx(outwards, abs=1e-9)
+
+    def test_tangent_is_counterclockwise_towards_the_next(self):
+        layout = ring({f"arm_{i}": "panda" for i in range(4)}, radius=1.0, facing="tangent")
+        assert [yaw_degrees(p.facing) for p in layout.values()] == pytest.approx(
+            [0, 90, 180, -90]
+        ) or yaw_degrees(layout["arm_2"].facing) == pytest.approx(-180)
+        assert layout["arm_1"].base_position == (1.0, 0.0, 0.0)
+
+    @given(spacings)
+    def test_two_stand_face_to_face(self, radius):
+        robots = {"a": "panda", "b": "so100"}
+        two = ring(robots, radius=radius, keyframe="rest")
+        pair = face_to_face(robots, spacing=2 * radius)
+        for name in robots:
+            assert two[name].base_position == pytest.approx(pair[name].base_position)
+            assert two[name].base_quaternion == pytest.approx(pair[name].base_quaternion)
+
+    def test_each_robot_starts_from_its_home_keyframe(self):
+        layout = ring({"a": "panda_wristcam", "b": "panda"})
+        assert [p.start_keyframe for p in layout.values()] == ["tabletop", "rest"]
+
+    @pytest.mark.parametrize("radius", [0, -1.0, math.nan, math.inf, True])
+    def test_a_radius_that_is_no_distance(self, radius):
+        with pytest.raises(LayoutError, match="radius is .* m; it must be finite and greater"):
+            ring({"a": "panda"}, radius=radius)
+
+    def test_an_unknown_way_to_face(self):
+        with pytest.raises(UnknownNameError, match="'center'. Did you mean 'centre'"):
+            ring({"a": "panda"}, facing="center")
+
+
+class TestAroundTable:
+    def test_four_stand_at_the_middles_of_the_edges_and_look_across(self):
+        robots = {f"arm_{i}": "panda" for i in range(4)}
+        layout = around_table(robots, table=(1.2, 0.8), inset=0.1)
+        expected = [(0, -0.3), (0, 0.3), (-0.5, 0), (0.5, 0)]
+        for placement, (x, y) in zip(layout.values(), expected, strict=True):
+            assert placement.base_position == pytest.approx((x, y, 0), abs=1e-12)
+            length = math.hypot(x, y)
+            towards = (-x / length, -y / length, 0)
+            assert forward(placement.facing) == pytest.approx(towards, abs=1e-12)
+
+    @given(mixed, st.randoms(use_true_random=False))
+    def test_everyone_stands_on_the_table_near_its_own_edge(self, robots, random):
+        edges = {name: random.choice(list(EDGES)) for name in robots}
+        layout = around_table(robots, edges=edges)
+        corners = next(iter(table_outlines(layout.frame_poses).values()))
+        width, depth = (2 * max(corner[i] for corner in corners) for i in (0, 1))
+        sides = {
+            "north": lambda x, y: depth / 2 - y,
+            "east": lambda x, y: width / 2 - x,
+            "south": lambda x, y: depth / 2 + y,
+            "west": lambda x, y: width / 2 + x,
+        }
+        for name, placement in layout.items():
+            x, y, _ = placement.base_position
+            assert sides[edges[name]](x, y) == pytest.approx(0.1)
+            assert all(margin(x, y) >= 0.1 - 1e-9 for margin in sides.values())
+
+    def test_robots_on_one_edge_share_it_from_right_to_left(self):
+        robots = {"a": "panda", "b": "panda", "c": "panda"}
+        layout = around_table(robots, edges=["south", "south", "south"], table=(3.0, 1.0))
+        assert [p.base_position[0] for p in layout.values()] == pytest.approx([1.0, 0.0, -1.0])
+
+    def test_neighbours_on_one_edge_of_an_automatic_table_can_hand_over(self):
+        layout = around_table({"a": "panda", "b": "panda"}, edges=["west", "west"])
+        assert HAND_OVER * 1.71 <= distance(layout, "a", "b") < 1.71
+
+    def test_edges_by_name_may_come_in_any_order(self):
+        robots = {"a": "panda", "b": "panda"}
+        layout = around_table(robots, edges={"b": "north", "a": "east"})
+        assert [placement.on for placement in layout.values()] == ["table.east", "table.north"]
+
+    @pytest.mark.parametrize(
+        ("options", "error", "message"),
+        [
+            ({"edges": ["north", "sout"]}, UnknownNameError, "table edge 'sout'. .*'south'"),
+            ({"edges": ["north"]}, LayoutError, r"takes one edge for each of \['a', 'b'\]"),
+            ({"edges": "ns"}, LayoutError, "edges is 'ns'; it takes one edge for each"),
+            ({"edges": {"a": "north"}}, LayoutError, "edges gives no edge for 'b'"),
+            ({"edges": {"a": "north", "c": "north"}}, UnknownNameError, "robot at the table 'c'"),
+            ({"table": "large"}, LayoutError, "table is 'large'; it takes width and depth"),
+            ({"table": (1.0,)}, LayoutError, "it takes width and depth"),
+            ({"table": (1.0, math.nan)}, LayoutError, "the table's depth is nan m; it must"),
+            ({"table": (1.0, 0.2)}, LayoutError, "with an inset of 0.1 m it must be more than 0.2"),
+            ({"inset": -0.1}, LayoutError, "inset is -0.1 m; it must be finite and 0 or more"),
+        ],
+    )
+    def test_refusals(self, options, error, message):
+        with pytest.raises(error, match=message):
+            around_table({"a": "panda", "b": "panda"}, **options)
+
+
+class TestGrid:
+    @given(mixed, st.integers(1, 10), spacings)
+    def test_neighbours_are_one_spacing_apart_in_rows_along_y(self, robots, columns, spacing):
+        layout = grid(robots, columns=columns, spacing=spacing)
+        places = [placement.base_position for placement in layout.values()]
+        per_row = min(columns, len(places))
+        for i, (x, y, _) in enumerate(places):
+            row, column = divmod(i, per_row)
+            assert x - places[0][0] == pytest.approx(row * spacing)
+            assert y - places[0][1] == pytest.approx(column * spacing)
+        assert places[0][1] == pytest.approx(-(per_row - 1) / 2 * spacing)
+
+    @given(st.integers(1, 6), spacings)
+    def test_one_row_stands_side_by_side(self, count, spacing):
+        robots = {f"arm_{i}": "panda" for i in range(count)}
+        row = grid(robots, spacing=spacing, columns=10, keyframe="rest")
+        pair = side_by_side(robots, spacing=spacing)
+        for name in robots:
+            assert row[name].base_position == pytest.approx(pair[name].base_position)
+            assert row[name].base_quaternion == pair[name].base_quaternion
+
+    def test_left_out_columns_make_it_square(self):
+        layout = grid({f"arm_{i}": "panda" for i in range(9)}, spacing=1.0)
+        places = {placement.base_position[:2] for placement in layout.values()}
+        assert places == {(x, y) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)}
+
+    @pytest.mark.parametrize("columns", [0, -1, 1.5, "2", True])
+    def test_columns_that_are_no_count(self, columns):
+        with pytest.raises(LayoutError, match="columns is .*; it must be 1 or a larger whole"):
+            grid({"a": "panda"}, columns=columns)
 
 
 @given(st.floats(min_value=-179.9, max_value=179.9))
