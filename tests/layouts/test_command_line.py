@@ -43,9 +43,9 @@ def test_show_saves_a_picture_and_says_where(tmp_path, capsys):
         ("ring a=panda --radius 0.5 --facing out", ring({"a": "panda"}, radius=0.5, facing="out")),
         ("grid a=panda b=panda --columns 1", grid({"a": "panda", "b": "panda"}, columns=1)),
         (
-            "around_table a=panda b=panda --edges west,west --table 1 2 --inset 0",
+            "around_table a=panda b=panda --edges west,west --table 1 2 --inset 0.2",
             around_table(
-                {"a": "panda", "b": "panda"}, edges=["west", "west"], table=(1.0, 2.0), inset=0.0
+                {"a": "panda", "b": "panda"}, edges=["west", "west"], table=(1.0, 2.0), inset=0.2
             ),
         ),
         (

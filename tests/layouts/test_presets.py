@@ -19,7 +19,7 @@ from layouts import (
 )
 from layouts.frames import EDGES, table_outlines
 from layouts.orientation import forward, multiplied, rotated, upward, yaw_degrees
-from layouts.presets import CLEAR, HAND_OVER, PRESETS
+from layouts.presets import HAND_OVER, PRESETS
 from robots import LayoutError, RobotRegistry, UnknownNameError
 
 spacings = st.floats(min_value=1e-3, max_value=100.0)
@@ -33,6 +33,14 @@ counts = {
 }
 mixed = st.lists(st.sampled_from(RobotRegistry.names()), min_size=1, max_size=9).map(
     lambda robots: {f"arm_{i}": robot for i, robot in enumerate(robots)}
+)
+PANDA = RobotRegistry.load("panda")
+# Robots of any size, from a toy to a crane.
+sized = st.lists(st.floats(0.1, 10.0), min_size=1, max_size=9).map(
+    lambda sizes: {
+        f"arm_{i}": dataclasses.replace(PANDA, name=f"robot_{i}", reach=reach)
+        for i, reach in enumerate(sizes)
+    }
 )
 
 
@@ -178,41 +186,72 @@ def test_native_poses_are_exact_to_the_last_bit():
         assert str(layout[name].base_position[0]) == "0.0"
 
 
+def apart(layout, *pair):
+    """How far apart two robots stand if nothing else matters (m)."""
+    return max(HAND_OVER * sum(reaches(layout, *pair)), *reaches(layout, *pair))
+
+
 class TestAutomaticDistances:
-    @given(mixed)
+    @given(sized)
     def test_in_a_row_every_pair_of_neighbours_can_hand_over(self, robots):
         layout = side_by_side(robots, spacing="auto")
         names = list(layout)
         for pair in zip(names, names[1:], strict=False):
-            apart, summed = distance(layout, *pair), sum(reaches(layout, *pair))
-            assert apart == pytest.approx(HAND_OVER * summed)
-            assert CLEAR * summed < apart < summed, "bases are clear, workspaces overlap"
+            length = distance(layout, *pair)
+            assert length == pytest.approx(apart(layout, *pair))
+            assert length < sum(reaches(layout, *pair)), "workspaces overlap"
+            assert length >= max(reaches(layout, *pair)) - 1e-9, "bases are out of reach"
         ys = [placement.base_position[1] for placement in layout.values()]
         assert ys[0] == pytest.approx(-ys[-1])
 
-    @given(mixed.filter(lambda robots: len(robots) > 1))
-    def test_in_a_ring_neighbours_overlap_and_bases_are_clear(self, robots):
+    @given(sized.filter(lambda robots: len(robots) > 1))
+    def test_in_a_ring_every_pair_of_neighbours_can_hand_over(self, robots):
         layout = ring(robots, radius="auto")
         names = list(layout)
-        around = list(zip(names, [*names[1:], names[0]], strict=True))
-        apart = {pair: distance(layout, *pair) for pair in around}
-        assert min(apart.values()) == pytest.approx(max(apart.values()))
-        assert any(
-            length == pytest.approx(HAND_OVER * sum(reaches(layout, *pair)))
-            for pair, length in apart.items()
-        )
-        for pair, length in apart.items():
-            assert CLEAR * sum(reaches(layout, *pair)) <= length < sum(reaches(layout, *pair))
+        for pair in zip(names, [*names[1:], names[0]], strict=True):
+            assert distance(layout, *pair) == pytest.approx(apart(layout, *pair), abs=1e-6)
+        radii = [math.hypot(*placement.base_position) for placement in layout.values()]
+        assert max(radii) == pytest.approx(min(radii))
+        for placement in layout.values():
+            inwards = [-x / radii[0] for x in placement.base_position]
+            assert forward(placement.facing) == pytest.approx(inwards, abs=1e-9)
+
+    @pytest.mark.parametrize("count", range(2, 9))
+    def test_a_ring_of_equals_is_regular(self, count):
+        layout = ring({f"arm_{i}": "panda" for i in range(count)}, radius="auto")
+        radius = HAND_OVER * 0.855 / math.sin(math.pi / count)
+        assert layout == ring({f"arm_{i}": "panda" for i in range(count)}, radius=radius)
+
+    @given(sized)
+    def test_in_a_grid_nobody_reaches_a_neighbours_base(self, robots):
+        layout = grid(robots, spacing="auto", columns=2)
+        names = list(layout)
+        pairs = [*zip(names[::2], names[1::2], strict=False), *zip(names, names[2:], strict=False)]
+        if pairs:
+            least = min(apart(layout, *pair) for pair in pairs)
+            farthest = max(reach for pair in pairs for reach in reaches(layout, *pair))
+            lengths = [distance(layout, *pair) for pair in pairs]
+            assert lengths == pytest.approx([max(least, farthest)] * len(pairs))
+
+    @given(sized)
+    def test_across_a_table_every_pair_can_hand_over(self, robots):
+        names = list(robots)[:4]
+        layout = around_table({name: robots[name] for name in names})
+        for pair in (names[:2], names[2:]):
+            if len(pair) == 2:
+                length = HAND_OVER * sum(reaches(layout, *pair))
+                assert distance(layout, *pair) == pytest.approx(length)
+
+    @given(sized)
+    def test_at_any_table_nobody_stands_beyond_its_middle(self, robots):
+        layout = around_table(robots, table=(0.9, 0.5))
+        for placement in layout.values():
+            assert placement.position[0] >= 0.1
+            assert placement.position[0] <= {"n": 0.25, "s": 0.25}.get(placement.on[6], 0.45)
 
     def test_two_pandas_stand_as_far_apart_as_in_native_to_within_a_centimetre(self):
         layout = face_to_face({"a": "panda", "b": "panda"}, spacing="auto")
         assert distance(layout, "a", "b") == pytest.approx(1.5, abs=0.01)
-
-    def test_tiny_robots_beside_a_large_one_stay_clear_of_its_base(self):
-        large = dataclasses.replace(RobotRegistry.load("panda"), name="large", reach=3.0)
-        tiny = dataclasses.replace(large, name="tiny", reach=0.1)
-        layout = ring({"large": large, "a": tiny, "b": tiny}, radius="auto")
-        assert distance(layout, "large", "a") == pytest.approx(CLEAR * 3.1)
 
     @given(mixed)
     def test_one_robot_at_a_table_or_in_a_ring_reaches_the_middle(self, robots):
@@ -306,7 +345,7 @@ class TestAroundTable:
     @given(mixed, st.randoms(use_true_random=False))
     def test_everyone_stands_on_the_table_near_its_own_edge(self, robots, random):
         edges = {name: random.choice(list(EDGES)) for name in robots}
-        layout = around_table(robots, edges=edges)
+        layout = around_table(robots, edges=edges, inset=0.1)
         corners = next(iter(table_outlines(layout.frame_poses).values()))
         width, depth = (2 * max(corner[i] for corner in corners) for i in (0, 1))
         sides = {
@@ -326,8 +365,10 @@ class TestAroundTable:
         assert [p.base_position[0] for p in layout.values()] == pytest.approx([1.0, 0.0, -1.0])
 
     def test_neighbours_on_one_edge_of_an_automatic_table_can_hand_over(self):
-        layout = around_table({"a": "panda", "b": "panda"}, edges=["west", "west"])
-        assert HAND_OVER * 1.71 <= distance(layout, "a", "b") < 1.71
+        robots = {"a": "panda", "b": "so100", "c": "so100"}
+        layout = around_table(robots, edges=["west", "west", "west"], inset=0.1)
+        assert distance(layout, "a", "b") == pytest.approx(HAND_OVER * (0.855 + 0.44))
+        assert distance(layout, "b", "c") == pytest.approx(HAND_OVER * 2 * 0.44)
 
     def test_edges_by_name_may_come_in_any_order(self):
         robots = {"a": "panda", "b": "panda"}
@@ -346,7 +387,8 @@ class TestAroundTable:
             ({"table": (1.0,)}, LayoutError, "it takes width and depth"),
             ({"table": (1.0, math.nan)}, LayoutError, "the table's depth is nan m; it must"),
             ({"table": (1.0, 0.2)}, LayoutError, "with an inset of 0.1 m it must be more than 0.2"),
-            ({"inset": -0.1}, LayoutError, "inset is -0.1 m; it must be finite and 0 or more"),
+            ({"inset": -0.1}, LayoutError, "inset is -0.1 m; it must be finite and greater than 0"),
+            ({"inset": "far"}, LayoutError, "inset is 'far'; it takes a number"),
         ],
     )
     def test_refusals(self, options, error, message):

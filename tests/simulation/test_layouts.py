@@ -5,12 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from layouts import Layout, Placement, ceiling, ring, wall
+from layouts import Layout, Placement, around_table, ceiling, grid, ring, side_by_side, wall
 from layouts.orientation import inverted, rotated
 from simulation import PhysicsSettings, Simulation, World
 
 MIXED = ("panda", "panda_stick", "so100")
-EIGHT = ring({f"arm_{i}": MIXED[i % len(MIXED)] for i in range(8)})
+NINE = {f"arm_{i}": MIXED[i % len(MIXED)] for i in range(9)}
+EIGHT = ring(dict(list(NINE.items())[:8]))
 STEPS = 5
 
 
@@ -57,6 +58,30 @@ def test_each_robot_of_a_ring_of_eight_is_driven_and_seen_alone(eight: Simulatio
             assert (change > 0.03) == (name == moved), (moved, name, change)
             tcp = np.abs(after.tcp_position(name) - before.tcp_position(name)).max()
             assert (tcp > 0.01) == (name == moved), (moved, name, tcp)
+
+
+@pytest.mark.parametrize(
+    "layout",
+    [
+        EIGHT,
+        ring({"a": "panda", "b": "so100", "c": "panda_stick"}),
+        around_table(dict(list(NINE.items())[:4])),
+        around_table(NINE),
+        grid(NINE),
+        side_by_side(NINE, spacing="auto", keyframe=None),
+    ],
+    ids=["ring", "ring of three", "table", "full table", "grid", "row"],
+)
+def test_at_automatic_distances_no_robot_touches_another(layout: Layout):
+    world = World(layout, PhysicsSettings())
+    for name, placement in layout.items():
+        world.robots[name].reset(placement.start_qpos)
+    world.scene.step()
+    owners = {link: n for n, robot in world.robots.items() for link in robot.links.values()}
+    for contact in world.system.get_contacts():
+        first, second = contact.bodies
+        if owners[first] != owners[second]:
+            assert min(point.separation for point in contact.points) > 0, (first, second)
 
 
 def test_robots_of_a_ring_reach_towards_its_centre_whatever_their_own_front(eight: Simulation):
