@@ -184,14 +184,15 @@ def write(path: Path, env: tasks.MultiRobotTask, episodes, **how) -> Path:
     return path
 
 
-def test_a_part_is_a_recording_itself(tmp_path, push_t):
+def test_a_part_says_what_it_is(tmp_path, push_t):
     env, episodes = push_t
     with Recorder(tmp_path / "open.h5", env) as recorder:
         recorder.add(episodes[3])
         (part,) = recorder.parts.iterdir()
         with h5py.File(part) as file:
             np.testing.assert_array_equal(file["traj_0/actions"], episodes[3].actions)
-            assert json.loads(file.attrs["layout"])["arm"]["robot"] == "panda_stick"
+            header = json.loads(file.attrs["header"])
+            assert header["layout"]["arm"]["robot"] == "panda_stick"
         assert len(recorder) == 1
 
 
