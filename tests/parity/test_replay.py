@@ -3,12 +3,14 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tasks
+from layouts import Layout
 from parity.__main__ import main
 from parity.comparison import EpisodeResult, FirstDifference
 from parity.native import quiet
@@ -203,6 +205,15 @@ def test_disagreement_is_told(capsys):
 def test_bad_usage(words, complaint, capsys):
     assert main(["replay", *words]) == 2
     assert complaint in capsys.readouterr().err
+
+
+def test_a_file_of_another_layout(tmp_path, capsys):
+    placement = replace(tasks.get_task_class("PushT-v1").layout["arm"], position=(-0.6, 0.0, 0.0))
+    env = tasks.make("PushT-v1", layout=Layout({"arm": placement}))
+    with Recorder(tmp_path / "trajectory.h5", env) as recorder:
+        recorder.add(play(env, 0, np.zeros((2, 7), np.float32)))
+    assert main(["replay", "--task", "push_t", "--demo", str(recorder.path)]) == 2
+    assert "arm.position: recorded [-0.6, 0.0, 0.0], here [-0.615," in capsys.readouterr().err
 
 
 def test_a_file_of_another_task(tmp_path, capsys):
