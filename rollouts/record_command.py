@@ -84,7 +84,9 @@ class _Line:
     @property
     def kept(self) -> str:
         """How many episodes are on the disk, in words."""
-        return f"{self._summary.recorded if self._summary else 0} episodes are recorded"
+        if self._summary is None:
+            return "nothing was begun"
+        return f"{self._summary.recorded} episodes are recorded"
 
     def __enter__(self) -> _Line:
         if sys.stderr.isatty():

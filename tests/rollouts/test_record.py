@@ -47,14 +47,14 @@ def start(*words: str) -> subprocess.Popen[str]:
 
 
 def wait_for_parts(out: Path, count: int) -> None:
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 180
     while len(list(out.glob("trajectory.parts/*.h5"))) < count:
         assert time.monotonic() < deadline, "nothing is recorded"
         time.sleep(0.005)
 
 
 def wait_until_nobody_is_left(process: subprocess.Popen[str]) -> None:
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 60
     while True:
         try:
             os.killpg(process.pid, 0)
@@ -170,7 +170,7 @@ def test_a_worker_that_is_killed(tmp_path):
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
     workers = [p for p in children if "spawn_main" in Path(f"/proc/{p}/cmdline").read_text()]
     os.kill(int(workers[0]), signal.SIGKILL)
-    printed, said = process.communicate(timeout=60)
+    printed, said = process.communicate(timeout=180)
     assert process.returncode == 0, said
     assert f"worker process {workers[0]} died by SIGKILL at seed" in said
     assert "its episode is played again" in said
@@ -188,7 +188,7 @@ def test_a_recording_that_is_interrupted(tmp_path, how):
         os.killpg(process.pid, how)  # as a terminal does
     else:
         process.send_signal(how)
-    printed, said = process.communicate(timeout=60)
+    printed, said = process.communicate(timeout=180)
     assert process.returncode == 130
     assert printed == ""
     assert "Traceback" not in said
@@ -245,7 +245,7 @@ def test_a_full_disk_ends_it_with_what_is_finished(tmp_path):
         pytest.skip("file systems cannot be mounted here")
     try:
         process = start(*arguments(disk, 1000, 2))
-        _, said = process.communicate(timeout=60)
+        _, said = process.communicate(timeout=180)
         assert process.returncode == 1
         assert "Traceback" not in said
         kept, error = said.splitlines()[-2:]
