@@ -46,6 +46,10 @@ class Rehearsal:
     def begin(self, seed: int) -> Scene:
         """Start the episode of a seed in a freshly built world, and return what it looks like."""
         self.task.reset(seed, options=REBUILT)
+        return self.scene()
+
+    def scene(self) -> Scene:
+        """Return what the episode looks like now."""
         return Scene(self.task)
 
     def play(self, script: Script) -> Attempt:
@@ -58,7 +62,7 @@ class Rehearsal:
             UnknownNameError: If the layout has no such robot, or the script no such waypoint.
             TaskError: If two waypoints of a robot have the same name.
         """
-        task, scene = self.task, Scene(self.task)
+        task, scene = self.task, self.scene()
         _check_names(script, task)
         players = [_Player(task, name, script.get(name, ()), scene) for name in task.layout]
         done: set[str] = set()
@@ -70,7 +74,7 @@ class Rehearsal:
                 return Attempt(_stack(actions, task), False, str(error))
             actions.append(np.concatenate(parts).astype(np.float32))
             *_, info = task.step(actions[-1])
-            scene = Scene(task)
+            scene = self.scene()
             if bool(info["success"][0]):
                 return Attempt(_stack(actions, task), True)
         places = ", ".join(player.place for player in players)

@@ -1,5 +1,6 @@
 """Scripts are played as they are written, for one arm as for two."""
 
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -9,7 +10,7 @@ import tasks
 from robots import TaskError, UnknownNameError
 from rollouts.episode import play
 from rollouts.experts.geometry import gripper_facing, nearest_quarter_turn, rotate, turn, yaw_of
-from rollouts.experts.rehearsal import Rehearsal, first_success
+from rollouts.experts.rehearsal import Attempt, Rehearsal, first_success, search
 from rollouts.experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
 
 FORWARD, DOWN = 0.0, gripper_facing(0.0, 0.0)
@@ -66,6 +67,30 @@ def test_no_plan_at_all_is_an_error():
     script = {"arm": (Waypoint("far", nowhere),)}
     with pytest.raises(TaskError, match=r"PickCube-v1, seed 3: no plan: arm\.far is out of reach"):
         first_success(tasks.make("PickCube-v1"), 3, lambda scene: [script])
+
+
+def test_attempts_end_with_the_first_that_succeeds():
+    """Each is made from a fresh world, and sees what came of the one before."""
+    lifted: list[bool] = []
+
+    def attempts(rehearsal: Rehearsal) -> Iterator[Attempt]:
+        for script in ({"arm": PICK["arm"][:3]}, PICK, {}):
+            rehearsal.begin(0)
+            yield rehearsal.play(script)
+            lifted.append(rehearsal.scene().grasps("arm", "cube"))
+
+    task = tasks.make("PickCube-v1")
+    actions = search(task, 0, attempts)
+    assert lifted == [True]
+    np.testing.assert_array_equal(actions, first_success(task, 0, lambda scene: [PICK]))
+
+
+def test_a_waypoint_turns_joints():
+    rehearsal = Rehearsal(tasks.make("PickCube-v1"))
+    start = rehearsal.begin(0).qpos("arm")
+    change = np.array([0.3, 0, 0, 0.2, 0, 0, -0.1])
+    rehearsal.play({"arm": (Waypoint("turn", turn=lambda arm: change),)})
+    np.testing.assert_allclose(rehearsal.scene().qpos("arm")[:7] - start[:7], change, atol=0.01)
 
 
 @pytest.fixture(scope="module")
