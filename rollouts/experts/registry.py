@@ -31,6 +31,7 @@ CATALOGUE = {
     "PullCube-v1": "rollouts.experts.slide_cube:slide",
     "PullCubeTool-v1": "rollouts.experts.pull_cube_tool:pull",
     "PushCube-v1": "rollouts.experts.slide_cube:slide",
+    "PushT-v1": "rollouts.experts.push_t:push_onto_outline",
     "RollBall-v1": "rollouts.experts.roll_ball:roll",
     "StackCube-v1": "rollouts.experts.stack_cube:stack_cube",
     "StackPyramid-v1": "rollouts.experts.stack_pyramid:stack_pyramid",
