@@ -157,7 +157,7 @@ def test_an_arm_without_fingers_is_an_error(name, plan_name):
 def test_an_arm_too_far_away_is_an_error(name):
     robot = task(name).layout["arm"].robot.name
     env = tasks.make(name, layout=Layout({"arm": Placement(robot, position=(-3.0, 0.0, 0.0))}))
-    with pytest.raises(TaskError, match=rf"{name}, seed 0: no plan: arm\.above is out of reach"):
+    with pytest.raises(TaskError, match=rf"{name}, seed 0: no plan: arm\.above.* is out of reach"):
         find_expert(name)(env, 0)
 
 
