@@ -2,10 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from functools import partial
+from math import pi
+
+import numpy as np
+
 from robots import TaskError
-from rollouts.experts.geometry import Floats, inverse, multiply, rotate
-from rollouts.experts.script import Pose, Scene
+from rollouts.experts.geometry import (
+    Floats,
+    backed_off,
+    gripper_facing,
+    inverse,
+    multiply,
+    rotate,
+    turn,
+    yaw_of,
+)
+from rollouts.experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
 from tasks import MultiRobotTask
+
+Numbers = Sequence[float] | Floats
+
+QUARTERS = (0, 1, 2, 3)
 
 
 def need_fingers(task: MultiRobotTask, plan: str, *robots: str) -> None:
@@ -26,6 +45,54 @@ def need_fingers(task: MultiRobotTask, plan: str, *robots: str) -> None:
                 f"{plan} needs fingers on {' and '.join(map(repr, robots))}; {name!r} is a"
                 f" {robot.name}, which has none"
             )
+
+
+def cube_grips(cube: Pose, turns: Sequence[int] = QUARTERS, tilt: float = 0.0) -> list[Pose]:
+    """Return the grips of a cube from above, by its side faces.
+
+    Args:
+        cube: Where it is.
+        turns: Quarter turns of the gripper from the cube's own heading, one grip each.
+        tilt: Angle of the gripper from straight down (rad).
+    """
+    position, quaternion = cube
+    yaw = yaw_of(quaternion)
+    return [(position, gripper_facing(yaw + turn * pi / 2, tilt)) for turn in turns]
+
+
+def pick(
+    robot: str,
+    body: str,
+    grips: Callable[[Scene], Sequence[Pose]],
+    *,
+    above: float = 0.05,
+    ready: float = 0.1,
+    around: float = 0.03,
+    most: int | None = None,
+) -> tuple[Waypoint, ...]:
+    """Return the waypoints after which a gripper holds a body: above, around, grasp.
+
+    Each is called by that word and the body's name.
+
+    Args:
+        robot: Whose gripper.
+        body: What it is to hold.
+        grips: The gripper's poses to choose from.
+        above: How far before the grip it gets ready, against its approach (m).
+        ready: How near it must come to that place before it goes on (rad).
+        around: How near it must come to the grip before it closes (rad).
+        most: How many steps each waypoint may take.
+    """
+
+    def before(scene: Scene) -> list[Pose]:
+        return [backed_off(grip, above) for grip in grips(scene)]
+
+    held = partial(Scene.grasps, robot=robot, body=body)
+    return (
+        Waypoint(f"above {body}", before, OPEN, near=ready, most=most),
+        Waypoint(f"around {body}", grips, OPEN, near=around, most=most),
+        Waypoint(f"grasp {body}", None, CLOSED, steps=2, until=held, most=most),
+    )
 
 
 def holding(scene: Scene, robot: str, body: str, place: Floats, quaternion: Floats) -> Pose:
@@ -55,3 +122,42 @@ def bringing(scene: Scene, robot: str, body: str, goal: Pose) -> Pose:
     place, quaternion = goal
     turned = multiply(quaternion, inverse(scene.body(body)[1]))
     return holding(scene, robot, body, place, multiply(turned, scene.tcp(robot)[1]))
+
+
+def held_at(
+    scene: Scene,
+    robot: str,
+    body: str,
+    place: Floats,
+    yaws: Sequence[float] = (0.0,),
+    leans: Sequence[float] = (0.0,),
+) -> list[Pose]:
+    """Return the gripper's poses that bring the body it holds to a place, turned a little.
+
+    Args:
+        scene: As it is now.
+        robot: Whose gripper.
+        body: What it holds.
+        place: Where the body's origin is to be, (3,) (m).
+        yaws: Turns about the vertical to choose from (rad).
+        leans: Turns about the way the fingers open to choose from (rad).
+    """
+    _, now = scene.tcp(robot)
+    turned = [
+        multiply(turn("z", yaw), multiply(now, turn("y", lean))) for yaw in yaws for lean in leans
+    ]
+    return [holding(scene, robot, body, place, quaternion) for quaternion in turned]
+
+
+def is_near(scene: Scene, body: str, other: str, offset: Numbers, limit: float) -> bool:
+    """Return whether a body is at a place beside another one.
+
+    Args:
+        scene: As it is now.
+        body: The body.
+        other: The other one.
+        offset: From the other one's origin to where the body's is to be, (3,) (m), world.
+        limit: How far it may be off along each axis (m).
+    """
+    error = scene.body(body)[0] - scene.body(other)[0] - np.array(offset)
+    return bool(np.abs(error).max() < limit)

@@ -23,6 +23,9 @@ CATALOGUE = {
     "DrawTriangle-v1": "rollouts.experts.draw_triangle:draw_outline",
     "LiftPegUpright-v1": "rollouts.experts.lift_peg_upright:stand_up",
     "PegInsertionSide-v1": "rollouts.experts.peg_insertion_side:insert_peg",
+    "PickCube-v1": "rollouts.experts.pick_cube:pick_cube",
+    "PickCubeSO100-v1": "rollouts.experts.pick_cube_so100:pick_small_cube",
+    "PlaceSphere-v1": "rollouts.experts.place_sphere:place_sphere",
     "PlugCharger-v1": "rollouts.experts.plug_charger:plug_in",
     "PokeCube-v1": "rollouts.experts.poke_cube:poke",
     "PullCube-v1": "rollouts.experts.slide_cube:slide",
@@ -30,7 +33,10 @@ CATALOGUE = {
     "PushCube-v1": "rollouts.experts.slide_cube:slide",
     "PushT-v1": "rollouts.experts.push_t:push_onto_outline",
     "RollBall-v1": "rollouts.experts.roll_ball:roll",
+    "StackCube-v1": "rollouts.experts.stack_cube:stack_cube",
+    "StackPyramid-v1": "rollouts.experts.stack_pyramid:stack_pyramid",
     "TwoRobotPickCube-v1": "rollouts.experts.two_robot_pick_cube:hand_over",
+    "TwoRobotStackCube-v1": "rollouts.experts.two_robot_stack_cube:stack_for_two",
 }
 
 _registered: dict[str, Expert] = {}

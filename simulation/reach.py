@@ -1,0 +1,120 @@
+"""Inverse kinematics of a point, for arms of too few joints to choose an orientation as well."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots import UnknownNameError
+from simulation.world import World
+
+Floats = NDArray[np.float64]
+
+_MAX_ITERATIONS = 40
+_DIFFERENCE = 1e-4  # of a joint, for the derivative (rad)
+_LONGEST_STEP = 0.3  # of a joint, per iteration (rad)
+_CONVERGED = 1e-3  # m
+_SHORT_WAY, _LONG_WAY = 0.001, 0.5  # m of error that a joint's way of so many rad is worth
+
+
+class PointReach:
+    """Solves for the arm joints that bring a point of a robot's TCP link to a place.
+
+    Attributes:
+        joints: The arm's joints, in the order of the solutions.
+    """
+
+    def __init__(self, world: World, robot: str) -> None:
+        """Take the robot's kinematic model.
+
+        Args:
+            world: The world it stands in; only its placement and joints are read.
+            robot: Its name in the layout.
+
+        Raises:
+            UnknownNameError: If the layout has no such robot, or the robot no such TCP link.
+        """
+        descriptor, simulated = world.layout[robot].robot, world.robots[robot]
+        self.joints = descriptor.arm_joints
+        self._base = simulated.base_pose
+        self._model: Any = simulated.articulation.create_pinocchio_model()
+        self._link = simulated.articulation.links.index(simulated.link(descriptor.tcp_link))
+        names = [joint.name for joint in simulated.joints]
+        self._arm = np.array([names.index(joint) for joint in self.joints])
+        self._size = len(names)
+        limits = np.concatenate([joint.limits for joint in simulated.joints])
+        self._low, self._high = limits[self._arm].astype(float).T
+
+    def arm(self, qpos: Floats) -> Floats:
+        """Pick the arm's joints, in the order of ``joints``, out of all in SAPIEN's order."""
+        return qpos[self._arm]
+
+    def forward(self, arm: Floats) -> tuple[Floats, Floats]:
+        """Return where arm joints bring the TCP link: position (3,) (m), quaternion (4,) wxyz.
+
+        Args:
+            arm: Positions in the order of ``joints``, shape (arm joints,) (rad).
+        """
+        pose = self._link_pose(arm)
+        return np.array(pose.p, float), np.array(pose.q, float)
+
+    def place_of(self, point: Floats, arm: Floats) -> Floats:
+        """Return where arm joints bring a point, (3,) (m), world.
+
+        Args:
+            point: In the frame of the TCP link, (3,) (m).
+            arm: Positions in the order of ``joints``, shape (arm joints,) (rad).
+        """
+        matrix = np.array(self._link_pose(arm).to_transformation_matrix(), float)
+        return matrix[:3, :3] @ point + matrix[:3, 3]
+
+    def _link_pose(self, arm: Floats) -> Any:
+        qpos = np.zeros(self._size)
+        qpos[self._arm] = arm
+        self._model.compute_forward_kinematics(qpos)
+        return self._base * self._model.get_link_pose(self._link)
+
+    def solve(
+        self, point: Floats, place: Floats, start: Floats, fixed: Sequence[str] = ()
+    ) -> Floats | None:
+        """Return arm joints near ``start`` that bring a point to a place, or None if none do.
+
+        Args:
+            point: In the frame of the TCP link, (3,) (m).
+            place: Where it is to be in the world, (3,) (m).
+            start: Positions in the order of ``joints``, shape (arm joints,) (rad).
+            fixed: Joints that stay as they are.
+
+        Returns:
+            Positions in the order of ``joints``, within their limits, (arm joints,) (rad).
+
+        Raises:
+            UnknownNameError: If a fixed joint is not one of ``joints``.
+        """
+        for joint in fixed:
+            if joint not in self.joints:
+                raise UnknownNameError("arm joint", joint, self.joints)
+        free = [i for i, joint in enumerate(self.joints) if joint not in fixed]
+
+        def errors(arm: Floats) -> Floats:
+            way = _SHORT_WAY * ((arm - start)[free] / _LONG_WAY) ** 3  # the longest counts most
+            return np.concatenate([self.place_of(point, arm) - place, way])
+
+        arm = start.astype(float)
+        for _ in range(_MAX_ITERATIONS):
+            error = errors(arm)
+            slopes = np.zeros((len(error), len(free)))
+            for column, joint in enumerate(free):
+                moved = arm.copy()
+                moved[joint] += _DIFFERENCE
+                slopes[:, column] = (errors(moved) - error) / _DIFFERENCE
+            step = np.linalg.lstsq(slopes, -error, rcond=None)[0]
+            arm[free] += np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
+            if np.abs(step).max() < _DIFFERENCE:
+                break
+        arm = np.clip(arm, self._low, self._high)
+        away = np.linalg.norm(self.place_of(point, arm) - place)
+        return arm if away < _CONVERGED else None
