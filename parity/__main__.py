@@ -11,6 +11,7 @@ from robots import unknown_name_message
 # Command -> the module whose ``main(argv)`` runs it, and what it does.
 COMMANDS = {
     "compare": ("parity.compare", "step tasks beside native and compare every bit"),
+    "replay": ("parity.replay", "play recorded actions beside native, episode by episode"),
     "readme": ("parity.readme", "write the recorded results into README.md, or check them there"),
     "render": ("parity.render", "show native and ours side by side, with their difference"),
 }

@@ -1,4 +1,4 @@
-"""`python -m rollouts demo`: an expert plays a task, and a recording of it is left behind."""
+"""`python -m rollouts COMMAND`: let experts play tasks, record them, and play recordings again."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from robots import RobotLayoutsError, UnknownNameError
+from rollouts import record_command, replay_command
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -20,16 +21,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 if all went well, 1 if not, 2 if the command makes no sense.
     """
     options = _parser().parse_args(arguments)
+    try:
+        return options.run(options)
+    except RobotLayoutsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2 if isinstance(error, UnknownNameError) else 1
+
+
+def _demo(options: argparse.Namespace) -> int:
     from rich.console import Console
 
     from rollouts.demo import DemoOptions, run_demo
 
     chosen = DemoOptions(options.task, options.seeds, options.out, video=not options.no_video)
-    try:
-        return 0 if run_demo(chosen, Console()) else 1
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2 if isinstance(error, UnknownNameError) else 1
+    return 0 if run_demo(chosen, Console()) else 1
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -41,6 +46,13 @@ def _parser() -> argparse.ArgumentParser:
     add("--seeds", type=_count, default=10, metavar="N", help="play seeds 0 to N - 1 (default 10)")
     add("--out", type=Path, default=Path("runs/demo"), metavar="DIR", help="default %(default)s")
     add("--no-video", action="store_true", help="make no video")
+    demo.set_defaults(run=_demo)
+    for name, module in (("record", record_command), ("replay", replay_command)):
+        command = commands.add_parser(
+            name, help=module.DESCRIPTION, description=module.DESCRIPTION, epilog=module.EPILOG
+        )
+        module.add_arguments(command)
+        command.set_defaults(run=module.run)
     return parser
 
 

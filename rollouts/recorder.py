@@ -2,35 +2,58 @@
 
 from __future__ import annotations
 
-import json
+import fcntl
+import glob
 import os
-from collections.abc import Generator
-from contextlib import contextmanager
+import shutil
+import weakref
+from collections.abc import Container, Mapping
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import h5py
-
-from layouts import Layout
 from robots import RecordingError
-from rollouts.episode import REBUILT, Episode
+from rollouts.episode import Episode
+from rollouts.parts import (
+    PARTIAL,
+    PartWriter,
+    Stored,
+    disk_errors,
+    join,
+    json_text,
+    list_parts,
+    part_path,
+    read_stored,
+    seed_of,
+    write_json,
+)
+from rollouts.provenance import describe_layout, describe_simulation, differences, listing
 from tasks import MultiRobotTask
 from tasks.native_format import observation_keys
 
-COMPRESSION = {"compression": "gzip", "compression_opts": 4}
+__all__ = ["Recorder", "describe_layout"]
+
+SOURCE = ("source_type", "source_desc")  # may change from one resumption to the next
 
 
 class Recorder:
     """A recording that grows by whole episodes; whatever ends it, the finished ones stay.
 
+    Each finished episode is a file of its own in a folder beside the recording, until `close`
+    joins them in the order of their seeds. If the process is killed before, the next Recorder
+    that resumes the recording finds them there.
+
     In the h5 file ``traj_i`` holds the flat actions (T, A), env states (T + 1, k), rewards and
     flags (T,). Its attribute ``action_split`` is json: robot name → first and last + 1 action
-    number. The file's attribute ``layout`` is json too; see `describe_layout`.
+    number. The file's attributes ``layout`` and ``simulation`` are json too; see
+    `rollouts.provenance`.
 
     Attributes:
         path: The h5 file.
         json_path: The json file beside it.
+        parts: The folder of finished episodes that are not joined yet.
+        writer: Writes one episode; may be handed to worker processes.
     """
 
     def __init__(
@@ -39,50 +62,43 @@ class Recorder:
         task: MultiRobotTask,
         *,
         overwrite: bool = False,
+        resume: bool = False,
         source: str = "scripted",
+        source_desc: str | None = None,
     ) -> None:
-        """Begin a recording.
+        """Begin a recording, or go on with one.
 
         Args:
             path: Name of the h5 file; its folder is made.
             task: The task whose episodes are recorded.
             overwrite: Whether a recording that is already there may be replaced.
+            resume: Whether to keep the episodes that are already there.
             source: Where the actions come from, in ManiSkill's words (``source_type``).
+            source_desc: The same in your own words.
 
         Raises:
-            RecordingError: If the file is there already, or cannot be made.
+            RecordingError: If there is a recording already and neither ``overwrite`` nor
+                ``resume``, it is of something else or in use by another process, or the folder
+                cannot be written.
+            AssetError: If robot files cannot be found.
         """
         self.path = Path(path)
         self.json_path = self.path.with_suffix(".json")
-        if self.path.exists() and not overwrite:
-            raise RecordingError(
-                f"{self.path} is there already; choose another name, or pass overwrite=True"
-            )
-        self._control_mode = _control_mode(task)
-        self._split = {n: [part.start, part.stop] for n, part in task.action_split.items()}
-        layout = describe_layout(task.layout)
-        self._summary: dict[str, Any] = {
-            "env_info": {
-                "env_id": task.task_id,
-                "env_kwargs": {
-                    "obs_mode": "none",
-                    "reward_mode": task.reward_mode,
-                    "control_mode": task.made_from.control_mode,
-                    "sim_backend": "physx_cpu",
-                },
-                "max_episode_steps": task.max_episode_steps,
-            },
-            "episodes": [],
-            "source_type": source,
-            "layout": layout,
-        }
-        with _disk_errors(self.path):
+        self.parts = self.path.with_suffix(".parts")
+        self._header = _header(task, source, source_desc)
+        with disk_errors(self.path):
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.json_path.unlink(missing_ok=True)
-            self._file = h5py.File(self.path, "w")
-            self._file.attrs["layout"] = json.dumps(layout)
-            self._file.flush()
-            self._write_summary()
+            lock = _lock(self.parts)
+            try:
+                self._joined = self._begin(overwrite=overwrite, resume=resume)
+            except BaseException:
+                with suppress(OSError):  # not empty
+                    self.parts.rmdir()
+                os.close(lock)
+                raise
+        self._release = weakref.finalize(self, os.close, lock)
+        self.writer = PartWriter(self.parts.absolute(), self._header, _control_mode(task))
+        self._closed = False
 
     def __enter__(self) -> Recorder:
         """Return itself."""
@@ -94,79 +110,147 @@ class Recorder:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Close the file."""
-        self.close()
+        """Close the recording; if it ends by an error, that is the one that counts."""
+        try:
+            self.close()
+        except RecordingError:
+            if error is None:
+                raise
 
     def __len__(self) -> int:
         """Return the number of episodes recorded."""
-        return len(self._summary["episodes"])
+        return len(self.seeds)
+
+    @property
+    def seeds(self) -> set[int]:
+        """Seeds of all episodes recorded, those that worker processes wrote included."""
+        return {*self._joined, *(seed_of(part) for part in list_parts(self.parts))}
 
     def add(self, episode: Episode) -> None:
-        """Write one episode; it is in both files when this returns.
-
-        It becomes part of the h5 file in one small step after all its data are on disk, so that a
-        process killed in between leaves the file as it was.
+        """Write one episode; it is kept when this returns.
 
         Raises:
-            RecordingError: If it cannot be written; the episodes before it stay.
+            RecordingError: If it cannot be written; the episodes before it stay. Also if there
+                is one of that seed already, or the recording was closed.
         """
-        number = len(self)
-        with _disk_errors(self.path):
-            group = self._file.create_group(None)
-            self._fill(group, episode)
-            self._file.flush()
-            self._file[f"traj_{number}"] = group
-            self._file.flush()
-            self._summary["episodes"].append(
-                {
-                    "episode_id": number,
-                    "episode_seed": episode.seed,
-                    "control_mode": self._control_mode,
-                    "elapsed_steps": len(episode.actions),
-                    "reset_kwargs": {"seed": episode.seed, "options": REBUILT},
-                    "success": episode.solved,
-                }
-            )
-            self._write_summary()
+        if self._closed:
+            raise RecordingError(f"cannot write {self.path}: the recording was closed")
+        if episode.seed in self._joined or part_path(self.parts, episode.seed).exists():
+            raise RecordingError(f"{self.path} has an episode of seed {episode.seed} already")
+        self.writer.write(episode)
 
     def close(self) -> None:
-        """Close the h5 file; closing twice is allowed."""
-        with _disk_errors(self.path):
-            self._file.close()
+        """Join the episodes into the h5 file and write the json; closing twice is allowed.
 
-    def _fill(self, group: h5py.Group, episode: Episode) -> None:
-        group.attrs["action_split"] = json.dumps(self._split)
-        group.create_dataset("actions", data=episode.actions, **COMPRESSION)
-        for kind, entries in episode.states.items():
-            for name, rows in entries.items():
-                group.create_dataset(f"env_states/{kind}/{name}", data=rows, **COMPRESSION)
-        for name in ("rewards", "success", "terminated", "truncated"):
-            group.create_dataset(name, data=getattr(episode, name))
+        Raises:
+            RecordingError: If they cannot be written; the finished episodes stay where they are.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            self._join()
+        finally:
+            self._release()
 
-    def _write_summary(self) -> None:
-        """Replace the json file in one step."""
-        partial = self.json_path.with_name(f"{self.json_path.name}.{os.getpid()}.partial")
-        partial.write_text(json.dumps(self._summary, indent=1) + "\n")
-        os.replace(partial, self.json_path)
+    def _begin(self, *, overwrite: bool, resume: bool) -> dict[int, Stored]:
+        """Check and tidy what is there; returns the episodes of the h5 file by seed."""
+        there = [path for path in (self.path, *list_parts(self.parts)) if path.exists()]
+        if there and not (overwrite or resume):
+            raise RecordingError(
+                f"{there[0]} is there already; choose another name, or pass overwrite=True to"
+                " replace the recording or resume=True to go on with it"
+            )
+        for left_over in (*self.parts.glob(f"*{PARTIAL}"), *self.path.parent.glob(self._partials)):
+            left_over.unlink(missing_ok=True)
+        if overwrite:
+            for path in (self.json_path, *there):
+                path.unlink(missing_ok=True)
+        joined = self._read_joined()
+        for part in list_parts(self.parts):
+            self._check_part(part, joined)
+        return joined
+
+    @property
+    def _partials(self) -> str:
+        return f"{glob.escape(self.path.stem)}.*{PARTIAL}"
+
+    def _read_joined(self) -> dict[int, Stored]:
+        if not self.path.exists():
+            return {}
+        header, stored = read_stored(self.path)
+        self._expect_same(self.path, header)
+        return {e.about["episode_seed"]: e for e in sorted(stored, key=_seed)}
+
+    def _check_part(self, part: Path, joined: Container[int]) -> None:
+        """Refuse a part of another recording; remove one that is damaged or already joined."""
+        try:
+            header, _ = read_stored(part)
+        except RecordingError:  # by a power cut, say: its episode is recorded again
+            part.unlink()
+            return
+        self._expect_same(part, header)
+        if seed_of(part) in joined:
+            part.unlink()
+
+    def _expect_same(self, path: Path, header: Mapping[str, Any]) -> None:
+        before, now = (
+            {name: value for name, value in about.items() if name not in SOURCE}
+            for about in (header, self._header)
+        )
+        found = differences(before, now)
+        if found:
+            raise RecordingError(
+                f"{path} was recorded with something else, so this recording cannot go on there"
+                f" ({listing(found)}); choose another folder"
+            )
+
+    def _join(self) -> None:
+        parts = list_parts(self.parts)
+        if parts or not self.path.exists():
+            stored = dict(self._joined)
+            for part in parts:
+                stored[seed_of(part)] = read_stored(part)[1][0]
+            self._joined = {seed: stored[seed] for seed in sorted(stored)}
+            join(self.path, self._header, list(self._joined.values()))
+        summary = {**self._header, "episodes": self._entries()}
+        if not self._json_says(json_text(summary)):
+            write_json(self.json_path, summary)
+        shutil.rmtree(self.parts, ignore_errors=True)  # the next Recorder removes what is left
+
+    def _entries(self) -> list[dict[str, Any]]:
+        stored = enumerate(self._joined.values())
+        return [{"episode_id": number, **episode.about} for number, episode in stored]
+
+    def _json_says(self, text: str) -> bool:
+        try:
+            return self.json_path.read_text() == text
+        except OSError:
+            return False
 
 
-def describe_layout(layout: Layout) -> dict[str, dict[str, Any]]:
-    """Return robot, base pose (m, wxyz), keyframe, noise (rad) and action numbers by robot name.
-
-    Everything in it can be written as json; the order is that of the action numbers.
-    """
-    split = layout.action_split
+def _header(task: MultiRobotTask, source: str, source_desc: str | None) -> dict[str, Any]:
+    """Return what the json and the attributes of every file say about all episodes."""
     return {
-        name: {
-            "robot": placement.robot.name,
-            "position": list(placement.base_position),
-            "quaternion": list(placement.base_quaternion),
-            "keyframe": placement.start_keyframe,
-            "qpos_noise": placement.qpos_noise,
-            "action": [split[name].start, split[name].stop],
-        }
-        for name, placement in layout.items()
+        "env_info": {
+            "env_id": task.task_id,
+            "env_kwargs": {
+                "obs_mode": "none",
+                "reward_mode": task.reward_mode,
+                "control_mode": task.made_from.control_mode,
+                "sim_backend": "physx_cpu",
+            },
+            "max_episode_steps": task.max_episode_steps,
+        },
+        "source_type": source,
+        "source_desc": source_desc,
+        "layout": describe_layout(task.layout),
+        "simulation": describe_simulation(task),
     }
+
+
+def _seed(stored: Stored) -> int:
+    return stored.about["episode_seed"]
 
 
 def _control_mode(task: MultiRobotTask) -> str | dict[str, str]:
@@ -176,12 +260,23 @@ def _control_mode(task: MultiRobotTask) -> str | dict[str, str]:
     return dict.fromkeys(keys, mode) if keys else mode
 
 
-@contextmanager
-def _disk_errors(path: Path) -> Generator[None]:
-    """Turn what the disk refuses into one of our errors; h5py says it in several ways."""
-    try:
-        yield
-    except RecordingError:
-        raise
-    except (OSError, RuntimeError, ValueError) as error:
-        raise RecordingError(f"cannot write {path}: {error}") from error
+def _lock(folder: Path) -> int:
+    """Make a folder and take the only right to it; the open descriptor holds the right.
+
+    Raises:
+        RecordingError: If another process has it.
+    """
+    while True:
+        folder.mkdir(exist_ok=True)
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(descriptor)
+            raise RecordingError(f"another process is recording into {folder}") from None
+        except OSError:
+            return descriptor  # a file system without locks
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(descriptor), folder.stat()):
+                return descriptor
+        os.close(descriptor)  # its owner removed it meanwhile

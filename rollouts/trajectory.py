@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from robots import CONTROL_MODES, RobotLayoutsError, closest_match
 from rollouts.episode import States
+from rollouts.provenance import describe_layout, describe_simulation, differences, listing
+from tasks import MultiRobotTask
 
 _FLAGS = ("success", "terminated", "truncated")
 
@@ -42,6 +44,8 @@ class Trajectory:
         success: Shape (T,), or None.
         terminated: Shape (T,), or None.
         truncated: Shape (T,), or None.
+        rebuilt: Whether its reset rebuilt the world, so that its states can be had again to the
+            last bit; where worlds are reused, they also depend on the episodes before.
     """
 
     episode_id: int
@@ -53,6 +57,12 @@ class Trajectory:
     success: NDArray[np.bool_] | None = None
     terminated: NDArray[np.bool_] | None = None
     truncated: NDArray[np.bool_] | None = None
+    rebuilt: bool = False
+
+    @property
+    def solved(self) -> bool | None:
+        """Whether the last step ended in success; None if the file does not say."""
+        return None if self.success is None else bool(self.success[-1])
 
 
 class TrajectoryFile(Sequence[Trajectory]):
@@ -65,7 +75,8 @@ class TrajectoryFile(Sequence[Trajectory]):
         max_episode_steps: Control steps until an episode was truncated, or None.
         env_kwargs: What native's environment was made with.
         source_type: Where the actions come from, in ManiSkill's words, or None.
-        layout: What `rollouts.recorder.describe_layout` wrote; None in native's files.
+        layout: What `rollouts.provenance.describe_layout` wrote; None in native's files.
+        simulation: What `rollouts.provenance.describe_simulation` wrote; None in native's files.
         action_split: Robot name → slice of the flat action; None in native's files.
         seeds: Reset seed of each episode, or None.
     """
@@ -93,8 +104,10 @@ class TrajectoryFile(Sequence[Trajectory]):
         self.control_mode = self._common_mode()
         with _damage(self.path, "this h5 file"):
             self._file = h5py.File(self.path, "r")
-            layout: Any = json.loads(self._file.attrs.get("layout", "null"))
-        self.layout: dict[str, Any] | None = layout
+            about: list[dict[str, Any] | None] = [
+                json.loads(self._file.attrs.get(name, "null")) for name in ("layout", "simulation")
+            ]
+        self.layout, self.simulation = about
         self.action_split = (
             {name: slice(*robot["action"]) for name, robot in self.layout.items()}
             if self.layout
@@ -161,6 +174,28 @@ class TrajectoryFile(Sequence[Trajectory]):
                     f"its actions have shape {shape}, not (T, {action_dim}): the robots are others",
                 )
 
+    def expect_world(self, task: MultiRobotTask) -> None:
+        """Refuse a task with another layout, robot files or physics than the recording had.
+
+        Native's files do not say what they had; they pass.
+
+        Raises:
+            TrajectoryError: If something differs; names every difference, or the first few.
+        """
+        here = {"layout": describe_layout(task.layout), "simulation": describe_simulation(task)}
+        recorded = {"layout": self.layout, "simulation": self.simulation}
+        found = [
+            difference
+            for name, about in recorded.items()
+            if about is not None
+            for difference in differences(about, here[name])
+        ]
+        if found:
+            raise TrajectoryError(
+                f"{self.path} was recorded in another world than this {task.task_id}:"
+                f" {listing(found)}"
+            )
+
     def _common_mode(self) -> str:
         default = self.env_kwargs.get("control_mode")
         found = {mode for episode in self._episodes for mode in _modes(episode, default)}
@@ -196,14 +231,22 @@ class TrajectoryFile(Sequence[Trajectory]):
             states=states,
             rewards=_column(columns, "rewards", np.float32),
             **{flag: _column(columns, flag, np.bool_) for flag in _FLAGS},
+            rebuilt=bool((_reset(about).get("options") or {}).get("reconfigure")),
         )
 
     def _group(self, about: Mapping[str, Any]) -> Any:
         name = _name(about)
         with _damage(self.path, name):
             group: Any = self._file.get(name)
+            own: Any = json.loads(getattr(group, "attrs", {}).get("episode", "null"))
         if not isinstance(group, h5py.Group):
             self._refuse(about, "the json beside it lists it, but it is not in the file")
+        if own is not None and own["episode_seed"] != about.get("episode_seed"):
+            self._refuse(
+                about,
+                f"the json beside it says seed {about.get('episode_seed')}, the file"
+                f" {own['episode_seed']}: the recording was killed as it ended; resume it once",
+            )
         return group
 
     def _actions(self, about: Mapping[str, Any]) -> h5py.Dataset:
@@ -280,8 +323,12 @@ def _name(about: Mapping[str, Any]) -> str:
     return f"traj_{about['episode_id']}"
 
 
+def _reset(about: Mapping[str, Any]) -> Mapping[str, Any]:
+    return about.get("reset_kwargs") or {}
+
+
 def _seed(about: Mapping[str, Any]) -> int | None:
-    seed = (about.get("reset_kwargs") or {}).get("seed")
+    seed = _reset(about).get("seed")
     if isinstance(seed, list) and len(seed) == 1:
         seed = seed[0]
     return seed if isinstance(seed, int) else None

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 from torch.linalg import vector_norm
 
@@ -54,18 +55,19 @@ class State:
     Attributes:
         num_envs: Number of worlds N.
         joint_positions: Joint positions of all robots, in layout order, (N, dof) (rad, m).
+        joint_velocities: Their velocities, (N, dof) (rad/s, m/s).
         memo: What was computed from it already.
     """
 
     __slots__ = (
         "_distances",
         "_index",
-        "_joint_velocities",
         "_offsets",
         "_poses",
         "_simulation",
         "_stamp",
         "joint_positions",
+        "joint_velocities",
         "memo",
         "num_envs",
     )
@@ -81,7 +83,7 @@ class State:
         self.num_envs = count = len(simulation.worlds)
         self._poses = poses = np.empty((index.frames, count, 7), np.float32)
         self.joint_positions = qpos = np.empty((count, index.dof), np.float32)
-        self._joint_velocities = qvel = np.empty((count, index.dof), np.float32)
+        self.joint_velocities = qvel = np.empty((count, index.dof), np.float32)
         entities = poses[: index.entities]
         for i, world in enumerate(simulation.worlds):
             packed = np.frombuffer(world.scene.pack_poses(), np.float32).reshape(-1, 7)
@@ -93,6 +95,10 @@ class State:
         for frame, orientation, points in index.mean_frames:
             poses[frame, :, :3] = sum(poses[point, :, :3] for point in points) / len(points)
             poses[frame, :, 3:] = poses[orientation, :, 3:]
+
+    def poses(self, frames: Sequence[int]) -> NDArray[np.float32]:
+        """Return a copy of the poses of some frames of `ReadoutIndex`, shape (K, N, 7)."""
+        return self._poses.take(frames, 0)
 
     # -- bodies ------------------------------------------------------------------------------
 
@@ -146,11 +152,11 @@ class State:
 
     def qvel(self, robot: str) -> Tensor:
         """Joint velocities of a robot in SAPIEN's joint order, shape (N, dof) (rad/s, m/s)."""
-        return torch.from_numpy(self._joint_velocities[:, self._index.joints[robot]])
+        return torch.from_numpy(self.joint_velocities[:, self._index.joints[robot]])
 
     def arm_qvel(self, robot: str) -> Tensor:
         """Joint velocities of a robot without its gripper, shape (N, arm joints) (rad/s)."""
-        return torch.from_numpy(self._joint_velocities[:, self._index.arm_joints[robot]])
+        return torch.from_numpy(self.joint_velocities[:, self._index.arm_joints[robot]])
 
     def link_pose(self, robot: str, link: str) -> Tensor:
         """Pose of a link, shape (N, 7)."""
@@ -208,7 +214,7 @@ class State:
     @_remembered
     def is_static(self, robot: str, threshold: float = 0.2) -> Tensor:
         """Whether no arm joint is faster than ``threshold`` (rad/s), shape (N,) bool."""
-        speeds = np.abs(self._joint_velocities[:, self._index.arm_joints[robot]])
+        speeds = np.abs(self.joint_velocities[:, self._index.arm_joints[robot]])
         return torch.from_numpy(np.maximum.reduce(speeds, 1) <= np.float32(threshold))
 
     # -- contacts ----------------------------------------------------------------------------

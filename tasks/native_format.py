@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from layouts import Layout
@@ -59,6 +60,60 @@ def _root_rows(simulation: Simulation, state: State, robot: str) -> list[Tensor]
         torch.from_numpy(np.stack([root.linear_velocity for root in roots])),
         torch.from_numpy(np.stack([root.angular_velocity for root in roots])),
     ]
+
+
+class StateTape:
+    """What `read_state_dict` returns, for many moments: cheap to write, put together at the end.
+
+    A tape is for one episode, as it keeps hold of the worlds' bodies: begin it after a reset.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        """Find what has to be read."""
+        world = simulation.worlds[0]
+        moving = [name for name, body in world.bodies.items() if body.kind != "static"]
+        dynamic = [name for name in moving if world.bodies[name].kind == "dynamic"]
+        keys = articulation_keys(simulation.layout)
+        self._bodies = {name: place for place, name in enumerate(moving)}
+        self._robots = {keys[name]: (len(moving) + i, name) for i, name in enumerate(world.robots)}
+        self._joints = simulation.index.joints
+        self._frames = [simulation.index.bodies[name] for name in moving]
+        self._frames += [simulation.index.bases[name] for name in world.robots]
+        self._with_velocity = [self._bodies[name] for name in dynamic]
+        self._with_velocity += [place for place, _ in self._robots.values()]
+        self._components: list[Any] = [
+            component
+            for world in simulation.worlds
+            for component in (
+                *(world.bodies[name].component for name in dynamic),
+                *(robot.articulation.links[0] for robot in world.robots.values()),
+            )
+        ]
+        self._rows: list[tuple[Any, ...]] = []
+
+    def write(self, state: State) -> None:
+        """Add the present moment; ``state`` must be the read-out of it."""
+        velocities = [(part.linear_velocity, part.angular_velocity) for part in self._components]
+        self._rows.append(
+            (state.poses(self._frames), velocities, state.joint_positions, state.joint_velocities)
+        )
+
+    def read(self) -> dict[str, dict[str, NDArray[np.float32]]]:
+        """Return every entry of the state dict with all moments, each (moments, N, k)."""
+        poses, velocities, qpos, qvel = (np.stack(rows) for rows in zip(*self._rows, strict=True))
+        moments, frames, count, _ = poses.shape
+        roots = np.zeros((moments, count, frames, 13), np.float32)
+        roots[..., :7] = poses.swapaxes(1, 2)
+        roots[:, :, self._with_velocity, 7:] = velocities.reshape(moments, count, -1, 6)
+        return {
+            "actors": {name: roots[:, :, place].copy() for name, place in self._bodies.items()},
+            "articulations": {
+                key: np.concatenate(
+                    [roots[:, :, place], *(q[:, :, self._joints[name]] for q in (qpos, qvel))], 2
+                )
+                for key, (place, name) in self._robots.items()
+            },
+        }
 
 
 def write_state_dict(

@@ -18,6 +18,7 @@ from simulation import PhysicsSettings, Simulation, State, World
 from tasks.actions import ActionReader
 from tasks.native_format import (
     StateDict,
+    StateTape,
     observation_keys,
     read_state_dict,
     write_state_dict,
@@ -280,6 +281,14 @@ class MultiRobotTask:
     def get_state_dict(self) -> StateDict:
         """Return all poses and velocities under native's keys; see `native_format`."""
         return read_state_dict(self.simulation, self._state)
+
+    def begin_tape(self) -> StateTape:
+        """Return a tape of states for the present episode; see `write_tape`."""
+        return StateTape(self.simulation)
+
+    def write_tape(self, tape: StateTape) -> None:
+        """Add the present state to a tape: what `get_state_dict` returns, much cheaper."""
+        tape.write(self._state)
 
     def set_state_dict(
         self, state: Mapping[str, Mapping[str, Any]], env_ids: Sequence[int] | None = None

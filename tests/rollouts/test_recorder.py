@@ -2,10 +2,14 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -15,6 +19,7 @@ import tasks
 from robots import ActionError, RecordingError, TaskError
 from rollouts.episode import Episode, play
 from rollouts.recorder import Recorder
+from rollouts.trajectory import TrajectoryFile
 from tests.rollouts.hand_overs import TASK, plan, task
 
 SEEDS = (0, 3)
@@ -128,11 +133,12 @@ KILLED = """
 import sys, numpy as np, tasks
 from rollouts.episode import play
 from rollouts.recorder import Recorder
+from rollouts.trajectory import TrajectoryFile
 env = tasks.make("PushT-v1")
-recorder = Recorder(sys.argv[1], env)
-for seed in range(10**6):
-    recorder.add(play(env, seed, np.zeros((3, 7), np.float32)))
-    print(seed, flush=True)
+with Recorder(sys.argv[1], env) as recorder:
+    for seed in range(10**6):
+        recorder.add(play(env, seed, np.full((3, 7), seed / 100, np.float32)))
+        print(seed, flush=True)
 """
 
 
@@ -146,24 +152,276 @@ def test_a_killed_recording_keeps_its_finished_episodes(tmp_path):
         time.sleep(0.02)
         os.kill(process.pid, signal.SIGKILL)
         finished += [int(line) for line in process.stdout.read().split("\n")[:-1]]
-    summary = json.loads(path.with_suffix(".json").read_text())
-    assert [entry["episode_seed"] for entry in summary["episodes"]][: len(finished)] == finished
-    with h5py.File(path) as file:
-        assert len(finished) <= len(summary["episodes"]) <= len(file)
-        for i in range(len(file)):
-            assert file[f"traj_{i}/env_states/actors/Tee"].shape == (4, 13)
+    assert not path.exists()
+    with Recorder(path, tasks.make("PushT-v1"), resume=True) as recorder:
+        assert set(finished) <= recorder.seeds <= {*finished, len(finished)}
+    with TrajectoryFile(path) as file:
+        assert list(file.seeds) == list(range(len(file)))
+        assert len(file) == len(recorder)
+        for episode in file:
+            assert episode.actions.shape == (3, 7)
+            assert (episode.actions == np.float32(episode.seed / 100)).all()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["killed.h5", "killed.json"]
 
 
-def test_an_episode_is_readable_before_the_recording_ends(tmp_path):
+def same_files(one: Path, other: Path) -> bool:
+    return all(
+        one.with_suffix(kind).read_bytes() == other.with_suffix(kind).read_bytes()
+        for kind in (".h5", ".json")
+    )
+
+
+@pytest.fixture(scope="module")
+def push_t():
     env = tasks.make("PushT-v1")
-    path = tmp_path / "open.h5"
-    with Recorder(path, env) as recorder:
-        recorder.add(short_episode(env, 0))
-        copy = tmp_path / "copy.h5"
-        copy.write_bytes(path.read_bytes())
-        with h5py.File(copy) as file:
-            assert file["traj_0/actions"].shape == (3, 7)
-        assert len(json.loads(recorder.json_path.read_text())["episodes"]) == len(recorder) == 1
+    return env, [short_episode(env, seed) for seed in range(12)]
+
+
+def write(path: Path, env: tasks.MultiRobotTask, episodes, **how) -> Path:
+    with Recorder(path, env, **how) as recorder:
+        for episode in episodes:
+            recorder.add(episode)
+    return path
+
+
+def test_a_part_says_what_it_is(tmp_path, push_t):
+    env, episodes = push_t
+    with Recorder(tmp_path / "open.h5", env) as recorder:
+        recorder.add(episodes[3])
+        (part,) = recorder.parts.iterdir()
+        with h5py.File(part) as file:
+            np.testing.assert_array_equal(file["traj_0/actions"], episodes[3].actions)
+            header = json.loads(file.attrs["header"])
+            assert header["layout"]["arm"]["robot"] == "panda_stick"
+        assert len(recorder) == 1
+
+
+def test_the_order_in_which_episodes_come_makes_no_difference(tmp_path, push_t):
+    env, episodes = push_t
+    straight = write(tmp_path / "one.h5", env, episodes)
+    for number, half in enumerate((episodes[1::2][::-1], episodes[::2])):
+        crooked = write(tmp_path / "two.h5", env, half, resume=number > 0)
+    assert same_files(straight, crooked)
+
+
+def test_a_recording_goes_on_whatever_moment_it_was_killed_at(tmp_path, push_t, monkeypatch):
+    """Stop at every change of the disk that closing makes, as a kill would, and go on."""
+    env, episodes = push_t
+    whole = write(tmp_path / "whole.h5", env, episodes)
+    calls = [(os, "replace"), (Path, "write_text"), (shutil, "rmtree"), (os, "fsync")]
+
+    class Killed(BaseException):
+        pass
+
+    stops = 0
+    while True:
+        path = write(tmp_path / f"{stops}" / "killed.h5", env, episodes[:5])
+        remaining = stops
+
+        def stop_or(call):
+            def replacement(*arguments, **keywords):
+                nonlocal remaining
+                remaining -= 1
+                if remaining < 0:
+                    raise Killed
+                return call(*arguments, **keywords)
+
+            return replacement
+
+        with monkeypatch.context() as patch, suppress(Killed):
+            recorder = Recorder(path, env, resume=True)
+            for episode in episodes[5:]:
+                recorder.add(episode)
+            for owner, name in calls:
+                patch.setattr(owner, name, stop_or(getattr(owner, name)))
+            recorder.close()
+        with Recorder(path, env, resume=True) as again:
+            assert again.seeds == set(range(12)), f"after {stops} calls"
+        assert same_files(path, whole), f"after {stops} calls"
+        assert not again.parts.exists()
+        if remaining > 0:
+            break
+        stops += 1
+    assert stops >= 5
+
+
+def test_what_a_kill_leaves_half_done_is_tidied(tmp_path, push_t):
+    env, episodes = push_t
+    path = write(tmp_path / "tidy.h5", env, episodes[:2])
+    parts = path.with_suffix(".parts")
+    parts.mkdir()
+    (parts / "seed-0000000007.h5.123.partial").write_bytes(b"half")
+    (parts / "seed-0000000008.h5").write_bytes(b"damaged")
+    path.with_name("tidy.h5.partial").write_bytes(b"half")
+    path.with_name("tidy.json.partial").write_text("{")
+    path.with_name("untidy.h5.partial").write_text("another's")
+    with Recorder(path, env, resume=True) as recorder:
+        assert recorder.seeds == {0, 1}
+    names = sorted(p.name for p in tmp_path.iterdir())
+    assert names == ["tidy.h5", "tidy.json", "untidy.h5.partial"]
+
+
+def test_one_episode_per_seed(tmp_path, push_t):
+    env, episodes = push_t
+    path = write(tmp_path / "once.h5", env, episodes[:1])
+    with Recorder(path, env, resume=True) as recorder:
+        recorder.add(episodes[1])
+        for again in episodes[:2]:
+            with pytest.raises(RecordingError, match=f"an episode of seed {again.seed} already"):
+                recorder.add(again)
+    assert json.loads(path.with_suffix(".json").read_text())["episodes"][1]["episode_seed"] == 1
+
+
+def test_two_recorders_do_not_write_the_same_recording(tmp_path, push_t):
+    env, episodes = push_t
+    with Recorder(tmp_path / "one.h5", env):
+        with pytest.raises(RecordingError, match=r"another process is recording into .*one.parts"):
+            Recorder(tmp_path / "one.h5", env, overwrite=True)
+        write(tmp_path / "two.h5", env, episodes[:1])  # another one may be
+    Recorder(tmp_path / "one.h5", env, overwrite=True).close()
+
+
+class TestResuming:
+    def refusal(self, path, env):
+        with pytest.raises(RecordingError) as caught:
+            Recorder(path, env, resume=True)
+        return str(caught.value)
+
+    @pytest.mark.parametrize("joined", [True, False])
+    def test_another_task_or_robot(self, tmp_path, push_t, joined):
+        env, episodes = push_t
+        path = tmp_path / "other.h5"
+        if joined:
+            write(path, env, episodes[:1])
+        else:
+            Recorder(path, env).add(episodes[0])
+        said = self.refusal(path, tasks.make("PullCube-v1"))
+        assert 'env_info.env_id: recorded "PushT-v1", here "PullCube-v1"' in said
+        other = replace(env.layout["arm"].robot, name="other_stick")
+        said = self.refusal(path, tasks.make("PushT-v1", robots=other))
+        assert 'layout.arm.robot: recorded "panda_stick", here "other_stick"' in said
+        assert "choose another folder" in said
+
+    def test_another_reward_or_control_mode(self, tmp_path, push_t):
+        env, episodes = push_t
+        path = write(tmp_path / "other.h5", env, episodes[:1])
+        said = self.refusal(path, tasks.make("PushT-v1", reward_mode="sparse"))
+        assert 'reward_mode: recorded "normalized_dense", here "sparse"' in said
+        said = self.refusal(path, tasks.make("PushT-v1", control_mode="pd_joint_pos"))
+        assert 'control_mode: recorded "pd_joint_delta_pos", here "pd_joint_pos"' in said
+
+    def test_a_foreign_file(self, tmp_path, push_t):
+        path = tmp_path / "foreign.h5"
+        with h5py.File(path, "w") as file:
+            file["traj_0/actions"] = np.zeros((2, 7))
+        assert "is no recording of this library" in self.refusal(path, push_t[0])
+        path.write_text("not even h5")
+        assert "is no recording of this library" in self.refusal(path, push_t[0])
+
+    def test_a_refused_recording_leaves_nothing_behind(self, tmp_path, push_t):
+        env, episodes = push_t
+        path = write(tmp_path / "other.h5", env, episodes[:1])
+        before = path.read_bytes()
+        self.refusal(path, tasks.make("PullCube-v1"))
+        assert path.read_bytes() == before
+        assert sorted(p.name for p in tmp_path.iterdir()) == ["other.h5", "other.json"]
+
+    def test_the_json_is_mended(self, tmp_path, push_t):
+        env, episodes = push_t
+        path = write(tmp_path / "mended.h5", env, episodes[:2])
+        right = path.with_suffix(".json").read_text()
+        path.with_suffix(".json").write_text("{}")
+        Recorder(path, env, resume=True).close()
+        assert path.with_suffix(".json").read_text() == right
+
+
+FULL = """
+import sys, numpy as np, tasks
+from robots import RecordingError
+from rollouts.episode import play
+from rollouts.recorder import Recorder
+from rollouts.trajectory import TrajectoryFile
+env = tasks.make("PushT-v1")
+try:
+    with Recorder(sys.argv[1], env) as recorder:
+        for seed in range(10**4):
+            recorder.add(play(env, seed, np.zeros((3, 7), np.float32)))
+            print(seed, flush=True)
+except RecordingError as error:
+    sys.exit(f"error: {error}")
+"""
+
+
+def run_full(path: Path) -> tuple[list[int], str]:
+    done = subprocess.run([sys.executable, "-c", FULL, str(path)], capture_output=True, text=True)
+    assert done.returncode == 1, done.stderr
+    return [int(line) for line in done.stdout.split()], done.stderr.splitlines()[-1]
+
+
+def expect_resumable(path: Path, finished: list[int]) -> None:
+    copy = path.parent.parent / "copy"
+    shutil.copytree(path.parent, copy)
+    with Recorder(copy / path.name, tasks.make("PushT-v1"), resume=True) as recorder:
+        assert recorder.seeds == set(finished)
+    with TrajectoryFile(copy / path.name) as file:
+        assert [episode.seed for episode in file] == finished
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of half a megabyte, as one process per test may mount it."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=512k", "none", str(place)]
+    if subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("file systems cannot be mounted here")
+    yield place
+    subprocess.run(["umount", str(place)], check=True)
+
+
+def test_a_full_disk(small_disk):
+    path = small_disk / "trajectory.h5"
+    finished, said = run_full(path)
+    assert len(finished) >= 3
+    assert finished == list(range(len(finished)))
+    assert said.startswith(f"error: cannot write {path.with_suffix('.parts')}/seed-")
+    assert said.endswith("No space left on device")
+    expect_resumable(path, finished)
+
+
+def test_a_disk_that_fills_up_while_episodes_are_joined(small_disk, push_t):
+    env, episodes = push_t
+    path = small_disk / "trajectory.h5"
+    recorder = Recorder(path, env)
+    for episode in episodes[:5]:
+        recorder.add(episode)
+    with suppress(OSError), (small_disk / "full").open("wb", buffering=0) as stream:
+        while stream.write(bytes(1024)):
+            pass
+    with pytest.raises(RecordingError, match=r"cannot write .*trajectory.h5: .*[Nn]o space left"):
+        recorder.close()
+    (small_disk / "full").unlink()
+    with Recorder(path, env, resume=True) as again:
+        assert again.seeds == set(range(5))
+    assert [p.name for p in sorted(small_disk.iterdir())] == ["trajectory.h5", "trajectory.json"]
+
+
+def test_a_read_only_folder(tmp_path, push_t):
+    env, episodes = push_t
+    path = write(tmp_path / "recorded" / "trajectory.h5", env, episodes[:2])
+    place = path.parent
+    if subprocess.run(["mount", "--bind", place, place], capture_output=True).returncode:
+        pytest.skip("folders cannot be mounted here")
+    try:
+        subprocess.run(["mount", "-o", "remount,ro,bind", place], check=True)
+        with pytest.raises(RecordingError, match=r"cannot write .*: Read-only file system"):
+            Recorder(path, env, resume=True)
+        with pytest.raises(RecordingError, match=r"cannot write .*: Read-only file system"):
+            Recorder(place / "new.h5", env)
+        with TrajectoryFile(path) as file:
+            assert [episode.seed for episode in file] == [0, 1]
+    finally:
+        subprocess.run(["umount", place], check=True)
 
 
 def test_an_existing_recording_is_not_overwritten_unasked(tmp_path):

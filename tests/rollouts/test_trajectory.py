@@ -1,12 +1,16 @@
 """Recorded episodes are read as they were written, and every damage is told in words."""
 
 import json
+import shutil
+from dataclasses import replace
 
 import h5py
 import numpy as np
 import pytest
 
 import tasks
+from layouts import Layout
+from robots import LocalUrdf, RobotRegistry
 from rollouts.episode import play
 from rollouts.recorder import Recorder
 from rollouts.trajectory import TrajectoryError, TrajectoryFile
@@ -76,9 +80,10 @@ def test_what_a_file_lacks_is_none(path):
     with h5py.File(path, "a") as file:
         for name in ("env_states", "rewards", "success", "terminated", "truncated"):
             del file[f"traj_0/{name}"]
-        del file.attrs["layout"]
+        del file.attrs["layout"], file.attrs["simulation"]
     with TrajectoryFile(path) as file:
-        assert (file.layout, file.action_split) == (None, None)
+        assert (file.layout, file.action_split, file.simulation) == (None, None, None)
+        file.expect_world(tasks.make(TASK))
         first = file[0]
     assert [first.states, first.rewards, first.success, first.terminated] == [None] * 4
 
@@ -94,7 +99,7 @@ def test_a_truncated_file(path, keep):
 def test_damaged_inside(path):
     whole = bytearray(path.read_bytes())
     with h5py.File(path) as file:
-        place = file["traj_1/actions"].id.get_chunk_info(0).byte_offset
+        place = h5py.h5o.get_info(file["traj_1/rewards"].id).addr
     whole[place : place + 8] = b"12345678"
     path.write_bytes(whole)
     with TrajectoryFile(path) as file:
@@ -203,6 +208,70 @@ def test_another_task_or_no_episodes(path):
     edit_json(path, lambda summary: summary["episodes"].clear())
     with TrajectoryFile(path) as file, pytest.raises(TrajectoryError, match="holds no episodes"):
         file.expect(TASK, 7)
+
+
+class TestOtherWorlds:
+    """A replay where anything that physics depends on differs is refused, and it is named."""
+
+    def refusal(self, path, env):
+        with TrajectoryFile(path) as file, pytest.raises(TrajectoryError) as caught:
+            file.expect_world(env)
+        return str(caught.value)
+
+    def test_the_same_world(self, path):
+        with TrajectoryFile(path) as file:
+            file.expect_world(tasks.make(TASK))
+
+    def test_another_robot(self, path):
+        panda = replace(RobotRegistry.load("panda"), name="my_panda")
+        panda = replace(panda, keyframes={**panda.keyframes, "push_start": (0.0,) * 9})
+        said = self.refusal(path, tasks.make(TASK, robots=panda))
+        assert "recorded in another world than this PushT-v1" in said
+        assert 'arm.robot: recorded "panda_stick", here "my_panda"' in said
+        assert "; and " in said
+
+    def test_another_place(self, path):
+        placement = replace(tasks.get_task_class(TASK).layout["arm"], position=(-0.6, 0.0, 0.0))
+        said = self.refusal(path, tasks.make(TASK, layout=Layout({"arm": placement})))
+        assert said.endswith("arm.position: recorded [-0.615, 0.0, 0.0], here [-0.6, 0.0, 0.0]")
+
+    def test_another_drive(self, path):
+        stick = RobotRegistry.load("panda_stick")
+        stiff = replace(stick.action_split.groups["arm"], stiffness=1010.0)
+        robot = replace(stick, action_split=stick.action_split.replace(arm=stiff))
+        said = self.refusal(path, tasks.make(TASK, robots=robot))
+        assert said.endswith("arm.joint_groups.arm.stiffness: recorded 1000.0, here 1010.0")
+
+    def test_other_robot_files(self, path, tmp_path):
+        folder = shutil.copytree(
+            RobotRegistry.load("panda_stick").urdf.locate().parent, tmp_path / "panda"
+        )
+        urdf = folder / "panda_stick.urdf"
+        copied = replace(RobotRegistry.load("panda_stick"), urdf=LocalUrdf(urdf))
+        with TrajectoryFile(path) as file:
+            file.expect_world(tasks.make(TASK, robots=copied))  # the place makes no difference
+        urdf.write_text(urdf.read_text().replace("</robot>", "<!-- changed --></robot>"))
+        said = self.refusal(path, tasks.make(TASK, robots=copied))
+        assert "arm.assets: recorded" in said
+
+    def test_other_physics(self, path):
+        physics = replace(tasks.get_task_class(TASK).physics, position_iterations=14)
+        said = self.refusal(path, tasks.make(TASK, physics=physics))
+        assert said.endswith("physics.position_iterations: recorded 15, here 14")
+
+    def test_another_control_mode(self, path):
+        said = self.refusal(path, tasks.make(TASK, control_mode="pd_joint_pos"))
+        assert "arm.joint_groups.arm.delta: recorded true, here false" in said
+
+
+def test_a_json_of_an_earlier_moment(path):
+    def swap(summary):
+        first, second, _ = summary["episodes"]
+        first["episode_seed"], second["episode_seed"] = 1, 0
+
+    edit_json(path, swap)
+    with pytest.raises(TrajectoryError, match=r"the json beside it says seed 1, the file 0: .*re"):
+        read_all(path)
 
 
 def test_a_json_or_a_file_that_is_not_there(path):

@@ -1,0 +1,43 @@
+"""One number that tells whether two robots are built from the same files."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+
+from robots.descriptor import UrdfSource
+from robots.errors import AssetError
+from robots.urdf_xml import read_references
+
+
+def asset_fingerprint(source: UrdfSource) -> str:
+    """Return a SHA-256, in hex, over every file that physics reads.
+
+    These are the URDF, the SRDF beside it if there is one, and the collision meshes, each with
+    its path relative to the URDF; where on this machine they are makes no difference.
+
+    Args:
+        source: Where the URDF comes from; files are fetched and checked as for a simulation.
+
+    Raises:
+        AssetError: If a file cannot be had or read.
+    """
+    urdf = source.locate()
+    digest = hashlib.sha256()
+    try:
+        for path in _physics_files(urdf):
+            name = Path(os.path.relpath(path, urdf.parent)).as_posix()
+            contents = hashlib.sha256(path.read_bytes()).hexdigest()
+            digest.update(f"{contents}  {name}\n".encode())
+    except OSError as error:
+        if isinstance(error, AssetError):
+            raise
+        raise AssetError(f"cannot read {error.filename}: {error.strerror}") from error
+    return digest.hexdigest()
+
+
+def _physics_files(urdf: Path) -> list[Path]:
+    references = read_references(urdf.read_bytes(), urdf.as_posix(), exists=os.path.isfile)
+    srdf = urdf.with_suffix(".srdf")
+    return [urdf, *([srdf] if srdf.is_file() else []), *map(Path, references.collision)]

@@ -1,0 +1,56 @@
+"""What worker processes do in tests; they import this module."""
+
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from robots import TaskError
+
+TASK = "PushT-v1"
+NO_PLAN = 1007  # a seed that the expert cannot plan
+
+
+def at_random(task, seed):
+    """An expert that costs nothing: it moves at random for a while."""
+    if seed == NO_PLAN:
+        raise TaskError(f"no plan for seed {seed}")
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-1, 1, (20 + seed % 5, task.layout.action_dim)).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Play:
+    """Return who played which seed; may die, fail or linger at some."""
+
+    folder: Path | None = None
+    dies_at: int = -1
+    always: bool = False
+    fails_at: int = -1
+    breaks_at: int = -1
+    lasts: float = 0.0  # s
+
+    def __call__(self):
+        return self.play
+
+    def play(self, seed: int):
+        time.sleep(self.lasts)
+        if seed == self.dies_at and (self.always or not (self.folder / "died").exists()):
+            (self.folder / "died").touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        if seed == self.fails_at:
+            raise TaskError(f"no plan for {seed}")
+        if seed == self.breaks_at:
+            return 1 / 0
+        return os.getpid(), seed**2
+
+
+def cannot_prepare():
+    raise TaskError("nothing can be made here")
+
+
+def dies_before_it_is_ready():
+    os._exit(7)

@@ -1,0 +1,259 @@
+"""`python -m rollouts record`: the same files whatever happens on the way."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tasks
+from rollouts.__main__ import main
+from rollouts.episode import play
+from rollouts.experts import registry
+from rollouts.recorder import Recorder
+from rollouts.trajectory import TrajectoryFile
+from tests.rollouts.plays import NO_PLAN, TASK, at_random
+from tests.rollouts.test_recorder import same_files
+
+ROOT = Path(__file__).parents[2]
+FILE = "trajectory.h5"
+
+
+@pytest.fixture(autouse=True)
+def _cheap_expert(monkeypatch):
+    monkeypatch.setitem(registry._registered, TASK, at_random)
+
+
+def arguments(out: Path, episodes: int, workers: int = 1, **more: object) -> list[str]:
+    chosen = {"task": TASK, "episodes": episodes, "workers": workers, "out": out, **more}
+    return ["record", *(f"--{k.replace('_', '-')}={value}" for k, value in chosen.items())]
+
+
+def start(*words: str) -> subprocess.Popen[str]:
+    """Start a recording in a process group of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "tests.rollouts.recording_process", *words],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def wait_for_parts(out: Path, count: int) -> None:
+    deadline = time.monotonic() + 180
+    while len(list(out.glob("trajectory.parts/*.h5"))) < count:
+        assert time.monotonic() < deadline, "nothing is recorded"
+        time.sleep(0.005)
+
+
+def wait_until_nobody_is_left(process: subprocess.Popen[str]) -> None:
+    deadline = time.monotonic() + 60
+    while True:
+        try:
+            os.killpg(process.pid, 0)
+        except ProcessLookupError:
+            return
+        assert time.monotonic() < deadline, "a process is left"
+        time.sleep(0.05)
+
+
+def recorded_directly(path: Path, seeds: range) -> Path:
+    """The same recording without any process or part of the command."""
+    env = tasks.make(TASK)
+    description = f"{at_random.__module__}:{at_random.__qualname__}"
+    with Recorder(path, env, source_desc=description) as recorder:
+        for seed in seeds:
+            recorder.add(play(env, seed, at_random(env, seed)))
+    return path
+
+
+def test_workers_make_no_difference(tmp_path, capsys):
+    for workers in (1, 3):
+        assert main(arguments(tmp_path / str(workers), 7, workers, seed=4)) == 0
+        printed = capsys.readouterr().out
+        assert f"{FILE}: 7 episodes" in printed
+        assert "recorded now 7, 0 with success, 22.0 steps on average" in printed
+    one, three = (tmp_path / workers / FILE for workers in "13")
+    assert same_files(one, three)
+    assert same_files(one, recorded_directly(tmp_path / FILE, range(4, 11)))
+    with TrajectoryFile(one) as file:
+        assert file.seeds == tuple(range(4, 11))
+        file.expect_world(tasks.make(TASK))
+
+
+@pytest.mark.long
+def test_the_same_command_goes_on(tmp_path, capsys):
+    assert main(arguments(tmp_path, 2, seed=2)) == 0
+    assert main(arguments(tmp_path, 5)) == 0
+    captured = capsys.readouterr()
+    assert "2 of 5 episodes were recorded before" in captured.err
+    assert "recorded now 3," in captured.out
+    before = (tmp_path / FILE).stat()
+    assert main(arguments(tmp_path, 5, workers=2)) == 0
+    assert "5 of 5 episodes were recorded before" in capsys.readouterr().err
+    assert (tmp_path / FILE).stat().st_mtime_ns == before.st_mtime_ns
+    assert same_files(tmp_path / FILE, recorded_directly(tmp_path / "direct" / FILE, range(5)))
+
+
+@pytest.mark.long
+def test_joint_positions_are_recorded_from_an_expert_that_speaks_deltas(tmp_path):
+    assert main(arguments(tmp_path / "deltas", 2)) == 0
+    assert main(arguments(tmp_path / "positions", 2, control_mode="pd_joint_pos")) == 0
+    with (
+        TrajectoryFile(tmp_path / "deltas" / FILE) as deltas,
+        TrajectoryFile(tmp_path / "positions" / FILE) as positions,
+    ):
+        assert positions.control_mode == "pd_joint_pos"
+        for one, other in zip(deltas, positions, strict=True):
+            assert not np.array_equal(one.actions, other.actions)
+            for kind, entries in one.states.items():
+                for name, rows in entries.items():
+                    np.testing.assert_array_equal(rows, other.states[kind][name])
+
+
+@pytest.mark.long
+def test_a_seed_without_a_plan_is_told_and_tried_again(tmp_path, capsys):
+    for _ in range(2):
+        assert main(arguments(tmp_path, 3, seed=NO_PLAN - 1)) == 1
+        captured = capsys.readouterr()
+        assert f"seed {NO_PLAN} is not recorded: no plan for seed {NO_PLAN}" in captured.err
+        assert f"not recorded: seeds {NO_PLAN}" in captured.out
+        with TrajectoryFile(tmp_path / FILE) as file:
+            assert file.seeds == (NO_PLAN - 1, NO_PLAN + 1)
+
+
+@pytest.mark.long
+def test_another_recording_is_not_gone_on_with(tmp_path, capsys):
+    assert main(arguments(tmp_path, 1)) == 0
+    before = (tmp_path / FILE).read_bytes()
+    assert main(arguments(tmp_path, 2, control_mode="pd_joint_pos")) == 1
+    said = capsys.readouterr().err
+    assert 'control_mode: recorded "pd_joint_delta_pos", here "pd_joint_pos"' in said
+    assert (tmp_path / FILE).read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "complaint"),
+    [
+        (["--task=PushX-v1"], 2, "unknown task 'PushX-v1'. Did you mean 'PushT-v1'?"),
+        (["--episodes=0"], 2, "0 is too few; it must be 1 or more"),
+        (["--seed=-1"], 2, "-1 is too few; it must be 0 or more"),
+        (["--control-mode=pd_ee_pose"], 2, "invalid choice: 'pd_ee_pose'"),
+    ],
+)
+def test_bad_usage(tmp_path, capsys, words, code, complaint):
+    try:
+        found = main([*arguments(tmp_path / "never", 1), *words])
+    except SystemExit as stop:
+        found = stop.code
+    assert found == code
+    assert complaint in capsys.readouterr().err
+    assert not (tmp_path / "never").exists()
+
+
+def test_a_folder_that_cannot_be_written(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert main(arguments(tmp_path / "file", 1)) == 1
+    assert f"error: cannot write {tmp_path / 'file' / FILE}: " in capsys.readouterr().err
+
+
+def test_a_worker_that_is_killed(tmp_path):
+    process = start(*arguments(tmp_path, 60, 2))
+    wait_for_parts(tmp_path, 2)
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    workers = [p for p in children if "spawn_main" in Path(f"/proc/{p}/cmdline").read_text()]
+    os.kill(int(workers[0]), signal.SIGKILL)
+    printed, said = process.communicate(timeout=180)
+    assert process.returncode == 0, said
+    assert f"worker process {workers[0]} died by SIGKILL at seed" in said
+    assert "its episode is played again" in said
+    assert f"played again: worker process {workers[0]} died" in printed
+    assert same_files(tmp_path / FILE, recorded_directly(tmp_path / "direct" / FILE, range(60)))
+
+
+@pytest.mark.parametrize(
+    "how", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)]
+)
+def test_a_recording_that_is_interrupted(tmp_path, how):
+    process = start(*arguments(tmp_path, 10**6, 2))
+    wait_for_parts(tmp_path, 3)
+    if how is signal.SIGINT:
+        os.killpg(process.pid, how)  # as a terminal does
+    else:
+        process.send_signal(how)
+    printed, said = process.communicate(timeout=180)
+    assert process.returncode == 130
+    assert printed == ""
+    assert "Traceback" not in said
+    wait_until_nobody_is_left(process)
+    with TrajectoryFile(tmp_path / FILE) as file:
+        assert len(file) >= 3
+        last = said.splitlines()[-1]
+        assert last == f"stopped; {len(file)} episodes are recorded; the same command goes on" + (
+            " from there"
+        )
+        assert sum(len(episode.actions) for episode in file) > 60
+    assert not (tmp_path / "trajectory.parts").exists()
+
+
+def expect_killed_and_resumed(tmp_path: Path, episodes: int, kills: list[float]) -> None:
+    """Kill a recording some time after it has begun to write, and go on until it is whole."""
+    out, undisturbed = tmp_path / "killed", tmp_path / "undisturbed" / FILE
+    for patience in kills:
+        before = len(list(out.glob("trajectory.parts/*.h5")))
+        process = start(*arguments(out, episodes, 2))
+        wait_for_parts(out, before + 1)
+        time.sleep(patience)
+        process.kill()
+        process.communicate()
+        wait_until_nobody_is_left(process)
+    left = len(list(out.glob("trajectory.parts/*.h5")))
+    assert 0 < left < episodes, "it was killed too late"
+    last = start(*arguments(out, episodes, 2))
+    printed, said = last.communicate(timeout=600)
+    assert last.returncode == 0, said
+    assert f"{left} of {episodes} episodes were recorded before" in said
+    assert f"recorded now {episodes - left}," in printed
+    assert same_files(out / FILE, recorded_directly(undisturbed, range(episodes)))
+    assert sorted(path.name for path in out.iterdir()) == [FILE, "trajectory.json"]
+
+
+def test_a_recording_that_is_killed_loses_nothing(tmp_path):
+    expect_killed_and_resumed(tmp_path, 80, [random.uniform(0, 0.2)])
+
+
+@pytest.mark.long
+def test_a_recording_that_is_killed_again_and_again(tmp_path):
+    kills = [random.uniform(0, 1.5) for _ in range(8)]
+    print("seconds after the first part:", kills)
+    expect_killed_and_resumed(tmp_path, 1500, kills)
+
+
+@pytest.mark.long
+def test_a_full_disk_ends_it_with_what_is_finished(tmp_path):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=512k", "none", str(disk)]
+    if subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("file systems cannot be mounted here")
+    try:
+        process = start(*arguments(disk, 1000, 2))
+        _, said = process.communicate(timeout=180)
+        assert process.returncode == 1
+        assert "Traceback" not in said
+        kept, error = said.splitlines()[-2:]
+        assert error.startswith(f"error: cannot write {disk}/trajectory.parts/seed-")
+        assert error.endswith("No space left on device")
+        parts = len(list(disk.glob("trajectory.parts/*.h5")))
+        assert parts > 3
+        assert kept == f"stopped; {parts} episodes are recorded"
+        wait_until_nobody_is_left(process)
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)
