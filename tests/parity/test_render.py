@@ -11,6 +11,7 @@ import tasks
 from parity.__main__ import main
 from parity.clip import Candidate, Clip, ClipOptions, choose
 from parity.episodes import random_episodes
+from parity.side_by_side import HONEST
 from parity.sides import NativeSide, OurSide
 from robots import RobotRegistry
 from tests.native import NATIVE
@@ -169,7 +170,7 @@ def expect_equal(found: dict) -> None:
     for key in ("max_state_difference", "differing_frames", "mean_pixel_difference"):
         assert found[key] == 0
     assert found["max_pixel_difference"] == 0
-    assert 0 <= found["live_difference"] < 0.005
+    assert 0 <= found["live_difference"] <= HONEST
     assert (found["panel_size"], found["difference_gain"]) == (SIZE, 8.0)
     assert (found["clip"], found["sheet"]) == ("side_by_side.mp4", "side_by_side.png")
 
