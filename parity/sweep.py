@@ -30,6 +30,7 @@ from parity.comparison import EpisodeResult
 from parity.episodes import load_episodes, random_episodes, recorded_control_mode
 from parity.findings import versions
 from parity.inventory import find_files
+from parity.replay import agree
 from parity.results import ResultsError
 from parity.rollout import Source, expert_source, roll_out
 from parity.runs import Run, play
@@ -367,7 +368,7 @@ def agreement(results: Sequence[EpisodeResult]) -> dict[str, Any]:
         "equal": sum(result.equal for result in results),
         "steps": sum(result.steps for result in results),
         "contact_steps": sum(result.contact_steps for result in results),
-        "same_success": sum(r.native_success == r.our_success for r in results),
+        "same_success": sum(map(agree, results)),
         "native_success": sum(result.native_success for result in results),
         "our_success": sum(result.our_success for result in results),
         "max_difference": _number(max(max(r.max_difference.values()) for r in results)),

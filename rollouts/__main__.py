@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from robots import RobotLayoutsError, UnknownNameError
-from rollouts import record_command
+from rollouts import record_command, replay_command
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -47,7 +47,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--out", type=Path, default=Path("runs/demo"), metavar="DIR", help="default %(default)s")
     add("--no-video", action="store_true", help="make no video")
     demo.set_defaults(run=_demo)
-    for name, module in (("record", record_command),):
+    for name, module in (("record", record_command), ("replay", replay_command)):
         command = commands.add_parser(
             name, help=module.DESCRIPTION, description=module.DESCRIPTION, epilog=module.EPILOG
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -56,6 +56,8 @@ def play(
     seed: int,
     actions: NDArray[np.float32],
     watch: Callable[[], None] = lambda: None,
+    *,
+    start: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Episode:
     """Play actions in a freshly built world.
 
@@ -64,6 +66,8 @@ def play(
         seed: Seed of the reset.
         actions: Shape (T, A) with T of 1 or more.
         watch: Called after the reset and after every step.
+        start: State to begin from instead of the one after the reset; see
+            `MultiRobotTask.set_state_dict`, which is not exact.
 
     Raises:
         TaskError: If the task has several environments, or there are no actions.
@@ -74,13 +78,15 @@ def play(
     if not len(actions):
         raise TaskError("an episode needs at least one action")
     task.reset(seed, options=REBUILT)
+    if start is not None:
+        task.set_state_dict(start)
     tape, outcomes, seconds = task.begin_tape(), list[tuple[Tensor, ...]](), 0.0
     task.write_tape(tape)
     watch()
     for action in actions:
-        start = perf_counter()
+        began = perf_counter()
         _, reward, terminated, truncated, info = task.step(action)
-        seconds += perf_counter() - start
+        seconds += perf_counter() - began
         outcomes.append((reward, info["success"], terminated, truncated))
         task.write_tape(tape)
         watch()

@@ -44,6 +44,8 @@ class Trajectory:
         success: Shape (T,), or None.
         terminated: Shape (T,), or None.
         truncated: Shape (T,), or None.
+        rebuilt: Whether its reset rebuilt the world, so that its states can be had again to the
+            last bit; where worlds are reused, they also depend on the episodes before.
     """
 
     episode_id: int
@@ -55,6 +57,12 @@ class Trajectory:
     success: NDArray[np.bool_] | None = None
     terminated: NDArray[np.bool_] | None = None
     truncated: NDArray[np.bool_] | None = None
+    rebuilt: bool = False
+
+    @property
+    def solved(self) -> bool | None:
+        """Whether the last step ended in success; None if the file does not say."""
+        return None if self.success is None else bool(self.success[-1])
 
 
 class TrajectoryFile(Sequence[Trajectory]):
@@ -223,6 +231,7 @@ class TrajectoryFile(Sequence[Trajectory]):
             states=states,
             rewards=_column(columns, "rewards", np.float32),
             **{flag: _column(columns, flag, np.bool_) for flag in _FLAGS},
+            rebuilt=bool((_reset(about).get("options") or {}).get("reconfigure")),
         )
 
     def _group(self, about: Mapping[str, Any]) -> Any:
@@ -314,8 +323,12 @@ def _name(about: Mapping[str, Any]) -> str:
     return f"traj_{about['episode_id']}"
 
 
+def _reset(about: Mapping[str, Any]) -> Mapping[str, Any]:
+    return about.get("reset_kwargs") or {}
+
+
 def _seed(about: Mapping[str, Any]) -> int | None:
-    seed = (about.get("reset_kwargs") or {}).get("seed")
+    seed = _reset(about).get("seed")
     if isinstance(seed, list) and len(seed) == 1:
         seed = seed[0]
     return seed if isinstance(seed, int) else None

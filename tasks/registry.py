@@ -87,15 +87,17 @@ def list_tasks() -> tuple[str, ...]:
 def get_task_class(name: str) -> type[MultiRobotTask]:
     """Return the class of a task by id or other name, ignoring case.
 
+    ``pick_cube`` is short for ``maniskill.pick_cube_native``.
+
     Raises:
         UnknownNameError: If no task has that name (also a ``KeyError``).
     """
-    key = str(name).lower()
-    if key not in _registered and (target := _built_in(name)):
-        import_module(target.partition(":")[0])  # registers itself
-    if key not in _registered:
-        raise UnknownNameError("task", name, _all_names())
-    return _registered[key]
+    for key in (str(name).lower(), f"maniskill.{str(name).lower()}_native"):
+        if key not in _registered and (target := _built_in(key)):
+            import_module(target.partition(":")[0])  # registers itself
+        if key in _registered:
+            return _registered[key]
+    raise UnknownNameError("task", name, _all_names())
 
 
 def other_names(cls: type[MultiRobotTask]) -> tuple[str, ...]:
