@@ -25,7 +25,7 @@ from rich.console import Console
 from rich.progress import Progress, TimeElapsedColumn
 
 import tasks
-from parity.clip import Candidate, Clip
+from parity.clip import Candidate, Clip, SideBySide
 from parity.comparison import EpisodeResult
 from parity.episodes import load_episodes, random_episodes, recorded_control_mode
 from parity.findings import versions
@@ -122,7 +122,11 @@ def _run(args: argparse.Namespace) -> int:
             print(line(entry), flush=True)
     entries = [found[p.task_id] for p in plans]
     good = sum(entry["error"] is None and entry["equal"] for entry in entries)
-    print(f"{good} of {len(entries)} tasks swept and equal to native. Written to {path}")
+    verified = sum(bool(e["clip"]) and SideBySide(**e["clip"]).verified for e in entries)
+    print(
+        f"{good} of {len(entries)} tasks swept and equal to native, {verified} with a clip in which"
+        f" both succeed and no pixel differs. Written to {path}"
+    )
     return 0 if good == len(entries) else 1
 
 
