@@ -12,14 +12,14 @@ from parity.__main__ import main
 from parity.clip import Candidate, Clip, ClipOptions, choose
 from parity.episodes import random_episodes
 from parity.side_by_side import HONEST
-from parity.sides import NativeSide, OurSide
+from parity.sides import OurSide
 from robots import RobotRegistry
 from tests.native import NATIVE
 from tests.parity.test_command import run_alone
 from tests.parity.test_episodes import demonstration
 from tests.parity.test_mutants import with_arm
+from tests.parity.test_pictures import SIZE, native
 
-SIZE = 192  # pixels
 STEPS = 5
 
 RENDER = (
@@ -72,10 +72,10 @@ class TestRendering:
         assert "states: largest difference 0 over 4 steps" in printed
         assert "mean difference 0.0000 of 255, 0 of 5 frames differ" in printed
         assert str(folder / "side_by_side.mp4") in printed
-        native, ours, delta = panels(folder / "side_by_side.mp4").swapaxes(0, 1)
-        assert len(native) == 5
-        assert native.std() > 20, "there is something to see"
-        assert np.abs(native.astype(int) - ours).mean() < 2, "h264 is not exact"
+        theirs, ours, delta = panels(folder / "side_by_side.mp4").swapaxes(0, 1)
+        assert len(theirs) == 5
+        assert theirs.std() > 20, "there is something to see"
+        assert np.abs(theirs.astype(int) - ours).mean() < 2, "h264 is not exact"
         assert delta.max() < 8
         assert imageio.imread(folder / "side_by_side.png").shape[2] == 3
 
@@ -89,10 +89,11 @@ class TestRendering:
 
     def test_a_clip_of_sides_that_differ(self, tmp_path):
         """Our side begins the episode of another seed: every frame differs, and it is told."""
-        native = NativeSide("PickCube-v1", picture_size=SIZE)
         ours = OtherSeed(tasks.make("PickCube-v1"))
         (episode,) = random_episodes([4], STEPS, 8)
-        made = Clip(native, ours, Candidate(episode, "random"), ClipOptions(gain=4)).write(tmp_path)
+        made = Clip(
+            native("PickCube-v1"), ours, Candidate(episode, "random"), ClipOptions(gain=4)
+        ).write(tmp_path)
         assert not made.verified
         assert made.differing_frames == made.frames == STEPS + 1
         assert made.max_state_difference > 1e-3
@@ -103,11 +104,10 @@ class TestRendering:
         assert mean == pytest.approx(made.mean_pixel_difference, rel=0.5), "amplified four times"
 
     def test_drives_stiffer_by_a_hundredth_are_seen(self, tmp_path):
-        native = NativeSide("PickCube-v1", picture_size=SIZE)
         stiffer = with_arm(RobotRegistry.load("panda"), stiffness=1010.0)
         ours = OurSide(tasks.make("PickCube-v1", robots={"arm": stiffer}))
         (episode,) = random_episodes([4], 2 * STEPS, 8)
-        made = Clip(native, ours, Candidate(episode, "random")).write(tmp_path)
+        made = Clip(native("PickCube-v1"), ours, Candidate(episode, "random")).write(tmp_path)
         assert made.max_state_difference > 0
         assert 0 < made.differing_frames < made.frames, "the reset's frame is the same"
         assert not made.verified
@@ -119,11 +119,10 @@ class TestRendering:
             def begins(self, seed: int) -> int:
                 return seed + seed % 2
 
-        native = NativeSide("PickCube-v1", picture_size=SIZE)
         ours = OddSeeds(tasks.make("PickCube-v1"))
         candidates = [Candidate(e, "random") for e in random_episodes([1, 4, 3], 2, 8)]
         steps: list[None] = []
-        chosen = choose(native, ours, candidates, 10, lambda: steps.append(None))
+        chosen = choose(native("PickCube-v1"), ours, candidates, 10, lambda: steps.append(None))
         assert chosen is candidates[1]
         assert len(steps) == 6
 
