@@ -15,10 +15,10 @@ from rich.table import Table
 import tasks
 from parity.comparison import EpisodeResult
 from parity.episodes import load_episodes, recorded_control_mode
-from parity.progress import LiveLine
 from parity.runs import Run, RunResult, play
 from robots import CONTROL_MODES, RobotLayoutsError, TaskError
 from rollouts.executor import ProcessExecutor
+from rollouts.progress import LiveLine
 from rollouts.record import FILE, record
 from rollouts.replay import find_official, task_for
 from rollouts.trajectory import TrajectoryError, TrajectoryFile

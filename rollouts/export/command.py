@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
         RobotLayoutsError: If the export fails; see `rollouts.export.dataset`.
     """
     from rollouts.export.dataset import Export, export
-    from rollouts.export.progress import EpisodeBar
+    from rollouts.progress import LiveLine
 
     wanted = Export(
         options.recording,
@@ -47,8 +47,13 @@ def run(options: argparse.Namespace) -> int:
         video=options.video,
         only_successes=options.only_successes,
     )
-    with EpisodeBar(f"exporting {options.recording.name}") as bar:
-        done = export(wanted, bar.update)
+    with LiveLine(unit="episodes") as line:
+
+        def show(done: float, total: int) -> None:
+            line.total = total
+            line.update(round(done, 1), f"exporting {options.recording.name}")
+
+        done = export(wanted, show)
     print(_summary(done))
     return 0
 
