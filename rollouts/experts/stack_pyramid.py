@@ -56,7 +56,7 @@ class Style:
 # How the gripper may turn about the vertical with the blue cube; the quickest is taken (rad).
 YAWS = tuple(0.3 * i for i in range(-4, 5))
 
-# Tried in this order. The first solves 5 of 6 seeds.
+# Tried in this order. The first solves 84 of 100 seeds, the first two 97.
 STYLES = (
     Style(),
     Style(side=1),
