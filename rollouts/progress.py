@@ -65,7 +65,8 @@ class LiveLine:
         if sys.stderr.isatty():
             self._progress = progress = Progress(console=Console(stderr=True), transient=True)
             progress.start()
-            self._bar = progress.add_task(what, total=self.total, completed=self._done)
+            self._bar = progress.add_task(what, total=self.total)
+            progress.update(self._bar, completed=self._done)
         else:
             done = f"{self._done:.10g} of {self.total:.10g} {self._unit}"
             self.say(f"{what}: {done} ({self._done / self.total:.0%})")
