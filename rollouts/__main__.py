@@ -48,9 +48,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--no-video", action="store_true", help="make no video")
     demo.set_defaults(run=_demo)
     for name, module in (("record", record_command), ("replay", replay_command)):
-        command = commands.add_parser(
-            name, help=module.DESCRIPTION, description=module.DESCRIPTION, epilog=module.EPILOG
-        )
+        command = commands.add_parser(name, help=module.DESCRIPTION, description=module.DESCRIPTION)
         module.add_arguments(command)
         command.set_defaults(run=module.run)
     return parser

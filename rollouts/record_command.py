@@ -31,6 +31,7 @@ _PLAIN_INTERVAL = 10.0  # s between lines where stderr is no terminal
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
+    parser.epilog = EPILOG
     add = parser.add_argument
     add("--task", required=True, help="task id")
     add("--episodes", type=_one_or_more, required=True, metavar="N", help="how many episodes")
