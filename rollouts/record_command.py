@@ -110,7 +110,7 @@ class _Line:
         if event is None and summary.already:
             self._say(f"{summary.already} of {self._total} episodes were recorded before")
         if event is not None and event.died is not None:
-            self._say(f"{event.died} at seed {event.seed}; its episode is played again")
+            self._say(f"{summary.deaths[-1]}; another takes its place")
         if event is not None and event.error is not None:
             self._say(f"seed {event.seed} is not recorded: {event.error}")
         solved = sum(played.success for played in summary.played.values())
@@ -136,7 +136,7 @@ def _report(summary: Summary, path: Path) -> None:
         steps = sum(played.steps for played in summary.played.values()) / count
         print(f"recorded now {count}, {solved} with success, {steps:.1f} steps on average")
     for death in summary.deaths:
-        print(f"played again: {death}")
+        print(f"made good: {death}")
     if summary.failed:
         print(f"not recorded: seeds {', '.join(map(str, sorted(summary.failed)))}")
 
