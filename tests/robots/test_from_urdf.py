@@ -171,7 +171,14 @@ class TestCommand:
 
 
 class TestRobotDescriptions:
-    """Names of the package robot_descriptions, which clones repositories."""
+    """Names of the package robot_descriptions, which clones repositories; never from here."""
+
+    @pytest.fixture(autouse=True)
+    def _no_network(self, monkeypatch):
+        """Let git look for every repository in a folder that does not exist."""
+        monkeypatch.setenv("GIT_CONFIG_COUNT", "1")
+        monkeypatch.setenv("GIT_CONFIG_KEY_0", "url./no/such/folder/.insteadOf")
+        monkeypatch.setenv("GIT_CONFIG_VALUE_0", "https://")
 
     def test_without_the_package_the_command_is_named(self, monkeypatch):
         monkeypatch.setattr("robots.from_urdf.find_spec", lambda name: None)
@@ -186,22 +193,21 @@ class TestRobotDescriptions:
     def test_a_repository_that_cannot_be_cloned_is_an_error(self, tmp_path, monkeypatch):
         pytest.importorskip("robot_descriptions")
         monkeypatch.setenv("ROBOT_DESCRIPTIONS_CACHE", str(tmp_path))
-        for variable in ("http_proxy", "https_proxy", "HTTPS_PROXY", "HTTP_PROXY"):
-            monkeypatch.setenv(variable, "http://127.0.0.1:9")  # nothing listens there
-        monkeypatch.delitem(sys.modules, "robot_descriptions.ur3_description", raising=False)
-        with pytest.raises(AssetError, match="robot_descriptions could not bring ur3_description"):
-            guess_descriptor("ur3_description")
+        monkeypatch.delitem(sys.modules, "robot_descriptions.ur5e_description", raising=False)
+        with pytest.raises(AssetError, match="robot_descriptions could not bring ur5e_descr"):
+            guess_descriptor("ur5e_description")
 
     def test_a_robot_in_its_cache_is_guessed(self, tmp_path, monkeypatch):
         """A repository of one real URDF, where the package would have cloned the public one."""
         pytest.importorskip("robot_descriptions")
         repository = tmp_path / "SO-ARM100"
-        folder = repository / "Simulation" / "SO100"
-        shutil.copytree(urdf_of("so100").parent, folder)
+        shutil.copytree(urdf_of("so100").parent, repository / "Simulation" / "SO100")
         git = ["git", "-C", str(repository), "-c", "user.name=x", "-c", "user.email=x@localhost"]
         for command in (["init", "-q"], ["add", "-A"], ["commit", "-q", "-m", "one"]):
             subprocess.run([*git, *command], check=True)
         head = subprocess.check_output([*git, "rev-parse", "HEAD"], text=True).strip()
+        (tmp_path / f"SO-ARM100-{head}").mkdir()
+        repository = repository.rename(tmp_path / f"SO-ARM100-{head}" / "SO-ARM100")
         code = (
             "from robots.from_urdf import guess_descriptor;"
             "robot = guess_descriptor('so_arm100_description', 'mine').descriptor;"
@@ -219,7 +225,8 @@ class TestRobotDescriptions:
             text=True,
             check=False,
         )
-        assert done.stdout == f"6 {folder / 'so100.urdf'}\n", done.stderr
+        urdf = repository / "Simulation" / "SO100" / "so100.urdf"
+        assert done.stdout == f"6 {urdf}\n", done.stderr
 
 
 def test_a_guess_can_be_registered_under_its_own_name(monkeypatch):
