@@ -10,14 +10,14 @@ from robots import unknown_name_message
 
 # Command -> the module whose ``main(argv)`` runs it, and what it does.
 COMMANDS = {
+    "inventory": ("parity.inventory", "list every task, and what proves it"),
     "compare": ("parity.compare", "step tasks beside native and compare every bit"),
     "replay": ("parity.replay", "play recorded actions beside native, episode by episode"),
-    "inventory": ("parity.inventory", "list every task, and what proves it"),
     "rollout": ("parity.rollout", "play one episode in native and here, and keep its arrays"),
+    "render": ("parity.render", "show native and ours side by side, with their difference"),
     "sweep": ("parity.sweep", "rollouts, agreement and clips of every task, into one summary"),
     "report": ("parity.page", "make one HTML page of a sweep and the recorded comparison"),
     "readme": ("parity.readme", "write the recorded results into README.md, or check them there"),
-    "render": ("parity.render", "show native and ours side by side, with their difference"),
 }
 
 

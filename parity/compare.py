@@ -24,11 +24,11 @@ from parity.episodes import (
     recorded_control_mode,
 )
 from parity.findings import document, sentences, table
-from parity.progress import LiveLine
 from parity.results import RESULTS, record
 from parity.runs import Run, play
 from parity.summary import summarise, summary_table
 from robots import CONTROL_MODES, RobotLayoutsError, TaskError, closest_match
+from rollouts.progress import LiveLine
 from tasks import MultiRobotTask
 
 TABLE_WIDTH = 180  # columns that a table may take; a narrower terminal wraps it

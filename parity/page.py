@@ -202,8 +202,8 @@ def _context(runs: Path, swept: Mapping[str, Any], recorded: Mapping[str, Any]) 
         "date": datetime.now(timezone.utc).strftime("%-d %B %Y"),
         "commands": [
             "python -m parity compare --all --demos DIR --record",
-            f"python -m parity sweep --demos DIR --out {runs}",
-            f"python -m parity report --runs {runs}",
+            f"python -m parity sweep --demos DIR --out {shlex.quote(str(runs))}",
+            f"python -m parity report --runs {shlex.quote(str(runs))}",
         ],
     }
 
@@ -386,16 +386,16 @@ def _caption(clip: Mapping[str, Any], cls: type[MultiRobotTask]) -> str:
 
 def _commands(task_id: str, entry: Mapping[str, Any] | None, runs: Path) -> Iterator[str]:
     yield f"python -m parity compare --task {task_id} --seeds 10 --steps 100"
-    if entry is None or not entry["rollout"]:
-        yield f"python -m parity sweep --tasks {task_id} --out {runs}"
+    rollout = entry["rollout"] if entry else None
+    if rollout is None or rollout["source"] == "random":
+        yield f"python -m parity sweep --tasks {task_id} --out {shlex.quote(str(runs))}"
         return
-    source, seed = entry["rollout"]["source"], entry["rollout"]["seed"]
-    demo = {"expert": "", "random": None}.get(source, f" --demo {shlex.quote(source)}")
-    if demo is None:
-        yield f"python -m parity sweep --tasks {task_id} --out {runs}"
-        return
-    yield f"python -m parity rollout --task {task_id}{demo} --seed {seed} --out {runs}"
-    yield f"python -m parity render --task {task_id}{demo} --seed {seed} --out {runs}"
+    demo = "" if rollout["source"] == "expert" else f" --demo {shlex.quote(rollout['source'])}"
+    if demo:
+        yield f"python -m parity replay --task {task_id}{demo}"
+    options = f"--task {task_id}{demo} --seed {rollout['seed']} --out {shlex.quote(str(runs))}"
+    yield f"python -m parity rollout {options}"
+    yield f"python -m parity render {options}"
 
 
 def missing(swept: Mapping[str, Mapping[str, Any] | None]) -> Iterator[Group]:

@@ -16,10 +16,10 @@ from rich.console import Console
 import tasks
 from parity.clip import Candidate, Clip, ClipOptions, SideBySide, choose
 from parity.episodes import Episode, load_episodes, recorded_control_mode
-from parity.progress import LiveLine
 from parity.sides import NativeSide, OurSide
 from robots import CONTROL_MODES, MissingPackageError, RecordingError, RobotLayoutsError, TaskError
 from rollouts.experts import find_expert
+from rollouts.progress import LiveLine
 from rollouts.video import package_problem
 from tasks import MultiRobotTask
 

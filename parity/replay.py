@@ -15,13 +15,13 @@ from rich.table import Table
 import tasks
 from parity.comparison import EpisodeResult
 from parity.episodes import load_episodes, recorded_control_mode
-from parity.progress import LiveLine
 from parity.runs import Run, RunResult, play
 from robots import CONTROL_MODES, RobotLayoutsError, TaskError
 from rollouts.executor import ProcessExecutor
+from rollouts.progress import LiveLine
 from rollouts.record import FILE, record
-from rollouts.replay import find_official
-from rollouts.trajectory import TrajectoryError
+from rollouts.replay import find_official, task_for
+from rollouts.trajectory import TrajectoryError, TrajectoryFile
 from tasks import MultiRobotTask
 
 
@@ -91,6 +91,9 @@ def _find(cls: type[MultiRobotTask], episodes: int, out: Path) -> Path:
 
 def _run(cls: type[MultiRobotTask], path: Path, count: int) -> Run:
     episodes = load_episodes(path, cls.task_id, cls.layout.action_dim)[:count]
+    if path.suffix == ".h5":
+        with TrajectoryFile(path) as file:
+            task_for(file).close()  # refuses a file of another layout, which native does not have
     return Run(
         cls.task_id,
         path.name,

@@ -25,12 +25,12 @@ from parity.episodes import Episode, load_episodes, recorded_control_mode
 from parity.findings import versions
 from parity.native import native_agents
 from parity.pictures import NativeScene
-from parity.progress import LiveLine
 from parity.sides import NativeSide, OurSide, Side
 from parity.snapshot import Snapshot, largest_difference
 from parity.summary import number_text
 from robots import CONTROL_MODES, RecordingError, RobotLayoutsError
 from rollouts.experts import find_expert
+from rollouts.progress import LiveLine
 from rollouts.trajectory import TrajectoryError
 from rollouts.video import open_video
 from tasks import MultiRobotTask

@@ -14,7 +14,9 @@ from parity.pictures import NativeScene, Picture, PictureError, difference
 from parity.sides import Side
 from parity.snapshot import STATE, Snapshot
 
-HONEST = 0.005  # of 255: mean difference between a state drawn and the same state seen live
+# Of 255: mean difference between a state drawn and the same state seen live. Rounding of poses
+# takes single pixels over an edge, which came to 0.002 at most; a goal left out, to 0.024 or more.
+HONEST = 0.02
 
 
 @dataclass(frozen=True)

@@ -25,11 +25,12 @@ from rich.console import Console
 from rich.progress import Progress, TimeElapsedColumn
 
 import tasks
-from parity.clip import Candidate, Clip
+from parity.clip import Candidate, Clip, SideBySide
 from parity.comparison import EpisodeResult
 from parity.episodes import load_episodes, random_episodes, recorded_control_mode
 from parity.findings import versions
 from parity.inventory import find_files
+from parity.replay import agree
 from parity.results import ResultsError
 from parity.rollout import Source, expert_source, roll_out
 from parity.runs import Run, play
@@ -121,7 +122,11 @@ def _run(args: argparse.Namespace) -> int:
             print(line(entry), flush=True)
     entries = [found[p.task_id] for p in plans]
     good = sum(entry["error"] is None and entry["equal"] for entry in entries)
-    print(f"{good} of {len(entries)} tasks swept and equal to native. Written to {path}")
+    verified = sum(bool(e["clip"]) and SideBySide(**e["clip"]).verified for e in entries)
+    print(
+        f"{good} of {len(entries)} tasks swept and equal to native, {verified} with a clip in which"
+        f" both succeed and no pixel differs. Written to {path}"
+    )
     return 0 if good == len(entries) else 1
 
 
@@ -367,7 +372,7 @@ def agreement(results: Sequence[EpisodeResult]) -> dict[str, Any]:
         "equal": sum(result.equal for result in results),
         "steps": sum(result.steps for result in results),
         "contact_steps": sum(result.contact_steps for result in results),
-        "same_success": sum(r.native_success == r.our_success for r in results),
+        "same_success": sum(map(agree, results)),
         "native_success": sum(result.native_success for result in results),
         "our_success": sum(result.our_success for result in results),
         "max_difference": _number(max(max(r.max_difference.values()) for r in results)),

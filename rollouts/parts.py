@@ -18,7 +18,8 @@ from rollouts.episode import REBUILT, Episode
 
 PARTIAL = ".partial"
 
-_PART = "traj_0"  # the only episode of a part, which is itself in ManiSkill's format
+_PART = "traj_0"  # the only episode of a part, which is nearly in ManiSkill's format itself
+_HEADER = "header"  # attribute of a part; in a recording each of its entries is an attribute
 _FORMAT = "v108"  # HDF5 1.8, the first in which attributes may be larger than 64 kB
 
 
@@ -45,19 +46,19 @@ class PartWriter:
         folder: Where to write.
         header: What the episodes have in common; every part carries it.
         control_mode: Control mode as ManiSkill writes it: by robot where there are several.
-        action_split: Robot name → first and last + 1 action number.
     """
 
     folder: Path
     header: Mapping[str, Any]
     control_mode: str | dict[str, str]
-    action_split: Mapping[str, list[int]]
-    _texts: dict[str, str] = field(init=False, repr=False)
+    _text: str = field(init=False, repr=False)
+    _split: str = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Write the header as text once for all parts."""
-        texts = {name: json.dumps(value) for name, value in self.header.items()}
-        object.__setattr__(self, "_texts", texts)
+        """Write as text once what all parts say."""
+        split = {name: robot["action"] for name, robot in self.header["layout"].items()}
+        object.__setattr__(self, "_text", json.dumps(self.header))
+        object.__setattr__(self, "_split", json.dumps(split))
 
     def write(self, episode: Episode) -> None:
         """Write one episode; it is there, whole, when this returns, or not at all.
@@ -81,9 +82,9 @@ class PartWriter:
         with h5py.File(
             "part", "w", driver="core", backing_store=False, libver=(_FORMAT, "latest")
         ) as file:
-            write_header(file, self._texts)
+            file.attrs[_HEADER] = self._text
             group = file.create_group(_PART)
-            group.attrs["action_split"] = json.dumps(self.action_split)
+            group.attrs["action_split"] = self._split
             group.attrs["episode"] = json.dumps(self._about(episode))
             group.create_dataset("actions", data=episode.actions)
             for kind, entries in episode.states.items():
@@ -119,12 +120,6 @@ def list_parts(folder: Path) -> list[Path]:
     return sorted(folder.glob("seed-*.h5"))
 
 
-def write_header(file: h5py.File, texts: Mapping[str, str]) -> None:
-    """Write what the episodes have in common into the file's attributes, as json."""
-    for name, text in texts.items():
-        file.attrs[name] = text
-
-
 def read_stored(path: Path) -> tuple[dict[str, Any], list[Stored]]:
     """Return the header of a file that was written here, and its episodes.
 
@@ -134,6 +129,7 @@ def read_stored(path: Path) -> tuple[dict[str, Any], list[Stored]]:
     try:
         with h5py.File(path, "r") as file:
             header = {name: json.loads(text) for name, text in file.attrs.items()}
+            header = header.get(_HEADER, header)
             stored = [
                 Stored(path, name, json.loads(group.attrs["episode"]))
                 for name, group in file.items()
@@ -161,7 +157,8 @@ def join(path: Path, header: Mapping[str, Any], episodes: Sequence[Stored]) -> N
         try:
             with ExitStack() as stack:
                 file = stack.enter_context(h5py.File(partial, "w", libver=(_FORMAT, "latest")))
-                write_header(file, {name: json.dumps(value) for name, value in header.items()})
+                for name, value in header.items():
+                    file.attrs[name] = json.dumps(value)
                 present = stack.enter_context(h5py.File(path, "r")) if path.exists() else None
                 for number, stored in enumerate(episodes):
                     if present is not None and stored.path == path:

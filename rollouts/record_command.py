@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
-import time
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,9 +13,8 @@ from typing import TYPE_CHECKING, NoReturn
 from robots import CONTROL_MODES, RecordingError
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
-
     from rollouts.executor import Event
+    from rollouts.progress import LiveLine
     from rollouts.record import Summary
 
 DESCRIPTION = "let an expert play episodes in worker processes, and record them"
@@ -26,11 +24,10 @@ EPILOG = (
 )
 INTERRUPTED = 130  # as shells have it
 
-_PLAIN_INTERVAL = 10.0  # s between lines where stderr is no terminal
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
+    parser.epilog = EPILOG
     add = parser.add_argument
     add("--task", required=True, help="task id")
     add("--episodes", type=_one_or_more, required=True, metavar="N", help="how many episodes")
@@ -47,10 +44,12 @@ def run(options: argparse.Namespace) -> int:
         RobotLayoutsError: If it makes no sense, or cannot go on; finished episodes are kept.
     """
     from rollouts.executor import ProcessExecutor, WorkerError
+    from rollouts.progress import LiveLine
     from rollouts.record import FILE, record
 
     seeds = range(options.seed, options.seed + options.episodes)
-    line = _Line(len(seeds))
+    line = LiveLine(len(seeds), "episodes")
+    status = _Status(line)
     try:
         with _stop_signals(), line:
             summary = record(
@@ -59,26 +58,23 @@ def run(options: argparse.Namespace) -> int:
                 options.out,
                 ProcessExecutor(options.workers),
                 control_mode=options.control_mode,
-                on_event=line.show,
+                on_event=status.show,
             )
     except KeyboardInterrupt:
-        print(f"stopped; {line.kept}; the same command goes on from there", file=sys.stderr)
+        print(f"stopped; {status.kept}; the same command goes on from there", file=sys.stderr)
         return INTERRUPTED
     except (RecordingError, WorkerError):
-        print(f"stopped; {line.kept}", file=sys.stderr)
+        print(f"stopped; {status.kept}", file=sys.stderr)
         raise
     _report(summary, options.out / FILE)
     return 1 if summary.failed else 0
 
 
-class _Line:
-    """How far the recording is: a bar on a terminal, else a line every ten seconds."""
+class _Status:
+    """How far the recording is, and what happens on the way."""
 
-    def __init__(self, total: int) -> None:
-        self._total = total
-        self._progress: Progress | None = None
-        self._bar: TaskID | None = None
-        self._next = time.monotonic() + _PLAIN_INTERVAL
+    def __init__(self, line: LiveLine) -> None:
+        self._line = line
         self._summary: Summary | None = None
 
     @property
@@ -86,43 +82,19 @@ class _Line:
         """How many episodes are on the disk, in words."""
         return f"{self._summary.recorded if self._summary else 0} episodes are recorded"
 
-    def __enter__(self) -> _Line:
-        if sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import Progress
-
-            self._progress = Progress(console=Console(stderr=True), transient=True)
-            self._progress.start()
-            self._bar = self._progress.add_task("starting", total=self._total)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._progress is not None:
-            self._progress.stop()
-
     def show(self, summary: Summary, event: Event | None) -> None:
         """Tell what has come of the episodes so far."""
-        done = summary.already + len(summary.played)
         self._summary = summary
         if event is None and summary.already:
-            self._say(f"{summary.already} of {self._total} episodes were recorded before")
+            total = self._line.total
+            self._line.say(f"{summary.already} of {total} episodes were recorded before")
         if event is not None and event.died is not None:
-            self._say(f"{event.died} at seed {event.seed}; its episode is played again")
+            self._line.say(f"{summary.deaths[-1]}; another takes its place")
         if event is not None and event.error is not None:
-            self._say(f"seed {event.seed} is not recorded: {event.error}")
+            self._line.say(f"seed {event.seed} is not recorded: {event.error}")
         solved = sum(played.success for played in summary.played.values())
-        text = f"{solved} of {len(summary.played)} succeeded"
-        if self._progress is not None and self._bar is not None:
-            self._progress.update(self._bar, completed=done, description=text)
-        elif (now := time.monotonic()) >= self._next:
-            self._next = now + _PLAIN_INTERVAL
-            self._say(f"{done} of {self._total} episodes, {text}")
-
-    def _say(self, text: str) -> None:
-        if self._progress is not None:
-            self._progress.console.print(text, highlight=False, markup=False, soft_wrap=True)
-        else:
-            print(text, file=sys.stderr, flush=True)
+        done = summary.already + len(summary.played)
+        self._line.update(done, f"{solved} of {len(summary.played)} succeeded")
 
 
 def _report(summary: Summary, path: Path) -> None:
@@ -133,7 +105,7 @@ def _report(summary: Summary, path: Path) -> None:
         steps = sum(played.steps for played in summary.played.values()) / count
         print(f"recorded now {count}, {solved} with success, {steps:.1f} steps on average")
     for death in summary.deaths:
-        print(f"played again: {death}")
+        print(f"made good: {death}")
     if summary.failed:
         print(f"not recorded: seeds {', '.join(map(str, sorted(summary.failed)))}")
 

@@ -97,8 +97,7 @@ class Recorder:
                 os.close(lock)
                 raise
         self._release = weakref.finalize(self, os.close, lock)
-        split = {name: [part.start, part.stop] for name, part in task.action_split.items()}
-        self.writer = PartWriter(self.parts.absolute(), self._header, _control_mode(task), split)
+        self.writer = PartWriter(self.parts.absolute(), self._header, _control_mode(task))
         self._closed = False
 
     def __enter__(self) -> Recorder:

@@ -68,6 +68,7 @@ def pick(
     above: float = 0.05,
     ready: float = 0.1,
     around: float = 0.03,
+    most: int | None = None,
 ) -> tuple[Waypoint, ...]:
     """Return the waypoints after which a gripper holds a body: above, around, grasp.
 
@@ -80,6 +81,7 @@ def pick(
         above: How far before the grip it gets ready, against its approach (m).
         ready: How near it must come to that place before it goes on (rad).
         around: How near it must come to the grip before it closes (rad).
+        most: How many steps each waypoint may take.
     """
 
     def before(scene: Scene) -> list[Pose]:
@@ -87,9 +89,9 @@ def pick(
 
     held = partial(Scene.grasps, robot=robot, body=body)
     return (
-        Waypoint(f"above {body}", before, OPEN, near=ready),
-        Waypoint(f"around {body}", grips, OPEN, near=around),
-        Waypoint(f"grasp {body}", None, CLOSED, steps=2, until=held),
+        Waypoint(f"above {body}", before, OPEN, near=ready, most=most),
+        Waypoint(f"around {body}", grips, OPEN, near=around, most=most),
+        Waypoint(f"grasp {body}", None, CLOSED, steps=2, until=held, most=most),
     )
 
 

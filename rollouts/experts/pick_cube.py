@@ -34,7 +34,7 @@ class Style:
 # How the gripper may lean at the goal; the quickest is taken (rad).
 LEANS = tuple(map(radians, (0, -20, -40, 20, 40)))
 
-# Tried in this order. The first solves each of the seeds 0 … 199.
+# Tried in this order. The first solves each of the seeds 0 … 99.
 STYLES = (
     Style(),
     Style(yaws=(0.0, -0.3, 0.3, -0.6, 0.6)),

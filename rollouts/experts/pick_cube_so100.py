@@ -65,7 +65,7 @@ class Style:
 _BASE = Style()
 _QUICK = Style(deep=-0.096, shut=0.6, near=0.03, close=-0.7, steps=1, hold=0.01, short=0.004)
 
-# Tried in this order. The first solves 2 of 3 seeds, the first two 5 of 6.
+# Tried in this order. The first solves 52 of 100 seeds, the first two 72.
 STYLES = (
     _BASE,
     _QUICK,

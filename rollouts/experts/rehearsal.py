@@ -70,7 +70,7 @@ class Rehearsal:
         while len(actions) < task.max_episode_steps:
             try:
                 parts = [player.act(scene, done) for player in players]
-            except _OutOfReachError as error:
+            except _StuckError as error:
                 return Attempt(_stack(actions, task), False, str(error))
             actions.append(np.concatenate(parts).astype(np.float32))
             *_, info = task.step(actions[-1])
@@ -81,8 +81,8 @@ class Rehearsal:
         return Attempt(_stack(actions, task), False, f"the episode ended at {places}")
 
 
-class _OutOfReachError(Exception):
-    """No joints bring a robot to any pose that its waypoint asks for."""
+class _StuckError(Exception):
+    """A robot cannot go on with its script."""
 
 
 class _Player:
@@ -110,14 +110,20 @@ class _Player:
         """Return the next action numbers; adds what is done to ``done``.
 
         Raises:
-            _OutOfReachError: If the next waypoint cannot be reached.
+            _StuckError: If the next waypoint cannot be reached, or the present one takes too long.
         """
         if self._current is not None and self._is_done(self._current, scene):
             done.add(self.place)
+        self._check_time(done)
         if self._may_begin(done):
             self._begin(self._waypoints[self._begun], scene)
         self._elapsed += 1
         return self._driver.action(self._goal, self._gripper, scene.qpos(self._robot))
+
+    def _check_time(self, done: set[str]) -> None:
+        most = self._current and self._current.most
+        if most is not None and self._elapsed >= most and self.place not in done:
+            raise _StuckError(f"{self.place} took more than {most} steps")
 
     def _is_done(self, waypoint: Waypoint, scene: Scene) -> bool:
         if self._elapsed < waypoint.steps:
@@ -148,7 +154,7 @@ class _Player:
         goals = [self._kinematics.solve(*pose, qpos) for pose in poses]
         reachable = [goal for goal in goals if goal is not None]
         if not reachable:
-            raise _OutOfReachError(f"{self.place} is out of reach")
+            raise _StuckError(f"{self.place} is out of reach")
         arm = self._driver.arm(qpos)
         return min(reachable, key=lambda goal: float(np.abs(goal - arm).max()))
 

@@ -63,6 +63,7 @@ class Waypoint:
         until: What else must hold for it to be done.
         turn: Instead of ``to``, how far the arm's joints turn, (arm joints,) (rad), worked out from
             where they are when the waypoint begins; both in the order of the robot's arm joints.
+        most: Number of control steps after which, if it is not done, the script has failed.
     """
 
     name: str
@@ -73,6 +74,7 @@ class Waypoint:
     steps: int = 0
     until: Callable[[Scene], bool] | None = None
     turn: Callable[[Floats], Floats] | None = None
+    most: int | None = None
 
 
 Script = Mapping[str, Sequence[Waypoint]]

@@ -33,6 +33,7 @@ APART = EDGE + 0.004  # of the middles of the red and the green cube; at most 0.
 IN_PLACE = 0.008  # how near to its place a cube is let go (m)
 CLEARANCE = 0.06  # how high above its place a cube travels (m)
 RISE = 0.08  # how far the gripper backs off from a cube (m)
+PATIENCE = 50  # how many steps a waypoint may take
 HALVES = ((0, 2), (1, 3))
 
 
@@ -55,7 +56,7 @@ class Style:
 # How the gripper may turn about the vertical with the blue cube; the quickest is taken (rad).
 YAWS = tuple(0.3 * i for i in range(-4, 5))
 
-# Tried in this order. The first solves 5 of 6 seeds.
+# Tried in this order. The first solves 84 of 100 seeds, the first two 97.
 STYLES = (
     Style(),
     Style(side=1),
@@ -110,7 +111,7 @@ def _lift(cube: str, turns: tuple[int, ...]) -> tuple[Waypoint, ...]:
         return held_at(scene, ARM, cube, scene.body(cube)[0] + CLEARANCE * UP)
 
     return (
-        *pick(ARM, cube, grips, above=0.08, ready=0.05),
+        *pick(ARM, cube, grips, above=0.08, ready=0.05, most=PATIENCE),
         Waypoint(f"lift {cube}", lift, CLOSED, near=0.03),
     )
 
@@ -139,11 +140,16 @@ def _put_down(
 ) -> tuple[Waypoint, ...]:
     """Let a cube go at its place, ``offset`` (m) from the green cube."""
     in_place = partial(is_near, body=cube, other=GREEN, offset=offset, limit=IN_PLACE)
+
+    def over(scene: Scene) -> list[Pose]:
+        return place(scene, CLEARANCE)
+
+    def low(scene: Scene) -> list[Pose]:
+        return place(scene, 0.001)
+
     return (
-        Waypoint(f"over {cube}", lambda scene: place(scene, CLEARANCE), CLOSED, near=0.03),
-        Waypoint(
-            f"lower {cube}", lambda scene: place(scene, 0.001), CLOSED, near=0.03, until=in_place
-        ),
+        Waypoint(f"over {cube}", over, CLOSED, near=0.03),
+        Waypoint(f"lower {cube}", low, CLOSED, near=0.03, until=in_place, most=PATIENCE),
         Waypoint(f"release {cube}", None, OPEN, steps=2),
         Waypoint(f"rise {cube}", _rise, OPEN),
     )

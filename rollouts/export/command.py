@@ -18,6 +18,7 @@ EPILOG = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Tell a parser what the command takes."""
+    parser.epilog = EPILOG
     add = parser.add_argument
     add("recording", type=Path, metavar="FILE", help="recorded episodes (.h5, its .json beside it)")
     add("--format", required=True, metavar="FORMAT", help="lerobot or robomimic")
@@ -37,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
         RobotLayoutsError: If the export fails; see `rollouts.export.dataset`.
     """
     from rollouts.export.dataset import Export, export
-    from rollouts.export.progress import EpisodeBar
+    from rollouts.progress import LiveLine
 
     wanted = Export(
         options.recording,
@@ -47,8 +48,13 @@ def run(options: argparse.Namespace) -> int:
         video=options.video,
         only_successes=options.only_successes,
     )
-    with EpisodeBar(f"exporting {options.recording.name}") as bar:
-        done = export(wanted, bar.update)
+    with LiveLine(unit="episodes") as line:
+
+        def show(done: float, total: int) -> None:
+            line.total = total
+            line.update(round(done, 1), f"exporting {options.recording.name}")
+
+        done = export(wanted, show)
     print(_summary(done))
     return 0
 

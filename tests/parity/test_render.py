@@ -11,14 +11,15 @@ import tasks
 from parity.__main__ import main
 from parity.clip import Candidate, Clip, ClipOptions, choose
 from parity.episodes import random_episodes
-from parity.sides import NativeSide, OurSide
+from parity.side_by_side import HONEST
+from parity.sides import OurSide
 from robots import RobotRegistry
 from tests.native import NATIVE
 from tests.parity.test_command import run_alone
 from tests.parity.test_episodes import demonstration
 from tests.parity.test_mutants import with_arm
+from tests.parity.test_pictures import SIZE, native
 
-SIZE = 192  # pixels
 STEPS = 5
 
 RENDER = (
@@ -71,13 +72,14 @@ class TestRendering:
         assert "states: largest difference 0 over 4 steps" in printed
         assert "mean difference 0.0000 of 255, 0 of 5 frames differ" in printed
         assert str(folder / "side_by_side.mp4") in printed
-        native, ours, delta = panels(folder / "side_by_side.mp4").swapaxes(0, 1)
-        assert len(native) == 5
-        assert native.std() > 20, "there is something to see"
-        assert np.abs(native.astype(int) - ours).mean() < 2, "h264 is not exact"
+        theirs, ours, delta = panels(folder / "side_by_side.mp4").swapaxes(0, 1)
+        assert len(theirs) == 5
+        assert theirs.std() > 20, "there is something to see"
+        assert np.abs(theirs.astype(int) - ours).mean() < 2, "h264 is not exact"
         assert delta.max() < 8
         assert imageio.imread(folder / "side_by_side.png").shape[2] == 3
 
+    @pytest.mark.long
     def test_a_file_in_joint_positions(self, tmp_path):
         demo = demonstration(tmp_path / "planned", control_mode="pd_joint_pos")
         out = ("--out", tmp_path, "--size", SIZE, "--truncate-buffer", -1, "--seed", 41)
@@ -88,10 +90,11 @@ class TestRendering:
 
     def test_a_clip_of_sides_that_differ(self, tmp_path):
         """Our side begins the episode of another seed: every frame differs, and it is told."""
-        native = NativeSide("PickCube-v1", picture_size=SIZE)
         ours = OtherSeed(tasks.make("PickCube-v1"))
         (episode,) = random_episodes([4], STEPS, 8)
-        made = Clip(native, ours, Candidate(episode, "random"), ClipOptions(gain=4)).write(tmp_path)
+        made = Clip(
+            native("PickCube-v1"), ours, Candidate(episode, "random"), ClipOptions(gain=4)
+        ).write(tmp_path)
         assert not made.verified
         assert made.differing_frames == made.frames == STEPS + 1
         assert made.max_state_difference > 1e-3
@@ -102,11 +105,10 @@ class TestRendering:
         assert mean == pytest.approx(made.mean_pixel_difference, rel=0.5), "amplified four times"
 
     def test_drives_stiffer_by_a_hundredth_are_seen(self, tmp_path):
-        native = NativeSide("PickCube-v1", picture_size=SIZE)
         stiffer = with_arm(RobotRegistry.load("panda"), stiffness=1010.0)
         ours = OurSide(tasks.make("PickCube-v1", robots={"arm": stiffer}))
         (episode,) = random_episodes([4], 2 * STEPS, 8)
-        made = Clip(native, ours, Candidate(episode, "random")).write(tmp_path)
+        made = Clip(native("PickCube-v1"), ours, Candidate(episode, "random")).write(tmp_path)
         assert made.max_state_difference > 0
         assert 0 < made.differing_frames < made.frames, "the reset's frame is the same"
         assert not made.verified
@@ -118,11 +120,10 @@ class TestRendering:
             def begins(self, seed: int) -> int:
                 return seed + seed % 2
 
-        native = NativeSide("PickCube-v1", picture_size=SIZE)
         ours = OddSeeds(tasks.make("PickCube-v1"))
         candidates = [Candidate(e, "random") for e in random_episodes([1, 4, 3], 2, 8)]
         steps: list[None] = []
-        chosen = choose(native, ours, candidates, 10, lambda: steps.append(None))
+        chosen = choose(native("PickCube-v1"), ours, candidates, 10, lambda: steps.append(None))
         assert chosen is candidates[1]
         assert len(steps) == 6
 
@@ -169,7 +170,7 @@ def expect_equal(found: dict) -> None:
     for key in ("max_state_difference", "differing_frames", "mean_pixel_difference"):
         assert found[key] == 0
     assert found["max_pixel_difference"] == 0
-    assert 0 <= found["live_difference"] < 0.005
+    assert 0 <= found["live_difference"] <= HONEST
     assert (found["panel_size"], found["difference_gain"]) == (SIZE, 8.0)
     assert (found["clip"], found["sheet"]) == ("side_by_side.mp4", "side_by_side.png")
 
@@ -215,18 +216,16 @@ class TestFiles:
         assert "not (T, 7)" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("package", ["imageio", "mani_skill"])
-def test_without_a_package(package, tmp_path):
+def test_without_imageio(tmp_path):
     """As on a machine without it: it cannot be found nor imported."""
     code = (
         "import importlib.util as u, sys; find = u.find_spec\n"
-        f"u.find_spec = lambda name, *a: None if name == {package!r} else find(name, *a)\n"
-        f"sys.modules[{package!r}] = None\n"
+        "u.find_spec = lambda name, *a: None if name == 'imageio' else find(name, *a)\n"
+        "sys.modules['imageio'] = None\n"
     )
     done = run_alone(code + RENDER.replace("sys.argv[1]", repr(str(tmp_path))))
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert done.stderr.startswith("error: ")
-    assert package in done.stderr
-    assert "pip install 'robot-layouts[" in done.stderr
+    assert "imageio not installed; pip install 'robot-layouts[video]'" in done.stderr
     assert not list(tmp_path.iterdir())

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -58,9 +59,11 @@ def test_nine_of_ten_are_enough(tmp_path, monkeypatch, console, solved, enough):
     good, bad = plan(0), np.zeros((1, 16), np.float32)
     play = demo.play
     monkeypatch.setattr(demo, "find_expert", lambda name: lambda task, seed: good)
-    monkeypatch.setattr(
-        demo, "play", lambda task, seed, actions: play(task, 0, good if seed < solved else bad)
-    )
+
+    def play_seed_0(task, seed, actions):
+        return replace(play(task, 0, good if seed < solved else bad), seed=seed)
+
+    monkeypatch.setattr(demo, "play", play_seed_0)
     assert run_demo(DemoOptions(out=tmp_path, video=False), console) is enough
     assert f"{solved} of 10 succeeded in {len(good)}.0 steps" in console.export_text()
 

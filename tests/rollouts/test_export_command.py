@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import rollouts.export.pictures as pictures
-import rollouts.export.progress as progress
+import rollouts.progress as progress
 import tasks
 from layouts import Layout, Placement
 from robots import RecordingError, RobotRegistry
@@ -118,7 +118,7 @@ def test_what_was_not_recorded_is_left_out(recording, tmp_path):
 def test_a_long_export_shows_how_far_it_is(recording, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(progress, "PATIENCE", 0.0)
     assert run(recording, "--format", "lerobot", "--out", tmp_path / "out") == 0
-    assert "exporting recording.h5: 1.0 of 3 episodes" in capsys.readouterr().err
+    assert "exporting recording.h5: 1 of 3 episodes" in capsys.readouterr().err
 
 
 def test_a_wrong_format_is_told_the_right_ones(recording, tmp_path, capsys):

@@ -47,14 +47,14 @@ def start(*words: str) -> subprocess.Popen[str]:
 
 
 def wait_for_parts(out: Path, count: int) -> None:
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 180
     while len(list(out.glob("trajectory.parts/*.h5"))) < count:
         assert time.monotonic() < deadline, "nothing is recorded"
         time.sleep(0.005)
 
 
 def wait_until_nobody_is_left(process: subprocess.Popen[str]) -> None:
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 60
     while True:
         try:
             os.killpg(process.pid, 0)
@@ -75,13 +75,13 @@ def recorded_directly(path: Path, seeds: range) -> Path:
 
 
 def test_workers_make_no_difference(tmp_path, capsys):
-    for workers in (1, 3):
+    for workers in (1, 2):
         assert main(arguments(tmp_path / str(workers), 7, workers, seed=4)) == 0
         printed = capsys.readouterr().out
         assert f"{FILE}: 7 episodes" in printed
         assert "recorded now 7, 0 with success, 22.0 steps on average" in printed
-    one, three = (tmp_path / workers / FILE for workers in "13")
-    assert same_files(one, three)
+    one, two = (tmp_path / workers / FILE for workers in "12")
+    assert same_files(one, two)
     assert same_files(one, recorded_directly(tmp_path / FILE, range(4, 11)))
     with TrajectoryFile(one) as file:
         assert file.seeds == tuple(range(4, 11))
@@ -164,17 +164,18 @@ def test_a_folder_that_cannot_be_written(tmp_path, capsys):
     assert f"error: cannot write {tmp_path / 'file' / FILE}: " in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_worker_that_is_killed(tmp_path):
     process = start(*arguments(tmp_path, 60, 2))
     wait_for_parts(tmp_path, 2)
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
     workers = [p for p in children if "spawn_main" in Path(f"/proc/{p}/cmdline").read_text()]
     os.kill(int(workers[0]), signal.SIGKILL)
-    printed, said = process.communicate(timeout=60)
+    printed, said = process.communicate(timeout=180)
     assert process.returncode == 0, said
-    assert f"worker process {workers[0]} died by SIGKILL at seed" in said
-    assert "its episode is played again" in said
-    assert f"played again: worker process {workers[0]} died" in printed
+    assert f"worker process {workers[0]} died by SIGKILL " in said
+    assert "; another takes its place" in said
+    assert f"made good: worker process {workers[0]} died" in printed
     assert same_files(tmp_path / FILE, recorded_directly(tmp_path / "direct" / FILE, range(60)))
 
 
@@ -182,13 +183,13 @@ def test_a_worker_that_is_killed(tmp_path):
     "how", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)]
 )
 def test_a_recording_that_is_interrupted(tmp_path, how):
-    process = start(*arguments(tmp_path, 10**6, 2))
+    process = start(*arguments(tmp_path, 10**6, 1 if how is signal.SIGINT else 2))
     wait_for_parts(tmp_path, 3)
     if how is signal.SIGINT:
         os.killpg(process.pid, how)  # as a terminal does
     else:
         process.send_signal(how)
-    printed, said = process.communicate(timeout=60)
+    printed, said = process.communicate(timeout=180)
     assert process.returncode == 130
     assert printed == ""
     assert "Traceback" not in said
@@ -203,12 +204,14 @@ def test_a_recording_that_is_interrupted(tmp_path, how):
     assert not (tmp_path / "trajectory.parts").exists()
 
 
-def expect_killed_and_resumed(tmp_path: Path, episodes: int, kills: list[float]) -> None:
+def expect_killed_and_resumed(
+    tmp_path: Path, episodes: int, kills: list[float], workers: int
+) -> None:
     """Kill a recording some time after it has begun to write, and go on until it is whole."""
     out, undisturbed = tmp_path / "killed", tmp_path / "undisturbed" / FILE
     for patience in kills:
         before = len(list(out.glob("trajectory.parts/*.h5")))
-        process = start(*arguments(out, episodes, 2))
+        process = start(*arguments(out, episodes, workers))
         wait_for_parts(out, before + 1)
         time.sleep(patience)
         process.kill()
@@ -216,7 +219,7 @@ def expect_killed_and_resumed(tmp_path: Path, episodes: int, kills: list[float])
         wait_until_nobody_is_left(process)
     left = len(list(out.glob("trajectory.parts/*.h5")))
     assert 0 < left < episodes, "it was killed too late"
-    last = start(*arguments(out, episodes, 2))
+    last = start(*arguments(out, episodes, workers))
     printed, said = last.communicate(timeout=600)
     assert last.returncode == 0, said
     assert f"{left} of {episodes} episodes were recorded before" in said
@@ -226,14 +229,14 @@ def expect_killed_and_resumed(tmp_path: Path, episodes: int, kills: list[float])
 
 
 def test_a_recording_that_is_killed_loses_nothing(tmp_path):
-    expect_killed_and_resumed(tmp_path, 80, [random.uniform(0, 0.2)])
+    expect_killed_and_resumed(tmp_path, 60, [random.uniform(0, 0.2)], 1)
 
 
 @pytest.mark.long
 def test_a_recording_that_is_killed_again_and_again(tmp_path):
     kills = [random.uniform(0, 1.5) for _ in range(8)]
     print("seconds after the first part:", kills)
-    expect_killed_and_resumed(tmp_path, 1500, kills)
+    expect_killed_and_resumed(tmp_path, 1000, kills, 2)
 
 
 @pytest.mark.long
@@ -245,7 +248,7 @@ def test_a_full_disk_ends_it_with_what_is_finished(tmp_path):
         pytest.skip("file systems cannot be mounted here")
     try:
         process = start(*arguments(disk, 1000, 2))
-        _, said = process.communicate(timeout=60)
+        _, said = process.communicate(timeout=180)
         assert process.returncode == 1
         assert "Traceback" not in said
         kept, error = said.splitlines()[-2:]

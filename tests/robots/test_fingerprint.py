@@ -1,0 +1,53 @@
+"""A fingerprint is that of the files' contents: not of their place, nor of pictures."""
+
+import shutil
+
+import pytest
+
+from robots import AssetError, LocalUrdf, RobotRegistry
+from robots.fingerprint import asset_fingerprint
+
+URDF = RobotRegistry.load("panda").urdf
+
+
+@pytest.fixture
+def copy(tmp_path):
+    found = URDF.locate()
+    return shutil.copytree(found.parent, tmp_path / "copy") / found.name
+
+
+def test_the_place_makes_no_difference(copy):
+    assert asset_fingerprint(LocalUrdf(copy)) == asset_fingerprint(URDF)
+
+
+@pytest.mark.parametrize(
+    "name", ["panda_v2.urdf", "panda_v2.srdf", "franka_description/meshes/collision/link3.stl"]
+)
+def test_every_file_that_physics_reads_counts(copy, name):
+    before = asset_fingerprint(LocalUrdf(copy))
+    with (copy.parent / name).open("ab") as stream:
+        stream.write(b"\n")
+    assert asset_fingerprint(LocalUrdf(copy)) != before
+
+
+def test_a_missing_srdf_counts(copy):
+    before = asset_fingerprint(LocalUrdf(copy))
+    copy.with_suffix(".srdf").unlink()
+    assert asset_fingerprint(LocalUrdf(copy)) != before
+
+
+def test_other_files_do_not_count(copy):
+    before = asset_fingerprint(LocalUrdf(copy))
+    (copy.parent / "notes.txt").write_text("nothing to do with physics")
+    assert asset_fingerprint(LocalUrdf(copy)) == before
+
+
+def test_robots_differ():
+    prints = [asset_fingerprint(RobotRegistry.load(name).urdf) for name in RobotRegistry.names()]
+    assert len(set(prints)) == len(prints)
+    assert all(len(text) == 64 for text in prints)
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    with pytest.raises(AssetError, match="cannot read the URDF"):
+        asset_fingerprint(LocalUrdf(tmp_path / "no.urdf"))

@@ -1,0 +1,78 @@
+"""Inverse kinematics of a point leads there, for every robot, or says that it cannot."""
+
+import functools
+
+import numpy as np
+import pytest
+
+from layouts import Layout, Placement
+from robots import RobotRegistry, UnknownNameError
+from simulation import World
+from simulation.reach import PointReach
+
+ROBOTS = RobotRegistry.names()
+POINT = np.array([0.01, -0.02, 0.03])
+
+
+@functools.cache
+def world_of(robot: str) -> World:
+    """Make a world with one robot that neither stands at the origin nor faces along x."""
+    base = ((0.3, -0.4, 0.1), (0.8, 0.0, 0.0, 0.6))
+    return World(Layout({"arm": Placement(RobotRegistry.load(robot), *base)}))
+
+
+def start_of(robot: str) -> np.ndarray:
+    """All joints of a keyframe, in SAPIEN's order."""
+    simulated = world_of(robot).robots["arm"]
+    qpos = np.zeros(len(simulated.joints))
+    qpos[simulated.active_index] = world_of(robot).layout["arm"].start_qpos
+    return qpos
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_forward_agrees_with_the_physics_engine(robot):
+    simulated = world_of(robot).robots["arm"]
+    qpos = start_of(robot)
+    simulated.articulation.set_qpos(qpos)
+    pose = simulated.links[simulated.descriptor.tcp_link].entity_pose
+    reach = PointReach(world_of(robot), "arm")
+    position, quaternion = reach.forward(reach.arm(qpos))
+    np.testing.assert_allclose(position, pose.p, atol=1e-5)
+    assert abs(np.dot(quaternion, pose.q)) == pytest.approx(1, abs=1e-5)
+    expected = pose.to_transformation_matrix() @ [*POINT, 1.0]
+    np.testing.assert_allclose(
+        reach.place_of(POINT, reach.arm(qpos)), np.array(expected)[:3], atol=1e-5
+    )
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_a_solution_brings_the_point_there_nearby(robot):
+    reach = PointReach(world_of(robot), "arm")
+    start = reach.arm(start_of(robot))
+    moved = start + 0.1 * np.sin(np.arange(1, len(start) + 1))
+    place = reach.place_of(POINT, moved)
+    solution = reach.solve(POINT, place, start)
+    assert solution is not None
+    np.testing.assert_allclose(reach.place_of(POINT, solution), place, atol=1e-3)
+    assert np.abs(solution - start).max() < 0.3
+
+
+def test_fixed_joints_stay():
+    reach = PointReach(world_of("so100"), "arm")
+    start = reach.arm(start_of("so100"))
+    place = reach.place_of(POINT, start) + [0.0, 0.0, -0.03]
+    solution = reach.solve(POINT, place, start, fixed=("wrist_roll",))
+    assert solution is not None
+    moved = np.abs(solution - start) > 0
+    assert moved.tolist() == [True, True, True, True, False]
+
+
+def test_a_place_out_of_reach_has_no_solution():
+    reach = PointReach(world_of("so100"), "arm")
+    assert reach.solve(POINT, np.array([9.0, 0.0, 0.0]), reach.arm(start_of("so100"))) is None
+
+
+def test_an_unknown_joint_is_refused():
+    reach = PointReach(world_of("so100"), "arm")
+    with pytest.raises(UnknownNameError, match="arm joint 'wrist_rol'. Did you mean 'wrist_roll'"):
+        reach.solve(POINT, np.zeros(3), reach.arm(start_of("so100")), fixed=("wrist_rol",))
