@@ -10,7 +10,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from layouts import Layout, Placement, face_to_face, side_by_side, yaw_quaternion
+from layouts import (
+    Layout,
+    Placement,
+    around_table,
+    face_to_face,
+    side_by_side,
+    yaw_quaternion,
+)
 from layouts.validation.bodies import load_model
 from layouts.validation.collisions import nearest, stand, touching
 from robots import AssetError, DescriptorError, LayoutError, MissingPackageError, RobotRegistry
@@ -294,6 +301,14 @@ class TestTable:
         assert finding.links[0].links == ("panda_link1", "table")
         assert finding.amount == pytest.approx(0.2 - 0.141, abs=0.001)
         assert "raise the base of arm by 0.069 m" in finding.advice
+
+    def test_tables_of_the_layout_count(self):
+        layout = around_table({"a": "panda", "b": "so100"}, edges=["north", "south"])
+        report = layout.validate(workspaces=False)
+        assert report.ok
+        assert {c.between for c in report.clearances if c.table} == {("a", "table"), ("b", "table")}
+        sunk = Layout({"a": replace(layout["a"], position=(0.1, 0, -0.3))}, layout.frames)
+        assert kinds(sunk.validate(workspaces=False)) == ["table"]
 
     def test_beside_it_there_is_none(self):
         assert self.validate(position=(2.0, 0.0, -0.2)).ok
