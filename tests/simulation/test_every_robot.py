@@ -10,6 +10,7 @@ import sapien
 
 from layouts import single
 from robots import ActionNumber, RobotRegistry
+from robots.asset_sources import find_mani_skill
 from robots.from_urdf import guess_descriptor
 from robots.registry import CATALOGUE
 from robots.urdf_model import read_model
@@ -136,9 +137,15 @@ def test_no_pose_is_farther_than_the_reach_and_some_come_near(robot):
     assert 0.9 * found.reach < farthest < found.reach + 1e-3
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+HANDS = ("dclaw/dclaw_gripper_glb.urdf", "allegro/allegro_hand_right.urdf")
+
+
+@pytest.mark.parametrize("robot", [*ROBOTS, *HANDS])
 def test_a_robot_that_was_only_guessed_stands_and_moves(robot):
-    path = RobotRegistry.load(robot).urdf.locate()
+    if robot in HANDS:
+        path = find_mani_skill() / "assets" / "robots" / robot
+    else:
+        path = RobotRegistry.load(robot).urdf.locate()
     guessed = guess_descriptor(path, "guessed").descriptor
     simulation = Simulation(single({"arm": guessed}), lambda world, _: None, 1, PhysicsSettings())
     simulation.worlds[0].robots["arm"].reset(guessed.keyframe("rest"))
