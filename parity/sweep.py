@@ -9,6 +9,7 @@ import os
 import platform
 import signal
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
@@ -485,6 +486,7 @@ def _finished(worker: _Worker) -> Entry:
 def _work(plan: Plan, reports: Connection) -> None:
     """Carry out one plan in this process, and say how it goes."""
     torch.set_num_threads(1)  # the tensors are small
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     entry, started = blank(plan.task_id, plan.options), time.monotonic()
     with _output_to(plan.folder / LOG):
         try:
@@ -498,6 +500,14 @@ def _work(plan: Plan, reports: Connection) -> None:
             entry["error"] = f"{type(error).__name__}: {error}"
     entry["seconds"] = round(time.monotonic() - started, 1)
     reports.send(entry)
+
+
+def _end_with_parent() -> None:
+    """End this process when the sweep that started it is gone, even killed."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
 
 
 @contextmanager
