@@ -20,6 +20,7 @@ CLONE_PREFIX = "maniskill."
 # One line per task, sorted by id: id -> module:class, then its other names.
 CATALOGUE = {
     "DrawTriangle-v1": ("tasks.draw_triangle:DrawTriangle", "maniskill.draw_triangle_native"),
+    "FourRobotStack-v1": ("tasks.four_robot_stack:FourRobotStack",),
     "LiftPegUpright-v1": (
         "tasks.lift_peg_upright:LiftPegUpright",
         "maniskill.lift_peg_upright_native",
@@ -40,13 +41,16 @@ CATALOGUE = {
     "PullCubeTool-v1": ("tasks.pull_cube_tool:PullCubeTool", "maniskill.pull_cube_tool_native"),
     "PushCube-v1": ("tasks.push_cube:PushCube", "maniskill.push_cube_native"),
     "PushT-v1": ("tasks.push_t:PushT", "maniskill.push_t_native"),
+    "Relay-v1": ("tasks.relay:Relay",),
     "RollBall-v1": ("tasks.roll_ball:RollBall", "maniskill.roll_ball_native"),
     "StackCube-v1": ("tasks.stack_cube:StackCube", "maniskill.stack_cube_native"),
     "StackPyramid-v1": ("tasks.stack_pyramid:StackPyramid", "maniskill.stack_pyramid_native"),
+    "TwoRobotLiftBar-v1": ("tasks.two_robot_lift_bar:TwoRobotLiftBar",),
     "TwoRobotPickCube-v1": (
         "tasks.two_robot_pick_cube:TwoRobotPickCube",
         "maniskill.two_robot_pick_cube_native",
     ),
+    "TwoRobotPushPick-v1": ("tasks.two_robot_push_pick:TwoRobotPushPick",),
     "TwoRobotStackCube-v1": (
         "tasks.two_robot_stack_cube:TwoRobotStackCube",
         "maniskill.two_robot_stack_cube_native",
