@@ -12,7 +12,7 @@ from robots import RobotLayoutsError, UnknownNameError
 from tasks.description import TaskFacts, describe, facts, list_table, parity_verdicts
 from tasks.registry import list_tasks, make
 
-MIN_WIDTH = 100  # columns that a table may take; a narrower terminal wraps it
+MIN_WIDTH = 120  # columns that a table may take; a narrower terminal wraps it
 LEGEND = (
     "norm is normalized_dense; the first reward mode is the default. parity: the last recorded"
     " comparison with native ManiSkill, where there was one."

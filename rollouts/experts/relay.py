@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from math import copysign, pi, radians, remainder
@@ -9,6 +10,7 @@ from math import copysign, pi, radians, remainder
 import numpy as np
 from numpy.typing import NDArray
 
+from layouts import Placement
 from rollouts.experts.geometry import Floats, gripper_facing, heading, planar_distance
 from rollouts.experts.rehearsal import first_success
 from rollouts.experts.script import CLOSED, Pose, Scene, Script, Waypoint
@@ -16,8 +18,9 @@ from tasks import MultiRobotTask
 from tasks.relay import find_zones
 
 BATON = "baton"
-HIGH = 0.12  # of the tip on its way over the table (m)
-OUT = 0.05  # how far the tip rises straight up, out of the baton (m)
+HIGH = 0.07  # of the tip on its way over the table (m)
+OUT = 0.04  # how far the tip rises straight up, out of the baton (m)
+POSE_JOINTS = 6  # of an arm that can choose both place and orientation of its tip
 LEANS = tuple(map(radians, (0, 20, 40)))  # of an arm, from straight down, outwards
 
 
@@ -58,57 +61,79 @@ def pass_on(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
 
 def _script(style: Style, task: MultiRobotTask) -> Script:
     zones = [np.array([*zone, 0.0]) for zone in find_zones(task.layout)]
-    bases = [np.array(placement.base_position) for placement in task.layout.values()]
     names = list(task.layout)
-    return {
-        name: _leg(name, style, base, zones[i - 1], zones[i], names[i - 1] if i else None)
-        for i, (name, base) in enumerate(zip(names, bases, strict=True))
-    }
+    script: dict[str, tuple[Waypoint, ...]] = {}
+    for i, (name, placement) in enumerate(task.layout.items()):
+        part = _Part(style, name, placement, zones[i - 1], zones[i])
+        script[name] = part.waypoints(after=names[i - 1] if i else None)
+    return script
 
 
-def _leg(
-    robot: str, style: Style, base: Floats, start: Floats, end: Floats, before: str | None
-) -> tuple[Waypoint, ...]:
-    """One robot's part of the way."""
-    first, last = heading(base, start), heading(base, end)
-    sweep = remainder(last - first, 2 * pi)
-    near, far = planar_distance(base, start), planar_distance(base, end)
-    sweep += copysign(style.beyond / far, sweep)
+class _Part:
+    """One robot's part of the way: an arc about its base, from the zone before to its own."""
 
-    def tip(place: Floats, height: float) -> list[Pose]:
-        at = np.array([*place[:2], height])
-        return [(at, gripper_facing(heading(base, at), lean)) for lean in LEANS]
+    def __init__(
+        self, style: Style, robot: str, placement: Placement, start: Floats, end: Floats
+    ) -> None:
+        self._style, self._robot = style, robot
+        self._base = base = np.array(placement.base_position)
+        self._poses = len(placement.robot.arm_joints) >= POSE_JOINTS
+        self._start = heading(base, start)
+        self._sweep = remainder(heading(base, end) - self._start, 2 * pi)
+        self._near, self._far = planar_distance(base, start), planar_distance(base, end)
+        self._sweep += copysign(style.beyond / self._far, self._sweep)
 
-    def around(share: float, closer: float = 1.0) -> Floats:
-        """The place on the arc about the base that is so far along, (3,) (m)."""
-        angle, distance = first + share * sweep, closer * (near + share * (far - near))
-        return base + distance * np.array([np.cos(angle), np.sin(angle), 0.0])
+    def waypoints(self, after: str | None) -> tuple[Waypoint, ...]:
+        """Return all of them; those in the baton wait until the robot ``after`` has left it."""
+        near, legs = self._style.near, self._style.legs
+        turn = () if after is None else (f"{after}.out",)
+        into = partial(self._at_baton, height=self._style.height)
+        return (
+            self._go("wait", self._waiting, near=0.1),
+            self._go("over", partial(self._at_baton, height=HIGH), near=0.04, after=turn),
+            self._go("into", into, near=0.03),
+            *(
+                self._go(f"along {i + 1}", partial(self._along, share=(i + 1) / legs), near=near)
+                for i in range(legs - 1)
+            ),
+            self._go("deliver", partial(self._along, share=1.0), near=0.03),
+            self._go("free", into, near=0.02),
+            self._go("out", self._above, near=0.02),
+            self._go("clear", self._waiting),
+        )
 
-    def wait(scene: Scene) -> list[Pose]:
-        return tip(around(0.5, style.waiting), HIGH)
+    def _go(
+        self,
+        name: str,
+        place: Callable[[Scene], Floats],
+        near: float = 0.05,
+        after: tuple[str, ...] = (),
+    ) -> Waypoint:
+        """Bring the tip to a place, closed, and leaning as it likes."""
+        if not self._poses:
+            return Waypoint(name, at=place, gripper=CLOSED, near=near, after=after)
 
-    def at_baton(scene: Scene, height: float) -> list[Pose]:
-        return tip(scene.body(BATON)[0], height)
+        def poses(scene: Scene) -> list[Pose]:
+            tip = place(scene)
+            return [(tip, gripper_facing(heading(self._base, tip), lean)) for lean in LEANS]
 
-    def along(scene: Scene, share: float) -> list[Pose]:
-        return tip(around(share), style.height)
+        return Waypoint(name, poses, CLOSED, near=near, after=after)
 
-    def up(scene: Scene) -> list[Pose]:
-        position, quaternion = scene.tcp(robot)
-        return [(position + np.array([0.0, 0.0, OUT]), quaternion)]
+    def _arc(self, share: float, height: float, closer: float = 1.0) -> Floats:
+        """Return the place on the arc that is so far along, (3,) (m)."""
+        angle = self._start + share * self._sweep
+        distance = closer * (self._near + share * (self._far - self._near))
+        x, y = self._base[:2] + distance * np.array([np.cos(angle), np.sin(angle)])
+        return np.array([x, y, height])
 
-    turn = () if before is None else (f"{before}.out",)
-    shares = np.arange(1, style.legs + 1) / style.legs
-    return (
-        Waypoint("wait", wait, CLOSED, near=0.1),
-        Waypoint("over", partial(at_baton, height=HIGH), CLOSED, near=0.04, after=turn),
-        Waypoint("into", partial(at_baton, height=style.height), CLOSED, near=0.03),
-        *(
-            Waypoint(f"along {share:.0%}", partial(along, share=share), CLOSED, near=style.near)
-            for share in shares[:-1]
-        ),
-        Waypoint("along 100%", partial(along, share=1.0), CLOSED, near=0.03),
-        Waypoint("free", partial(at_baton, height=style.height), CLOSED, near=0.02),
-        Waypoint("out", up, CLOSED, near=0.02),
-        Waypoint("clear", wait, CLOSED),
-    )
+    def _waiting(self, scene: Scene) -> Floats:
+        return self._arc(0.5, HIGH, self._style.waiting)
+
+    def _at_baton(self, scene: Scene, height: float) -> Floats:
+        return np.array([*scene.body(BATON)[0][:2], height])
+
+    def _along(self, scene: Scene, share: float) -> Floats:
+        return self._arc(share, self._style.height)
+
+    def _above(self, scene: Scene) -> Floats:
+        return scene.tcp(self._robot)[0] + np.array([0.0, 0.0, OUT])

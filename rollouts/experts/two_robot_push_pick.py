@@ -98,14 +98,16 @@ def _script(style: Style, forward: float, scene: Scene) -> Script:
 
     return {
         PUSHER: (
-            Waypoint("above", partial(behind, height=HIGH), near=0.1),
-            Waypoint("behind", partial(behind, height=style.height), near=style.near),
+            Waypoint("above", partial(behind, height=HIGH), CLOSED, near=0.1),
+            Waypoint("behind", partial(behind, height=style.height), CLOSED, near=style.near),
             *(
-                Waypoint(f"push {i}", partial(push, share=(i + 1) / strokes), near=style.near)
+                Waypoint(
+                    f"push {i}", partial(push, share=(i + 1) / strokes), CLOSED, near=style.near
+                )
                 for i in range(strokes)
             ),
-            Waypoint("back", partial(back, height=style.height, way=0.05), near=0.1),
-            Waypoint("away", partial(back, height=HIGH, way=0.25), near=0.1),
+            Waypoint("back", partial(back, height=style.height, way=0.05), CLOSED, near=0.1),
+            Waypoint("away", partial(back, height=HIGH, way=0.25), CLOSED, near=0.1),
         ),
         PICKER: (
             Waypoint("make room", make_room, OPEN, near=0.1),
