@@ -13,6 +13,7 @@ from layouts.frames import EDGES
 from layouts.layout import Layout
 from layouts.maniskill import TASKS, from_maniskill
 from layouts.presets import FACING, PRESETS
+from layouts.validate_command import add_check_options
 from robots import LayoutError, RobotLayoutsError, RobotRegistry, UnknownNameError
 
 # What presets take besides the robots.
@@ -26,15 +27,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: Words after ``python -m layouts``; by default those of this process.
 
     Returns:
-        Exit status: 0 if all went well, 1 after an error that was printed.
+        Exit status: 0 if all went well, 1 after an error that was printed, or if a layout was
+            checked and is not ok.
     """
     options = _parser().parse_args(arguments)
     try:
-        options.run(options)
+        return options.run(options) or 0
     except RobotLayoutsError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
-    return 0
 
 
 def add_layout_words(parser: argparse.ArgumentParser) -> None:
@@ -54,6 +55,7 @@ def add_layout_words(parser: argparse.ArgumentParser) -> None:
     for name, help_text in (
         ("--spacing", "between neighbouring bases (m)"),
         ("--radius", "of the bases from the middle (m)"),
+        ("--inset", "of the bases from the table's edge (m)"),
     ):
         parser.add_argument(name, type=_distance, metavar="M|auto", help=help_text)
     parser.add_argument("--facing", metavar="WAY", help=f"in a ring: {', '.join(FACING)}")
@@ -64,7 +66,6 @@ def add_layout_words(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--table", type=float, nargs=2, metavar=("WIDTH", "DEPTH"), help="along x and y (m)"
     )
-    parser.add_argument("--inset", type=float, metavar="M", help="from the table's edge (m)")
     parser.add_argument("--keyframe", metavar="NAME", help="joint positions to start from")
 
 
@@ -164,6 +165,9 @@ def _parser() -> argparse.ArgumentParser:
     show.add_argument("--save", metavar="FILE", help="write the layout as YAML")
     show.add_argument("--preview", metavar="FILE", help="save a top view (.png, .pdf or .svg)")
     show.set_defaults(run=_show)
+    check = commands.add_parser("validate", help="check a layout for collisions and reach")
+    add_layout_words(check)
+    add_check_options(check, chosen_layout)
     return parser
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from layouts.description import describe
 from layouts.files import written_whole
@@ -26,6 +26,9 @@ from layouts.frames import (
 from layouts.orientation import inverted, multiplied, normalised, yaw_quaternion
 from robots import LayoutError, RobotDescriptor, RobotRegistry, UnknownNameError
 from robots.descriptor import IDENTITY, Quaternion, Vector3
+
+if TYPE_CHECKING:
+    from layouts.validation import Report
 
 RobotLike = str | RobotDescriptor
 
@@ -391,6 +394,45 @@ class Layout(Mapping[str, Placement]):
         from layouts.preview import preview
 
         return preview(self, path, table)
+
+    def validate(
+        self,
+        *,
+        targets: Mapping[str, Sequence[float]] | Sequence[Sequence[float]] = (),
+        samples: int = 20,
+        table: tuple[float, float, float, float] | None = None,
+        seed: int = 0,
+        workspaces: bool = True,
+    ) -> Report:
+        """Check the layout before anything moves, from the robots' real collision shapes.
+
+        Looks for robots that collide with each other, with themselves or with tables at their
+        keyframes and with joint noise, for keyframes beyond the joint limits, and for targets that
+        nobody reaches; measures distances and shared workspaces. Needs the robots' files.
+
+        Args:
+            targets: What some robot must reach, by name or in order: x, y, z of a tool centre
+                point in the world (m), or these and the wxyz quaternion of the TCP link.
+            samples: How many postures with joint noise to look at, besides the keyframes.
+            table: Outline of a table whose top is at z = 0, as x_min, y_min, x_max, y_max (m),
+                besides those that are among the layout's frames. Bases may stand on tables.
+            seed: Of the joint noise.
+            workspaces: Whether to measure how much space robots share, to about a tenth.
+
+        Returns:
+            The report: ``ok``, ``findings``, a readable ``str`` and ``picture(path)``.
+
+        Raises:
+            LayoutError: If an argument makes no sense.
+            AssetError: If a robot's files cannot be found or make no sense.
+            DescriptorError: If a robot's descriptor contradicts its URDF.
+            MissingPackageError: If python-fcl is not installed.
+        """
+        from layouts.validation import validate
+
+        return validate(
+            self, targets=targets, samples=samples, table=table, seed=seed, workspaces=workspaces
+        )
 
 
 def load_robot(robot: RobotLike) -> RobotDescriptor:

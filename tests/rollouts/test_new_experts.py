@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import tasks
-from layouts import Layout, ring
+from layouts import Layout
 from robots import TaskError
 from rollouts.episode import play
 from rollouts.experts import find_expert
-from tests.tasks.test_relay import mixed
+from tests.tasks.test_relay import mixed, three_kinds
 
 OWN = sorted(set(tasks.list_tasks()) - set(tasks.list_clones()))
 
@@ -33,16 +33,9 @@ def test_it_succeeds_on_18_of_20_seeds(task_id: str):
     assert sum(solved) >= 18, f"failed: {[seed for seed, good in enumerate(solved) if not good]}"
 
 
-def three_of_a_kind_each() -> Layout:
-    """Two long arms that look along the ring, so that they start apart, and a short one."""
-    along = ring({"a": "panda", "b": "panda_stick", "c": "so100"}, radius=0.62, facing="tangent")
-    across = ring({"a": "panda", "b": "panda_stick", "c": "so100"}, radius=0.62)
-    return Layout({**along, "c": across["c"]})
-
-
 @pytest.mark.parametrize(
     "layout",
-    [three_of_a_kind_each(), mixed(5, 0.85), mixed(8, 0.95)],
+    [three_kinds(), mixed(5, 0.85), mixed(8, 0.95)],
     ids=("three", "five", "eight"),
 )
 def test_the_baton_goes_round_mixed_rings(layout: Layout):

@@ -24,13 +24,20 @@ def mixed(count: int, radius: float = 0.9, kinds: tuple[str, ...] = KINDS) -> La
     )
 
 
+def three_kinds() -> Layout:
+    """Two long arms that look along the ring, so that they start apart, and a short one."""
+    robots = {"first": "panda", "second": "panda_stick", "third": "so100"}
+    along, across = ring(robots, radius=0.62, facing="tangent"), ring(robots, radius=0.62)
+    return Layout({**along, "third": across["third"]})
+
+
 def at(zone: tuple[float, float]) -> tuple[float, float, float]:
     return (*zone, 0.015)
 
 
 @pytest.mark.parametrize("count", range(3, 9))
 def test_any_ring_builds_steps_and_is_observed_robot_by_robot(count: int):
-    layout = mixed(count, radius=0.6 if count == 3 else 0.8, kinds=KINDS)
+    layout = three_kinds() if count == 3 else mixed(count, radius=0.7 + 0.03 * count)
     env = tasks.make(TASK, layout=layout)
     obs, _ = env.reset(seed=1)
     assert env.single_action_space.shape == (layout.action_dim,)
@@ -50,7 +57,7 @@ def test_other_numbers_of_robots_are_refused(count: int):
 
 
 @pytest.mark.parametrize(
-    "layout", [mixed(3, 0.6), mixed(5), mixed(8, 0.95), mixed(8, 1.8, ("panda",))]
+    "layout", [three_kinds(), mixed(5), mixed(8, 0.95), mixed(8, 1.8, ("panda",))]
 )
 def test_each_zone_is_in_reach_of_both(layout: Layout):
     placements = list(layout.values())
