@@ -19,7 +19,7 @@ from parity.results import RESULTS, read
 from robots import MissingPackageError, RobotLayoutsError, RobotRegistry
 from rollouts.experts import list_experts
 from rollouts.trajectory import TrajectoryError, recorded_task
-from tasks import get_task_class, list_tasks
+from tasks import get_task_class, list_clones, list_tasks
 from tasks.description import UNKNOWN, TaskFacts, facts, short_modes
 from tasks.registry import other_names
 
@@ -185,7 +185,7 @@ def missing_tasks() -> list[Missing]:
     Raises:
         MissingPackageError: If mani_skill is not installed.
     """
-    ours = set(list_tasks())
+    ours = set(list_clones())
     return [
         Missing(task_id, reason(task_id, spec))
         for task_id, spec in native_tasks().items()

@@ -109,9 +109,9 @@ def test_without_mani_skill_the_rest_is_told():
 @pytest.mark.parametrize(
     ("robots", "downloads", "expected"),
     [
-        (["fetch"], [], "no descriptor here of its robot: fetch"),
-        ([("panda", "fetch")], [], NO_REASON),
-        ([("fetch", "dclaw")], [], "no descriptor here of its robot: dclaw, fetch"),
+        (["anymal_c"], [], "no descriptor here of its robot: anymal_c"),
+        ([("panda", "anymal_c")], [], NO_REASON),
+        ([("anymal_c", "dclaw")], [], "no descriptor here of its robot: anymal_c, dclaw"),
         (["panda"], ["ycb", "more"], "needs files that native downloads: ycb, more"),
         (None, [], NO_REASON),
     ],
