@@ -10,7 +10,7 @@ import torch
 import tasks
 from layouts import Layout, ring
 from robots import TaskError
-from tasks.relay import FARTHEST_REACH, ZONE_RADIUS, find_zones
+from tasks.relay import FARTHEST_REACH, find_zones
 from tests.tasks.own import look, make, put
 
 TASK = "Relay-v1"
@@ -75,6 +75,14 @@ def test_zones_follow_a_layout_that_is_moved():
     np.testing.assert_allclose(find_zones(moved), expected, atol=1e-9)
 
 
+def test_zones_lie_inwards_whichever_way_the_robots_go_round():
+    layout = mixed(8, 1.0, ("panda",))
+    zones = find_zones(layout)
+    assert max(hypot(x, y) for x, y in zones) < 0.6 < np.cos(np.pi / 8)
+    backwards = find_zones(Layout(dict(reversed(layout.items()))))
+    np.testing.assert_allclose(sorted(backwards), sorted(zones), atol=1e-9)
+
+
 def test_robots_too_far_apart_are_named():
     with pytest.raises(TaskError, match="'robot0' and 'robot1' stand 1.73 m apart.*Move them"):
         tasks.make(TASK, layout=mixed(3, 1.0))
@@ -98,7 +106,7 @@ def test_a_zone_ends_five_centimetres_from_its_middle():
     env = make(TASK)
     (x, y), *_ = find_zones(env.layout)
     still = torch.zeros(1, env.layout.action_dim)
-    for way, expected in ((ZONE_RADIUS + 0.002, 0), (ZONE_RADIUS - 0.002, 1)):
+    for way, expected in ((0.052, 0), (0.048, 1)):
         put(env, baton=(x + way, y, 0.015))
         assert env.step(still)[4]["zones_visited"].tolist() == [expected]
 

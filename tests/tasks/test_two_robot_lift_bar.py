@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 import tasks
+from rollouts.episode import play
 from rollouts.experts import find_expert
 from rollouts.experts.rehearsal import Rehearsal
 from rollouts.experts.two_robot_lift_bar import STYLES, _script
+from simulation import State
 from tests.tasks.own import look, make, put
 
 TASK = "TwoRobotLiftBar-v1"
@@ -47,11 +49,20 @@ def test_success_needs_both_grippers_and_rest():
     assert rewards[-1] > rewards[len(rewards) // 2] > rewards[0]
     assert info["is_left_grasping"].all()
     assert info["is_right_grasping"].all()
-    release = np.zeros((1, 16), np.float32)
-    release[0, 7] = 1.0
-    for _ in range(2):
-        env.step(release)
-    assert not look(env)["is_left_grasping"].any()
+
+
+@pytest.mark.parametrize("robot", ["left", "right"])
+@pytest.mark.parametrize("what", ["is_grasping", "is_static"])
+def test_neither_arm_may_let_go_or_move(monkeypatch, robot: str, what: str):
+    env = tasks.make(TASK)
+    assert play(env, 0, find_expert(TASK)(env, 0)).solved
+    assert look(env)["success"].all()
+    told = getattr(State, what)
+
+    def all_but_one(state: State, name: str, *arguments: object) -> np.ndarray:
+        return told(state, name, *arguments) & (name != robot)
+
+    monkeypatch.setattr(State, what, all_but_one)
     assert not look(env)["success"].any()
 
 
