@@ -79,7 +79,7 @@ def test_zones_lie_inwards_whichever_way_the_robots_go_round():
     layout = mixed(8, 1.0, ("panda",))
     zones = find_zones(layout)
     assert max(hypot(x, y) for x, y in zones) < 0.6 < np.cos(np.pi / 8)
-    backwards = find_zones(Layout(dict(reversed(layout.items()))))
+    backwards = find_zones(Layout(dict(reversed(list(layout.items())))))
     np.testing.assert_allclose(sorted(backwards), sorted(zones), atol=1e-9)
 
 
