@@ -41,7 +41,12 @@ class Rehearsal:
         """Build one environment with the layout and physics of ``task``, without pictures."""
         cheapest = "none" if "none" in task.reward_modes else None
         scenario = replace(
-            task.made_from, num_envs=1, obs_mode="none", reward_mode=cheapest, render_mode=None
+            task.made_from,
+            num_envs=1,
+            obs_mode="none",
+            reward_mode=cheapest,
+            render_mode=None,
+            check_layout=False,  # it was checked when the task was made
         )
         self.task = type(task)(scenario)
 
