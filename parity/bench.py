@@ -149,14 +149,14 @@ def table(results: Sequence[StepTimes]) -> Table:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the benchmark from the command line."""
     parser = argparse.ArgumentParser(prog="python -m parity.bench", description=__doc__)
-    parser.add_argument("--task", action="append", help="task id; all tasks if left out")
+    parser.add_argument("--task", action="append", help="task id; all clones if left out")
     parser.add_argument("--blocks", type=int, default=20, help=f"timed blocks of {BLOCK} steps")
     parser.add_argument("--batch", type=int, default=16, help="environments of the batched run")
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     args = parser.parse_args(argv)
     torch.set_num_threads(1)
     logging.disable(logging.WARNING)
-    task_ids = args.task or tasks.list_tasks()
+    task_ids = args.task or tasks.list_clones()
     results: list[StepTimes] = []
     with Progress(console=Console(stderr=True)) as progress:
         bar = progress.add_task("timing", total=len(task_ids) * (args.blocks + 1))

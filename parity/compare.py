@@ -117,7 +117,7 @@ def _compare(args: argparse.Namespace) -> int:
 
 def plan(args: argparse.Namespace) -> list[Run]:
     """Return the runs that the arguments ask for, with every file read and every name checked."""
-    classes = [tasks.get_task_class(name) for name in args.task or tasks.list_tasks()]
+    classes = [tasks.get_task_class(name) for name in args.task or tasks.list_clones()]
     demonstrations = find_demonstrations(args.demos) if args.demos else {}
     runs: list[Run] = []
     for cls in classes:

@@ -19,7 +19,7 @@ from parity.results import RESULTS, read
 from robots import MissingPackageError, RobotLayoutsError, RobotRegistry
 from rollouts.experts import list_experts
 from rollouts.trajectory import TrajectoryError, recorded_task
-from tasks import get_task_class, list_tasks
+from tasks import get_task_class, list_clones, list_tasks
 from tasks.description import UNKNOWN, TaskFacts, facts, short_modes
 from tasks.registry import other_names
 
@@ -65,6 +65,7 @@ class Entry:
     Attributes:
         facts: Its sizes, robots and reward modes.
         other_names: What it is known as besides its id.
+        native_id: Id of the ManiSkill task that it clones, or None.
         expert: Whether a scripted expert plays it.
         episodes: Episodes in the last recorded comparison with native; None if there was none.
         equal: Whether that comparison found no difference; None if there was none.
@@ -73,6 +74,7 @@ class Entry:
 
     facts: TaskFacts
     other_names: tuple[str, ...]
+    native_id: str | None
     expert: bool
     episodes: int | None
     equal: bool | None
@@ -165,10 +167,11 @@ def take_inventory(
     with Console(stderr=True).status("") as status:
         for number, task_id in enumerate(task_ids, start=1):
             status.update(f"making {task_id} to count its numbers ({number} of {len(task_ids)})")
-            result = recorded.get(task_id, {})
+            result, cls = recorded.get(task_id, {}), get_task_class(task_id)
             yield Entry(
                 facts(task_id),
-                other_names(get_task_class(task_id)),
+                other_names(cls),
+                cls.native_id,
                 task_id in experts,
                 result.get("episodes"),
                 result.get("equal"),
@@ -182,7 +185,7 @@ def missing_tasks() -> list[Missing]:
     Raises:
         MissingPackageError: If mani_skill is not installed.
     """
-    ours = set(list_tasks())
+    ours = set(list_clones())
     return [
         Missing(task_id, reason(task_id, spec))
         for task_id, spec in native_tasks().items()
@@ -236,6 +239,7 @@ def document(
             {
                 **asdict(entry.facts),
                 "other_names": entry.other_names,
+                "native_id": entry.native_id,
                 "expert": entry.expert,
                 "parity": {"episodes": entry.episodes, "equal": entry.equal},
                 "demonstrations": [str(path) for path in entry.demonstrations],
@@ -277,6 +281,8 @@ def entries_table(entries: Sequence[Entry], *, with_demonstrations: bool) -> Tab
 
 def parity_text(entry: Entry) -> str:
     """Return the recorded comparison in few words: ``equal, 55 episodes``."""
+    if entry.native_id is None:
+        return "no clone"
     if entry.episodes is None:
         return "never compared"
     return f"{'equal' if entry.equal else 'DIFFERS'}, {entry.episodes} episodes"

@@ -25,7 +25,7 @@ from parity.summary import REWARD, number_text, success_text
 from parity.sweep import SUMMARY, read_summary
 from robots import MissingPackageError, RecordingError, RobotLayoutsError, TaskError
 from rollouts.experts import list_experts
-from tasks import MultiRobotTask, get_task_class, list_tasks
+from tasks import MultiRobotTask, get_task_class, list_clones
 from tasks.description import read_docstring, robots_text
 
 LIMIT = 25.0  # MB
@@ -186,7 +186,7 @@ def _encoded(count: int) -> int:
 
 def _context(runs: Path, swept: Mapping[str, Any], recorded: Mapping[str, Any]) -> dict[str, Any]:
     entries: Mapping[str, Any] = swept["tasks"]
-    task_ids = sorted({*list_tasks(), *entries})
+    task_ids = sorted({*list_clones(), *entries})
     found = {task_id: entries.get(task_id) for task_id in task_ids}
     not_cloned, note = _not_cloned()
     return {

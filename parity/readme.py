@@ -11,7 +11,7 @@ from typing import Any
 from parity.results import RESULTS, ResultsError, read
 from parity.summary import REWARD_MODES, number_text, reward_text, success_text
 from robots import RobotLayoutsError
-from tasks import list_tasks
+from tasks import list_clones
 
 README = Path(__file__).parents[1] / "README.md"
 BEGIN = "<!-- parity table: begin; written by `python -m parity readme` -->"
@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (RobotLayoutsError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    complaints = list(missing_and_extra(record["tasks"], list_tasks()))
+    complaints = list(missing_and_extra(record["tasks"], list_clones()))
     if args.check and fresh != text:
         complaints.append(f"{args.readme.name} is stale; run `python -m parity readme`")
     for complaint in complaints:

@@ -173,7 +173,7 @@ def plan(args: argparse.Namespace) -> list[Plan]:
     for name in ("episodes", "workers"):
         if getattr(args, name) < 1:
             raise TaskError(f"--{name} is {getattr(args, name)}; it must be 1 or more")
-    classes = [tasks.get_task_class(name) for name in args.tasks or tasks.list_tasks()]
+    classes = [tasks.get_task_class(name) for name in args.tasks or tasks.list_clones()]
     demos, unreadable = find_files(args.demos) if args.demos else ({}, [])
     for file in unreadable:
         print(f"{file.path} is left out: {file.problem}", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""``python -m tasks list`` and ``python -m tasks describe TASK``: what there is to achieve."""
+"""``python -m tasks``: what there is to achieve, and what a step costs."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from collections.abc import Sequence
 
 from rich.console import Console
 
-from robots import RobotLayoutsError, UnknownNameError
+from robots import RobotLayoutsError, TaskError, UnknownNameError
 from tasks.description import TaskFacts, describe, facts, list_table, parity_verdicts
 from tasks.registry import list_tasks, make
 
-MIN_WIDTH = 100  # columns that a table may take; a narrower terminal wraps it
+MIN_WIDTH = 120  # columns that a table may take; a narrower terminal wraps it
 LEGEND = (
     "norm is normalized_dense; the first reward mode is the default. parity: the last recorded"
     " comparison with native ManiSkill, where there was one."
@@ -32,6 +32,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if options.command == "list":
             _list()
+        elif options.command == "bench":
+            _bench(options)
         else:
             _describe(options.task)
     except RobotLayoutsError as error:
@@ -66,6 +68,18 @@ def _describe(name: str) -> None:
     env.close()
 
 
+def _bench(options: argparse.Namespace) -> None:
+    from tasks.bench import MOST_ROBOTS, cost_table, measure
+
+    counts = options.robots or range(1, MOST_ROBOTS + 1)
+    for count in counts:
+        if not 1 <= count <= MOST_ROBOTS:
+            raise TaskError(f"--robots {count}: it takes numbers from 1 to {MOST_ROBOTS}")
+    if options.blocks < 1:
+        raise TaskError(f"--blocks is {options.blocks}; it must be 1 or more")
+    _console().print(cost_table(measure(counts, options.kinds, options.blocks)))
+
+
 def _console() -> Console:
     console = Console(markup=False, highlight=False)
     console.width = max(console.width, MIN_WIDTH)
@@ -80,6 +94,11 @@ def _parser() -> argparse.ArgumentParser:
     commands.add_parser("list", help="print every task as a row of a table")
     one = commands.add_parser("describe", help="print everything about a task")
     one.add_argument("task", metavar="TASK", help="task id or another of its names")
+    bench = commands.add_parser("bench", help="time a step with one robot, two, and so on")
+    add = bench.add_argument
+    add("--robots", type=int, nargs="+", metavar="N", help="numbers of robots (1 to 8)")
+    add("--kinds", nargs="+", default=["panda"], metavar="ROBOT", help="robots, in turn (panda)")
+    add("--blocks", type=int, default=20, help="timed blocks of 50 steps (20)")
     return parser
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from math import cos, pi, sin
 
+import numpy as np
+
 from robots.descriptor import Vector3
-from simulation import Box, Cylinder, Sphere, World
+from simulation import Box, Cylinder, Plane, Sphere, World
 from simulation.shapes import Color
 
 RED: Color = (1.0, 0.0, 0.0, 1.0)
@@ -16,6 +18,13 @@ WHITE: Color = (1.0, 1.0, 1.0, 1.0)
 TARGET_RED: Color = (194 / 255, 19 / 255, 22 / 255, 1.0)
 DARK_BLUE: Color = (12 / 255, 42 / 255, 160 / 255, 1.0)
 DARK_RED: Color = (176 / 255, 14 / 255, 14 / 255, 1.0)
+
+WOOD: Color = (0.55, 0.42, 0.32, 1.0)
+STONE: Color = (0.35, 0.37, 0.4, 1.0)
+
+TABLE_MARGIN = 0.3  # of a wide table beyond the outermost bases (m)
+TABLE_THICKNESS, TABLE_HEIGHT = 0.05, 0.9  # of a wide table (m)
+UPWARD = (cos(pi / 4), 0.0, -sin(pi / 4), 0.0)  # wxyz; turns a plane's normal from x to z
 
 TARGET_HEIGHT = 1e-3  # of a target's middle above the table (m)
 FACE_UP = (cos(pi / 4), 0.0, sin(pi / 4), 0.0)  # wxyz; turns a disc's axis from x to z
@@ -102,3 +111,21 @@ def add_target(world: World, radius: float, name: str = "goal_region") -> None:
         for i in range(5)
     ]
     world.add(name, *rings, kind="kinematic")
+
+
+def add_wide_table(world: World) -> None:
+    """Add a table under all robots of a layout, its top at z = 0, and the floor below it.
+
+    It ends `TABLE_MARGIN` beyond the outermost bases.
+
+    Args:
+        world: The world; its layout says where the bases are.
+    """
+    bases = np.array([placement.base_position[:2] for placement in world.layout.values()])
+    low, high = bases.min(0) - TABLE_MARGIN, bases.max(0) + TABLE_MARGIN
+    (x, y), (half_x, half_y) = (low + high) / 2, (high - low) / 2
+    slab = Box(half_size=(half_x, half_y, TABLE_THICKNESS / 2), color=WOOD)
+    middle = (x, y, -TABLE_THICKNESS / 2)
+    world.add("table", slab, kind="kinematic", position=middle, anchored=True)
+    floor = Plane(position=(0.0, 0.0, -TABLE_HEIGHT), quaternion=UPWARD, color=STONE)
+    world.add("ground", floor, kind="static")

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from layouts import Layout
-from layouts.layout import RobotLike
+from layouts import Layout, Placement
+from layouts.layout import RobotLike, load_robot
 from robots import TaskError, UnknownNameError
 
 if TYPE_CHECKING:
     from tasks.task import MultiRobotTask
 
+# Beginning of the name of a task that clones one of ManiSkill's.
+CLONE_PREFIX = "maniskill."
+
 # One line per task, sorted by id: id -> module:class, then its other names.
 CATALOGUE = {
     "DrawTriangle-v1": ("tasks.draw_triangle:DrawTriangle", "maniskill.draw_triangle_native"),
+    "FourRobotStack-v1": ("tasks.four_robot_stack:FourRobotStack",),
     "LiftPegUpright-v1": (
         "tasks.lift_peg_upright:LiftPegUpright",
         "maniskill.lift_peg_upright_native",
@@ -36,13 +41,16 @@ CATALOGUE = {
     "PullCubeTool-v1": ("tasks.pull_cube_tool:PullCubeTool", "maniskill.pull_cube_tool_native"),
     "PushCube-v1": ("tasks.push_cube:PushCube", "maniskill.push_cube_native"),
     "PushT-v1": ("tasks.push_t:PushT", "maniskill.push_t_native"),
+    "Relay-v1": ("tasks.relay:Relay",),
     "RollBall-v1": ("tasks.roll_ball:RollBall", "maniskill.roll_ball_native"),
     "StackCube-v1": ("tasks.stack_cube:StackCube", "maniskill.stack_cube_native"),
     "StackPyramid-v1": ("tasks.stack_pyramid:StackPyramid", "maniskill.stack_pyramid_native"),
+    "TwoRobotLiftBar-v1": ("tasks.two_robot_lift_bar:TwoRobotLiftBar",),
     "TwoRobotPickCube-v1": (
         "tasks.two_robot_pick_cube:TwoRobotPickCube",
         "maniskill.two_robot_pick_cube_native",
     ),
+    "TwoRobotPushPick-v1": ("tasks.two_robot_push_pick:TwoRobotPushPick",),
     "TwoRobotStackCube-v1": (
         "tasks.two_robot_stack_cube:TwoRobotStackCube",
         "maniskill.two_robot_stack_cube_native",
@@ -57,6 +65,8 @@ TaskClass = TypeVar("TaskClass", bound="type[MultiRobotTask]")
 
 def register_task(*names: str) -> Callable[[TaskClass], TaskClass]:
     """Make a task class known by names; the first one is its id. For use as a decorator.
+
+    A name that begins with ``maniskill.`` says that it clones ManiSkill's task of that id.
 
     Raises:
         TaskError: If no name is given or a name is taken by another class.
@@ -74,6 +84,7 @@ def register_task(*names: str) -> Callable[[TaskClass], TaskClass]:
         if names[0] not in _listed and names[0] not in CATALOGUE:
             _listed.append(names[0])
         cls.task_id = names[0]
+        cls.native_id = names[0] if any(map(_is_clone_name, names)) else None
         return cls
 
     return register
@@ -84,6 +95,13 @@ def list_tasks() -> tuple[str, ...]:
     return tuple(sorted({*CATALOGUE, *_listed}))
 
 
+def list_clones() -> tuple[str, ...]:
+    """Return the id of every task that clones one of ManiSkill's, sorted."""
+    built_in = (i for i, (_, *names) in CATALOGUE.items() if any(map(_is_clone_name, names)))
+    registered = (i for i in _listed if _registered[i.lower()].native_id is not None)
+    return tuple(sorted({*built_in, *registered}))
+
+
 def get_task_class(name: str) -> type[MultiRobotTask]:
     """Return the class of a task by id or other name, ignoring case.
 
@@ -92,7 +110,7 @@ def get_task_class(name: str) -> type[MultiRobotTask]:
     Raises:
         UnknownNameError: If no task has that name (also a ``KeyError``).
     """
-    for key in (str(name).lower(), f"maniskill.{str(name).lower()}_native"):
+    for key in (str(name).lower(), f"{CLONE_PREFIX}{str(name).lower()}_native"):
         if key not in _registered and (target := _built_in(key)):
             import_module(target.partition(":")[0])  # registers itself
         if key in _registered:
@@ -120,8 +138,9 @@ def make(
         task_id: Its id or another of its names.
         num_envs: Number of environments in this process.
         robots: Other robots for some places: a mapping place → robot, or one robot for a task
-            with one place.
-        layout: Another layout with the task's places.
+            with one place. A robot that lacks its place's keyframe starts from its home's.
+        layout: Another layout with the task's places, in any order; for a task over any number of
+            robots, with places of any names.
         obs_mode: ``"state"``, ``"state_dict"`` or ``"none"``.
         reward_mode: One of the task's reward modes; None takes native's default.
         fields: Other fields of `tasks.Scenario`.
@@ -146,13 +165,26 @@ def make(
 
 def _replace_robots(layout: Layout, robots: RobotLike | Mapping[str, RobotLike]) -> Layout:
     if isinstance(robots, Mapping):
-        return layout.replace_robots(**robots)
+        changed = {place: _stand(layout[place], robot) for place, robot in robots.items()}
+        return Layout({**layout, **changed}, layout.frames)
     if len(layout) != 1:
         raise TaskError(
             f"robots={robots!r} does not say which place it takes; the places are {list(layout)},"
             f" for example robots={{{next(iter(layout))!r}: {robots!r}}}"
         )
-    return layout.replace_robots(**{next(iter(layout)): robots})
+    return _replace_robots(layout, {next(iter(layout)): robots})
+
+
+def _stand(placement: Placement, robot: RobotLike) -> Placement:
+    """Return a placement with another robot, at its home's keyframe if it lacks the place's."""
+    robot = load_robot(robot)
+    if placement.keyframe not in robot.keyframes:
+        placement = replace(placement, keyframe=None)
+    return placement.with_robot(robot)
+
+
+def _is_clone_name(name: str) -> bool:
+    return name.lower().startswith(CLONE_PREFIX)
 
 
 def _built_in(name: str) -> str | None:

@@ -52,8 +52,11 @@ class MultiRobotTask:
 
     Attributes:
         task_id: The task's id.
-        source: Where a clone's numbers come from: package, version and file.
+        native_id: Id of the ManiSkill task that it clones; None for a task of our own.
+        source: Where its numbers come from; of a clone package, version and file.
         layout: Default layout.
+        robot_counts: How many robots a layout may have, in places called as one likes; None if it
+            takes exactly the places of ``layout``.
         physics: Solver settings; None keeps SAPIEN's own defaults.
         max_episode_steps: Control steps until an episode is truncated.
         reward_modes: Reward modes, the default first.
@@ -71,9 +74,11 @@ class MultiRobotTask:
     """
 
     task_id: ClassVar[str] = ""
+    native_id: ClassVar[str | None] = None
     source: ClassVar[str] = ""
     scenario: ClassVar[Any] = _FreshScenario()
     layout: Layout
+    robot_counts: ClassVar[range | None] = None
     physics: ClassVar[PhysicsSettings | None] = None
     max_episode_steps: ClassVar[int]
     reward_modes: ClassVar[tuple[str, ...]] = ()
@@ -162,11 +167,7 @@ class MultiRobotTask:
             AssetError: If robot files cannot be found.
         """
         scenario.check(self.reward_modes)
-        if list(scenario.layout) != list(type(self).layout):
-            raise TaskError(
-                f"{type(self).__name__} has the places {list(type(self).layout)};"
-                f" the layout has {list(scenario.layout)}"
-            )
+        self._check_places(scenario.layout)
         if scenario.check_layout and scenario.layout != type(self).layout:
             refuse_collisions(scenario.layout)
         self.made_from = scenario
@@ -329,6 +330,21 @@ class MultiRobotTask:
         return self._camera.take()
 
     # -- inside ------------------------------------------------------------------------------
+
+    @classmethod
+    def _check_places(cls, layout: Layout) -> None:
+        """Refuse a layout whose places are not the task's; their order is the layout's own."""
+        if cls.robot_counts is not None:
+            if len(layout) not in cls.robot_counts:
+                raise TaskError(
+                    f"{cls.__name__} takes {cls.robot_counts[0]} to {cls.robot_counts[-1]} robots;"
+                    f" the layout has {len(layout)}: {list(layout)}"
+                )
+        elif set(layout) != set(cls.layout):
+            raise TaskError(
+                f"{cls.__name__} has the places {list(cls.layout)}; the layout has {list(layout)}."
+                " Give the layout's robots the names of the places"
+            )
 
     def _joint_noise(self, layout: Layout, rng: EpisodeRandom) -> dict[str, NDArray[np.float64]]:
         if not self.shared_joint_noise:

@@ -12,7 +12,7 @@ from parity.comparison import EpisodeResult, History, compare
 from parity.episodes import Episode
 from parity.sides import NativeSide, OurSide
 
-TASKS = tasks.list_tasks()
+TASKS = tasks.list_clones()
 NATIVE = [
     pytest.mark.native,
     # mani_skill's own

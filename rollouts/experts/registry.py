@@ -21,6 +21,7 @@ of their own. The actions hold for freshly built worlds, ``reset(seed, {"reconfi
 # One line per task, sorted by id: id -> module:function.
 CATALOGUE = {
     "DrawTriangle-v1": "rollouts.experts.draw_triangle:draw_outline",
+    "FourRobotStack-v1": "rollouts.experts.four_robot_stack:stack_for_four",
     "LiftPegUpright-v1": "rollouts.experts.lift_peg_upright:stand_up",
     "PegInsertionSide-v1": "rollouts.experts.peg_insertion_side:insert_peg",
     "PickCube-v1": "rollouts.experts.pick_cube:pick_cube",
@@ -32,10 +33,13 @@ CATALOGUE = {
     "PullCubeTool-v1": "rollouts.experts.pull_cube_tool:pull",
     "PushCube-v1": "rollouts.experts.slide_cube:slide",
     "PushT-v1": "rollouts.experts.push_t:push_onto_outline",
+    "Relay-v1": "rollouts.experts.relay:pass_on",
     "RollBall-v1": "rollouts.experts.roll_ball:roll",
     "StackCube-v1": "rollouts.experts.stack_cube:stack_cube",
     "StackPyramid-v1": "rollouts.experts.stack_pyramid:stack_pyramid",
+    "TwoRobotLiftBar-v1": "rollouts.experts.two_robot_lift_bar:lift_for_two",
     "TwoRobotPickCube-v1": "rollouts.experts.two_robot_pick_cube:hand_over",
+    "TwoRobotPushPick-v1": "rollouts.experts.two_robot_push_pick:push_and_pick",
     "TwoRobotStackCube-v1": "rollouts.experts.two_robot_stack_cube:stack_for_two",
 }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from math import pi, remainder
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +12,10 @@ from numpy.typing import NDArray
 from robots import TaskError, UnknownNameError
 from rollouts.episode import REBUILT
 from rollouts.experts.driver import ArmDriver
-from rollouts.experts.geometry import Floats
+from rollouts.experts.geometry import Floats, heading, inverse, rotate
 from rollouts.experts.script import OPEN, Pose, Scene, Script, Waypoint
 from simulation.kinematics import InverseKinematics
+from simulation.reach import PointReach
 from tasks import MultiRobotTask
 
 
@@ -39,7 +41,12 @@ class Rehearsal:
         """Build one environment with the layout and physics of ``task``, without pictures."""
         cheapest = "none" if "none" in task.reward_modes else None
         scenario = replace(
-            task.made_from, num_envs=1, obs_mode="none", reward_mode=cheapest, render_mode=None
+            task.made_from,
+            num_envs=1,
+            obs_mode="none",
+            reward_mode=cheapest,
+            render_mode=None,
+            check_layout=False,  # it was checked when the task was made
         )
         self.task = type(task)(scenario)
 
@@ -96,6 +103,9 @@ class _Player:
         self._driver = ArmDriver(task.layout[robot].robot, world.robots[robot].active_index)
         if any(waypoint.to is not None for waypoint in waypoints):
             self._kinematics = InverseKinematics(world, robot)
+        if any(waypoint.at is not None for waypoint in waypoints):
+            self._reach = PointReach(world, robot)
+            self._base = np.array(task.layout[robot].base_position)
         self._goal = self._driver.arm(scene.qpos(robot))
         self._gripper = OPEN
         self._current: Waypoint | None = None
@@ -128,7 +138,7 @@ class _Player:
     def _is_done(self, waypoint: Waypoint, scene: Scene) -> bool:
         if self._elapsed < waypoint.steps:
             return False
-        if waypoint.to is not None or waypoint.turn is not None:
+        if (waypoint.to, waypoint.turn, waypoint.at) != (None, None, None):
             away = np.abs(self._driver.arm(scene.qpos(self._robot)) - self._goal).max()
             if away > waypoint.near:
                 return False
@@ -149,6 +159,8 @@ class _Player:
         elif waypoint.turn is not None:
             arm = self._driver.arm(scene.qpos(self._robot))
             self._goal = arm + waypoint.turn(arm)
+        elif waypoint.at is not None:
+            self._goal = self._reaching(waypoint.at(scene), scene)
 
     def _nearest(self, poses: Sequence[Pose], qpos: Floats) -> Floats:
         goals = [self._kinematics.solve(*pose, qpos) for pose in poses]
@@ -156,6 +168,23 @@ class _Player:
         if not reachable:
             raise _StuckError(f"{self.place} is out of reach")
         arm = self._driver.arm(qpos)
+        return min(reachable, key=lambda goal: float(np.abs(goal - arm).max()))
+
+    def _reaching(self, place: Floats, scene: Scene) -> Floats:
+        """Return arm joints that bring the TCP to a place.
+
+        They are sought from the present ones, and from those turned towards the place by the
+        first joint, which turns an arm about its base.
+        """
+        arm, tip = self._reach.arm(scene.qpos(self._robot)), scene.tcp(self._robot)[0]
+        origin, turned = self._reach.forward(arm)
+        point = rotate(inverse(turned), tip - origin)
+        about = remainder(heading(self._base, place) - heading(self._base, tip), 2 * pi)
+        starts = [arm + about * side * (np.arange(len(arm)) == 0) for side in (0, 1, -1)]
+        goals = [self._reach.solve(point, place, start) for start in starts]
+        reachable = [goal for goal in goals if goal is not None]
+        if not reachable:
+            raise _StuckError(f"{self.place} is out of reach")
         return min(reachable, key=lambda goal: float(np.abs(goal - arm).max()))
 
 

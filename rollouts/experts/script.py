@@ -64,6 +64,8 @@ class Waypoint:
         turn: Instead of ``to``, how far the arm's joints turn, (arm joints,) (rad), worked out from
             where they are when the waypoint begins; both in the order of the robot's arm joints.
         most: Number of control steps after which, if it is not done, the script has failed.
+        at: Instead of ``to``, where the TCP should be, (3,) (m, world), turned in any way: for arms
+            of too few joints to choose that too.
     """
 
     name: str
@@ -75,6 +77,7 @@ class Waypoint:
     until: Callable[[Scene], bool] | None = None
     turn: Callable[[Floats], Floats] | None = None
     most: int | None = None
+    at: Callable[[Scene], Floats] | None = None
 
 
 Script = Mapping[str, Sequence[Waypoint]]

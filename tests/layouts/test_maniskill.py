@@ -7,11 +7,7 @@ from layouts import from_maniskill
 from layouts.maniskill import TASKS
 from robots import UnknownNameError
 
-CLONES = [
-    task_id
-    for task_id in tasks.list_tasks()
-    if "native" in "".join(tasks.registry.other_names(tasks.get_task_class(task_id)))
-]
+CLONES = tasks.list_clones()
 
 
 @pytest.mark.parametrize("task_id", CLONES)

@@ -22,7 +22,7 @@ def planned(*options: str) -> list:
 
 
 class TestPlan:
-    @pytest.mark.parametrize("task_id", tasks.list_tasks())
+    @pytest.mark.parametrize("task_id", tasks.list_clones())
     def test_every_way_of_playing_every_task(self, task_id):
         default, *others = tasks.get_task_class(task_id).reward_modes
         ways = [("fresh", default), ("reused", default), *(("reused", mode) for mode in others)]
@@ -144,7 +144,7 @@ class TestComparing:
 
     @pytest.fixture(autouse=True)
     def only_push_t(self, monkeypatch):
-        monkeypatch.setattr("tasks.list_tasks", lambda: ("PushT-v1",))
+        monkeypatch.setattr("tasks.list_clones", lambda: ("PushT-v1",))
 
     def test_what_is_found_is_shown_written_and_recorded(self, capsys, monkeypatch, tmp_path):
         json_file, record_file = tmp_path / "found.json", tmp_path / "results.json"

@@ -61,6 +61,7 @@ def test_as_json(inventory, demos):
         "max_episode_steps": 50,
         "reward_modes": ["normalized_dense", "dense", "sparse", "none"],
         "other_names": ["maniskill.pick_cube_native"],
+        "native_id": "PickCube-v1",
         "expert": one["expert"],
         "parity": {"episodes": 7, "equal": False},
         "demonstrations": [str(demos / "a/one.h5"), str(demos / "b/two.h5")],
@@ -108,9 +109,9 @@ def test_without_mani_skill_the_rest_is_told():
 @pytest.mark.parametrize(
     ("robots", "downloads", "expected"),
     [
-        (["fetch"], [], "no descriptor here of its robot: fetch"),
-        ([("panda", "fetch")], [], NO_REASON),
-        ([("fetch", "dclaw")], [], "no descriptor here of its robot: dclaw, fetch"),
+        (["anymal_c"], [], "no descriptor here of its robot: anymal_c"),
+        ([("panda", "anymal_c")], [], NO_REASON),
+        ([("anymal_c", "dclaw")], [], "no descriptor here of its robot: anymal_c, dclaw"),
         (["panda"], ["ycb", "more"], "needs files that native downloads: ycb, more"),
         (None, [], NO_REASON),
     ],
@@ -127,7 +128,7 @@ class TestNative:
 
     def test_every_task_of_natives_is_either_cloned_or_missing(self):
         missing = {task.task_id: task.reason for task in missing_tasks()}
-        cloned = set(tasks.list_tasks())
+        cloned = set(tasks.list_clones())
         assert cloned.isdisjoint(missing)
         assert cloned | set(missing) == set(native_tasks())
         assert (

@@ -209,7 +209,7 @@ class TestInABrowser:
         swept = json.loads((runs / SUMMARY).read_text())["tasks"]
         recorded = read(RESULTS)["tasks"]
         rows = rows_of(visit().page)
-        assert [row[0].split()[0] for row in rows] == list(tasks.list_tasks())
+        assert [row[0].split()[0] for row in rows] == list(tasks.list_clones())
         for first, *shown in rows:
             task_id = first.split()[0]
             known = recorded[task_id]
@@ -271,7 +271,7 @@ class TestInABrowser:
 
     def test_without_scripts_everything_is_there(self, visit):
         page = visit(java_script_enabled=False).page
-        assert page.locator("tbody tr").count() == len(tasks.list_tasks())
+        assert page.locator("tbody tr").count() == len(tasks.list_clones())
         assert page.locator("video[controls][poster]").count() == 2
         assert page.locator("#filter").is_hidden()
         assert page.get_by_role("heading", name="What is missing").is_visible()
@@ -315,13 +315,13 @@ class TestInABrowser:
 
         button.click()
         assert steps() == sorted(steps())
-        assert len(steps()) == len(tasks.list_tasks())
+        assert len(steps()) == len(tasks.list_clones())
         button.press("Enter")
         assert steps() == sorted(steps(), reverse=True)
         heading = page.get_by_role("columnheader", name="steps", exact=True)
         assert heading.get_attribute("aria-sort") == "descending"
         page.get_by_role("button", name="task", exact=True).click()
-        assert [row[0].split()[0] for row in rows_of(page)] == sorted(tasks.list_tasks())
+        assert [row[0].split()[0] for row in rows_of(page)] == sorted(tasks.list_clones())
 
     def test_what_was_not_measured_is_sorted_last(self, visit):
         page = visit().page
@@ -340,7 +340,7 @@ class TestInABrowser:
             "DrawTriangle-v1",
             "PushT-v1",
         }
-        assert page.get_by_role("status").inner_text() == f"2 of {len(tasks.list_tasks())}"
+        assert page.get_by_role("status").inner_text() == f"2 of {len(tasks.list_clones())}"
 
     def test_by_keyboard(self, visit):
         page = visit().page
@@ -437,7 +437,7 @@ class TestInABrowser:
                 strict=True,
             )
         )
-        recorded, count = read(RESULTS)["tasks"], len(tasks.list_tasks())
+        recorded, count = read(RESULTS)["tasks"], len(tasks.list_clones())
         assert found["tasks equal to native"] == (
             f"{sum(result['equal'] for result in recorded.values())} of {count}"
         )

@@ -60,7 +60,7 @@ class Files:
 
 @pytest.fixture
 def files(tmp_path, monkeypatch):
-    monkeypatch.setattr("parity.readme.list_tasks", lambda: tuple(CATALOGUE))
+    monkeypatch.setattr("parity.readme.list_clones", lambda: tuple(CATALOGUE))
     return Files(tmp_path, a_record(*CATALOGUE))
 
 

@@ -66,7 +66,7 @@ def planned(tmp_path, **changes) -> list[Plan]:
 class TestPlan:
     def test_every_task(self, tmp_path):
         plans = planned(tmp_path, no_video=True)
-        assert [p.task_id for p in plans] == list(tasks.list_tasks())
+        assert [p.task_id for p in plans] == list(tasks.list_clones())
         assert {(p.demos, p.episodes, p.video) for p in plans} == {((), 3, False)}
         assert plans[0].folder == tmp_path / plans[0].task_id
 

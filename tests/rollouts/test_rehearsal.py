@@ -93,6 +93,26 @@ def test_a_waypoint_turns_joints():
     np.testing.assert_allclose(rehearsal.scene().qpos("arm")[:7] - start[:7], change, atol=0.01)
 
 
+@pytest.mark.parametrize("heading", [-1.4, 0.0, 1.4])
+@pytest.mark.parametrize("distance", [0.25, 0.35])
+def test_an_arm_of_few_joints_reaches_a_place(heading: float, distance: float):
+    rehearsal = Rehearsal(tasks.make("PickCubeSO100-v1"))
+    rehearsal.begin(0)
+    base = np.array(rehearsal.task.layout["arm"].base_position)
+    place = base + [distance * np.cos(heading), distance * np.sin(heading), 0.1]
+    go = Waypoint("go", at=lambda scene: place)
+    for _ in range(2):  # 50 steps are not enough to turn so far
+        rehearsal.play({"arm": (go,)})
+    np.testing.assert_allclose(rehearsal.scene().tcp("arm")[0], place, atol=0.01)
+
+
+def test_a_place_out_of_reach_is_told():
+    rehearsal = Rehearsal(tasks.make("PickCubeSO100-v1"))
+    rehearsal.begin(0)
+    go = Waypoint("go", at=lambda scene: np.array([0.0, 0.0, 0.1]))
+    assert rehearsal.play({"arm": (go,)}).reason == "arm.go is out of reach"
+
+
 @pytest.fixture(scope="module")
 def two_arms() -> Rehearsal:
     return Rehearsal(tasks.make("TwoRobotPickCube-v1"))

@@ -12,10 +12,11 @@ from robots import TaskError, UnknownNameError
 from simulation import Friction, PhysicsSettings, State, World
 
 
-@pytest.mark.parametrize("task_id", tasks.list_tasks())
-def test_every_task_has_its_id_and_its_native_name(task_id: str):
+@pytest.mark.parametrize("task_id", tasks.list_clones())
+def test_every_clone_has_its_id_and_its_native_name(task_id: str):
     cls = tasks.get_task_class(task_id)
-    assert cls.task_id == task_id
+    assert cls.task_id == cls.native_id == task_id
+    assert cls.source.startswith("mani_skill ")
     assert tasks.get_task_class(task_id.lower()) is cls
     snake = re.sub("(?<=[a-z])(?=[A-Z])", "_", task_id[:-3]).lower()
     assert tasks.get_task_class(f"maniskill.{snake}_native") is cls
@@ -31,8 +32,17 @@ def test_every_task_says_what_it_is(task_id: str):
     assert cls.physics is not None
 
 
-def test_the_list_is_sorted():
+def test_the_lists_are_sorted():
     assert list(tasks.list_tasks()) == sorted(tasks.list_tasks())
+    assert list(tasks.list_clones()) == sorted(tasks.list_clones())
+
+
+def test_a_task_of_our_own_has_no_native_counterpart():
+    own = set(tasks.list_tasks()) - set(tasks.list_clones())
+    assert own
+    for cls in map(tasks.get_task_class, own):
+        assert cls.native_id is None
+        assert "mani_skill" not in cls.source
 
 
 def test_a_wrong_name_gets_its_closest_match():
@@ -111,9 +121,13 @@ def test_one_place_takes_a_bare_name_and_two_do_not():
         tasks.make("PickCube-v1", robots="pnda")
 
 
-def test_a_robot_without_the_keyframe_is_refused():
+def test_a_robot_without_the_keyframe_starts_from_its_home():
+    assert tasks.make("PushT-v1").layout["arm"].start_keyframe == "push_start"
+    assert tasks.make("PushT-v1", robots="panda").layout["arm"].start_keyframe == "rest"
+    given = single({"arm": "panda"}, keyframe="rest")
     with pytest.raises(UnknownNameError, match="keyframe of panda 'push_start'"):
-        tasks.make("PushT-v1", robots="panda")
+        single({"arm": "panda_stick"}, keyframe="push_start").replace_robots(arm="panda")
+    assert tasks.make("PickCube-v1", layout=given).layout == given
 
 
 class Still(tasks.MultiRobotTask):

@@ -1,0 +1,106 @@
+"""TwoRobotPushPick: a stick pushes a cube within a gripper's reach, which picks it."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+
+from layouts import face_to_face
+from simulation import Box, Friction, PhysicsSettings, State, World, add_table
+from simulation.arrays import Array, Floats, constants, norm
+from tasks.props import DARK_RED, add_goal
+from tasks.randomness import EpisodeRandom
+from tasks.registry import register_task
+from tasks.shaping import closeness
+from tasks.task import Info, MultiRobotTask
+
+# m; the picker's base is at y = 0.7, and a Panda that points down reaches about 0.8 m
+CUBE_HALF_SIZE = 0.02
+CUBE_LOW, CUBE_HIGH = (-0.1, -0.28), (0.1, -0.2)
+GOAL_LOW, GOAL_HIGH = (-0.1, 0.15, 0.1), (0.1, 0.25, 0.3)
+IN_REACH_Y = -0.05  # from here on the cube counts as within reach
+GOAL_RADIUS = 0.025
+PUSH_OFFSET = -0.03  # from the cube's middle to where a stick pushes it, along y
+LARGEST_TURN = pi / 6  # of the cube (rad)
+CUBE_FRICTION = Friction(1.0, 1.0, 0.0)  # so that a stick does not slip off at once
+STATIC_SPEED = 0.2  # rad/s
+
+
+@register_task("TwoRobotPushPick-v1")
+class TwoRobotPushPick(MultiRobotTask):
+    """Push a cube from where only the pusher reaches it to the picker, which holds it at a goal.
+
+    The cube lies at x in [-0.1, 0.1], y in [-0.28, -0.2], turned by at most 30°; the goal is at x
+    in [-0.1, 0.1], y in [0.15, 0.25] and 0.1 to 0.3 high (m). Success: the cube is within 2.5 cm
+    of the goal, the picker grasps it and is static.
+    """
+
+    source = "robot-layouts; geometry and rewards are its own"
+    layout = face_to_face({"pusher": "panda_stick", "picker": "panda_wristcam"}, spacing=1.4)
+    physics = PhysicsSettings()
+    max_episode_steps = 150
+    max_reward = 8
+    viewpoint = ((1.4, 0.4, 0.75), (0.0, 0.0, 0.1))
+
+    def build(self, world: World) -> None:
+        """Add the table, the cube and the goal."""
+        add_table(world)
+        half = CUBE_HALF_SIZE
+        cube = Box(half_size=(half, half, half), color=DARK_RED, friction=CUBE_FRICTION)
+        world.add("cube", cube, position=(0.0, 0.0, half))
+        add_goal(world, GOAL_RADIUS)
+
+    def sample(self, world: World, rng: EpisodeRandom) -> None:
+        """Lay the cube before the pusher, and the goal before the picker."""
+        x, y = rng.uniform_between(CUBE_LOW, CUBE_HIGH).tolist()
+        turn = rng.yaw_quaternion(-LARGEST_TURN, LARGEST_TURN)
+        world.set_pose("cube", (x, y, CUBE_HALF_SIZE), turn)
+        world.set_pose("goal_site", rng.uniform_between(GOAL_LOW, GOAL_HIGH))
+
+    def evaluate(self, state: State) -> dict[str, Array]:
+        """Success: placed, and held by the picker, which is static."""
+        placed = state.distance("cube", "goal_site") <= _GOAL_RADIUS
+        grasped = state.is_grasping("picker", "cube")
+        return {
+            "is_cube_in_reach": state.position("cube")[:, 1] >= _IN_REACH_Y,
+            "is_cube_grasped": grasped,
+            "is_cube_placed": placed,
+            "success": placed & grasped & state.is_static("picker", STATIC_SPEED),
+        }
+
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
+        """Both TCPs, cube and goal, and the ways between them."""
+        return {
+            "pusher_tcp_pose": state.tcp_pose("pusher"),
+            "picker_tcp_pose": state.tcp_pose("picker"),
+            "cube_pose": state.pose("cube"),
+            "goal_pos": state.position("goal_site"),
+            "pusher_tcp_to_cube_pos": state.tcp_offset("pusher", "cube"),
+            "picker_tcp_to_cube_pos": state.tcp_offset("picker", "cube"),
+            "cube_to_goal_pos": state.offset("cube", "goal_site"),
+            "is_cube_grasped": info["is_cube_grasped"],
+        }
+
+    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
+        """Reach and push (1), approach (2), grasp and carry (5), hold still (7); 8 on success."""
+        cube = state.position("cube")
+        push_place = cube + _PUSH_OFFSET
+        reach, across, take, carry, still = closeness(
+            norm(push_place - state.tcp_position("pusher")),
+            np.maximum(_IN_REACH_Y - cube[:, 1], _ZERO),
+            state.tcp_distance("picker", "cube"),
+            state.distance("cube", "goal_site"),
+            state.arm_speed("picker"),
+        )
+        grasped = info["is_cube_grasped"]
+        reward = (reach + across) * _HALF
+        reward = np.where(info["is_cube_in_reach"], _ONE + take, reward)
+        reward = np.where(grasped, _THREE + _TWO * carry, reward)
+        reward = np.where(grasped & info["is_cube_placed"], _SIX + still, reward)
+        return np.where(info["success"], _DONE, reward)
+
+
+_ZERO, _HALF, _ONE, _TWO, _THREE, _SIX, _DONE = constants(0.0, 0.5, 1.0, 2.0, 3.0, 6.0, 8.0)
+_GOAL_RADIUS, _IN_REACH_Y = constants(GOAL_RADIUS, IN_REACH_Y)
+_PUSH_OFFSET = np.array([0.0, PUSH_OFFSET, 0.0], np.float32)

@@ -1,0 +1,63 @@
+"""Any robot stands in any place: every clone takes the others, and its numbers follow them."""
+
+from itertools import product
+
+import pytest
+import torch
+
+import tasks
+from layouts import face_to_face
+from robots import RobotRegistry, TaskError
+
+ROBOTS = ("panda", "panda_wristcam", "panda_stick", "so100")
+
+
+def combinations():
+    """Yield every place of every clone with every robot; the other places as they are."""
+    for task_id in tasks.list_clones():
+        for place, robot in product(tasks.get_task_class(task_id).layout, ROBOTS):
+            yield task_id, place, robot
+
+
+@pytest.mark.parametrize(("task_id", "place", "robot"), list(combinations()))
+def test_it_builds_resets_and_steps(task_id: str, place: str, robot: str):
+    env = tasks.make(task_id, num_envs=2, robots={place: robot})
+    descriptor = RobotRegistry.load(robot)
+    part = env.action_split[place]
+    assert part.stop - part.start == descriptor.action_dim
+    obs, _ = env.reset(seed=3)
+    for name in env.layout:
+        for kind in ("qpos", "qvel"):
+            own = env.observation_slices[f"{name}.{kind}"]
+            assert own.stop - own.start == env.layout[name].robot.dof
+    own = obs[:, env.observation_slices[f"{place}.qpos"]]
+    assert torch.equal(own, torch.from_numpy(env.simulation.read().qpos(place).copy()))
+    for _ in range(2):
+        obs, reward, terminated, _, info = env.step(env.action_space.sample())
+        assert torch.isfinite(obs).all()
+        assert torch.isfinite(reward).all()
+        assert not terminated.any()
+    assert obs.shape == env.observation_space.shape
+    env.set_state_dict(env.get_state_dict())
+
+
+def test_only_what_is_driven_moves():
+    layout = face_to_face({"right": "panda", "left": "panda_stick"}, spacing=1.5)
+    env = tasks.make("TwoRobotPickCube-v1", layout=layout)
+    assert env.action_split == {"right": slice(0, 8), "left": slice(8, 15)}
+    for driven, still in (("left", "right"), ("right", "left")):
+        before, _ = env.reset(seed=0)
+        action = torch.zeros(1, 15)
+        action[:, env.action_split[driven]] = 0.5
+        after = env.step(action)[0]
+        moved = {
+            name: (after - before)[:, env.observation_slices[f"{name}.qpos"]].abs().max()
+            for name in (driven, still)
+        }
+        assert moved[driven] > 0.01 > moved[still]
+
+
+def test_other_places_are_refused():
+    layout = face_to_face({"left": "panda", "rigth": "panda"}, spacing=1.5)
+    with pytest.raises(TaskError, match=r"\['left', 'right'\]; the layout has \['left', 'rigth'\]"):
+        tasks.make("TwoRobotPickCube-v1", layout=layout)
