@@ -11,6 +11,7 @@ from layouts.layout import RobotLike
 from robots import TaskError, UnknownNameError
 
 if TYPE_CHECKING:
+    from tasks.scenario import Scenario
     from tasks.task import MultiRobotTask
 
 # One line per task, sorted by id: id -> module:class, then its other names.
@@ -132,6 +133,24 @@ def make(
         AssetError: If robot files cannot be found.
     """
     cls = get_task_class(task_id)
+    return cls(make_scenario(cls, num_envs, robots, layout, obs_mode, reward_mode, **fields))
+
+
+def make_scenario(
+    cls: type[MultiRobotTask],
+    num_envs: int = 1,
+    robots: RobotLike | Mapping[str, RobotLike] | None = None,
+    layout: Layout | None = None,
+    obs_mode: str = "state",
+    reward_mode: str | None = None,
+    **fields: Any,
+) -> Scenario:
+    """Return the scenario that `make` makes a task of, for the same arguments.
+
+    Raises:
+        UnknownNameError: If a place, a robot or a field is unknown.
+        TaskError: If the robots do not say which places they take.
+    """
     scenario = cls.scenario
     if layout is not None:
         scenario.layout = layout
@@ -140,7 +159,7 @@ def make(
     chosen = {"num_envs": num_envs, "obs_mode": obs_mode, "reward_mode": reward_mode, **fields}
     for name, value in chosen.items():
         setattr(scenario, name, value)
-    return cls(scenario)
+    return scenario
 
 
 def _replace_robots(layout: Layout, robots: RobotLike | Mapping[str, RobotLike]) -> Layout:
