@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
-from gymnasium.spaces import Box
+from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
@@ -18,6 +18,7 @@ Observation = NDArray[np.float32]
 RobotReward = Callable[[str, Observation, float, dict[str, Any]], float]
 """Robot, its observation, the task's reward, info → what the robot earns."""
 
+_Space = TypeVar("_Space", bound=Space[Any])
 _NOT_OFFERED = ("num_envs", "obs_mode")
 
 
@@ -71,11 +72,11 @@ class ParallelTask(ParallelEnv[str, Observation, NDArray[np.float32]]):
             for name, numbers in self.observed.items()
         }
 
-    def observation_space(self, agent: str) -> Box:
+    def observation_space(self, agent: str) -> Space[Observation]:
         """Return what a robot observes; always the same object."""
         return _look_up(self._observation_spaces, agent)
 
-    def action_space(self, agent: str) -> Box:
+    def action_space(self, agent: str) -> Space[NDArray[np.float32]]:
         """Return what a robot may do; always the same object."""
         return _look_up(self._action_spaces, agent)
 
@@ -171,7 +172,7 @@ class ParallelTask(ParallelEnv[str, Observation, NDArray[np.float32]]):
         return float(self._robot_reward(name, observation, shared, info))
 
 
-def _look_up(spaces: dict[str, Box], agent: str) -> Box:
+def _look_up(spaces: Mapping[str, _Space], agent: str) -> _Space:
     if agent not in spaces:
         raise UnknownNameError("agent", agent, spaces)
     return spaces[agent]
