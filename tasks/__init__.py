@@ -1,13 +1,14 @@
 """What is to be achieved: one file per task, a registry, the batched task class, and its fronts.
 
-Nothing is loaded before it is asked for: Gymnasium looks in here whenever it is imported.
+Importing this tells Gymnasium the tasks. What needs torch or sapien is loaded when it is used.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from tasks.fronts import parallel_env, register
+
 if TYPE_CHECKING:
-    from tasks.fronts import parallel_env
     from tasks.randomness import EpisodeRandom
     from tasks.registry import get_task_class, list_tasks, make, register_task
     from tasks.scenario import Scenario
@@ -31,7 +32,6 @@ _MODULES = {
     "get_task_class": "tasks.registry",
     "list_tasks": "tasks.registry",
     "make": "tasks.registry",
-    "parallel_env": "tasks.fronts",
     "register_task": "tasks.registry",
 }
 
@@ -42,3 +42,6 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = globals()[name] = getattr(import_module(_MODULES[name]), name)
     return value
+
+
+register()

@@ -74,6 +74,7 @@ def register_task(*names: str) -> Callable[[TaskClass], TaskClass]:
         _registered.update({name.lower(): cls for name in names})
         if names[0] not in _listed and names[0] not in CATALOGUE:
             _listed.append(names[0])
+            import_module("tasks.fronts").register()
         cls.task_id = names[0]
         return cls
 

@@ -5,6 +5,7 @@ Importing this loads neither torch nor sapien; each front is loaded when one is 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -16,18 +17,20 @@ if TYPE_CHECKING:
 
 NAMESPACE = "RobotLayouts"  # Gymnasium ids are RobotLayouts/PickCube-v1
 
+_GYMNASIUM_NAME = re.compile(r"[\w.-]+-v\d+")
+
 __all__ = ["NAMESPACE", "parallel_env", "register"]
 
 
 def register() -> None:
     """Tell Gymnasium every task of `tasks.list_tasks` that it does not know yet.
 
-    Gymnasium calls this when it is imported, through its plugin entry point. Call it again after
-    registering tasks of your own.
+    Importing `tasks` does this, and so does registering a task. Names that are no Gymnasium ids
+    (those end with ``-v`` and a number) stay unknown to it.
     """
     import gymnasium
 
-    for task_id in list_tasks():
+    for task_id in filter(_GYMNASIUM_NAME.fullmatch, list_tasks()):
         if f"{NAMESPACE}/{task_id}" not in gymnasium.registry:
             gymnasium.register(
                 f"{NAMESPACE}/{task_id}",

@@ -9,11 +9,8 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import tasks
 from robots import ActionError, TaskError, UnknownNameError
-from tasks import fronts
 from tasks.fronts.vector import VectorTask
 from tests.native import NATIVE, pair
-
-fronts.register()
 
 NUM_ENVS = 3
 WORKERS = 2  # one of them holds one environment, the other two
