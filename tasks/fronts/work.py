@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
 import threading
 import traceback
 from multiprocessing import reduction
@@ -61,7 +62,7 @@ def _serve(connection: Connection, batch: Batch) -> None:
         except Exception as error:
             connection.send((None, _said(error)))
         else:
-            connection.send((answer, None))
+            connection.send_bytes(pickle.dumps((answer, None)))
 
 
 def _attach(connection: Connection, batch: Batch, shapes: Any, num_envs: int) -> None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import pickle
+import select
 import signal
 import time
 from collections.abc import Generator, Iterable, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import get_context, reduction, resource_tracker
-from multiprocessing.connection import wait
 from typing import Any
 
 from robots import RobotLayoutsError
@@ -174,12 +174,16 @@ class Workers:
         """Wait until workers have answered, and return the answers of those that did."""
         deadline = None if timeout is None else time.monotonic() + timeout
         answers, failures = dict[int, Any](), list[Failure]()
-        waiting = {self._crew[i].connection: i for i in numbers}
+        waiting = {self._crew[i].connection.fileno(): i for i in numbers}
+        poller = select.poll()
+        for descriptor in waiting:
+            poller.register(descriptor, select.POLLIN)
         while waiting:
-            left = None if deadline is None else max(0.0, deadline - time.monotonic())
-            ready: list[Any] = wait(list(waiting), left)
-            for connection in ready:
-                i = waiting.pop(connection)
+            left = None if deadline is None else max(0.0, deadline - time.monotonic()) * 1000
+            ready = poller.poll(left)
+            for descriptor, _ in ready:
+                poller.unregister(descriptor)
+                i = waiting.pop(descriptor)
                 try:
                     answers[i] = self._crew[i].receive()
                 except _Gone as gone:
@@ -257,7 +261,7 @@ class _Worker:
         self.pid = self._process.pid
         try:
             with suppress(OSError):  # it died: that is read from the connection
-                self.connection.send(part)
+                self.connection.send_bytes(pickle.dumps(part))
         except (pickle.PicklingError, AttributeError, TypeError) as error:
             self.connection.close()
             self.end(0.0)
@@ -270,7 +274,7 @@ class _Worker:
         """Let it do something."""
         self.busy = True
         with suppress(OSError):
-            self.connection.send((method, arguments))
+            self.connection.send_bytes(pickle.dumps((method, arguments)))
 
     def send_memory(self, descriptor: int) -> None:
         """Give it the shared memory, right after an ``attach``."""
