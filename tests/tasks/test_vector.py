@@ -150,6 +150,39 @@ def test_an_ended_episode_waits_for_its_reset():
     assert info["elapsed_steps"].tolist() == [0, 0]
 
 
+def test_an_ended_environment_stands_still_while_others_move(monkeypatch):
+    env = make()
+    simulation = env._crew._batch._task.simulation
+    moved, step = [], simulation.step
+
+    def spy(action, joint_positions, env_ids):
+        moved.append([*env_ids])
+        step(action, joint_positions, env_ids)
+
+    monkeypatch.setattr(simulation, "step", spy)
+    action = np.zeros((NUM_ENVS, 8), np.float32)
+    env.reset(seed=0)
+    for _ in range(20):
+        env.step(action)
+    env.reset(options={"reset_mask": LATER})
+    for _ in range(32):
+        env.step(action)
+    assert moved[-3:] == [[0, 1, 2], [1], [0, 1, 2]]
+    assert env.step(action)[4]["elapsed_steps"].tolist() == [2, 33, 2]
+
+
+def test_a_step_of_some_environments_leaves_the_others_as_they_are():
+    task = tasks.make("PickCube-v1", num_envs=NUM_ENVS)
+    task.reset(seed=0)
+    before = task.get_state_dict()
+    info = task.step(np.ones((NUM_ENVS, 8), np.float32), env_ids=[1])[4]
+    assert info["elapsed_steps"].tolist() == [0, 1, 0]
+    arm = [state["articulations"]["panda"] for state in (before, task.get_state_dict())]
+    assert [bool((arm[0][i] == arm[1][i]).all()) for i in range(NUM_ENVS)] == [True, False, True]
+    with pytest.raises(TaskError, match="env_ids"):
+        task.step(np.ones((NUM_ENVS, 8), np.float32), env_ids=[3])
+
+
 def test_seeds():
     env = make()
     each = env.reset(seed=[5, 9, 5])[0]
