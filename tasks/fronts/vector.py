@@ -94,6 +94,8 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             Part(cls, scenario, start, stop, mode)
             for start, stop in zip(bounds, bounds[1:], strict=False)
         ]
+        for placement in layout.values():
+            placement.robot.urdf.locate()  # fetched here, not by all workers at once
         try:
             self._crew = Workers(parts, timeout) if workers else InProcess(parts[0])
         except WorkersFailed as failed:

@@ -121,15 +121,21 @@ class Workers:
             RobotLayoutsError: What a worker could not make its task for.
         """
         numbers = list(numbers)
-        for i in numbers:
-            self._crew[i] = _Worker(self.parts[i])
-        shapes = self._collect(numbers, START_SECONDS)
-        if self._descriptor < 0:
-            self._make_board(shapes[numbers[0]])
-        for i in numbers:
-            self._crew[i].send("attach", (self._shapes, self.parts[-1].stop))
-            self._crew[i].send_memory(self._descriptor)
-        self._collect(numbers, START_SECONDS)
+        try:
+            for i in numbers:
+                self._crew[i] = _Worker(self.parts[i])
+            shapes = self._collect(numbers, START_SECONDS)
+            if self._descriptor < 0:
+                self._make_board(shapes[numbers[0]])
+            for i in numbers:
+                self._crew[i].send("attach", (self._shapes, self.parts[-1].stop))
+                self._crew[i].send_memory(self._descriptor)
+            self._collect(numbers, START_SECONDS)
+        except BaseException:
+            for i in numbers:
+                if i in self._crew:
+                    self._crew.pop(i).end(0.0)
+            raise
         for i in numbers:
             self.failures.pop(i, None)
 

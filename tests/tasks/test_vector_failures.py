@@ -14,6 +14,7 @@ import pytest
 
 from layouts import face_to_face
 from robots import SimulationError, TaskError
+from tasks.fronts import workers as workers_module
 from tasks.fronts.vector import VectorTask
 from tasks.fronts.workers import WorkerError
 
@@ -80,6 +81,48 @@ def test_a_worker_that_fails_is_told_and_replaced(shared, how):
     assert len(workers()) == 2
 
 
+def test_after_an_interrupted_step_the_next_one_is_right(shared):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    shared.reset(seed=0)
+    victim = first_worker(shared)
+    before = signal.signal(signal.SIGALRM, interrupt)
+    try:
+        os.kill(victim, signal.SIGSTOP)
+        signal.setitimer(signal.ITIMER_REAL, 0.3)
+        with pytest.raises(KeyboardInterrupt):
+            shared.step(ACTION)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+        os.kill(victim, signal.SIGCONT)
+    assert shared.step(ACTION)[4]["elapsed_steps"].tolist() == [2, 2, 2, 2]
+
+
+@pytest.mark.long
+def test_a_restart_that_fails_may_be_tried_again(shared, monkeypatch):
+    shared.reset(seed=0)
+    crew, living = shared._crew, first_worker(shared)
+    for worker in [*crew._crew.values()]:
+        os.kill(worker.pid, signal.SIGKILL)
+    with pytest.raises(WorkerError, match=r"environments \[0, 1\].*environments \[2, 3\]"):
+        shared.step(ACTION)
+    start = workers_module._Worker.__init__
+
+    def doomed(self, part):
+        start(self, part)
+        if part.start == 0:
+            os.kill(self.pid, signal.SIGKILL)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(workers_module._Worker, "__init__", doomed)
+        with pytest.raises(WorkerError, match=r"environments \[0, 1\].*died by SIGKILL"):
+            shared.restart()
+    assert not {living, *(worker.pid for worker in crew._crew.values())} & {*workers()}
+    shared.restart()
+    assert shared.step(ACTION)[4]["elapsed_steps"].tolist() == [1, 1, 1, 1]
+
+
 def test_an_error_in_a_worker_is_told_with_its_place(shared):
     with pytest.raises(WorkerError, match="failed with AttributeError: .*no_such_method.*work.py"):
         shared._call("no_such_method", {0: ()}, lambda: None)
@@ -108,6 +151,24 @@ def test_what_cannot_be_built_raises_here_and_leaves_nothing():
     with pytest.raises(TaskError, match="has the places"):
         VectorTask("PickCube-v1", num_envs=2, num_workers=1, layout=two)
     assert workers() == before
+
+
+@pytest.mark.long
+def test_a_script_without_a_guard_is_told_so(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import gymnasium, tasks\n"
+        "gymnasium.make_vec('RobotLayouts/PickCube-v1', num_envs=2, num_workers=1)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        env={**os.environ, "PYTHONPATH": os.getcwd()},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert "needs `if __name__ == '__main__':` around what it runs" in done.stderr
 
 
 SCRIPT = """
