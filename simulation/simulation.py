@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from time import perf_counter
 
 import numpy as np
@@ -65,17 +65,23 @@ class Simulation:
         """Return what the robot of that name is."""
         return self.layout[robot].robot
 
-    def step(self, action: NDArray[np.float32], joint_positions: NDArray[np.float32]) -> None:
-        """Advance every world by one control step.
+    def step(
+        self,
+        action: NDArray[np.float32],
+        joint_positions: NDArray[np.float32],
+        env_ids: Iterable[int] | None = None,
+    ) -> None:
+        """Advance worlds by one control step.
 
         Args:
             action: Shape (N, A), finite.
             joint_positions: Joint positions before the step, shape (N, dof) (rad, m).
+            env_ids: Which worlds; all if None. The others stand still.
         """
         targets = self._controller.targets(action, joint_positions)
-        for i, world in enumerate(self.worlds):
+        for i in range(len(self.worlds)) if env_ids is None else env_ids:
             self._controller.drive(targets, i)
-            step = world.system.step
+            step = self.worlds[i].system.step
             for _ in range(self.substeps):
                 step()
         self.stamp += 1

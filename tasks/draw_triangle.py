@@ -152,25 +152,29 @@ class DrawTriangle(MultiRobotTask):
             self._covered[i] = self._strayed[i] = False
             self._used[i] = 0
 
-    def step(self, action: Any) -> tuple[Any, Tensor, Tensor, Tensor, Info]:
+    def step(
+        self, action: Any, env_ids: Sequence[int] | None = None
+    ) -> tuple[Any, Tensor, Tensor, Tensor, Info]:
         """Advance by one control step; see `MultiRobotTask.step`.
 
         Raises:
             SimulationError: If an environment has used all its dots up; nothing moves then.
         """
-        empty = [i for i, used in enumerate(self._used) if used >= MAX_DOTS]
+        moving = range(self.num_envs) if env_ids is None else env_ids
+        empty = [i for i in moving if self._used[i] >= MAX_DOTS]
         if empty:
             raise SimulationError(
                 f"environments {empty} have used up their {MAX_DOTS} dots, one per step;"
                 f" reset them: reset(env_ids={empty})"
             )
-        return super().step(action)
+        return super().step(action, env_ids)
 
     def respond(self, state: State) -> None:
         """Leave a dot under every stick that is low enough, and hide a dot for every other."""
         tips = torch.from_numpy(state.tcp_position("arm"))
-        drawing = tips[:, 2] < _REACH
-        for i, draws in enumerate(drawing.tolist()):
+        drawing = torch.zeros(self.num_envs, dtype=torch.bool)
+        for i in self.moving:
+            drawing[i] = draws = bool(tips[i, 2] < _REACH)
             dot = _DOTS[self._used[i]]
             self._used[i] += 1
             place = (*tips[i, :2].tolist(), DOT_THICKNESS / 2 + CANVAS_TOP) if draws else _HIDDEN

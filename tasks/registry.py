@@ -12,6 +12,7 @@ from layouts.layout import RobotLike, load_robot
 from robots import TaskError, UnknownNameError
 
 if TYPE_CHECKING:
+    from tasks.scenario import Scenario
     from tasks.task import MultiRobotTask
 
 # Beginning of the name of a task that clones one of ManiSkill's.
@@ -83,6 +84,7 @@ def register_task(*names: str) -> Callable[[TaskClass], TaskClass]:
         _registered.update({name.lower(): cls for name in names})
         if names[0] not in _listed and names[0] not in CATALOGUE:
             _listed.append(names[0])
+            import_module("tasks.fronts").register()
         cls.task_id = names[0]
         cls.native_id = names[0] if any(map(_is_clone_name, names)) else None
         return cls
@@ -152,6 +154,24 @@ def make(
         AssetError: If robot files cannot be found.
     """
     cls = get_task_class(task_id)
+    return cls(make_scenario(cls, num_envs, robots, layout, obs_mode, reward_mode, **fields))
+
+
+def make_scenario(
+    cls: type[MultiRobotTask],
+    num_envs: int = 1,
+    robots: RobotLike | Mapping[str, RobotLike] | None = None,
+    layout: Layout | None = None,
+    obs_mode: str = "state",
+    reward_mode: str | None = None,
+    **fields: Any,
+) -> Scenario:
+    """Return the scenario that `make` makes a task of, for the same arguments.
+
+    Raises:
+        UnknownNameError: If a place, a robot or a field is unknown.
+        TaskError: If the robots do not say which places they take.
+    """
     scenario = cls.scenario
     if layout is not None:
         scenario.layout = layout
@@ -160,7 +180,7 @@ def make(
     chosen = {"num_envs": num_envs, "obs_mode": obs_mode, "reward_mode": reward_mode, **fields}
     for name, value in chosen.items():
         setattr(scenario, name, value)
-    return cls(scenario)
+    return scenario
 
 
 def _replace_robots(layout: Layout, robots: RobotLike | Mapping[str, RobotLike]) -> Layout:

@@ -70,6 +70,8 @@ class MultiRobotTask:
             mode asks for positions, else [-1, 1].
         action_space: Actions of all environments, (N, A).
         action_split: Robot name → slice of the flat action, in declared order.
+        moving: Which environments the present step advances.
+        start: Observation and info of the first reset, when it was made.
         made_from: The scenario it was made from.
     """
 
@@ -134,6 +136,7 @@ class MultiRobotTask:
         """Move bodies in answer to a control step, before the step is judged.
 
         Called after every step's physics if a subclass has it; the state is read anew then.
+        Only the environments in ``moving`` take the step.
         """
 
     def reset_robots(self, world: World, rng: EpisodeRandom) -> None:
@@ -155,11 +158,12 @@ class MultiRobotTask:
 
     # -- making and closing ------------------------------------------------------------------
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, *, first_seed: int = FIRST_SEED) -> None:
         """Build the worlds and reset them with native's first seeds.
 
         Args:
             scenario: How to make it; `tasks.make` and ``cls.scenario`` give one to start from.
+            first_seed: Environment i starts with seed ``first_seed + i``.
 
         Raises:
             TaskError: If the scenario asks for what the task does not offer.
@@ -183,9 +187,11 @@ class MultiRobotTask:
         self._reader = ActionReader(self.layout, self.num_envs)
         self._observation_keys = observation_keys(self.layout)
         self._robots = tuple(self.layout)
-        self._rngs = [EpisodeRandom(FIRST_SEED + i) for i in range(self.num_envs)]
+        self._rngs = [EpisodeRandom(first_seed + i) for i in range(self.num_envs)]
         self._max_reward = np.array(self.max_reward, np.float32)
         self._elapsed = np.zeros(self.num_envs, np.int32)
+        self._everywhere: Sequence[int] = range(self.num_envs)
+        self.moving = self._everywhere
         self._simulation: Simulation | None = Simulation(
             self.layout,
             self._build_world,
@@ -196,7 +202,8 @@ class MultiRobotTask:
         )
         self._camera: Any = None
         self._responds = type(self).respond is not MultiRobotTask.respond
-        obs, _ = self._begin(list(range(self.num_envs)), reconfigured=True)
+        self.start = self._begin(list(range(self.num_envs)), reconfigured=True)
+        obs = self.start[0]
         self.observation_slices = self._slices() if self.obs_mode == "state" else {}
         if isinstance(obs, Tensor):
             shape = (obs.shape[1],)
@@ -255,8 +262,10 @@ class MultiRobotTask:
             self.simulation.rebuild(ids)
         return self._begin(ids, reconfigured=reconfigure)
 
-    def step(self, action: Any) -> tuple[Any, Tensor, Tensor, Tensor, Info]:
-        """Advance every environment by one control step.
+    def step(
+        self, action: Any, env_ids: Sequence[int] | None = None
+    ) -> tuple[Any, Tensor, Tensor, Tensor, Info]:
+        """Advance environments by one control step.
 
         There is no automatic reset, and stepping past truncation is allowed.
 
@@ -264,6 +273,8 @@ class MultiRobotTask:
             action: (N, A) tensor or array in the order of ``action_split``, or a mapping
                 robot name → (N, a); normalised numbers beyond [-1, 1] are clipped, joint
                 positions beyond their limits are not.
+            env_ids: Which environments move; all if None. The others stand still, and what is
+                returned for them means nothing.
 
         Returns:
             Observation, reward (N,) float32, terminated (N,), truncated (N,), info. An
@@ -273,8 +284,9 @@ class MultiRobotTask:
             ActionError: If the action has a wrong shape, type or number; nothing moves then.
         """
         flat = self._reader.read(action)
-        self.simulation.step(flat, self._state.joint_positions)
-        self._elapsed += 1
+        self.moving = self._everywhere if env_ids is None else self._checked_ids(env_ids)
+        self.simulation.step(flat, self._state.joint_positions, self.moving)
+        self._elapsed[slice(None) if env_ids is None else self.moving] += 1
         state = self.simulation.read()
         if self._responds:
             self.respond(state)

@@ -1,0 +1,68 @@
+"""Tasks behind the interfaces of other libraries: Gymnasium, its vectors, and PettingZoo.
+
+Importing this loads neither torch nor sapien; each front is loaded when one is made.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from robots import MissingPackageError
+from tasks.registry import list_tasks
+
+if TYPE_CHECKING:
+    from tasks.fronts.parallel import ParallelTask
+
+NAMESPACE = "RobotLayouts"  # Gymnasium ids are RobotLayouts/PickCube-v1
+
+_GYMNASIUM_NAME = re.compile(r"[\w.-]+-v\d+")
+
+__all__ = ["NAMESPACE", "parallel_env", "register"]
+
+
+def register() -> None:
+    """Tell Gymnasium every task of `tasks.list_tasks` that it does not know yet.
+
+    Importing `tasks` does this, and so does registering a task. Names that are no Gymnasium ids
+    (those end with ``-v`` and a number) stay unknown to it.
+    """
+    import gymnasium
+
+    for task_id in filter(_GYMNASIUM_NAME.fullmatch, list_tasks()):
+        if f"{NAMESPACE}/{task_id}" not in gymnasium.registry:
+            gymnasium.register(
+                f"{NAMESPACE}/{task_id}",
+                entry_point="tasks.fronts.gymnasium:GymnasiumTask",
+                vector_entry_point="tasks.fronts.vector:VectorTask",
+                kwargs={"task_id": task_id},
+            )
+
+
+def parallel_env(
+    task_id: str, robot_reward: Callable[..., float] | None = None, **fields: Any
+) -> ParallelTask:
+    """Make a PettingZoo ``ParallelEnv`` of a task: one agent per robot, named as its place.
+
+    Args:
+        task_id: The task's id or another of its names.
+        robot_reward: What each robot earns; None gives every robot the task's reward. Called as
+            ``robot_reward(robot, observation, reward, info)`` with its place, what it observes
+            now, the task's reward and the info of the step.
+        fields: Other arguments of `tasks.make`; ``num_envs`` and ``obs_mode`` are not offered.
+
+    Raises:
+        MissingPackageError: If pettingzoo is not installed.
+        UnknownNameError: If the task, a place, a robot or a field is unknown.
+        TaskError: If the task cannot be made like that.
+    """
+    try:
+        from tasks.fronts.parallel import ParallelTask
+    except ModuleNotFoundError as error:
+        if error.name != "pettingzoo":
+            raise
+        raise MissingPackageError(
+            "parallel_env needs pettingzoo; pip install 'robot-layouts[pettingzoo]'"
+        ) from error
+    return ParallelTask(task_id, robot_reward, **fields)

@@ -1,0 +1,184 @@
+"""Some environments of a vector in one process: automatic resets, results written to arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+
+from robots import TaskError
+from tasks.fronts.board import Arrays, Shapes
+from tasks.scenario import Scenario
+from tasks.task import FIRST_SEED, MultiRobotTask
+
+OBSERVATION, INFO = "obs", "info"  # what the names of their arrays begin with
+FINAL = "final_"  # and those of episodes that ended in a step and began anew in it
+
+
+@dataclass(frozen=True)
+class Part:
+    """Which part of a vector a batch is, and how to make it; can be pickled.
+
+    Attributes:
+        task: The task's class.
+        scenario: The scenario of the whole vector.
+        start: Its first environment's number in the vector.
+        stop: One more than its last environment's number.
+        autoreset: When an environment whose episode ended begins a new one.
+    """
+
+    task: type[MultiRobotTask]
+    scenario: Scenario
+    start: int
+    stop: int
+    autoreset: AutoresetMode
+
+    @property
+    def env_ids(self) -> range:
+        """The numbers of its environments in the vector."""
+        return range(self.start, self.stop)
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """Which environments of a batch begin new episodes.
+
+    Attributes:
+        env_ids: Their numbers in the batch.
+        seeds: The seed of each; None lets its random streams run on.
+        reconfigure: Whether their worlds are rebuilt.
+    """
+
+    env_ids: list[int]
+    seeds: list[int | None]
+    reconfigure: bool
+
+
+class Batch:
+    """Environments of one process; each call leaves what it found in their rows of a board."""
+
+    def __init__(self, part: Part) -> None:
+        """Make the task, with the first seeds that it has in one large batch.
+
+        Raises:
+            TaskError: If the task cannot be made like that.
+            AssetError: If robot files cannot be found.
+        """
+        scenario = replace(part.scenario, num_envs=len(part.env_ids))
+        self._task = part.task(scenario, first_seed=FIRST_SEED + part.start)
+        self._part = part
+        self._over = np.zeros(len(part.env_ids), bool)  # begin anew at the next step
+        self._rows: Arrays = {}
+
+    def shapes(self) -> Shapes:
+        """Return which arrays a board needs."""
+        shapes: dict[str, tuple[tuple[int, ...], str]] = {
+            "action": (self._task.single_action_space.shape, "float32"),
+            "reward": ((), "float32"),
+            "terminated": ((), "bool"),
+            "truncated": ((), "bool"),
+        }
+        told = {name: (x.shape[1:], str(x.dtype)) for name, x in _told(*self._task.start)}
+        shapes.update(told)
+        if self._part.autoreset is AutoresetMode.SAME_STEP:
+            shapes["restarted"] = ((), "bool")
+            shapes.update({FINAL + name: entry for name, entry in told.items()})
+        return shapes
+
+    def attach(self, board: Arrays) -> None:
+        """Take its rows of a board, and write what the environments look like into them."""
+        self._rows = {name: x[self._part.start : self._part.stop] for name, x in board.items()}
+        self._write(*self._task.start)
+
+    def reset(self, beginning: Beginning) -> None:
+        """Begin new episodes."""
+        ids, seeds = beginning.env_ids, beginning.seeds
+        seeded = [i for i, seed in zip(ids, seeds, strict=True) if seed is not None]
+        running_on = [i for i in ids if i not in set(seeded)]
+        options = {"reconfigure": beginning.reconfigure}
+        for some in (seeded, running_on):
+            if some:
+                own = [s for s in seeds if s is not None] if some is seeded else None
+                self._write(*self._task.reset(own, options, some), some)
+        self._clear_flags(ids)
+
+    def step(self) -> None:
+        """Advance by one control step with the actions on the board."""
+        rows, over = self._rows, np.flatnonzero(self._over).tolist()
+        if not over:
+            self._move(rows["action"], None)
+        else:
+            moving = np.flatnonzero(~self._over).tolist()
+            if moving:
+                self._move(np.where(self._over[:, None], np.float32(0.0), rows["action"]), moving)
+            self._write(*self._task.reset(env_ids=over), over)
+            rows["reward"][over] = 0.0
+            self._clear_flags(over)
+        ended = rows["terminated"] | rows["truncated"]
+        if self._part.autoreset is AutoresetMode.NEXT_STEP:
+            self._over = ended
+        elif self._part.autoreset is AutoresetMode.SAME_STEP:
+            self._restart(ended)
+
+    def render(self) -> NDArray[np.uint8]:
+        """Return a picture of every environment."""
+        return self._task.render()
+
+    def close(self) -> None:
+        """Let the worlds and the board go."""
+        self._task.close()
+        self._rows = {}
+
+    # -- inside ------------------------------------------------------------------------------
+
+    def _move(self, action: NDArray[np.float32], env_ids: list[int] | None) -> None:
+        obs, reward, terminated, truncated, info = self._task.step(action, env_ids)
+        self._write(obs, info)
+        rows = self._rows
+        rows["reward"][:] = reward.numpy()
+        rows["terminated"][:] = terminated.numpy()
+        rows["truncated"][:] = truncated.numpy()
+
+    def _restart(self, ended: NDArray[np.bool_]) -> None:
+        rows, ids = self._rows, np.flatnonzero(ended).tolist()
+        rows["restarted"][:] = ended
+        if ids:
+            for name in [name for name in rows if name.startswith(FINAL)]:
+                rows[name][ids] = rows[name.removeprefix(FINAL)][ids]
+            self._write(*self._task.reset(env_ids=ids), ids)
+
+    def _write(self, obs: Any, info: Mapping[str, Any], ids: Sequence[int] | None = None) -> None:
+        which = slice(None) if ids is None else ids
+        for name, value in _told(obs, info):
+            if name not in self._rows:
+                raise TaskError(
+                    f"{name!r} was not there at the first reset of {type(self._task).__name__};"
+                    " evaluate() and observe() must always return the same keys"
+                )
+            self._rows[name][which] = value[which]
+
+    def _clear_flags(self, ids: Sequence[int]) -> None:
+        self._over[ids] = False
+        for name in ("terminated", "truncated"):
+            self._rows[name][ids] = False
+
+
+def _told(obs: Any, info: Mapping[str, Any]) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Go through observation and info by the names of their arrays."""
+    yield from _leaves(OBSERVATION, obs)
+    for key, value in info.items():
+        if not isinstance(value, bool):  # "reconfigure" is not told of single environments
+            yield f"{INFO}/{key}", value.numpy()
+
+
+def _leaves(name: str, tree: Any) -> Iterator[tuple[str, NDArray[Any]]]:
+    if isinstance(tree, Mapping):
+        for key, part in tree.items():
+            yield from _leaves(f"{name}/{key}", part)
+    else:
+        array: NDArray[Any] = tree.numpy()
+        yield name, array.astype(np.float32, copy=False)

@@ -1,0 +1,178 @@
+"""A task as a PettingZoo environment: one agent per robot, named as its place in the layout."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, TypeVar
+
+import numpy as np
+from gymnasium.spaces import Box, Space
+from numpy.typing import NDArray
+from pettingzoo import ParallelEnv
+
+from robots import TaskError, UnknownNameError
+from tasks.fronts.numbers import info_row
+from tasks.registry import make
+
+Observation = NDArray[np.float32]
+RobotReward = Callable[[str, Observation, float, dict[str, Any]], float]
+"""Robot, its observation, the task's reward, info → what the robot earns."""
+
+_Space = TypeVar("_Space", bound=Space[Any])
+_NOT_OFFERED = ("num_envs", "obs_mode")
+
+
+class ParallelTask(ParallelEnv[str, Observation, NDArray[np.float32]]):
+    """What `tasks.parallel_env` gives: every robot observes and acts for itself.
+
+    A robot observes its own joint positions and velocities, then all that the task observes
+    besides joints (TCP poses, objects, goals). Its action is its own slice of the task's. All
+    robots end together: when the task succeeds or is truncated, ``agents`` is emptied.
+
+    Attributes:
+        task: The task, with one environment.
+        possible_agents: The robots' places, in declared order.
+        agents: The same during an episode, else nothing.
+        observed: Robot → the numbers of the task's observation that it observes.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {
+        "name": "robot_layouts",
+        "render_modes": ["rgb_array"],
+        "render_fps": 20,
+        "is_parallelizable": True,
+    }
+
+    def __init__(
+        self,
+        task_id: str,
+        robot_reward: RobotReward | None = None,
+        render_mode: str | None = None,
+        **fields: Any,
+    ) -> None:
+        """Make the task; see `tasks.parallel_env`."""
+        for name in _NOT_OFFERED:
+            if name in fields:
+                raise TaskError(f"parallel_env takes no {name}: it is one environment of states")
+        self.task = make(task_id, render_mode=render_mode, **fields)
+        self.render_mode = render_mode
+        frames = round(self.task.made_from.control_frequency)
+        self.metadata = {**self.metadata, "name": self.task.task_id, "render_fps": frames}  # type: ignore[misc]
+        self._robot_reward = robot_reward
+        self.possible_agents = list(self.task.layout)
+        self.agents: list[str] = []
+        self.observed = self._observed()
+        bounds = self.task.single_action_space
+        self._action_spaces = {
+            name: Box(bounds.low[part], bounds.high[part], dtype=np.float32)
+            for name, part in self.task.action_split.items()
+        }
+        self._observation_spaces = {
+            name: Box(-np.inf, np.inf, (len(numbers),), np.float32)
+            for name, numbers in self.observed.items()
+        }
+
+    def observation_space(self, agent: str) -> Space[Observation]:
+        """Return what a robot observes; always the same object."""
+        return _look_up(self._observation_spaces, agent)
+
+    def action_space(self, agent: str) -> Space[NDArray[np.float32]]:
+        """Return what a robot may do; always the same object."""
+        return _look_up(self._action_spaces, agent)
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+        """Begin a new episode.
+
+        Args:
+            seed: Seed of the episode; None lets the random streams run on.
+            options: ``{"reconfigure": True}`` rebuilds the world; as PettingZoo's checks demand,
+                other options are ignored.
+
+        Returns:
+            Observation and info of every robot.
+        """
+        reconfigure = bool((options or {}).get("reconfigure", False))
+        obs, info = self.task.reset(seed, {"reconfigure": reconfigure})
+        self.agents = list(self.possible_agents)
+        return self._observations(obs), self._infos(info_row(info))
+
+    def step(
+        self, actions: Mapping[str, NDArray[np.float32]]
+    ) -> tuple[
+        dict[str, Observation],
+        dict[str, float],
+        dict[str, bool],
+        dict[str, bool],
+        dict[str, dict[str, Any]],
+    ]:
+        """Advance by one control step.
+
+        Args:
+            actions: What each robot does, (a,) each.
+
+        Returns:
+            Observation, reward, terminated, truncated and info of every robot.
+
+        Raises:
+            ActionError: If a robot's action is missing or wrong; nothing moves then.
+            TaskError: If the episode is over.
+        """
+        if not self.agents:
+            raise TaskError("no episode is being played; call reset() first")
+        obs, reward, terminated, truncated, info = self.task.step(actions)
+        observations, told, shared = self._observations(obs), info_row(info), reward[0].item()
+        over, late = bool(terminated[0]), bool(truncated[0])
+        agents = self.agents
+        if over or late:
+            self.agents = []
+        return (
+            observations,
+            {name: self._reward(name, observations[name], shared, told) for name in agents},
+            dict.fromkeys(agents, over),
+            dict.fromkeys(agents, late),
+            self._infos(told),
+        )
+
+    def render(self) -> NDArray[np.uint8]:
+        """Return a picture, (512, 512, 3) uint8.
+
+        Raises:
+            TaskError: If it was not made with ``render_mode="rgb_array"``.
+        """
+        return self.task.render()[0]
+
+    def close(self) -> None:
+        """Let the world go."""
+        self.task.close()
+
+    # -- inside ------------------------------------------------------------------------------
+
+    def _observed(self) -> dict[str, NDArray[np.intp]]:
+        slices = self.task.observation_slices
+        joints = {n: (f"{n}.qpos", f"{n}.qvel") for n in self.possible_agents}
+        owned = {key for keys in joints.values() for key in keys}
+        shared = [key for key in slices if key not in owned]
+        return {
+            name: np.concatenate([np.arange(slices[k].start, slices[k].stop) for k in keys])
+            for name, keys in ((name, [*own, *shared]) for name, own in joints.items())
+        }
+
+    def _observations(self, obs: Any) -> dict[str, Observation]:
+        flat = obs[0].numpy()
+        return {name: flat[numbers] for name, numbers in self.observed.items()}
+
+    def _infos(self, info: dict[str, Any]) -> dict[str, dict[str, Any]]:
+        return {name: dict(info) for name in self.possible_agents}
+
+    def _reward(self, name: str, observation: Observation, shared: float, info: Any) -> float:
+        if self._robot_reward is None:
+            return shared
+        return float(self._robot_reward(name, observation, shared, info))
+
+
+def _look_up(spaces: Mapping[str, _Space], agent: str) -> _Space:
+    if agent not in spaces:
+        raise UnknownNameError("agent", agent, spaces)
+    return spaces[agent]

@@ -1,0 +1,382 @@
+"""A task as a Gymnasium vector: many environments, in worker processes or in this one."""
+
+from __future__ import annotations
+
+import operator
+import os
+import weakref
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium.spaces import Box, Dict, Space
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from robots import SimulationError, TaskError, unknown_name_message
+from tasks.actions import ActionReader
+from tasks.fronts.batch import FINAL, INFO, OBSERVATION, Beginning, Part
+from tasks.fronts.gymnasium import RENDER_MODES
+from tasks.fronts.workers import Failure, InProcess, WorkerError, Workers, WorkersFailed
+from tasks.registry import get_task_class, make_scenario
+from tasks.task import FIRST_SEED
+
+RESET_OPTIONS = ("reconfigure", "reset_mask")
+
+_Flags = NDArray[np.bool_]
+
+
+class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
+    """What ``gymnasium.make_vec("RobotLayouts/PickCube-v1", num_envs=64)`` gives.
+
+    Environment i of N is environment i of ``tasks.make(task_id, num_envs=N)``, bit for bit,
+    whatever the number of workers. Every worker holds some consecutive environments; actions and
+    results go through memory that all processes share.
+
+    A worker that dies, hangs or fails is reported as a `WorkerError` with its environments and
+    their seeds. The others are as if nothing had happened, and `restart` replaces it. If Ctrl-C
+    interrupts a call, some environments may have taken the step and others not.
+
+    Attributes:
+        num_envs: Number of environments N.
+        num_workers: Number of worker processes; 0 if the environments are in this one.
+        action_split: Robot name → slice of one environment's action.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": RENDER_MODES, "render_fps": 20}
+
+    def __init__(
+        self,
+        task_id: str,
+        num_envs: int = 1,
+        num_workers: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        timeout: float | None = 60.0,
+        render_mode: str | None = None,
+        **fields: Any,
+    ) -> None:
+        """Start the workers and build the worlds.
+
+        Args:
+            task_id: The task's id or another of its names.
+            num_envs: Number of environments.
+            num_workers: Number of processes; None takes one per core, 0 this process.
+            autoreset_mode: What happens after an episode's last step. With ``NEXT_STEP`` the next
+                step begins a new one, without reading the action; with ``SAME_STEP`` the same
+                step does, and ``info`` keeps ``final_obs`` and ``final_info``; with ``DISABLED``
+                nothing does, and stepping past the end is allowed.
+            timeout: Seconds that workers may take for a step or a reset; None waits for ever.
+            render_mode: ``"rgb_array"`` to draw pictures, which needs a Vulkan driver.
+            fields: Other arguments of `tasks.make`.
+
+        Raises:
+            UnknownNameError: If the task, a place, a robot or a field is unknown.
+            TaskError: If the task cannot be made like that.
+            AssetError: If robot files cannot be found.
+            WorkerError: If a worker ends before it is ready.
+        """
+        mode = _checked_mode(autoreset_mode)
+        cls = get_task_class(task_id)
+        scenario = make_scenario(cls, num_envs, render_mode=render_mode, **fields)
+        scenario.check(cls.reward_modes)
+        workers = _checked_workers(num_workers, num_envs)
+        self.num_envs, self.num_workers, self.render_mode = num_envs, workers, render_mode
+        frames = round(scenario.control_frequency)
+        self.metadata = {**self.metadata, "autoreset_mode": mode, "render_fps": frames}  # type: ignore[misc]
+        layout = scenario.layout.in_control_mode(scenario.control_mode)
+        self.action_split = layout.action_split
+        self._reader = ActionReader(layout, num_envs)
+        self._seeds = [FIRST_SEED + i for i in range(num_envs)]
+        self._everywhere = np.ones(num_envs, bool)
+        bounds = [(i * num_envs) // max(workers, 1) for i in range(max(workers, 1) + 1)]
+        parts = [
+            Part(cls, scenario, start, stop, mode)
+            for start, stop in zip(bounds, bounds[1:], strict=False)
+        ]
+        for placement in layout.values():
+            placement.robot.urdf.locate()  # fetched here, not by all workers at once
+        try:
+            self._crew = Workers(parts, timeout) if workers else InProcess(parts[0])
+        except WorkersFailed as failed:
+            raise self._error(failed.failures, None) from None
+        self._close = weakref.finalize(self, self._crew.close)
+        low, high = np.array(layout.action_bounds, np.float32).T
+        self.single_action_space = Box(low, high, dtype=np.float32)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.single_observation_space = _space(self._observation())
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin new episodes.
+
+        Args:
+            seed: ``k`` seeds environment i with k + i; a list gives each its own; None lets the
+                random streams run on.
+            options: ``{"reset_mask": mask}`` resets only where the mask, (N,) bool, is true;
+                ``{"reconfigure": True}`` rebuilds the worlds.
+
+        Returns:
+            Observation of all environments and info, which tells of those that were reset.
+
+        Raises:
+            TaskError: If an argument makes no sense; nothing is reset then.
+            WorkerError: If workers die, hang or fail.
+        """
+        mask, reconfigure = self._checked_options(options)
+        seeds = self._checked_seeds(seed)
+        if seed is None or isinstance(seed, int):
+            super().reset(seed=seed)
+        ids = np.flatnonzero(mask).tolist()
+        self._call("reset", self._beginnings(ids, seeds, reconfigure), lambda: self._begun(mask))
+        self._note(ids, seeds)
+        return self._begun(mask)
+
+    def step(self, actions: Any) -> tuple[Any, NDArray[np.float32], _Flags, _Flags, dict[str, Any]]:
+        """Advance every environment by one control step.
+
+        Args:
+            actions: (N, A) floating, in the order of ``action_split``, or a mapping robot name →
+                (N, a).
+
+        Returns:
+            Observation, reward (N,) float32, terminated (N,), truncated (N,), info.
+
+        Raises:
+            ActionError: If the action has a wrong shape, type or number; nothing moves then.
+            WorkerError: If workers die, hang or fail; its ``results`` are what the others give.
+        """
+        self._expect_workers()
+        self._crew.arrays["action"][:] = self._reader.read(actions)
+        self._call("step", {i: () for i in range(len(self._crew.parts))}, self._results)
+        return self._results()
+
+    def restart(self, seed: Mapping[int, int] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Replace the workers that are gone; their environments begin new episodes.
+
+        Args:
+            seed: Environment → seed, for some that are gone; the others take the last seed that
+                they were given.
+
+        Returns:
+            Observation and info of all environments; those that were not gone are as they were.
+
+        Raises:
+            TaskError: If a seed is none, or of an environment that is not gone.
+            WorkerError: If a worker ends before it is ready; another attempt is allowed.
+        """
+        self._expect_open()
+        gone = sorted(self._crew.failures)
+        ids = [i for part in gone for i in self._crew.parts[part].env_ids]
+        given = dict(seed or {})
+        if wrong := [i for i in given if i not in ids]:
+            raise TaskError(f"environments {wrong} are not gone; those that are: {ids}")
+        wanted = [given.get(i, own) for i, own in enumerate(self._seeds)]
+        seeds = self._checked_seeds(wanted)
+        try:
+            if gone:
+                self._crew.start(gone)
+            self._crew.call("reset", self._beginnings(ids, seeds, reconfigure=False))
+        except WorkersFailed as failed:
+            raise self._error(failed.failures, None) from None
+        self._note(ids, seeds)
+        return self._begun(self._everywhere)
+
+    def render(self) -> tuple[NDArray[np.uint8], ...]:  # type: ignore[override]
+        """Return a picture of every environment, (512, 512, 3) uint8 each.
+
+        Raises:
+            TaskError: If it was not made with ``render_mode="rgb_array"``.
+            WorkerError: If workers die, hang or fail.
+        """
+        if self.render_mode is None:
+            raise TaskError("this task draws no pictures; make it with render_mode='rgb_array'")
+        everyone = {i: () for i in range(len(self._crew.parts))}
+        pictures = self._call("render", everyone, lambda: None)
+        return tuple(picture for i in everyone for picture in pictures[i])
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """End the workers and let the shared memory go."""
+        self._close()
+
+    # -- inside ------------------------------------------------------------------------------
+
+    def _call(
+        self,
+        method: str,
+        arguments: Mapping[int, tuple[Any, ...]],
+        results: Callable[[], Any],
+    ) -> dict[int, Any]:
+        self._expect_workers()
+        try:
+            return self._crew.call(method, arguments)
+        except WorkersFailed as failed:
+            raise self._error(failed.failures, results()) from None
+
+    def _expect_open(self) -> None:
+        if self.closed:
+            raise SimulationError("this vector is closed; make a new one")
+
+    def _expect_workers(self) -> None:
+        self._expect_open()
+        if self._crew.failures:
+            raise self._error(list(self._crew.failures.values()), None)
+
+    def _error(self, failures: list[Failure], results: Any) -> WorkerError:
+        lines: list[str] = []
+        seeds: list[int] = []
+        for failure in failures:
+            own = [self._seeds[i] for i in failure.env_ids]
+            lines.append(
+                f"worker {failure.worker} with environments {list(failure.env_ids)} of seeds {own}:"
+                f" {failure.reason}"
+            )
+            seeds.extend(own)
+        hint = "restart() replaces what is gone; the other environments are untouched"
+        if not hasattr(self, "_crew"):
+            hint = (
+                "nothing was started; a script that makes a vector needs"
+                " `if __name__ == '__main__':` around what it runs, or num_workers=0"
+            )
+        return WorkerError("; ".join([*lines, hint]), failures, seeds, results)
+
+    def _beginnings(
+        self, ids: list[int], seeds: list[int | None], reconfigure: bool
+    ) -> dict[int, tuple[Beginning]]:
+        beginnings: dict[int, tuple[Beginning]] = {}
+        for number, part in enumerate(self._crew.parts):
+            own = [i for i in ids if i in part.env_ids]
+            if own:
+                local = [i - part.start for i in own]
+                beginnings[number] = (Beginning(local, [seeds[i] for i in own], reconfigure),)
+        return beginnings
+
+    def _note(self, ids: list[int], seeds: list[int | None]) -> None:
+        for i in ids:
+            seed = seeds[i]
+            if seed is not None:
+                self._seeds[i] = seed
+
+    # -- results -----------------------------------------------------------------------------
+
+    def _begun(self, mask: _Flags) -> tuple[Any, dict[str, Any]]:
+        return self._observation(), self._info(INFO, mask)
+
+    def _results(self) -> tuple[Any, NDArray[np.float32], _Flags, _Flags, dict[str, Any]]:
+        arrays = self._crew.arrays
+        info = self._info(INFO, self._everywhere)
+        restarted = arrays.get("restarted")
+        if restarted is not None and restarted.any():
+            info.update(self._final(restarted.copy()))
+        flags = (arrays[name].copy() for name in ("reward", "terminated", "truncated"))
+        return self._observation(), *flags, info
+
+    def _observation(self, prefix: str = "") -> Any:
+        arrays = self._crew.arrays
+        if prefix + OBSERVATION in arrays:
+            return arrays[prefix + OBSERVATION].copy()
+        tree: dict[str, Any] = {}
+        for name, array in arrays.items():
+            first, *way = name.split("/")
+            if first == prefix + OBSERVATION:
+                branch = tree
+                for key in way[:-1]:
+                    branch = branch.setdefault(key, {})
+                branch[way[-1]] = array.copy()
+        return tree or np.empty((self.num_envs, 0), np.float32)
+
+    def _info(self, prefix: str, mask: _Flags) -> dict[str, Any]:
+        """Return what is known of some environments, as Gymnasium's own vectors tell it."""
+        info: dict[str, Any] = {}
+        for name, array in self._crew.arrays.items():
+            first, _, key = name.partition("/")
+            if first == prefix:
+                info[key] = array.copy()
+                if mask is not self._everywhere:
+                    info[key][~mask] = 0
+                info[f"_{key}"] = mask.copy()
+        return info
+
+    def _final(self, ended: _Flags) -> dict[str, Any]:
+        observations = np.full(self.num_envs, None, object)
+        batch = self._observation(FINAL)
+        for i in np.flatnonzero(ended).tolist():
+            observations[i] = _row(batch, i)
+        return {
+            "final_obs": observations,
+            "_final_obs": ended,
+            "final_info": self._info(FINAL + INFO, ended),
+            "_final_info": ended.copy(),
+        }
+
+    # -- checks ------------------------------------------------------------------------------
+
+    def _checked_options(self, options: Mapping[str, Any] | None) -> tuple[_Flags, bool]:
+        options = options or {}
+        for key in options:
+            if key not in RESET_OPTIONS:
+                raise TaskError(unknown_name_message("reset option", key, RESET_OPTIONS))
+        mask = options.get("reset_mask")
+        if mask is None:
+            mask = self._everywhere
+        elif not (
+            isinstance(mask, np.ndarray) and mask.dtype == bool and mask.shape == (self.num_envs,)
+        ):
+            raise TaskError(
+                f"reset_mask must be an array of {self.num_envs} booleans, not {mask!r}"
+            )
+        elif not mask.any():
+            raise TaskError("reset_mask is false everywhere; it must be true somewhere")
+        return mask, bool(options.get("reconfigure", False))
+
+    def _checked_seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
+        if seed is None:
+            return [None] * self.num_envs
+        try:
+            if isinstance(seed, Sequence | np.ndarray):
+                seeds = [None if s is None else operator.index(s) for s in seed]
+            else:
+                seeds = [operator.index(seed) + i for i in range(self.num_envs)]
+        except TypeError:
+            raise TaskError(f"seed is {seed!r}; it takes an integer or a list of them") from None
+        if len(seeds) != self.num_envs:
+            raise TaskError(f"{len(seeds)} seeds for {self.num_envs} environments")
+        if not all(s is None or 0 <= s < 2**32 for s in seeds):
+            raise TaskError(f"seeds {seeds} must lie from 0 to 2**32 - 1")
+        return list(seeds)
+
+
+def _checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    for choice in AutoresetMode:
+        if mode in (choice, choice.value, choice.name):
+            return choice
+    choices = [choice.name for choice in AutoresetMode]
+    raise TaskError(unknown_name_message("autoreset_mode", mode, choices))
+
+
+def _checked_workers(num_workers: int | None, num_envs: int) -> int:
+    if num_workers is None:
+        return min(len(os.sched_getaffinity(0)), num_envs)
+    if not (isinstance(num_workers, int) and 0 <= num_workers <= num_envs):
+        raise TaskError(
+            f"num_workers is {num_workers!r}; it must be an integer from 0 to the number of"
+            f" environments, {num_envs}"
+        )
+    return num_workers
+
+
+def _space(batch: Any) -> Space[Any]:
+    if isinstance(batch, Mapping):
+        return Dict({key: _space(part) for key, part in batch.items()})
+    return Box(-np.inf, np.inf, batch.shape[1:], np.float32)
+
+
+def _row(batch: Any, env: int) -> Any:
+    if isinstance(batch, Mapping):
+        return {key: _row(part, env) for key, part in batch.items()}
+    return batch[env]

@@ -1,0 +1,333 @@
+"""Worker processes that hold the environments of a vector, and what happens when one fails."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import select
+import signal
+import time
+from collections.abc import Generator, Iterable, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from multiprocessing import get_context, reduction, resource_tracker
+from typing import Any
+
+from robots import RobotLayoutsError
+from tasks.fronts.batch import Part
+from tasks.fronts.board import (
+    Arrays,
+    Shapes,
+    board_size,
+    lay_out,
+    map_shared_memory,
+    new_shared_memory,
+)
+from tasks.fronts.work import work
+
+START_SECONDS = 300.0  # until all workers have built their worlds
+_FAREWELL_SECONDS = 2.0  # that workers may take to end by themselves
+
+_context = get_context("spawn")  # SAPIEN does not survive a fork
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A worker that is gone.
+
+    Attributes:
+        worker: Its number.
+        env_ids: The environments that are gone with it.
+        reason: What happened to it, in words.
+    """
+
+    worker: int
+    env_ids: range
+    reason: str
+
+
+class WorkerError(RobotLayoutsError, RuntimeError):
+    """Workers of a vector that died, hung or failed; the others have done what they were asked.
+
+    Attributes:
+        failures: The workers that are gone.
+        env_ids: The numbers of the environments that are gone with them.
+        seeds: The last seed that each of them was given.
+        results: What the call would have returned; the rows of ``env_ids`` mean nothing. None
+            if there was nothing to return.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        failures: Iterable[Failure] = (),
+        seeds: Iterable[int] = (),
+        results: Any = None,
+    ) -> None:
+        """Take what is known of the failure."""
+        super().__init__(message)
+        self.failures = tuple(failures)
+        self.env_ids = [i for failure in self.failures for i in failure.env_ids]
+        self.seeds = list(seeds)
+        self.results = results
+
+
+class WorkersFailed(Exception):
+    """Some workers failed; says which. The vector turns it into a `WorkerError`."""
+
+    def __init__(self, failures: list[Failure]) -> None:
+        """Take the failures, at least one."""
+        super().__init__(failures)
+        self.failures = failures
+
+
+class Workers:
+    """Processes that hold one part of a vector each and write to one shared board.
+
+    Attributes:
+        parts: Which part each worker holds.
+        arrays: The board, with a row for every environment.
+        failures: Workers that are gone, by number.
+    """
+
+    def __init__(self, parts: list[Part], timeout: float | None) -> None:
+        """Start the processes and wait until their worlds are built.
+
+        Args:
+            parts: Which environments each worker holds.
+            timeout: Seconds that workers may take for an answer; None waits for ever.
+
+        Raises:
+            WorkersFailed: If a worker ends before it is ready.
+            RobotLayoutsError: What a worker could not make its task for.
+        """
+        self.parts, self._timeout = parts, timeout
+        self.arrays: Arrays = {}
+        self.failures: dict[int, Failure] = {}
+        self._crew: dict[int, _Worker] = {}
+        self._shapes: Shapes = {}
+        self._descriptor = -1
+        try:
+            self.start(range(len(parts)))
+        except BaseException:
+            self.close()
+            raise
+
+    def start(self, numbers: Iterable[int]) -> None:
+        """Start workers, in the place of those that are gone.
+
+        Raises:
+            WorkersFailed: If one ends before it is ready.
+            RobotLayoutsError: What a worker could not make its task for.
+        """
+        numbers = list(numbers)
+        try:
+            for i in numbers:
+                self._crew[i] = _Worker(self.parts[i])
+            shapes = self._collect(numbers, START_SECONDS)
+            if self._descriptor < 0:
+                self._make_board(shapes[numbers[0]])
+            for i in numbers:
+                self._crew[i].send("attach", (self._shapes, self.parts[-1].stop))
+                self._crew[i].send_memory(self._descriptor)
+            self._collect(numbers, START_SECONDS)
+        except BaseException:
+            for i in numbers:
+                if i in self._crew:
+                    self._crew.pop(i).end(0.0)
+            raise
+        for i in numbers:
+            self.failures.pop(i, None)
+
+    def call(self, method: str, arguments: Mapping[int, tuple[Any, ...]]) -> dict[int, Any]:
+        """Let workers do something, all at once, and return what they answer.
+
+        Args:
+            method: A method of `Batch`.
+            arguments: Number of a worker → what it calls the method with.
+
+        Raises:
+            WorkersFailed: If workers die, hang or fail; the others have done it.
+        """
+        self._collect([i for i, worker in self._crew.items() if worker.busy], self._timeout)
+        for i, own in arguments.items():
+            self._crew[i].send(method, own)
+        return self._collect(list(arguments), self._timeout)
+
+    def close(self) -> None:
+        """End all processes and let the memory go; closing twice is allowed."""
+        crew, self._crew = self._crew, {}
+        for worker in crew.values():
+            worker.connection.close()
+        deadline = time.monotonic() + _FAREWELL_SECONDS
+        for worker in crew.values():
+            worker.end(max(0.0, deadline - time.monotonic()))
+        self.arrays = {}
+        if self._descriptor >= 0:
+            os.close(self._descriptor)
+            self._descriptor = -1
+
+    # -- inside ------------------------------------------------------------------------------
+
+    def _make_board(self, shapes: Shapes) -> None:
+        num_envs = self.parts[-1].stop
+        size = board_size(shapes, num_envs)
+        self._shapes, self._descriptor = shapes, new_shared_memory(size)
+        memory = map_shared_memory(os.dup(self._descriptor), size)
+        self.arrays = lay_out(memory, shapes, num_envs)
+
+    def _collect(self, numbers: list[int], timeout: float | None) -> dict[int, Any]:
+        """Wait until workers have answered, and return the answers of those that did."""
+        deadline = None if timeout is None else time.monotonic() + timeout
+        answers, failures = dict[int, Any](), list[Failure]()
+        waiting = {self._crew[i].connection.fileno(): i for i in numbers}
+        poller = select.poll()
+        for descriptor in waiting:
+            poller.register(descriptor, select.POLLIN)
+        while waiting:
+            left = None if deadline is None else max(0.0, deadline - time.monotonic()) * 1000
+            ready = poller.poll(left)
+            for descriptor, _ in ready:
+                poller.unregister(descriptor)
+                i = waiting.pop(descriptor)
+                try:
+                    answers[i] = self._crew[i].receive()
+                except _Gone as gone:
+                    failures.append(self._lose(i, str(gone)))
+            if not ready:
+                failures.extend(
+                    self._lose(i, f"did not answer within {timeout:g} s and was ended")
+                    for i in waiting.values()
+                )
+                break
+        if failures:
+            raise WorkersFailed(sorted(failures, key=lambda failure: failure.worker))
+        return answers
+
+    def _lose(self, number: int, reason: str) -> Failure:
+        worker = self._crew.pop(number)
+        worker.end(0.0)
+        failure = Failure(number, self.parts[number].env_ids, f"process {worker.pid} {reason}")
+        self.failures[number] = failure
+        return failure
+
+
+class InProcess:
+    """The same without processes, for debugging: one batch holds all environments.
+
+    Attributes:
+        parts: The only part.
+        arrays: The board, with a row for every environment.
+        failures: Nothing; what fails is raised as it is.
+    """
+
+    def __init__(self, part: Part) -> None:
+        """Make the batch.
+
+        Raises:
+            RobotLayoutsError: If the task cannot be made.
+        """
+        from tasks.fronts.batch import Batch
+
+        self.parts = [part]
+        self.failures: dict[int, Failure] = {}
+        self._batch = Batch(part)
+        shapes = self._batch.shapes()
+        memory = bytearray(board_size(shapes, part.stop))
+        self.arrays = lay_out(memory, shapes, part.stop)
+        self._batch.attach(self.arrays)
+
+    def start(self, numbers: Iterable[int]) -> None:
+        """Do nothing: nothing is ever gone."""
+
+    def call(self, method: str, arguments: Mapping[int, tuple[Any, ...]]) -> dict[int, Any]:
+        """Call a method of the batch; see `Workers.call`."""
+        return {i: getattr(self._batch, method)(*own) for i, own in arguments.items()}
+
+    def close(self) -> None:
+        """Let the worlds go."""
+        self._batch.close()
+        self.arrays = {}
+
+
+class _Gone(Exception):
+    """A worker that can answer no more; says why."""
+
+
+class _Worker:
+    """One process, which holds one part."""
+
+    def __init__(self, part: Part) -> None:
+        self.connection, theirs = _context.Pipe()
+        self.busy = True  # until it has told the shapes
+        self._process = _context.Process(target=work, args=(theirs,), daemon=True)
+        with _no_interrupts():
+            self._process.start()
+        theirs.close()
+        self.pid = self._process.pid
+        try:
+            with suppress(OSError):  # it died: that is read from the connection
+                self.connection.send_bytes(pickle.dumps(part))
+        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            self.connection.close()
+            self.end(0.0)
+            raise WorkerError(
+                f"the task cannot be sent to worker processes: {error}; define its class in a"
+                " module that they can import, or take num_workers=0"
+            ) from error
+
+    def send(self, method: str, arguments: tuple[Any, ...]) -> None:
+        """Let it do something."""
+        self.busy = True
+        with suppress(OSError):
+            self.connection.send_bytes(pickle.dumps((method, arguments)))
+
+    def send_memory(self, descriptor: int) -> None:
+        """Give it the shared memory, right after an ``attach``."""
+        with suppress(OSError):
+            reduction.send_handle(self.connection, descriptor, self.pid)
+
+    def receive(self) -> Any:
+        """Return its answer.
+
+        Raises:
+            RobotLayoutsError: What it could not make its task for.
+        """
+        try:
+            answer, error = self.connection.recv()
+        except (EOFError, OSError):
+            raise _Gone(self._death()) from None
+        self.busy = False
+        if isinstance(error, RobotLayoutsError):
+            raise error
+        if error is not None:
+            raise _Gone(error)
+        return answer
+
+    def end(self, patience: float) -> None:
+        """End it, after a while in which it may do so by itself (s)."""
+        self.connection.close()
+        self._process.join(patience)
+        self._process.kill()
+        self._process.join()
+
+    def _death(self) -> str:
+        self._process.join(_FAREWELL_SECONDS)
+        code = self._process.exitcode
+        if code is None:
+            return "closed its connection"
+        return f"died by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
+
+
+@contextmanager
+def _no_interrupts() -> Generator[None]:
+    """Hold back Ctrl-C here, and for good in processes that are started meanwhile.
+
+    A terminal sends it to all of them; only the main process is to act on it.
+    """
+    resource_tracker.ensure_running()  # else the first start runs it, which lets Ctrl-C through
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -1,0 +1,233 @@
+"""Workers that die or hang, and what a vector leaves behind."""
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from layouts import face_to_face
+from robots import SimulationError, TaskError
+from tasks.fronts import workers as workers_module
+from tasks.fronts.vector import VectorTask
+from tasks.fronts.workers import WorkerError
+
+GONE, LEFT = [0, 1], [2, 3]  # environments of the first worker and of the second
+ACTION = np.full((4, 8), 0.2, np.float32)
+PATIENCE = 20.0  # s, for processes to be gone on a busy machine
+
+
+def workers():
+    return sorted(p.pid for p in multiprocessing.active_children())
+
+
+@pytest.fixture(scope="module")
+def shared():
+    env = VectorTask("PickCube-v1", num_envs=4, num_workers=2, timeout=30.0)
+    yield env
+    env.close()
+
+
+def first_worker(env):
+    return env._crew._crew[0].pid
+
+
+@pytest.mark.parametrize("how", ["killed", "hung"])
+def test_a_worker_that_fails_is_told_and_replaced(shared, how):
+    reference = VectorTask("PickCube-v1", num_envs=4, num_workers=0)
+    for env in (shared, reference):
+        env.reset(seed=40, options={"reconfigure": True})
+        env.step(ACTION)
+    victim = first_worker(shared)
+    shared._crew._timeout = 30.0 if how == "killed" else 3.0
+    os.kill(victim, signal.SIGKILL if how == "killed" else signal.SIGSTOP)
+    with pytest.raises(WorkerError) as caught:
+        shared.step(ACTION)
+    shared._crew._timeout = 30.0
+    error = caught.value
+    assert error.env_ids == GONE
+    assert error.seeds == [40, 41]
+    why = "died by SIGKILL" if how == "killed" else "did not answer within 3 s and was ended"
+    assert f"worker 0 with environments [0, 1] of seeds [40, 41]: process {victim} {why}" in str(
+        error
+    )
+    assert "restart()" in str(error)
+
+    expected = reference.step(ACTION)
+    for result, wanted in zip(error.results[:4], expected[:4], strict=True):
+        np.testing.assert_array_equal(result[LEFT], wanted[LEFT])
+    with pytest.raises(WorkerError, match=r"environments \[0, 1\]"):
+        shared.step(ACTION)
+    with pytest.raises(TaskError, match=r"environments \[3\] are not gone"):
+        shared.restart({3: 5})
+
+    obs, info = shared.restart({1: 77})
+    gone = np.array([True, True, False, False])
+    wanted, _ = reference.reset(
+        seed=[40, 77, None, None], options={"reset_mask": gone, "reconfigure": True}
+    )
+    np.testing.assert_array_equal(obs, wanted)
+    assert info["elapsed_steps"].tolist() == [0, 0, 2, 2]
+    for _ in range(50):  # beyond the end of the episodes
+        for result, wanted in zip(shared.step(ACTION)[:4], reference.step(ACTION)[:4], strict=True):
+            np.testing.assert_array_equal(result, wanted)
+    assert victim not in workers()
+    assert len(workers()) == 2
+
+
+def test_after_an_interrupted_step_the_next_one_is_right(shared):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    shared.reset(seed=0)
+    victim = first_worker(shared)
+    before = signal.signal(signal.SIGALRM, interrupt)
+    try:
+        os.kill(victim, signal.SIGSTOP)
+        signal.setitimer(signal.ITIMER_REAL, 0.3)
+        with pytest.raises(KeyboardInterrupt):
+            shared.step(ACTION)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+        os.kill(victim, signal.SIGCONT)
+    assert shared.step(ACTION)[4]["elapsed_steps"].tolist() == [2, 2, 2, 2]
+
+
+@pytest.mark.long
+def test_a_restart_that_fails_may_be_tried_again(shared, monkeypatch):
+    shared.reset(seed=0)
+    crew, living = shared._crew, first_worker(shared)
+    for worker in [*crew._crew.values()]:
+        os.kill(worker.pid, signal.SIGKILL)
+    with pytest.raises(WorkerError, match=r"environments \[0, 1\].*environments \[2, 3\]"):
+        shared.step(ACTION)
+    start = workers_module._Worker.__init__
+
+    def doomed(self, part):
+        start(self, part)
+        if part.start == 0:
+            os.kill(self.pid, signal.SIGKILL)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(workers_module._Worker, "__init__", doomed)
+        with pytest.raises(WorkerError, match=r"environments \[0, 1\].*died by SIGKILL"):
+            shared.restart()
+    assert not {living, *(worker.pid for worker in crew._crew.values())} & {*workers()}
+    shared.restart()
+    assert shared.step(ACTION)[4]["elapsed_steps"].tolist() == [1, 1, 1, 1]
+
+
+def test_an_error_in_a_worker_is_told_with_its_place(shared):
+    with pytest.raises(WorkerError, match="failed with AttributeError: .*no_such_method.*work.py"):
+        shared._call("no_such_method", {0: ()}, lambda: None)
+    shared.restart()
+    assert shared.step(ACTION)[0].shape == (4, 42)
+
+
+def test_closing_leaves_nothing():
+    before, open_before = workers(), len(os.listdir("/proc/self/fd"))
+    env = VectorTask("PickCube-v1", num_envs=2, num_workers=1)
+    assert len(workers()) == len(before) + 1
+    assert "memfd:robot-layouts" in Path("/proc/self/maps").read_text()
+    shared_maps = Path("/proc/self/maps").read_text().count("memfd:robot-layouts")
+    env.close()
+    env.close()
+    assert workers() == before
+    assert len(os.listdir("/proc/self/fd")) <= open_before + 1  # Python's own resource tracker
+    assert Path("/proc/self/maps").read_text().count("memfd:robot-layouts") < shared_maps
+    with pytest.raises(SimulationError, match="closed"):
+        env.step(ACTION[:2])
+
+
+def test_what_cannot_be_built_raises_here_and_leaves_nothing():
+    before = workers()
+    two = face_to_face({"a": "panda", "b": "panda"}, spacing=1.0)
+    with pytest.raises(TaskError, match="has the places"):
+        VectorTask("PickCube-v1", num_envs=2, num_workers=1, layout=two)
+    assert workers() == before
+
+
+@pytest.mark.long
+def test_a_script_without_a_guard_is_told_so(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import gymnasium, tasks\n"
+        "gymnasium.make_vec('RobotLayouts/PickCube-v1', num_envs=2, num_workers=1)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        env={**os.environ, "PYTHONPATH": os.getcwd()},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert "needs `if __name__ == '__main__':` around what it runs" in done.stderr
+
+
+SCRIPT = """
+import multiprocessing, sys, time
+import numpy as np
+from tasks.fronts.vector import VectorTask
+
+if __name__ == "__main__":
+    env = VectorTask("PickCube-v1", num_envs=2, num_workers=1)
+    env.reset(seed=0)
+    print(*(p.pid for p in multiprocessing.active_children()), flush=True)
+    while True:
+        env.step(np.zeros((2, 8), np.float32))
+        if sys.argv[1] == "raises":
+            raise ValueError("on purpose")
+"""
+
+
+@pytest.mark.parametrize(
+    ("ending", "code"),
+    [("raises", 1), ("interrupted", -signal.SIGINT), ("killed", -signal.SIGKILL)],
+)
+def test_no_ending_leaves_a_process_or_memory(tmp_path, ending, code):
+    script, memory_before = tmp_path / "script.py", set(os.listdir("/dev/shm"))
+    script.write_text(SCRIPT)
+    process = subprocess.Popen(
+        [sys.executable, str(script), ending],
+        env={**os.environ, "PYTHONPATH": os.getcwd()},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        assert process.stdout is not None
+        worker = int(process.stdout.readline())
+        assert lives(worker)
+        if ending == "interrupted":
+            os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+        elif ending == "killed":
+            process.kill()
+        _, said = process.communicate(timeout=PATIENCE)
+        assert process.returncode == code, said
+        assert said.count("Traceback") <= 1, said
+        expect_gone(worker)
+        assert set(os.listdir("/dev/shm")) <= memory_before
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+
+
+def lives(pid):
+    with suppress(FileNotFoundError):
+        return "\nState:\tZ" not in Path(f"/proc/{pid}/status").read_text()
+    return False
+
+
+def expect_gone(pid):
+    deadline = time.monotonic() + PATIENCE
+    while lives(pid):
+        assert time.monotonic() < deadline, f"process {pid} is still there"
+        time.sleep(0.05)
