@@ -92,9 +92,9 @@ def read_references(
     found: dict[str, set[str]] = {"collision": set(), "visual": set()}
     for kind, paths in found.items():
         for element in (*root.iterfind(f".//{kind}//mesh"), *root.iterfind(f".//{kind}//texture")):
-            paths.add(_resolve(element.get("filename", ""), folder, exists))
+            paths.add(resolve_reference(element.get("filename", ""), folder, exists))
     for texture in root.iterfind("./material/texture"):
-        found["visual"].add(_resolve(texture.get("filename", ""), folder, exists))
+        found["visual"].add(resolve_reference(texture.get("filename", ""), folder, exists))
     return UrdfReferences(
         collision=tuple(sorted(found["collision"])),
         visual=tuple(sorted(found["visual"] - found["collision"])),
@@ -133,7 +133,14 @@ def _read_joint(joint: ElementTree.Element) -> UrdfJoint:
     )
 
 
-def _resolve(filename: str, folder: str, exists: Callable[[str], bool]) -> str:
+def resolve_reference(filename: str, folder: str, exists: Callable[[str], bool]) -> str:
+    """Return the path of a file that a URDF refers to, as `read_references` explains.
+
+    Args:
+        filename: The reference as written.
+        folder: Folder of the URDF.
+        exists: Whether a path exists.
+    """
     if filename.startswith("file://"):
         return posixpath.normpath(filename.removeprefix("file://"))
     reference = filename.removeprefix("package://")
