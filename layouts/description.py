@@ -53,9 +53,9 @@ def action_text(numbers: slice) -> str:
 def facing_text(placement: Placement) -> str:
     """Return where a robot faces: degrees if its base is upright, a wxyz quaternion if not."""
     yaw = yaw_degrees(placement.facing)
-    if yaw is None:
-        return f"wxyz {', '.join(decimal(x) for x in placement.facing)}"
-    return f"{decimal(yaw, digits=1)}°"
+    if yaw is not None:
+        return f"{decimal(yaw, digits=1)}°"
+    return f"wxyz {', '.join(decimal(x) for x in placement.facing)}"
 
 
 def decimal(value: float, digits: int = 3) -> str:

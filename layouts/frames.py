@@ -122,6 +122,25 @@ def table(
     return {name: Frame(position, rpy=(0.0, 0.0, yaw)), **edges}
 
 
+def table_outlines(frames: Mapping[str, Pose]) -> dict[str, list[Vector3]]:
+    """Return the four corners of each table, by the name of its middle (m).
+
+    A table is a frame ``NAME`` with frames ``NAME.north``, ``NAME.east`` and so on.
+
+    Args:
+        frames: World pose by name, as `Layout.frame_poses`.
+    """
+    corners: dict[str, list[Vector3]] = {}
+    for name, middle in frames.items():
+        if all(f"{name}.{edge}" in frames for edge in EDGES):
+            north, east, south, west = (frames[f"{name}.{edge}"].position for edge in EDGES)
+            corners[name] = [
+                _sum(a, b, middle.position)
+                for a, b in ((north, east), (east, south), (south, west), (west, north))
+            ]
+    return corners
+
+
 def wall(position: Vector3, *, yaw: float = 0.0) -> Frame:
     """Return a frame on a wall: z points out of the wall, x down.
 
@@ -218,14 +237,13 @@ def declared_quaternion(declared: Any, default: Quaternion) -> Quaternion:
     return default if declared.quaternion is None else declared.quaternion
 
 
-def check_positive(what: str, value: object) -> None:
+def check_positive(what: str, value: Any) -> None:
     """Refuse a distance that is not a finite number greater than 0 (m).
 
     Raises:
         LayoutError: If it is not.
     """
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not (number and math.isfinite(value) and value > 0):
+    if isinstance(value, (str, bool)) or not (math.isfinite(value) and value > 0):
         raise LayoutError(f"{what} is {value} m; it must be finite and greater than 0")
 
 
@@ -252,3 +270,9 @@ def _support(name: str, poses: Mapping[str, tuple[str | None, Pose]]) -> str | N
         )
         raise HangingError(f"{name!r} hangs on an {problem}", name)
     return on
+
+
+def _sum(first: Vector3, second: Vector3, start: Vector3) -> Vector3:
+    """Return the point at ``first`` and ``second`` from ``start``, all given in the world."""
+    x, y, z = (a + b - c for a, b, c in zip(first, second, start, strict=True))
+    return (x, y, z)

@@ -67,8 +67,13 @@ class Placement:
         check_pose(self)
         if self.keyframe is not None:
             self.robot.keyframe(self.keyframe)
-        if not (math.isfinite(self.qpos_noise) and self.qpos_noise >= 0):
+        try:
+            noise = float(self.qpos_noise)
+        except (TypeError, ValueError):
+            noise = math.nan
+        if not (math.isfinite(noise) and noise >= 0):
             raise LayoutError(f"qpos_noise is {self.qpos_noise} rad; it must be 0 or more")
+        object.__setattr__(self, "qpos_noise", noise)
 
     @property
     def local_pose(self) -> Pose:

@@ -292,15 +292,17 @@ def _table_size(
     inset: float,
 ) -> tuple[float, float]:
     """Return width and depth (m)."""
-    if table == "auto":
+    if isinstance(table, str):
+        if table != "auto":
+            raise LayoutError(f"table is {table!r}; it takes width and depth (m) or 'auto'")
         pairs = list(combinations(robots, 2)) or [(robots[0], robots[0])]
-        apart = _distance("table", table, pairs)
+        apart = _distance("table", "auto", pairs)
         across, along = (
             max(1, *(len(rows[edge]) for edge in edges))
             for edges in (("north", "south"), ("east", "west"))
         )
         return apart * across + 2 * inset, apart * along + 2 * inset
-    if isinstance(table, str) or len(table) != 2:
+    if len(table) != 2:
         raise LayoutError(f"table is {table!r}; it takes width and depth (m) or 'auto'")
     for what, size in zip(("width", "depth"), table, strict=True):
         check_positive(f"the table's {what}", size)

@@ -12,6 +12,7 @@ import numpy as np
 
 from layouts.description import action_text, decimal, facing_text, headline
 from layouts.files import written_whole
+from layouts.frames import table_outlines
 from layouts.orientation import forward, yaw_degrees
 from robots import LayoutError, MissingPackageError
 
@@ -107,6 +108,8 @@ def draw(layout: Layout, table: Rectangle | None = None) -> Figure:
 def _bounds(layout: Layout, table: Rectangle | None) -> Rectangle:
     """Return the outline of everything drawn, with a margin (m)."""
     boxes: list[Rectangle] = [] if table is None else [table]
+    for corners in table_outlines(layout.frame_poses).values():
+        boxes += [(x, y, x, y) for x, y, _ in corners]
     for placement in layout.values():
         x, y, _ = placement.base_position
         reach = placement.robot.reach
@@ -127,19 +130,16 @@ def _stretched(bounds: Rectangle, aspect: float) -> Rectangle:
 
 
 def _draw_plan(plan: Axes, layout: Layout, bounds: Rectangle, table: Rectangle | None) -> None:
-    from matplotlib.patches import Rectangle as RectanglePatch
+    from matplotlib.patches import Polygon
 
+    outlines = [
+        [(x, y) for x, y, _ in corners] for corners in table_outlines(layout.frame_poses).values()
+    ]
     if table is not None:
-        plan.add_patch(
-            RectanglePatch(
-                (table[0], table[1]),
-                table[2] - table[0],
-                table[3] - table[1],
-                facecolor=TABLE,
-                edgecolor="#C9B99B",
-                zorder=0.5,
-            )
-        )
+        x_min, y_min, x_max, y_max = table
+        outlines.append([(x_min, y_min), (x_max, y_min), (x_max, y_max), (x_min, y_max)])
+    for outline in outlines:
+        plan.add_patch(Polygon(outline, facecolor=TABLE, edgecolor="#C9B99B", zorder=0.5))
     if _draw_overlap(plan, layout, bounds):
         plan.set_title("grey: within reach of two or more", loc="right", color=FAINT, fontsize=10)
     arrow = HEADING * max(bounds[2] - bounds[0], bounds[3] - bounds[1])

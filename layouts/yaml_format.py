@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, replace
 from typing import Any, NoReturn
@@ -211,7 +211,7 @@ class _Reader:
             self._fail(node, f"the tag {node.tag!r} is not allowed in a layout; leave it out")
 
     @contextmanager
-    def _at(self, node: Any) -> Iterator[None]:
+    def _at(self, node: Any) -> Generator[None, None, None]:
         """Name a node's line in every error of this library."""
         try:
             yield
