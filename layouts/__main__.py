@@ -13,6 +13,7 @@ from layouts.frames import EDGES
 from layouts.layout import Layout
 from layouts.maniskill import TASKS, from_maniskill
 from layouts.presets import FACING, PRESETS
+from layouts.validation.command import add_check_options
 from robots import LayoutError, RobotLayoutsError, RobotRegistry, UnknownNameError
 
 # What presets take besides the robots.
@@ -26,15 +27,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: Words after ``python -m layouts``; by default those of this process.
 
     Returns:
-        Exit status: 0 if all went well, 1 after an error that was printed.
+        Exit status: 0 if all went well, 1 after an error that was printed, or if a layout was
+            checked and is not ok.
     """
     options = _parser().parse_args(arguments)
     try:
-        options.run(options)
+        return options.run(options) or 0
     except RobotLayoutsError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
-    return 0
 
 
 def add_layout_words(parser: argparse.ArgumentParser) -> None:
@@ -164,6 +165,9 @@ def _parser() -> argparse.ArgumentParser:
     show.add_argument("--save", metavar="FILE", help="write the layout as YAML")
     show.add_argument("--preview", metavar="FILE", help="save a top view (.png, .pdf or .svg)")
     show.set_defaults(run=_show)
+    check = commands.add_parser("validate", help="check a layout for collisions and reach")
+    add_layout_words(check)
+    add_check_options(check, chosen_layout)
     return parser
 
 

@@ -15,9 +15,10 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from layouts.validation.kinematics import Floats, Kinematics, read_numbers, read_origin
+from layouts.validation.kinematics import Floats, Kinematics, origin_matrix
 from robots import AssetError, MissingPackageError, RobotDescriptor
-from robots.urdf_xml import parse_urdf, resolve_reference
+from robots.urdf_model import read_model
+from robots.urdf_xml import numbers_of, parse_urdf, resolve
 
 SIDES = 32  # of the polygon that stands for a circle; 0.5 % of the radius is lost
 
@@ -96,7 +97,7 @@ def box_hull(low: Floats, high: Floats) -> Hull:
 @lru_cache(maxsize=64)
 def _load(urdf: Path, joints: tuple[str, ...], _modified: int) -> RobotModel:
     xml = urdf.read_bytes()
-    kinematics = Kinematics(xml, str(urdf), joints)
+    kinematics = Kinematics(read_model(xml, str(urdf)), joints)
     hulls = tuple(
         hull
         for element in parse_urdf(xml, str(urdf)).iterfind("link")
@@ -135,7 +136,11 @@ def _link_hulls(link: Element, index: int, urdf: Path) -> Iterator[Hull]:
         where = f"{urdf}, link {link.get('name')!r}"
         if shape is None:
             raise AssetError(f"{where}: a collision without a shape")
-        pose = read_origin(collision, str(urdf))
+        xyz, rpy = (
+            numbers_of(collision.find("origin"), key, (0.0, 0.0, 0.0), where)
+            for key in ("xyz", "rpy")
+        )
+        pose = origin_matrix(xyz, rpy)
         corners = _corners(shape, urdf, where)
         yield _hull(index, corners @ pose[:3, :3].T + pose[:3, 3], where)
 
@@ -145,14 +150,14 @@ def _corners(shape: Element, urdf: Path, where: str) -> Floats:
     import trimesh
 
     def size(key: str) -> float:
-        return float(read_numbers(shape, key, (0.0,), where)[0])
+        return numbers_of(shape, key, (0.0,), where)[0]
 
     match shape.tag:
         case "mesh":
-            scale = read_numbers(shape, "scale", (1.0, 1.0, 1.0), where)
+            scale = numbers_of(shape, "scale", (1.0, 1.0, 1.0), where)
             return _mesh_corners(shape.get("filename", ""), urdf, where) * scale
         case "box":
-            made = trimesh.creation.box(read_numbers(shape, "size", (0.0, 0.0, 0.0), where))
+            made = trimesh.creation.box(numbers_of(shape, "size", (0.0, 0.0, 0.0), where))
         case "sphere":
             made = trimesh.creation.icosphere(subdivisions=3, radius=size("radius"))
         case "cylinder":
@@ -170,7 +175,7 @@ def _corners(shape: Element, urdf: Path, where: str) -> Floats:
 def _mesh_corners(reference: str, urdf: Path, where: str) -> Floats:
     import trimesh
 
-    path = resolve_reference(reference, posixpath.dirname(urdf.as_posix()), os.path.isfile)
+    path = resolve(reference, posixpath.dirname(urdf.as_posix()), os.path.isfile)
     if not os.path.isfile(path):
         raise AssetError(f"{where} refers to a file that does not exist: {path}")
     try:
@@ -183,14 +188,11 @@ def _mesh_corners(reference: str, urdf: Path, where: str) -> Floats:
 def _hull(link: int, corners: Floats, where: str) -> Hull:
     import fcl
     import trimesh
-    from scipy.spatial import QhullError
 
-    if len(corners) < 4 or not np.isfinite(corners).all():
+    solid = len(corners) > 3 and np.isfinite(corners).all()
+    if not solid or np.linalg.matrix_rank(corners - corners.mean(axis=0), tol=1e-6) < 3:
         raise AssetError(f"{where}: a collision shape without a volume")
-    try:
-        hull: Any = trimesh.convex.convex_hull(corners)
-    except QhullError as error:
-        raise AssetError(f"{where}: a collision shape without a volume") from error
+    hull: Any = trimesh.convex.convex_hull(corners)
     vertices, triangles = np.asarray(hull.vertices, float), np.asarray(hull.faces, int)
     faces = np.concatenate([np.full((len(triangles), 1), 3), triangles], axis=1)
     return Hull(link, vertices, fcl.Convex(vertices, len(triangles), faces.flatten()))

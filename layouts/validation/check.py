@@ -186,11 +186,11 @@ class _Check:
         clearance = Clearance(
             between, still.links, still.distance, near.links, near.distance, still.points
         )
-        if near.distance >= NARROW:
-            return [], [clearance]
         if near.distance < 0:
             return [self._collision(one, other, touching(one, other, pairs))], [clearance]
-        return [self._narrow(one, other, near)], [clearance]
+        if near.distance < NARROW and other is not self._surface:
+            return [self._narrow(one, other, near)], [clearance]
+        return [], [clearance]
 
     def _collision(self, one: Postures, other: Postures, overlaps: list[Approach]) -> Finding:
         pairs, between = _worst(overlaps), (one.name, other.name)
@@ -208,18 +208,17 @@ class _Check:
         )
 
     def _narrow(self, one: Postures, other: Postures, near: Approach) -> Finding:
-        at_table = other is self._surface
         first, second = near.links
         return Finding(
             "clearance",
             False,
-            (one.name,) if at_table else (one.name, other.name),
+            (one.name, other.name),
             (),
             near.distance,
             "m",
             f"{one.name}.{first} comes within {length_text(near.distance)} of"
-            f" {'the table' if at_table else f'{other.name}.{second}'}",
-            self._table_advice(one, [near]) if at_table else self._distance_advice(one, other),
+            f" {other.name}.{second}",
+            self._distance_advice(one, other),
         )
 
     def _when(self, overlaps: list[Approach]) -> str:
@@ -242,8 +241,8 @@ class _Check:
         if move is None:
             return f"even {FARTHEST_MOVE:g} m farther apart they collide; use another keyframe"
         return (
-            f"stand {one.name} and {other.name} {move:.2f} m farther apart"
-            f" ({now + move:.2f} m between their bases instead of {now:.2f} m), which leaves"
+            f"stand {one.name} and {other.name} {move:.3f} m farther apart"
+            f" ({now + move:.3f} m between their bases instead of {now:.3f} m), which leaves"
             f" {length_text(NARROW)} or more"
         )
 
@@ -258,10 +257,10 @@ class _Check:
         )
 
     def _table_advice(self, robot: Postures, overlaps: list[Approach]) -> str:
-        lift = NARROW - min(overlap.distance for overlap in overlaps)
+        lift = MOVE_STEP - overlaps[0].distance
         placement = self._layout[robot.name]
         return (
-            f"raise the base of {robot.name} by {lift:.2f} m, or give it another keyframe than"
+            f"raise the base of {robot.name} by {lift:.3f} m, or give it another keyframe than"
             f" {placement.start_keyframe!r}: {_others(placement)}"
         )
 
@@ -272,7 +271,7 @@ class _Check:
         for name, placement in self._layout.items():
             self._progress.tell(f"workspace of {name}")
             spaces[name] = Workspace(placement, self._models[name])
-        return spaces
+        return {name: space for name, space in spaces.items() if space.sampled}
 
     def _reaches(self) -> Iterator[TargetReach]:
         for name, placement in self._layout.items() if self._targets else ():

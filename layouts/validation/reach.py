@@ -166,6 +166,8 @@ class Workspace:
     Attributes:
         cells: Their whole-number places, as keys.
         volume: Of all cells (m³).
+        sampled: Whether the samples were dense enough to tell; not for a robot that slides for
+            many metres.
     """
 
     def __init__(self, placement: Placement, model: RobotModel) -> None:
@@ -175,6 +177,7 @@ class Workspace:
         cells = np.floor((points @ base[:3, :3].T + base[:3, 3]) / VOXEL).astype(np.int64)
         self.cells = np.unique(cells @ np.array([1 << 40, 1 << 20, 1]))
         self.volume = len(self.cells) * VOXEL**3
+        self.sampled = len(self.cells) < len(points) / 2
 
     def shared_with(self, other: Workspace) -> float:
         """Return the volume of the cells that both get into (m³)."""

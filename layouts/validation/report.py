@@ -136,7 +136,8 @@ class Report:
         clearances: Between robots, and between robots and the table; what is farther than 10 m
             apart is left out.
         shared: Workspaces that overlap; empty if they were not looked at.
-        workspaces: Volume of each robot's workspace (m³); empty if they were not looked at.
+        workspaces: Volume of each robot's workspace (m³), to about a tenth; empty if they were not
+            looked at. A robot that slides for many metres is left out.
         reaches: For each target and robot, whether it gets there.
         outlines: For each robot the corners of its hulls at the keyframe, world (m).
     """

@@ -39,8 +39,11 @@ def test_a_stale_manifest_is_noticed_and_rewritten(tmp_path, monkeypatch, capsys
 
 def test_every_package_says_its_origin_and_licence():
     licences = {
+        "maniskill_fetch": ("CC BY-NC 4.0", "name the authors, no commercial use"),
+        "maniskill_koch": ("Apache-2.0", "keep the licence file"),
         "maniskill_panda": ("CC BY-NC 4.0", "name the authors, no commercial use"),
         "maniskill_so100": ("Apache-2.0", "keep the licence file"),
+        "maniskill_xarm7": ("CC BY-NC 4.0", "name the authors, no commercial use"),
     }
     for name, package in load_manifest().packages.items():
         assert package.origin.licence == licences[name][0]
@@ -64,9 +67,19 @@ def test_convex_hulls_beside_the_meshes_are_left_out():
 
 def test_physics_is_small_and_the_camera_is_in_the_pictures():
     package = load_manifest().package("maniskill_panda")
-    assert sum(file.bytes for file in package.files if file.physics) < 200_000
+    arms = ("panda_v2.urdf", "panda_v3.urdf", "panda_stick.urdf")
+    physics = {file for urdf in arms for file in package.needed(urdf, pictures=False)}
+    assert sum(file.bytes for file in physics) < 200_000
     pictures = {file.path for file in package.needed("panda_v3.urdf", pictures=True)}
     assert "realsense2_description/meshes/d415.stl" in pictures
+
+
+def test_the_images_that_a_collada_mesh_names_are_pictures_too():
+    package = load_manifest().package("maniskill_fetch")
+    pictures = {file.path for file in package.needed("fetch.urdf", pictures=True)}
+    assert "fetch_description/meshes/head_pan_uv.png" in pictures
+    physics = {file.path for file in package.needed("fetch.urdf", pictures=False)}
+    assert not [path for path in physics if path.endswith(".png")]
 
 
 def test_another_robot_needs_no_more_than_writing_the_manifest_again():
