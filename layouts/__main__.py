@@ -55,6 +55,7 @@ def add_layout_words(parser: argparse.ArgumentParser) -> None:
     for name, help_text in (
         ("--spacing", "between neighbouring bases (m)"),
         ("--radius", "of the bases from the middle (m)"),
+        ("--inset", "of the bases from the table's edge (m)"),
     ):
         parser.add_argument(name, type=_distance, metavar="M|auto", help=help_text)
     parser.add_argument("--facing", metavar="WAY", help=f"in a ring: {', '.join(FACING)}")
@@ -65,7 +66,6 @@ def add_layout_words(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--table", type=float, nargs=2, metavar=("WIDTH", "DEPTH"), help="along x and y (m)"
     )
-    parser.add_argument("--inset", type=float, metavar="M", help="from the table's edge (m)")
     parser.add_argument("--keyframe", metavar="NAME", help="joint positions to start from")
 
 

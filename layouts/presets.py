@@ -5,16 +5,16 @@ whose own front is not its base's +x faces like the others.
 
 A distance given as ``"auto"`` comes from the robots' reach. Neighbours stand `HAND_OVER` of the sum
 of their reaches apart: the last eighth of that sum is where both can work, so one can hand an
-object to the other. Where one distance has to serve several pairs of neighbours, it is that of the
-pair that can be the least far apart, but never less than `CLEAR` of the sum of two neighbours'
-reaches, which keeps the bases of arms clear of each other.
+object to the other. They never stand so near that one can reach the other's base. Where one
+distance has to serve several pairs of neighbours, it is that of the pair that asks for the least,
+unless somebody could then reach a neighbour's base.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from itertools import accumulate, combinations, pairwise
+from itertools import accumulate, pairwise
 from typing import Literal
 
 from layouts.frames import EDGES, check_positive
@@ -29,7 +29,7 @@ Distance = float | Literal["auto"]  # m
 # Share of the sum of two reaches. ManiSkill's two-robot tasks stand their Pandas 1.5 m apart,
 # which is 0.877 of twice 0.855 m (mani_skill 3.0.1, scene_builder/table).
 HAND_OVER = 7 / 8
-CLEAR = 1 / 4  # share of the sum of two reaches; 0.43 m for two Pandas
+EDGE = 0.1  # from a table's edge to a base's middle (m); native's single Pandas have 0.11 m
 
 FACING: Mapping[str, float] = {  # turn from an outward look along the radius (rad)
     "centre": math.pi,
@@ -63,10 +63,9 @@ def side_by_side(
     """
     loaded = _loaded(robots)
     if spacing == "auto":
-        gaps = [_distance("spacing", spacing, [pair]) for pair in pairwise(loaded.values())]
-        along = list(accumulate(gaps, initial=-sum(gaps) / 2))
+        along = _centred([_apart(*pair) for pair in _pairs(loaded)])
     else:
-        distance = _distance("spacing", spacing, [])
+        distance = _given("spacing", spacing)
         first = -distance * (len(loaded) - 1) / 2
         along = [first + i * distance for i in range(len(loaded))]
     return Layout(
@@ -89,7 +88,7 @@ def face_to_face(
     """
     _expect_count("face_to_face", robots, 2)
     loaded = _loaded(robots)
-    distance = _distance("spacing", spacing, [tuple(loaded.values())])
+    distance = _apart(*loaded.values()) if spacing == "auto" else _given("spacing", spacing)
     return Layout(
         {
             name: _placed(robot, (0.0, side * distance / 2, 0.0), -side * math.pi / 2, keyframe)
@@ -105,14 +104,15 @@ def ring(
     facing: str = "centre",
     keyframe: str | None = None,
 ) -> Layout:
-    """Robots at equal angles on a circle about the origin; the first at -y, counterclockwise.
+    """Robots on a circle about the origin, the first at -y, the others counterclockwise.
 
     Two robots that face the centre stand as in `face_to_face`.
 
     Args:
         robots: Robot by name, in order.
-        radius: Distance of the bases from the origin (m). ``"auto"`` puts neighbours at hand-over
-            distance, and a single robot where it reaches the centre.
+        radius: Distance of the bases from the origin (m), at equal angles. ``"auto"`` puts every
+            two neighbours at their own hand-over distance, which makes the angles equal if the
+            reaches are; a single robot stands where it reaches the centre.
         facing: ``"centre"``, ``"out"``, or ``"tangent"``: towards the next robot, along the circle.
         keyframe: Keyframe every robot starts from; None is each one's home.
 
@@ -122,16 +122,13 @@ def ring(
     if facing not in FACING:
         raise UnknownNameError("way to face", facing, FACING)
     loaded = _loaded(robots)
-    around = list(loaded.values())
-    if radius == "auto" and len(around) == 1:
-        radius = HAND_OVER * around[0].reach
-    elif radius == "auto":
-        chord = _distance("radius", radius, pairwise([*around, around[0]]))
-        radius = chord / (2 * math.sin(math.pi / len(around)))
-    check_positive("radius", radius)
+    if radius == "auto":
+        radius, angles = _automatic_ring(list(loaded.values()))
+    else:
+        radius = _given("radius", radius)
+        angles = [2 * math.pi * i / len(loaded) for i in range(len(loaded))]
     placements: dict[str, Placement] = {}
-    for i, (name, robot) in enumerate(loaded.items()):
-        angle = 2 * math.pi * i / len(around)
+    for angle, (name, robot) in zip(angles, loaded.items(), strict=True):
         position = (_rounded(radius * math.sin(angle)), _rounded(-radius * math.cos(angle)), 0.0)
         yaw = math.remainder(angle - math.pi / 2 + FACING[facing], 2 * math.pi)
         placements[name] = _placed(robot, position, yaw, keyframe)
@@ -143,44 +140,54 @@ def around_table(
     *,
     edges: Mapping[str, str] | Sequence[str] | None = None,
     table: tuple[float, float] | Literal["auto"] = "auto",
-    inset: float = 0.1,
+    inset: Distance = "auto",
     keyframe: str | None = None,
 ) -> Layout:
     """Robots on a table about the origin, along its edges, facing across it.
 
     They hang on the frames ``table.north`` (+y), ``table.east`` (+x), ``table.south`` and
-    ``table.west``; see `layouts.frames.table`. Robots on one edge share it evenly, in order from
-    right to left as they look at the table.
+    ``table.west``; see `layouts.frames.table`. Robots on one edge stand in order from right to left
+    as they look at the table: evenly, or at hand-over distance if the table is ``"auto"``.
 
     Args:
         robots: Robot by name, in order.
         edges: Edge of each robot, by name or in order. Left out: south, north, west, east, and
             again from the south.
         table: Width (along x) and depth (along y) of the table (m). ``"auto"`` makes it so large
-            that robots on one edge, and robots on opposite edges of a table with one robot an
-            edge, are at hand-over distance.
-        inset: Distance of the bases from the edge, inwards (m).
+            that robots on opposite edges are at hand-over distance, or larger if several robots
+            stand on one edge.
+        inset: Distance of the bases from the edge, inwards (m). ``"auto"`` is 0.1 m for the robot
+            that reaches farthest, and more for others, so that they work in the same places.
         keyframe: Keyframe every robot starts from; None is each one's home.
 
     Raises:
-        LayoutError: If a robot has no edge, or the table is too small for the inset.
+        LayoutError: If a robot has no edge, or a size or the inset is no distance or does not fit.
         UnknownNameError: If an edge, a robot or a keyframe does not exist.
     """
     loaded = _loaded(robots)
     sides = _edges(tuple(loaded), edges)
-    if isinstance(inset, bool) or not (math.isfinite(inset) and inset >= 0):
-        raise LayoutError(f"inset is {inset} m; it must be finite and 0 or more")
-    rows = {edge: [name for name in loaded if sides[name] == edge] for edge in EDGES}
-    width, depth = _table_size(table, list(loaded.values()), rows, inset)
+    rows = {edge: {n: r for n, r in loaded.items() if sides[n] == edge} for edge in EDGES}
+    if inset != "auto":
+        inset = _given("inset", inset)
+    size = _table_size(table, rows, EDGE if inset == "auto" else inset)
+    farthest = max(robot.reach for robot in loaded.values())
+    along: dict[str, float] = {}
+    for edge, row in rows.items():
+        length = size[0] if edge in ("north", "south") else size[1]
+        gaps = [_apart(*pair) if table == "auto" else length / len(row) for pair in _pairs(row)]
+        along.update(zip(row, _centred(gaps), strict=False))
     placements: dict[str, Placement] = {}
     for name, robot in loaded.items():
-        row = rows[sides[name]]
-        length = width if sides[name] in ("north", "south") else depth
-        along = ((row.index(name) + 0.5) / len(row) - 0.5) * length
+        across = size[1] if sides[name] in ("north", "south") else size[0]
+        if inset == "auto":
+            shorter = HAND_OVER * (farthest - robot.reach)
+            inwards = max(EDGE, min(EDGE + shorter, across / 2 - HAND_OVER * robot.reach))
+        else:
+            inwards = inset
         placements[name] = Placement(
-            robot, (inset, along, 0.0), keyframe=keyframe, on=f"table.{sides[name]}"
+            robot, (inwards, along[name], 0.0), keyframe=keyframe, on=f"table.{sides[name]}"
         )
-    return Layout(placements, table_frames(width, depth))
+    return Layout(placements, table_frames(*size))
 
 
 def grid(
@@ -218,7 +225,7 @@ def grid(
         for other in ((row + 1, column), (row, column + 1))
         if other in cells
     ]
-    distance = _distance("spacing", spacing, neighbours) if count > 1 or spacing != "auto" else 0.0
+    distance = _shared_distance(neighbours) if spacing == "auto" else _given("spacing", spacing)
     placements: dict[str, Placement] = {}
     for i, (name, robot) in enumerate(loaded.items()):
         row, column = divmod(i, columns)
@@ -251,17 +258,73 @@ def _placed(
     return Placement(robot, position, faced(robot, yaw_quaternion(yaw)), keyframe)
 
 
-def _distance(
-    what: str, distance: Distance, neighbours: Iterable[Sequence[RobotDescriptor]]
-) -> float:
-    """Return a distance that is given, or the one that ``"auto"`` means for pairs of neighbours."""
-    if distance == "auto":
-        sums = [sum(robot.reach for robot in pair) for pair in neighbours]
-        return max(HAND_OVER * min(sums), CLEAR * max(sums))
+def _given(what: str, distance: Distance) -> float:
+    """Return a distance (m) that is not automatic."""
     if isinstance(distance, str):
         raise LayoutError(f"{what} is {distance!r}; it takes a number (m) or 'auto'")
     check_positive(what, distance)
     return distance
+
+
+def _apart(one: RobotDescriptor, other: RobotDescriptor) -> float:
+    """Return the hand-over distance (m) of two bases, from which neither reaches the other one."""
+    return max(HAND_OVER * (one.reach + other.reach), one.reach, other.reach)
+
+
+def _shared_distance(neighbours: Sequence[tuple[RobotDescriptor, RobotDescriptor]]) -> float:
+    """Return one distance (m) for several pairs of neighbours; 0 if there is no pair."""
+    if not neighbours:
+        return 0.0
+    farthest = max(robot.reach for pair in neighbours for robot in pair)
+    return max(min(_apart(*pair) for pair in neighbours), farthest)
+
+
+def _automatic_ring(robots: Sequence[RobotDescriptor]) -> tuple[float, list[float]]:
+    """Return the radius (m) and the angles (rad) that put neighbours at hand-over distance.
+
+    The neighbours' distances are the sides of a polygon whose corners lie on the circle.
+    """
+    count = len(robots)
+    if count == 1:
+        return HAND_OVER * robots[0].reach, [0.0]
+    sides = [_apart(*pair) for pair in pairwise([*robots, robots[0]])]
+    longest = max(range(count), key=lambda i: sides[i])
+    if sides[longest] - min(sides) < 1e-12:
+        radius = sides[0] / (2 * math.sin(math.pi / count))
+        return radius, [2 * math.pi * i / count for i in range(count)]
+    radius = _circumradius(sides)
+    arcs = [2 * math.asin(min(side / (2 * radius), 1.0)) for side in sides]
+    arcs[longest] = 2 * math.pi - (sum(arcs) - arcs[longest])
+    return radius, list(accumulate(arcs[:-1], initial=0.0))
+
+
+def _circumradius(sides: Sequence[float]) -> float:
+    """Return the radius of the circle through the corners of a polygon with these sides (m).
+
+    Each side is shorter than the others together. Found by bisection: the smallest circle that
+    the longest side fits into is half of it.
+    """
+    longest = max(sides)
+
+    def angle(radius: float) -> float:  # half of what all sides but the longest span
+        return sum(math.asin(min(s / (2 * radius), 1.0)) for s in sides) - math.asin(
+            min(longest / (2 * radius), 1.0)
+        )
+
+    # The longest side spans the rest of the circle; more than half of it if the others span less.
+    centre_inside = angle(longest / 2) >= math.pi / 2
+
+    def too_small(radius: float) -> bool:
+        rest = math.asin(longest / (2 * radius))
+        return angle(radius) > math.pi - rest if centre_inside else angle(radius) < rest
+
+    low, high = longest / 2, longest
+    while too_small(high):
+        low, high = high, 2 * high
+    for _ in range(100):
+        middle = (low + high) / 2
+        low, high = (middle, high) if too_small(middle) else (low, middle)
+    return high
 
 
 def _edges(
@@ -287,22 +350,18 @@ def _edges(
 
 def _table_size(
     table: tuple[float, float] | Literal["auto"],
-    robots: Sequence[RobotDescriptor],
-    rows: Mapping[str, Sequence[str]],
+    rows: Mapping[str, Mapping[str, RobotDescriptor]],
     inset: float,
 ) -> tuple[float, float]:
     """Return width and depth (m)."""
-    if isinstance(table, str):
-        if table != "auto":
-            raise LayoutError(f"table is {table!r}; it takes width and depth (m) or 'auto'")
-        pairs = list(combinations(robots, 2)) or [(robots[0], robots[0])]
-        apart = _distance("table", "auto", pairs)
-        across, along = (
-            max(1, *(len(rows[edge]) for edge in edges))
+    if table == "auto":
+        farthest = max(robot.reach for row in rows.values() for robot in row.values())
+        width, depth = (
+            max(_row_length(rows[edge], farthest) for edge in edges) + 2 * inset
             for edges in (("north", "south"), ("east", "west"))
         )
-        return apart * across + 2 * inset, apart * along + 2 * inset
-    if len(table) != 2:
+        return width, depth
+    if isinstance(table, str) or len(table) != 2:
         raise LayoutError(f"table is {table!r}; it takes width and depth (m) or 'auto'")
     for what, size in zip(("width", "depth"), table, strict=True):
         check_positive(f"the table's {what}", size)
@@ -312,6 +371,25 @@ def _table_size(
                 f" {2 * inset} m"
             )
     return table
+
+
+def _row_length(row: Mapping[str, RobotDescriptor], farthest: float) -> float:
+    """Return how long an edge is (m) so that robots keep clear of each other, round corners too.
+
+    One robot works in the middle, as do those on the other edges. Of several, the outer ones stand
+    as far from the corner as any robot round it reaches.
+    """
+    span = sum(_apart(*pair) for pair in _pairs(row))
+    return span + 2 * (farthest if span > 0 else HAND_OVER * farthest)
+
+
+def _pairs(row: Mapping[str, RobotDescriptor]) -> Iterable[tuple[RobotDescriptor, RobotDescriptor]]:
+    return pairwise(row.values())
+
+
+def _centred(gaps: Sequence[float]) -> list[float]:
+    """Return the places of a row with these gaps, from smallest to largest, about 0 (m)."""
+    return list(accumulate(gaps, initial=-sum(gaps) / 2))
 
 
 def _rounded(value: float) -> float:

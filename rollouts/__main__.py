@@ -53,9 +53,7 @@ def _parser() -> argparse.ArgumentParser:
         ("replay", replay_command),
         ("export", export_command),
     ):
-        command = commands.add_parser(
-            name, help=module.DESCRIPTION, description=module.DESCRIPTION, epilog=module.EPILOG
-        )
+        command = commands.add_parser(name, help=module.DESCRIPTION, description=module.DESCRIPTION)
         module.add_arguments(command)
         command.set_defaults(run=module.run)
     return parser

@@ -7,7 +7,7 @@ import os
 import pickle
 import signal
 import traceback
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -35,13 +35,13 @@ class Event:
     """What happened to the episode of a seed.
 
     Attributes:
-        seed: Its seed.
+        seed: Its seed; None if a worker died that was not playing yet.
         result: What was returned when it was played to the end, else None.
         error: Why it could not be played, else None.
         died: How its worker died, in words, else None; the episode will be played again.
     """
 
-    seed: int
+    seed: int | None
     result: Any = None
     error: Exception | None = None
     died: str | None = None
@@ -80,7 +80,7 @@ class ProcessExecutor:
 
     def run(self, prepare: Callable[[], Play], seeds: Iterable[int]) -> Generator[Event]:
         """Play the episode of every seed; see `Executor`."""
-        waiting, deaths = deque(seeds), dict[int, int]()
+        waiting, deaths = deque(seeds), Counter[int | None]()
         crew: list[_Worker] = []
         try:
             for _ in range(min(self.workers, len(waiting))):
@@ -92,10 +92,13 @@ class ProcessExecutor:
                     if event is not None:
                         yield event
                     if event is not None and event.died is not None:
-                        waiting.appendleft(event.seed)
-                        deaths[event.seed] = deaths.get(event.seed, 0) + 1
+                        crew.remove(worker)
+                        if event.seed is not None:
+                            waiting.appendleft(event.seed)
+                        deaths[event.seed] += 1
                         _expect_alive(event, deaths[event.seed])
-                        crew[crew.index(worker)] = worker = _Worker(prepare)
+                        if waiting:
+                            crew.append(_Worker(prepare))
                     elif waiting:
                         worker.send(waiting.popleft())
                     else:
@@ -133,7 +136,7 @@ class _Worker:
         """Return what it says; None if it has just become ready.
 
         Raises:
-            WorkerError: If it died before it was ready.
+            RobotLayoutsError: What it could not begin for.
         """
         try:
             said = self.connection.recv()
@@ -163,18 +166,17 @@ class _Worker:
         self._process.join()
         code = self._process.exitcode or 0
         how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
-        words = f"worker process {self._process.pid} died {how}"
-        if self.seed is None:
-            raise WorkerError(f"{words} before it could play anything")
-        return Event(self.seed, died=words)
+        return Event(self.seed, died=f"worker process {self._process.pid} died {how}")
 
 
 def _expect_alive(event: Event, deaths: int) -> None:
-    if deaths >= DEATHS_ALLOWED:
-        raise WorkerError(
-            f"the episode of seed {event.seed} ended {deaths} worker processes; the last:"
-            f" {event.died}"
-        )
+    if deaths < DEATHS_ALLOWED:
+        return
+    if event.seed is None:
+        what = f"{deaths} worker processes died before they could play anything"
+    else:
+        what = f"the episode of seed {event.seed} ended {deaths} worker processes"
+    raise WorkerError(f"{what}; the last: {event.died}")
 
 
 def _work(connection: Connection, prepare: Callable[[], Play]) -> None:

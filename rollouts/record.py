@@ -151,11 +151,18 @@ def record(
     return summary
 
 
+def where_died(event: Event) -> str:
+    """Return how a worker died and what it was doing, in words."""
+    return f"{event.died} " + (
+        "before it could play anything" if event.seed is None else f"at seed {event.seed}"
+    )
+
+
 def _note(summary: Summary, event: Event) -> None:
     if isinstance(event.error, RecordingError):
         raise event.error
-    if event.died is not None:
-        summary.deaths.append(f"{event.died} at seed {event.seed}")
+    if event.died is not None or event.seed is None:
+        summary.deaths.append(where_died(event))
     elif event.error is not None:
         summary.failed[event.seed] = event.error
     else:

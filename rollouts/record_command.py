@@ -27,6 +27,7 @@ INTERRUPTED = 130  # as shells have it
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
+    parser.epilog = EPILOG
     add = parser.add_argument
     add("--task", required=True, help="task id")
     add("--episodes", type=_one_or_more, required=True, metavar="N", help="how many episodes")
@@ -88,7 +89,7 @@ class _Status:
             total = self._line.total
             self._line.say(f"{summary.already} of {total} episodes were recorded before")
         if event is not None and event.died is not None:
-            self._line.say(f"{event.died} at seed {event.seed}; its episode is played again")
+            self._line.say(f"{summary.deaths[-1]}; another takes its place")
         if event is not None and event.error is not None:
             self._line.say(f"seed {event.seed} is not recorded: {event.error}")
         solved = sum(played.success for played in summary.played.values())
@@ -104,7 +105,7 @@ def _report(summary: Summary, path: Path) -> None:
         steps = sum(played.steps for played in summary.played.values()) / count
         print(f"recorded now {count}, {solved} with success, {steps:.1f} steps on average")
     for death in summary.deaths:
-        print(f"played again: {death}")
+        print(f"made good: {death}")
     if summary.failed:
         print(f"not recorded: seeds {', '.join(map(str, sorted(summary.failed)))}")
 

@@ -18,6 +18,7 @@ EPILOG = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Tell a parser what the command takes."""
+    parser.epilog = EPILOG
     add = parser.add_argument
     add("recording", type=Path, metavar="FILE", help="recorded episodes (.h5, its .json beside it)")
     add("--format", required=True, metavar="FORMAT", help="lerobot or robomimic")

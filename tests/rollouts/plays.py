@@ -48,6 +48,20 @@ class Play:
         return os.getpid(), seed**2
 
 
+@dataclass(frozen=True)
+class DiesOnce:
+    """The first worker to begin dies; the others play."""
+
+    folder: Path
+
+    def __call__(self):
+        try:
+            (self.folder / "died").touch(exist_ok=False)
+        except FileExistsError:
+            return Play().play
+        os._exit(7)
+
+
 def cannot_prepare():
     raise TaskError("nothing can be made here")
 

@@ -8,7 +8,7 @@ import pytest
 
 from robots import TaskError
 from rollouts.executor import Event, ProcessExecutor, WorkerError
-from tests.rollouts.plays import Play, cannot_prepare, dies_before_it_is_ready
+from tests.rollouts.plays import DiesOnce, Play, cannot_prepare, dies_before_it_is_ready
 
 
 def run(prepare, seeds, workers=2):
@@ -30,8 +30,9 @@ def test_every_seed_is_played_once(workers):
     events = run(Play(lasts=0.02), range(5, 15), workers)
     assert sorted(event.seed for event in events) == list(range(5, 15))
     assert squares(events) == {seed: seed**2 for seed in range(5, 15)}
-    assert len({event.result[0] for event in events}) == workers
-    assert os.getpid() not in {event.result[0] for event in events}
+    players = {event.result[0] for event in events}
+    assert len(players) <= workers  # not all need be ready in time
+    assert os.getpid() not in players
 
 
 def test_nothing_to_play():
@@ -68,8 +69,15 @@ def test_an_episode_that_cannot_be_played(tmp_path):
 def test_workers_that_cannot_begin():
     with pytest.raises(TaskError, match="nothing can be made here"):
         run(cannot_prepare, range(3))
-    with pytest.raises(WorkerError, match="died with exit code 7 before it could play anything"):
+    with pytest.raises(WorkerError, match="3 worker processes died before .* with exit code 7"):
         run(dies_before_it_is_ready, range(3))
+
+
+def test_a_worker_that_dies_before_it_is_ready_is_replaced(tmp_path):
+    events = run(DiesOnce(tmp_path), range(4))
+    (death,) = [event for event in events if event.died is not None]
+    assert death.seed is None
+    assert squares(events) == {seed: seed**2 for seed in range(4)}
 
 
 def test_what_cannot_be_sent_is_said():

@@ -173,9 +173,9 @@ def test_a_worker_that_is_killed(tmp_path):
     os.kill(int(workers[0]), signal.SIGKILL)
     printed, said = process.communicate(timeout=180)
     assert process.returncode == 0, said
-    assert f"worker process {workers[0]} died by SIGKILL at seed" in said
-    assert "its episode is played again" in said
-    assert f"played again: worker process {workers[0]} died" in printed
+    assert f"worker process {workers[0]} died by SIGKILL " in said
+    assert "; another takes its place" in said
+    assert f"made good: worker process {workers[0]} died" in printed
     assert same_files(tmp_path / FILE, recorded_directly(tmp_path / "direct" / FILE, range(60)))
 
 
@@ -236,7 +236,7 @@ def test_a_recording_that_is_killed_loses_nothing(tmp_path):
 def test_a_recording_that_is_killed_again_and_again(tmp_path):
     kills = [random.uniform(0, 1.5) for _ in range(8)]
     print("seconds after the first part:", kills)
-    expect_killed_and_resumed(tmp_path, 1500, kills, 2)
+    expect_killed_and_resumed(tmp_path, 1000, kills, 2)
 
 
 @pytest.mark.long
