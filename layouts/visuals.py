@@ -12,9 +12,9 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from layouts.validation.kinematics import Floats, read_numbers, read_origin
+from layouts.validation.kinematics import Floats, origin_matrix
 from robots import AssetError, MissingPackageError
-from robots.urdf_xml import parse_urdf, resolve_reference
+from robots.urdf_xml import numbers_of, parse_urdf, resolve
 
 Rgba = tuple[float, float, float, float]  # 0 … 1
 
@@ -119,7 +119,7 @@ def _named_colours(root: Element, urdf: Path) -> Iterator[tuple[str, Rgba]]:
 
 
 def _rgba(color: Element, urdf: Path) -> Rgba:
-    red, green, blue, alpha = read_numbers(color, "rgba", GREY, str(urdf)).tolist()
+    red, green, blue, alpha = numbers_of(color, "rgba", GREY, str(urdf))
     return (red, green, blue, alpha)
 
 
@@ -134,9 +134,11 @@ def _visual_parts(
     rgba = None if material is None else colours.get(material.get("name", ""))
     if material is not None and (color := material.find("color")) is not None:
         rgba = _rgba(color, urdf)
-    pose = read_origin(visual, str(urdf))
+    origin = visual.find("origin")
+    xyz, rpy = (numbers_of(origin, key, (0.0, 0.0, 0.0), where) for key in ("xyz", "rpy"))
+    pose = origin_matrix(xyz, rpy)
     if shape.tag == "mesh":
-        pose = pose @ np.diag([*read_numbers(shape, "scale", (1.0, 1.0, 1.0), where), 1.0])
+        pose = pose @ np.diag([*numbers_of(shape, "scale", (1.0, 1.0, 1.0), where), 1.0])
         yield from _mesh_parts(shape.get("filename", ""), urdf, where, pose, rgba)
         return
     mesh = _primitive(shape, where)
@@ -148,11 +150,11 @@ def _primitive(shape: Element, where: str) -> Any:
     import trimesh
 
     def size(key: str) -> float:
-        return float(read_numbers(shape, key, (0.0,), where)[0])
+        return numbers_of(shape, key, (0.0,), where)[0]
 
     match shape.tag:
         case "box":
-            return trimesh.creation.box(read_numbers(shape, "size", (0.0, 0.0, 0.0), where))
+            return trimesh.creation.box(numbers_of(shape, "size", (0.0, 0.0, 0.0), where))
         case "sphere":
             return trimesh.creation.icosphere(subdivisions=3, radius=size("radius"))
         case "cylinder":
@@ -169,7 +171,7 @@ def _primitive(shape: Element, where: str) -> Any:
 def _mesh_parts(
     reference: str, urdf: Path, where: str, pose: Floats, rgba: Rgba | None
 ) -> Iterator[Part]:
-    path = resolve_reference(reference, posixpath.dirname(urdf.as_posix()), os.path.isfile)
+    path = resolve(reference, posixpath.dirname(urdf.as_posix()), os.path.isfile)
     for mesh in load_meshes(path, where):
         mesh.apply_transform(pose)
         own = _own_colour(mesh)

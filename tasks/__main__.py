@@ -1,16 +1,19 @@
-"""``python -m tasks list`` and ``python -m tasks describe TASK``: what there is to achieve."""
+"""``python -m tasks list``, ``describe TASK`` and ``view TASK``: what there is to achieve."""
 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 
 from rich.console import Console
 
+from layouts.viewer import add_page_options, page_words, show
 from robots import RobotLayoutsError, UnknownNameError
 from tasks.description import TaskFacts, describe, facts, list_table, parity_verdicts
 from tasks.registry import list_tasks, make
+from tasks.view import task_cell
 
 MIN_WIDTH = 100  # columns that a table may take; a narrower terminal wraps it
 LEGEND = (
@@ -32,8 +35,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if options.command == "list":
             _list()
-        else:
+        elif options.command == "describe":
             _describe(options.task)
+        else:
+            return _view(options)
     except RobotLayoutsError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2 if isinstance(error, UnknownNameError) else 1
@@ -66,6 +71,18 @@ def _describe(name: str) -> None:
     env.close()
 
 
+def _view(options: argparse.Namespace) -> int:
+    """Show a task as it is reset, or hand a recording over to the room that reads recordings."""
+    if options.demo is not None:
+        words = ["view", options.demo, "--task", options.task, "--episode", str(options.episode)]
+        os.execv(sys.executable, [sys.executable, "-m", "rollouts", *words, *page_words(options)])
+    env = make(options.task, obs_mode="none")
+    env.reset(options.seed)
+    status = show(lambda: task_cell(env, f"{env.task_id}, seed {options.seed}"), options)
+    env.close()
+    return status
+
+
 def _console() -> Console:
     console = Console(markup=False, highlight=False)
     console.width = max(console.width, MIN_WIDTH)
@@ -80,6 +97,16 @@ def _parser() -> argparse.ArgumentParser:
     commands.add_parser("list", help="print every task as a row of a table")
     one = commands.add_parser("describe", help="print everything about a task")
     one.add_argument("task", metavar="TASK", help="task id or another of its names")
+    view = commands.add_parser(
+        "view",
+        help="look at a task, or at a demonstration of it, in a browser",
+        epilog="--demo hands over to `python -m rollouts view`.",
+    )
+    view.add_argument("task", metavar="TASK", help="task id or another of its names")
+    view.add_argument("--seed", type=int, default=0, metavar="N", help="of the reset (0)")
+    view.add_argument("--demo", metavar="FILE", help="an h5 file of recorded episodes")
+    view.add_argument("--episode", type=int, default=0, metavar="N", help="the Nth of them (0)")
+    add_page_options(view)
     return parser
 
 

@@ -18,7 +18,7 @@ from layouts.export.urdf import base_link, rpy
 from layouts.files import written_whole
 from layouts.visuals import Part, load_meshes, read_visuals, require_trimesh, simplified
 from robots import LayoutError, RobotDescriptor
-from robots.urdf_xml import parse_urdf, resolve_reference
+from robots.urdf_xml import parse_urdf, resolve
 
 if TYPE_CHECKING:
     from layouts.layout import Layout, Placement
@@ -73,7 +73,7 @@ def _directives(place: str, placement: Placement, urdf: Path) -> Iterator[dict[s
     yield {
         "add_weld": {
             "parent": "world",
-            "child": f"{place}::{base_link(placement, urdf)}",
+            "child": f"{place}::{base_link(urdf)}",
             "X_PC": {
                 "translation": list(placement.base_position),
                 "rotation": _Rpy(deg=turn),
@@ -154,7 +154,7 @@ def _convert_collisions(link: Element, urdf: Path, folder: Path) -> None:
     where = f"{urdf}, link {link.get('name')!r}"
     for number, mesh in enumerate(link.iterfind("collision/geometry/mesh")):
         base = posixpath.dirname(urdf.as_posix())
-        path = resolve_reference(mesh.get("filename", ""), base, os.path.isfile)
+        path = resolve(mesh.get("filename", ""), base, os.path.isfile)
         name = f"{link.get('name')}_collision_{number}.obj"
         _save(trimesh.util.concatenate(load_meshes(path, where)), folder / name)
         mesh.set("filename", name)

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
 from layouts.files import written_whole
-from layouts.validation.kinematics import Kinematics
 from robots import LayoutError
 from robots.descriptor import Quaternion, Vector3
-from robots.urdf_xml import parse_urdf, resolve_reference
+from robots.urdf_model import read_model
+from robots.urdf_xml import parse_urdf, resolve
 
 if TYPE_CHECKING:
     from layouts.layout import Layout, Placement
@@ -45,9 +45,9 @@ def write_urdf(layout: Layout, path: str | os.PathLike[str], *, relative: bool =
     return target
 
 
-def base_link(placement: Placement, file: Path) -> str:
-    """Return the name of the link of a robot's URDF that hangs on no joint."""
-    return Kinematics(file.read_bytes(), str(file), placement.robot.joints).links[0]
+def base_link(file: Path) -> str:
+    """Return the name of the link of a URDF that hangs on no joint."""
+    return read_model(file.read_bytes(), str(file)).root
 
 
 def rpy(quaternion: Quaternion) -> Vector3:
@@ -68,7 +68,7 @@ def rpy(quaternion: Quaternion) -> Vector3:
 def _fixed_to_world(place: str, placement: Placement, file: Path) -> Element:
     joint = Element("joint", name=f"{place}/base", type="fixed")
     SubElement(joint, "parent", link=WORLD)
-    SubElement(joint, "child", link=f"{place}/{base_link(placement, file)}")
+    SubElement(joint, "child", link=f"{place}/{base_link(file)}")
     turn = rpy(placement.base_quaternion)
     SubElement(joint, "origin", xyz=_text(placement.base_position), rpy=_text(turn))
     return joint
@@ -91,7 +91,7 @@ def _renamed(file: Path, place: str, folder: Path | None) -> Iterator[Element]:
 
 
 def _file(reference: str, urdf: Path, folder: Path | None) -> str:
-    path = resolve_reference(reference, posixpath.dirname(urdf.as_posix()), os.path.isfile)
+    path = resolve(reference, posixpath.dirname(urdf.as_posix()), os.path.isfile)
     path = os.path.abspath(path)
     return path if folder is None else Path(os.path.relpath(path, folder)).as_posix()
 

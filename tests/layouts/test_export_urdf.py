@@ -20,20 +20,24 @@ from tests.layouts.cells import link_poses, mixed_cell, random_positions
 
 DRAWS = 5
 
+INERTIA = (
+    b'<inertial><mass value="1"/>'
+    b'<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+)
 ARM = b"""<robot name="two_links">
   <gazebo reference="tip"><turnGravityOff>true</turnGravityOff></gazebo>
   <material name="paint"><color rgba="1 0 0 1"/></material>
   <link name="base"><visual><geometry><box size="1 1 1"/></geometry>
     <material name="paint"/></visual></link>
-  <link name="tip"><visual><geometry><mesh filename="package://arm/tip.stl"/></geometry>
+  <link name="tip">INERTIA<visual><geometry><mesh filename="package://arm/tip.stl"/></geometry>
     <material name="paint"><texture filename="paint.png"/></material></visual></link>
   <joint name="turn" type="revolute"><parent link="base"/><child link="tip"/>
     <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-  <link name="second"/>
+  <link name="second">INERTIA</link>
   <joint name="follow" type="revolute"><parent link="base"/><child link="second"/>
     <limit lower="-1" upper="1" effort="1" velocity="1"/>
     <mimic joint="turn" multiplier="2"/></joint>
-</robot>"""
+</robot>""".replace(b"INERTIA", INERTIA)
 
 
 @pytest.fixture(scope="module")

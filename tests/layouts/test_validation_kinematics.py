@@ -171,9 +171,7 @@ class TestJoints:
 
     def test_a_joint_that_nobody_drives_is_refused(self):
         loose = joint("loose", "top", "jaw")
-        with pytest.raises(
-            DescriptorError, match="'loose' of 'small' moves, but is in no"
-        ):
+        with pytest.raises(DescriptorError, match="'loose' of 'small' moves, but is in no"):
             self.kinematics(
                 link("base"), link("top"), link("jaw"), joint("turn", "base", "top"), loose
             )
