@@ -13,7 +13,7 @@ from layouts.frames import EDGES
 from layouts.layout import Layout
 from layouts.maniskill import TASKS, from_maniskill
 from layouts.presets import FACING, PRESETS
-from layouts.validation.command import add_check_options
+from layouts.validate_command import add_check_options
 from layouts.viewer.command import add_view_options
 from robots import LayoutError, RobotLayoutsError, RobotRegistry, UnknownNameError
 

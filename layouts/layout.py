@@ -452,7 +452,7 @@ class Layout(Mapping[str, Placement]):
     ) -> Report:
         """Check the layout before anything moves, from the robots' real collision shapes.
 
-        Looks for robots that collide with each other, with themselves or with a table at their
+        Looks for robots that collide with each other, with themselves or with tables at their
         keyframes and with joint noise, for keyframes beyond the joint limits, and for targets that
         nobody reaches; measures distances and shared workspaces. Needs the robots' files.
 
@@ -460,8 +460,8 @@ class Layout(Mapping[str, Placement]):
             targets: What some robot must reach, by name or in order: x, y, z of a tool centre
                 point in the world (m), or these and the wxyz quaternion of the TCP link.
             samples: How many postures with joint noise to look at, besides the keyframes.
-            table: Outline of a table whose top is at z = 0, as x_min, y_min, x_max, y_max (m);
-                bases may stand on it. None for no table.
+            table: Outline of a table whose top is at z = 0, as x_min, y_min, x_max, y_max (m),
+                besides those that are among the layout's frames. Bases may stand on tables.
             seed: Of the joint noise.
             workspaces: Whether to measure how much space robots share, to about a tenth.
 

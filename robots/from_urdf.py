@@ -10,6 +10,8 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import redirect_stdout
+from difflib import get_close_matches
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -85,9 +87,12 @@ def _described(name: str) -> Path:
     catalogue: Any = import_module("robot_descriptions._descriptions").DESCRIPTIONS
     with_urdf = [key for key, about in catalogue.items() if about.has_urdf]
     if name not in with_urdf:
-        raise UnknownNameError("robot of robot_descriptions with a URDF", name, with_urdf)
+        near = get_close_matches(name, with_urdf, n=8, cutoff=0.4)
+        hint = f"These are the closest of {len(with_urdf)}; `robot_descriptions list` has them all."
+        raise UnknownNameError("robot of robot_descriptions with a URDF", name, near, hint)
     try:
-        module: Any = import_module(f"robot_descriptions.{name}")  # clones, or finds its clone
+        with redirect_stdout(sys.stderr):  # clones, or finds its clone, and talks about it
+            module: Any = import_module(f"robot_descriptions.{name}")
     except Exception as error:  # git's own errors, of a package that need not be installed here
         raise AssetError(f"robot_descriptions could not bring {name}: {error}") from error
     path = getattr(module, "URDF_PATH", None)

@@ -15,5 +15,6 @@ PANDA_PINCH = replace(
     urdf=UrdfLocator("maniskill_panda", "panda_pinch.urdf"),
     action_split=PANDA.action_split.replace(gripper=GRIPPER),
     keyframes={"rest": (*PANDA.keyframe("rest")[:7], 0.06, 0.06)},
+    reach=1.0,  # of the TCP, from the URDF: the hand is longer
     source="mani_skill 3.0.1, agents/robots/panda/panda.py; fingers from panda_pinch.urdf",
 )

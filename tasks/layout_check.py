@@ -10,7 +10,7 @@ from robots import LayoutError, MissingPackageError
 
 
 def refuse_collisions(layout: Layout) -> None:
-    """Refuse a layout whose robots collide with each other or with themselves.
+    """Refuse a layout whose robots collide with each other, themselves or the layout's tables.
 
     Looks at their keyframes and at some draws of joint noise. The verdict on a layout is
     remembered. Where python-fcl is not installed it cannot look, and warns instead.
@@ -37,5 +37,5 @@ def refuse_collisions(layout: Layout) -> None:
 @lru_cache(maxsize=256)
 def _collisions(layout: Layout) -> str:
     findings = layout.validate(workspaces=False).findings
-    kinds = ("collision", "self-collision")
+    kinds = ("collision", "self-collision", "table")
     return "\n".join(str(finding) for finding in findings if finding.kind in kinds)

@@ -86,12 +86,18 @@ def require_packages() -> None:
         ) from error
 
 
-def box_hull(low: Floats, high: Floats) -> Hull:
-    """Return a box with edges along the axes, between two corners (m), as a body of its own."""
-    import trimesh
+def slab_hull(top: Floats, depth: float, name: str) -> Hull:
+    """Return what lies below a flat top, as a body of its own in the world frame.
 
-    box = trimesh.creation.box(bounds=[low, high])
-    return _hull(0, np.asarray(box.vertices), "table")
+    Args:
+        top: Its corners, (n, 3) (m).
+        depth: How far it goes down (m).
+        name: Its name, for errors.
+
+    Raises:
+        AssetError: If it has no volume.
+    """
+    return _hull(0, np.concatenate([top, top - [0.0, 0.0, depth]]), name)
 
 
 @lru_cache(maxsize=64)

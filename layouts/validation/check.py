@@ -10,8 +10,9 @@ from itertools import combinations
 
 import numpy as np
 
+from layouts.frames import table_outlines
 from layouts.layout import Layout, Placement
-from layouts.validation.bodies import RobotModel, box_hull, load_model
+from layouts.validation.bodies import RobotModel, load_model, slab_hull
 from layouts.validation.collisions import (
     Approach,
     Postures,
@@ -39,7 +40,7 @@ from robots import LayoutError
 Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)
 Targets = Mapping[str, Sequence[float]] | Sequence[Sequence[float]]
 
-TABLE_DEPTH = 0.9  # m; the table is solid, from z = 0 down
+TABLE_DEPTH = 0.9  # m; tables are solid, from their tops down
 NARROW = 0.02  # m; less clearance than this is worth a warning
 LIMIT_TOLERANCE = 1e-4  # rad or m; limits and keyframes are written with four digits
 FARTHEST_MOVE = 3.0  # m; of the search for a distance that is clear
@@ -77,19 +78,24 @@ class _Check:
         table: Rectangle | None,
         seed: int,
     ) -> None:
-        self._layout, self._targets, self._table = layout, targets, table
-        self._draws = samples
-        self._models = {name: load_model(p.robot) for name, p in layout.items()}
+        self._layout, self._targets, self._draws = layout, targets, samples
+        self._tops = _table_tops(layout, table)
+        self._progress = _Progress()
+        self._models = dict(self._load())
         random = np.random.default_rng(seed)
         self._robots = {
             name: stand(name, p, self._models[name], _noisy(p, samples, random))
             for name, p in layout.items()
         }
-        self._surface: Postures | None = None
-        if table is not None:
-            low, high = (*table[:2], -TABLE_DEPTH), (*table[2:], 0.0)
-            self._surface = fixed("table", box_hull(np.array(low), np.array(high)), samples + 1)
-        self._progress = _Progress()
+        self._surfaces = {
+            name: fixed(name, slab_hull(np.array(top), TABLE_DEPTH, name), samples + 1)
+            for name, top in self._tops.items()
+        }
+
+    def _load(self) -> Iterator[tuple[str, RobotModel]]:
+        for name, placement in self._layout.items():
+            self._progress.tell(f"files of {name}")
+            yield name, load_model(placement.robot)
 
     def run(self, workspaces: bool) -> Report:
         findings = [*self._limits(), *self._self_collisions()]
@@ -104,7 +110,7 @@ class _Check:
         return Report(
             layout=self._layout,
             draws=self._draws,
-            table=self._table,
+            tables=self._tops,
             targets={name: target[:3] for name, target in self._targets.items()},
             findings=tuple(sorted(findings, key=lambda finding: not finding.serious)),
             clearances=tuple(clearances),
@@ -170,8 +176,8 @@ class _Check:
         for one, other in combinations(self._robots.values(), 2):
             yield one, other, None
         for name, robot in self._robots.items():
-            if self._surface is not None:
-                yield robot, self._surface, _moving_hulls(self._models[name])
+            for surface in self._surfaces.values():
+                yield robot, surface, _moving_hulls(self._models[name])
 
     def _compare(
         self, one: Postures, other: Postures, pairs: Sequence[tuple[int, int]] | None
@@ -182,19 +188,19 @@ class _Check:
         near = nearest(one, other, pairs)
         if still is None or near is None:
             return [], []
-        between = one.name, other.name
+        between, table = (one.name, other.name), other.name in self._surfaces
         clearance = Clearance(
-            between, still.links, still.distance, near.links, near.distance, still.points
+            between, table, still.links, still.distance, near.links, near.distance, still.points
         )
         if near.distance < 0:
             return [self._collision(one, other, touching(one, other, pairs))], [clearance]
-        if near.distance < NARROW and other is not self._surface:
+        if near.distance < NARROW and not table:
             return [self._narrow(one, other, near)], [clearance]
         return [], [clearance]
 
     def _collision(self, one: Postures, other: Postures, overlaps: list[Approach]) -> Finding:
         pairs, between = _worst(overlaps), (one.name, other.name)
-        at_table = other is self._surface
+        at_table = other.name in self._surfaces
         return Finding(
             "table" if at_table else "collision",
             True,
@@ -202,8 +208,8 @@ class _Check:
             pairs,
             pairs[0].depth,
             "m",
-            f"{one.name} and {'the table' if at_table else other.name} collide"
-            f" {self._when(overlaps)}: {links_text(pairs, between)}",
+            f"{one.name} and {other.name} collide {self._when(overlaps)}:"
+            f" {links_text(pairs, between, table=at_table)}",
             self._table_advice(one, overlaps) if at_table else self._distance_advice(one, other),
         )
 
@@ -298,8 +304,8 @@ class _Check:
         others = [r.only(first) for n, r in self._robots.items() if n != name]
         if touching(robot, robot, model.self_pairs) or any(touching(robot, o) for o in others):
             return False
-        surface = self._surface
-        return surface is None or not touching(robot, surface.only(first), _moving_hulls(model))
+        surfaces = [surface.only(first) for surface in self._surfaces.values()]
+        return not any(touching(robot, s, _moving_hulls(model)) for s in surfaces)
 
     def _missed(self, reaches: Sequence[TargetReach]) -> Iterator[Finding]:
         for target in self._targets:
@@ -333,6 +339,22 @@ class _Progress:
         if now - self._told > PATIENCE:
             self._told = now
             print(f"checking the layout: {what}", file=sys.stderr, flush=True)
+
+
+def _table_tops(layout: Layout, table: Rectangle | None) -> dict[str, tuple[Point, ...]]:
+    """Return the corners of each table's top (m): those of the layout's frames, and the one given.
+
+    The one given takes the place of a frame called ``table``.
+    """
+    tops: dict[str, tuple[Point, ...]] = {
+        name: tuple(map(tuple, corners))
+        for name, corners in table_outlines(layout.frame_poses).items()
+    }
+    if table is not None:
+        x_min, y_min, x_max, y_max = table
+        outline = ((x_min, y_min), (x_max, y_min), (x_max, y_max), (x_min, y_max))
+        tops["table"] = tuple((x, y, 0.0) for x, y in outline)
+    return tops
 
 
 def _named_targets(targets: Targets) -> dict[str, tuple[float, ...]]:

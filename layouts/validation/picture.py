@@ -58,7 +58,7 @@ def draw(report: Report) -> Figure:
     lines = _captions(report)
     below = 0.1 + 0.028 * len(lines)
     plan = figure.add_axes((0.08, below, 0.89, 0.93 - below))
-    _draw_table(plan, report)
+    _draw_tables(plan, report)
     for index, name in enumerate(report.layout):
         _draw_robot(plan, report, index, name)
     for clearance in _nearest_neighbours(report):
@@ -72,14 +72,12 @@ def draw(report: Report) -> Figure:
     return figure
 
 
-def _draw_table(plan: Axes, report: Report) -> None:
-    from matplotlib.patches import Rectangle
+def _draw_tables(plan: Axes, report: Report) -> None:
+    from matplotlib.patches import Polygon
 
-    if report.table is not None:
-        x_min, y_min, x_max, y_max = report.table
-        patch = Rectangle((x_min, y_min), x_max - x_min, y_max - y_min)
-        patch.set(facecolor=TABLE, edgecolor="#C9B99B", zorder=0.5)
-        plan.add_patch(patch)
+    for corners in report.tables.values():
+        outline = np.array(corners)[:, :2]
+        plan.add_patch(Polygon(outline, facecolor=TABLE, edgecolor="#C9B99B", zorder=0.5))
 
 
 def _draw_robot(plan: Axes, report: Report, index: int, name: str) -> None:
@@ -112,7 +110,7 @@ def _nearest_neighbours(report: Report) -> list[Clearance]:
     """Return, without repetition, the least clearance that each robot has from another."""
     chosen: list[Clearance] = []
     for name in report.layout:
-        own = [c for c in report.clearances if name in c.between and "table" not in c.between]
+        own = [c for c in report.clearances if name in c.between and not c.table]
         least = min(own, key=lambda clearance: clearance.distance, default=None)
         if least is not None and least.distance > 0 and least not in chosen:
             chosen.append(least)

@@ -104,11 +104,15 @@ class Reach:
             errors, slopes = self._errors(qpos, target, turns)
             if (np.abs(errors).max(axis=1) < NEAR_ENOUGH[0] / 10).all():
                 break
+            # A joint at a limit that it is drawn beyond leaves the way to the others.
+            at, pull = qpos[:, self._arm], (errors[:, None] @ slopes)[:, 0]
+            stuck = ((at <= limits[:, 0]) & (pull < 0)) | ((at >= limits[:, 1]) & (pull > 0))
+            slopes = np.where(stuck[:, None], 0.0, slopes)
             # The damping vanishes with the error, so that the last steps are whole ones.
             scale = np.minimum(1.0, np.linalg.norm(errors, axis=1) * 10)[:, None, None]
             normal = slopes @ slopes.transpose(0, 2, 1) + scale * damping + 1e-9 * np.eye(rows)
             step = slopes.transpose(0, 2, 1) @ np.linalg.solve(normal, errors[:, :, None])
-            moved = qpos[:, self._arm] + np.clip(step[:, :, 0], -LONGEST_STEP, LONGEST_STEP)
+            moved = at + np.clip(step[:, :, 0], -LONGEST_STEP, LONGEST_STEP)
             qpos[:, self._arm] = np.clip(moved, limits[:, 0], limits[:, 1])
         return qpos
 

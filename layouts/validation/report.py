@@ -24,7 +24,7 @@ class LinkPair:
     """Two links that overlap.
 
     Attributes:
-        links: Their names; the second may be ``table``.
+        links: Their names; the second may be a table's.
         depth: By how much at worst (m).
         point: Where, in the world (m).
     """
@@ -70,7 +70,8 @@ class Clearance:
     """How near two robots come, or a robot and the table.
 
     Attributes:
-        between: Names of both robots, or of a robot and ``table``.
+        between: Names of both robots, or of a robot and a table.
+        table: Whether the second is a table.
         links: The links that come nearest at the keyframes.
         distance: Between them at the keyframes (m); negative if they overlap.
         noisy_links: The links that come nearest with joint noise.
@@ -79,6 +80,7 @@ class Clearance:
     """
 
     between: tuple[str, str]
+    table: bool
     links: tuple[str, str]
     distance: float
     noisy_links: tuple[str, str]
@@ -130,10 +132,10 @@ class Report:
     Attributes:
         layout: The layout.
         draws: How many postures with joint noise were looked at, besides the keyframes.
-        table: Outline of the table, as x_min, y_min, x_max, y_max (m), if one was given.
+        tables: Corners of each table's top (m), by name.
         targets: Position of each target in the world (m).
         findings: What is wrong, serious findings first.
-        clearances: Between robots, and between robots and the table; what is farther than 10 m
+        clearances: Between robots, and between robots and tables; what is farther than 10 m
             apart is left out.
         shared: Workspaces that overlap; empty if they were not looked at.
         workspaces: Volume of each robot's workspace (m³), to about a tenth; empty if they were not
@@ -144,7 +146,7 @@ class Report:
 
     layout: Layout
     draws: int
-    table: tuple[float, float, float, float] | None
+    tables: dict[str, tuple[Point, ...]]
     targets: dict[str, Point]
     findings: tuple[Finding, ...]
     clearances: tuple[Clearance, ...]
@@ -185,11 +187,11 @@ def length_text(metres: float) -> str:
     return f"{metres:.2f} m" if abs(metres) >= 1 else f"{metres * 100:.1f} cm"
 
 
-def links_text(pairs: Sequence[LinkPair], between: Sequence[str]) -> str:
+def links_text(pairs: Sequence[LinkPair], between: tuple[str, str], *, table: bool = False) -> str:
     """Name pairs of links, the deepest first: ``left.panda_hand with right.panda_link7``."""
-    one, other = between[0], between[-1]
+    one, other = between
     spoken = [
-        f"{one}.{a} with {b if other == 'table' else f'{other}.{b}'} ({length_text(pair.depth)})"
+        f"{one}.{a} with {b if table else f'{other}.{b}'} ({length_text(pair.depth)})"
         for pair in pairs[:SPOKEN_LINKS]
         for a, b in [pair.links]
     ]
@@ -238,7 +240,7 @@ def _distances(report: Report) -> Iterator[str]:
 def _near(clearance: Clearance) -> str:
     one, other = clearance.between
     first, second = clearance.links
-    ends = f"{one}.{first} – {second if other == 'table' else f'{other}.{second}'}"
+    ends = f"{one}.{first} – {second if clearance.table else f'{other}.{second}'}"
     return (
         f"{one} – {other}: {length_text(clearance.distance)};"
         f" {length_text(clearance.noisy_distance)} ({ends})"

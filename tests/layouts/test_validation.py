@@ -10,11 +10,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from layouts import Layout, Placement, face_to_face, side_by_side, yaw_quaternion
+from layouts import (
+    Layout,
+    Placement,
+    around_table,
+    face_to_face,
+    side_by_side,
+    yaw_quaternion,
+)
 from layouts.validation.bodies import load_model
 from layouts.validation.collisions import nearest, stand, touching
 from robots import AssetError, DescriptorError, LayoutError, MissingPackageError, RobotRegistry
-from tests.layouts.small_robots import FOLDING, folding, joint, link, robot, turntable, urdf
+from tests.layouts.small_robots import (
+    FOLDING,
+    TURNTABLE,
+    folding,
+    joint,
+    link,
+    robot,
+    turntable,
+    urdf,
+)
 
 PANDAS = {"left": "panda", "right": "panda"}
 TABLE = (-0.7245, -1.209, 0.4845, 1.209)
@@ -129,6 +145,14 @@ class TestDistances:
         assert (finding.kind, finding.serious) == ("clearance", False)
         assert finding.amount == pytest.approx(0.015)
         assert "0.010 m farther apart (0.125 m between their bases" in finding.advice
+
+    def test_the_nearest_boxes_need_not_be_those_of_the_nearest_bounds(self, tmp_path):
+        """The turned tops' boxes along the axes are 11.3 cm apart, but the tops 11.7 cm."""
+        text = TURNTABLE.replace('size="0.1 0.1 0.1"', 'size="0.1 0.135 0.1"', 1)
+        arm = robot(tmp_path, text, ["turn"], rest=[math.pi / 6])
+        (between,) = pair(arm, 0.25).validate(samples=0, workspaces=False).clearances
+        assert between.links == ("base", "base")
+        assert between.distance == pytest.approx(0.115, abs=1e-9)
 
     def test_turned_boxes_are_moved_no_farther_than_they_need(self, tmp_path):
         """Their sides face each other, though not along the world's axes."""
@@ -277,6 +301,14 @@ class TestTable:
         assert finding.links[0].links == ("panda_link1", "table")
         assert finding.amount == pytest.approx(0.2 - 0.141, abs=0.001)
         assert "raise the base of arm by 0.069 m" in finding.advice
+
+    def test_tables_of_the_layout_count(self):
+        layout = around_table({"a": "panda", "b": "so100"}, edges=["north", "south"])
+        report = layout.validate(workspaces=False)
+        assert report.ok
+        assert {c.between for c in report.clearances if c.table} == {("a", "table"), ("b", "table")}
+        sunk = Layout({"a": replace(layout["a"], position=(0.1, 0, -0.3))}, layout.frames)
+        assert kinds(sunk.validate(workspaces=False)) == ["table"]
 
     def test_beside_it_there_is_none(self):
         assert self.validate(position=(2.0, 0.0, -0.2)).ok

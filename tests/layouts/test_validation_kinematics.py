@@ -1,6 +1,7 @@
 """Forward and inverse kinematics of the checks agree with the physics engine."""
 
 import functools
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -188,3 +189,35 @@ class TestJoints:
         arm = replace(turntable(tmp_path), tcp_link="tip")
         with pytest.raises(UnknownNameError, match="unknown link 'tip'. Did you mean 'top'"):
             Layout({"arm": Placement(arm)}).validate(targets=[(0, 0, 0)])
+
+
+@every_robot
+def test_hulls_are_the_engines_collision_shapes(robot):
+    """Link by link, as many and of the same size; PhysX may leave out corners of a mesh."""
+    simulated = engine(robot)
+    model = load_model(simulated.descriptor)
+    compared = 0
+    for name, link_ in simulated.links.items():
+        hulls = [hull for hull in model.hulls if model.kinematics.links[hull.link] == name]
+        shapes = link_.get_collision_shapes()
+        assert len(hulls) == len(shapes)
+        for hull, shape in zip(hulls, shapes, strict=True):
+            corners = shape_corners(shape)
+            if corners is None:
+                continue
+            compared += 1
+            np.testing.assert_allclose(hull.corners.min(0), corners.min(0), atol=2e-3)
+            np.testing.assert_allclose(hull.corners.max(0), corners.max(0), atol=2e-3)
+    assert compared >= 8
+
+
+def shape_corners(shape):
+    """Corners of a box or mesh in its link's frame, (n, 3) (m); None of round shapes."""
+    if hasattr(shape, "vertices"):
+        corners = shape.vertices * shape.scale
+    elif hasattr(shape, "half_size"):
+        corners = np.array(list(itertools.product((-1, 1), repeat=3))) * shape.half_size
+    else:
+        return None
+    pose = shape.local_pose.to_transformation_matrix()
+    return corners @ pose[:3, :3].T + pose[:3, 3]

@@ -6,10 +6,15 @@ import functools
 
 import numpy as np
 import pytest
+import sapien
 
 from layouts import single
 from robots import ActionNumber, RobotRegistry
+from robots.asset_sources import find_mani_skill
+from robots.from_urdf import guess_descriptor
 from robots.registry import CATALOGUE
+from robots.urdf_model import read_model
+from robots.urdf_reach import link_frame
 from robots.urdf_xml import parse_urdf
 from simulation import PhysicsSettings, Simulation
 from simulation.controller import JointPositionController
@@ -99,3 +104,57 @@ def test_an_action_number_moves_its_own_joints_and_no_others(robot, number):
     own, others = moved[mine], np.delete(moved, mine)
     assert (own > 0.003).all()
     assert others.max(initial=0.0) < 0.4 * max(own.max(), 0.02)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_links_are_where_the_urdf_alone_says(robot):
+    simulation, start = stand(robot)
+    descriptor, arm = simulation.layout["arm"].robot, simulation.worlds[0].robots["arm"]
+    arm.articulation.set_root_pose(sapien.Pose())
+    model = read_model(descriptor.urdf.locate().read_bytes(), robot)
+    positions = dict(zip(descriptor.joints, start, strict=True))
+    for name, link in arm.links.items():
+        frame, pose = link_frame(model, name, positions), link.entity_pose
+        np.testing.assert_allclose(frame.position, pose.p, atol=2e-6, err_msg=name)
+        matrix = pose.to_transformation_matrix()[:3, :3]
+        np.testing.assert_allclose(frame.rotation, matrix, atol=5e-6, err_msg=name)
+
+
+@pytest.mark.parametrize("robot", ["panda", "koch", "xarm7"])
+def test_no_pose_is_farther_than_the_reach_and_some_come_near(robot):
+    found = guess_descriptor(RobotRegistry.load(robot).urdf.locate()).descriptor
+    simulation, _ = stand(robot)
+    arm = simulation.worlds[0].robots["arm"]
+    arm.articulation.set_root_pose(sapien.Pose())
+    limits = np.concatenate([joint.limits for joint in arm.joints])
+    rng = np.random.default_rng(0)
+    farthest = 0.0
+    for _ in range(3000):
+        arm.articulation.set_qpos(rng.uniform(*limits.T))
+        points = found.tcp_position_links or (found.tcp_link,)
+        middle = np.mean([arm.links[link].entity_pose.p for link in points], axis=0)
+        farthest = max(farthest, float(np.hypot(*middle[:2])))
+    assert 0.9 * found.reach < farthest < found.reach + 1e-3
+
+
+HANDS = ("dclaw/dclaw_gripper_glb.urdf", "allegro/allegro_hand_right.urdf")
+
+
+@pytest.mark.parametrize("robot", [*ROBOTS, *HANDS])
+def test_a_robot_that_was_only_guessed_stands_and_moves(robot):
+    if robot in HANDS:
+        path = find_mani_skill() / "assets" / "robots" / robot
+    else:
+        path = RobotRegistry.load(robot).urdf.locate()
+    guessed = guess_descriptor(path, "guessed").descriptor
+    simulation = Simulation(single({"arm": guessed}), lambda world, _: None, 1, PhysicsSettings())
+    simulation.worlds[0].robots["arm"].reset(guessed.keyframe("rest"))
+    simulation.touched()
+    before = qpos(simulation)
+    action = np.full(guessed.action_dim, 0.3, np.float32)
+    after = play(simulation, action, STEPS)
+    assert np.isfinite(after).all()
+    held = [j for g in guessed.action_split.groups.values() if g.held for j in g.joints]
+    moved = dict(zip(guessed.joints, np.abs(after - before), strict=True))
+    assert all(moved[joint] < 0.01 for joint in held)
+    assert max(moved.values()) > 0.02

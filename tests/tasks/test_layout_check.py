@@ -1,12 +1,13 @@
 """A task refuses a layout whose robots collide, unless told otherwise."""
 
 import sys
+from dataclasses import replace
 
 import pytest
 
 import tasks
-from layouts import Layout, Placement, face_to_face, side_by_side
-from robots import LayoutError, TaskError
+from layouts import Layout, Placement, around_table, face_to_face, side_by_side
+from robots import LayoutError, RobotRegistry, TaskError
 from tasks.layout_check import refuse_collisions
 
 TWO = "TwoRobotPickCube-v1"
@@ -73,6 +74,17 @@ def test_every_task_has_a_layout_that_passes(task_id):
     refuse_collisions(tasks.get_task_class(task_id).layout)
 
 
-def test_a_single_robot_is_checked_with_itself():
-    folded = Placement("panda", keyframe="rest")
-    refuse_collisions(Layout({"arm": folded}))
+def test_a_robot_in_a_table_of_its_layout_is_refused():
+    layout = around_table({"arm": "panda"}, edges=["north"])
+    sunk = Layout({"arm": replace(layout["arm"], position=(0.1, 0.0, -0.3))}, layout.frames)
+    with pytest.raises(LayoutError, match="arm and table collide at the keyframes"):
+        refuse_collisions(sunk)
+
+
+def test_a_robot_that_collides_with_itself_is_refused():
+    panda = RobotRegistry.load("panda")
+    # The hand over the base, elbow bent as far as it goes.
+    bent = (0.0, -1.7, 0.0, -3.05, 0.0, 0.0, 0.0, 0.04, 0.04)
+    layout = Layout({"arm": Placement(replace(panda, keyframes={"rest": bent}))})
+    with pytest.raises(LayoutError, match="arm touches itself at the keyframes: arm.panda_"):
+        refuse_collisions(layout)
