@@ -370,7 +370,9 @@ class Layout(Mapping[str, Placement]):
             raise LayoutError(f"cannot read the layout {str(path)!r}: {reason}") from error
         return from_yaml(text, str(path))
 
-    def to_urdf(self, path: str | PathLike[str], *, relative: bool = False) -> Path:
+    def to_urdf(
+        self, path: str | PathLike[str], *, relative: bool = False, visuals: bool = True
+    ) -> Path:
         """Save the layout as one URDF, in which every robot is fixed to a link ``world``.
 
         Names of links, joints and materials stand behind their place: ``left/panda_hand``.
@@ -382,6 +384,8 @@ class Layout(Mapping[str, Placement]):
             path: Where to save; must end in ``.urdf``.
             relative: Whether meshes are referred to by paths relative to the file's folder, not
                 by absolute ones.
+            visuals: Whether to include what the robots look like; without, only the files that
+                physics needs are looked for.
 
         Returns:
             The path of the URDF.
@@ -392,9 +396,9 @@ class Layout(Mapping[str, Placement]):
         """
         from layouts.export import write_urdf
 
-        return write_urdf(self, path, relative=relative)
+        return write_urdf(self, path, relative=relative, visuals=visuals)
 
-    def to_drake(self, path: str | PathLike[str]) -> Path:
+    def to_drake(self, path: str | PathLike[str], *, visuals: bool = True) -> Path:
         """Save the layout as Drake's model directives: a model, its pose and start per robot.
 
         The models are called as the robots are here. Drake reads no STL, GLB or PLY meshes, so
@@ -403,6 +407,7 @@ class Layout(Mapping[str, Placement]):
 
         Args:
             path: Where to save; must end in ``.dmd.yaml``.
+            visuals: Whether to include what the robots look like.
 
         Returns:
             The path of the directives.
@@ -414,7 +419,7 @@ class Layout(Mapping[str, Placement]):
         """
         from layouts.export import write_drake
 
-        return write_drake(self, path)
+        return write_drake(self, path, visuals=visuals)
 
     def preview(
         self,

@@ -7,7 +7,7 @@ import os
 import posixpath
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
@@ -27,7 +27,7 @@ ENDING = ".dmd.yaml"  # by which Drake's parser knows directives
 COPIED = ("material", "link", "joint")  # elements of a robot that are taken over
 
 
-def write_drake(layout: Layout, path: str | os.PathLike[str]) -> Path:
+def write_drake(layout: Layout, path: str | os.PathLike[str], *, visuals: bool = True) -> Path:
     """Write a layout as Drake's model directives; see `layouts.Layout.to_drake`."""
     target = Path(path)
     if not target.name.endswith(ENDING):
@@ -36,7 +36,7 @@ def write_drake(layout: Layout, path: str | os.PathLike[str]) -> Path:
         )
     require_trimesh("meshes that Drake can read")
     folder = target.absolute().with_name(target.name.removesuffix(ENDING) + "_robots")
-    models = _write_models([placement.robot for placement in layout.values()], folder)
+    models = _write_models([placement.robot for placement in layout.values()], folder, visuals)
     directives = [
         directive
         for place, placement in layout.items()
@@ -82,7 +82,9 @@ def _directives(place: str, placement: Placement, urdf: Path) -> Iterator[dict[s
     }
 
 
-def _write_models(robots: Sequence[RobotDescriptor], folder: Path) -> dict[RobotDescriptor, Path]:
+def _write_models(
+    robots: Sequence[RobotDescriptor], folder: Path, visuals: bool
+) -> dict[RobotDescriptor, Path]:
     """Write each robot once into a folder, which takes its place whole, and return the URDFs."""
     names: dict[RobotDescriptor, str] = {}
     for robot in robots:
@@ -94,7 +96,9 @@ def _write_models(robots: Sequence[RobotDescriptor], folder: Path) -> dict[Robot
     with tempfile.TemporaryDirectory(dir=folder.parent) as unfinished:
         made = Path(unfinished) / "robots"
         for robot, name in names.items():
-            _write_model(robot.urdf.locate(pictures=True), made / name, f"{name}.urdf")
+            urdf = robot.urdf.locate(pictures=visuals)
+            drawn = read_visuals(urdf) if visuals else {}
+            _write_model(urdf, drawn, made / name, f"{name}.urdf")
         if folder.exists():
             shutil.rmtree(folder)
         made.rename(folder)
@@ -117,11 +121,12 @@ def _listed(folder: Path) -> list[Path]:
     return sorted(folder.iterdir()) if folder.is_dir() else []
 
 
-def _write_model(urdf: Path, folder: Path, name: str) -> None:
+def _write_model(
+    urdf: Path, visuals: Mapping[str, tuple[Part, ...]], folder: Path, name: str
+) -> None:
     """Write a URDF whose meshes are Wavefront files beside it."""
     folder.mkdir(parents=True)
     source = parse_urdf(urdf.read_bytes(), str(urdf))
-    visuals = read_visuals(urdf)
     robot = Element("robot", source.attrib)
     for element in source:
         if element.tag not in COPIED:

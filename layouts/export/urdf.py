@@ -23,7 +23,13 @@ WORLD = "world"
 COPIED = ("material", "link", "joint")  # elements of a robot that are taken over
 
 
-def write_urdf(layout: Layout, path: str | os.PathLike[str], *, relative: bool = False) -> Path:
+def write_urdf(
+    layout: Layout,
+    path: str | os.PathLike[str],
+    *,
+    relative: bool = False,
+    visuals: bool = True,
+) -> Path:
     """Write a layout as one URDF; see `layouts.Layout.to_urdf`."""
     target = Path(path)
     if target.suffix.lower() != ".urdf":
@@ -32,9 +38,9 @@ def write_urdf(layout: Layout, path: str | os.PathLike[str], *, relative: bool =
     urdf, semantics = Element("robot", name=target.stem), Element("robot", name=target.stem)
     SubElement(urdf, "link", name=WORLD)
     for place, placement in layout.items():
-        file = placement.robot.urdf.locate(pictures=True)
+        file = placement.robot.urdf.locate(pictures=visuals)
         urdf.append(_fixed_to_world(place, placement, file))
-        urdf.extend(_renamed(file, place, folder))
+        urdf.extend(_renamed(file, place, folder, visuals=visuals))
         semantics.extend(_excuses(file.with_suffix(".srdf"), place))
     _write(urdf, target)
     beside = target.with_suffix(".srdf")
@@ -74,11 +80,13 @@ def _fixed_to_world(place: str, placement: Placement, file: Path) -> Element:
     return joint
 
 
-def _renamed(file: Path, place: str, folder: Path | None) -> Iterator[Element]:
+def _renamed(file: Path, place: str, folder: Path | None, *, visuals: bool) -> Iterator[Element]:
     """Yield the elements of a robot with names behind its place, and files by their paths."""
     for element in parse_urdf(file.read_bytes(), str(file)):
         if element.tag not in COPIED:
             continue
+        for visual in [] if visuals else element.findall("visual"):
+            element.remove(visual)
         names = [(element, "name"), *((part, "name") for part in element.iter("material"))]
         names += [(part, "link") for part in element if part.tag in ("parent", "child")]
         names += [(part, "joint") for part in element.iterfind("mimic")]

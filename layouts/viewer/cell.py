@@ -12,8 +12,8 @@ from layouts.layout import Layout
 from layouts.validation.bodies import RobotModel, load_model
 from layouts.validation.collisions import stand, touching
 from layouts.validation.kinematics import Floats
-from layouts.visuals import Part
-from robots import LayoutError
+from layouts.visuals import Part, read_visuals
+from robots import AssetError, LayoutError
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +74,8 @@ class Cell:
         motion: What they do, or None.
         start: By robot, the joint positions to begin with, in the descriptor's order (rad, m).
         models: By robot, its links and hulls.
+        visuals: By robot and link, what it looks like; empty where its files lack that.
+        notes: What a person should be told of the robots' files.
     """
 
     def __init__(
@@ -104,6 +106,14 @@ class Cell:
         self.things = dict(things or {})
         self.motion = motion
         self.models: dict[str, RobotModel] = {n: load_model(p.robot) for n, p in layout.items()}
+        self.visuals: dict[str, Mapping[str, tuple[Part, ...]]] = {}
+        self.notes: list[str] = []
+        for name, placement in layout.items():
+            try:
+                self.visuals[name] = read_visuals(placement.robot.urdf.locate(pictures=True))
+            except AssetError as error:
+                self.visuals[name] = {}
+                self.notes.append(f"{name} is shown by its collision shapes: {error}")
         if motion is not None:
             _check_motion(motion, layout, self.things)
         first = {} if motion is None else {n: rows[0] for n, rows in motion.qpos.items()}

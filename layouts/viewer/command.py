@@ -60,11 +60,14 @@ def show(cell: Callable[[], Cell], options: argparse.Namespace) -> int:
     import_viser()
     from layouts.viewer.page import save_html, serve
 
-    if options.html is not None:
-        print(f"page: {save_html(cell(), options.html)}")
-        return 0
     try:
-        serve(cell(), options.host, options.port, lambda line: print(line, flush=True))
+        made = cell()
+        for note in made.notes:
+            print(note, flush=True)
+        if options.html is not None:
+            print(f"page: {save_html(made, options.html)}")
+            return 0
+        serve(made, options.host, options.port, lambda line: print(line, flush=True))
     except KeyboardInterrupt:
         print("ended")
         return 0

@@ -61,9 +61,6 @@ class Page:
         Args:
             server: A viser server.
             cell: What to show.
-
-        Raises:
-            AssetError: If a mesh is missing or cannot be read.
         """
         self._cell = cell
         self._lock = RLock()
@@ -116,7 +113,7 @@ class Page:
         # viser's own share button would put the page on the internet, at one click.
         gui.configure_theme(show_logo=False, show_share_button=False)
         gui.main_panel.dock_right()
-        gui.add_markdown(f"**{self._cell.title}**")
+        gui.add_markdown("\n\n".join([f"**{self._cell.title}**", *self._cell.notes]))
         if self._cell.motion is not None:
             self._build_timeline(gui, len(self._cell.motion))
         with gui.add_folder("Collisions"):
@@ -200,7 +197,6 @@ def serve(cell: Cell, host: str, port: int, announce: Callable[[str], None]) -> 
     Raises:
         MissingPackageError: If viser is not installed.
         ViewerError: If the port is in use, or the address is none of this machine's.
-        AssetError: If a mesh is missing or cannot be read.
     """
     with serving(host, port, cell.title) as server:
         page = Page(server, cell)
@@ -228,7 +224,6 @@ def save_html(cell: Cell, path: str | os.PathLike[str]) -> Path:
     Raises:
         MissingPackageError: If viser is not installed.
         ViewerError: If the path ends otherwise.
-        AssetError: If a mesh is missing or cannot be read.
     """
     target = Path(path)
     if target.suffix.lower() not in (".html", ".htm"):

@@ -12,7 +12,7 @@ from layouts.frames import table_outlines
 from layouts.preview import COLOURS
 from layouts.validation.kinematics import Floats
 from layouts.viewer.cell import Cell, Contact
-from layouts.visuals import Part, read_visuals, simplified
+from layouts.visuals import Part, simplified
 
 # What can be shown and hidden, and whether it is shown at first.
 OVERLAYS: Mapping[str, bool] = {
@@ -42,9 +42,6 @@ class Scene:
         Args:
             api: The ``scene`` of a viser server.
             cell: What to draw.
-
-        Raises:
-            AssetError: If a mesh is missing or cannot be read.
         """
         self._api, self._cell = api, cell
         self._overlays: dict[str, dict[str, Any]] = {name: {} for name in cell.layout}
@@ -93,7 +90,8 @@ class Scene:
         api, placement = self._api, self._cell.layout[name]
         pose = placement.base_pose
         api.add_frame(f"/{name}", show_axes=False, position=pose.position, wxyz=pose.quaternion)
-        for overlay, visible in OVERLAYS.items():
+        for overlay, at_first in OVERLAYS.items():
+            visible = at_first or (overlay == "collision" and not self._cell.visuals[name])
             self._overlays[name][overlay] = api.add_frame(
                 f"/{name}/{overlay}", show_axes=False, visible=visible
             )
@@ -110,8 +108,7 @@ class Scene:
 
     def _draw_meshes(self, name: str) -> None:
         kinematics = self._cell.models[name].kinematics
-        urdf = self._cell.layout[name].robot.urdf.locate(pictures=True)
-        for link, parts in read_visuals(urdf).items():
+        for link, parts in self._cell.visuals[name].items():
             node = f"/{name}/meshes/{link}"
             self._moving[name].append((kinematics.link(link), _add_parts(self._api, node, parts)))
 

@@ -14,7 +14,7 @@ from layouts import Layout, Placement, face_to_face, single
 from layouts.export.urdf import rpy
 from layouts.orientation import normalised, rpy_quaternion
 from layouts.validation.kinematics import pose_matrix
-from robots import LayoutError, LocalUrdf, RobotRegistry
+from robots import AssetError, LayoutError, LocalUrdf, RobotRegistry
 from robots.urdf_xml import read_references
 from tests.layouts.cells import link_poses, mixed_cell, random_positions
 
@@ -123,6 +123,21 @@ def test_names_references_and_files_of_any_urdf_are_carried_over(tmp_path):
     references = read_references(path.read_bytes(), str(path))
     assert references.visual == (str(own.parent / "paint.png"), str(own.parent / "tip.stl"))
     assert not path.with_suffix(".srdf").exists()
+
+
+def test_robots_whose_looks_are_missing_can_be_saved_without(tmp_path):
+    layout = single({"arm": "panda_pinch"})
+    with pytest.raises(AssetError, match="lacks some of its visual meshes"):
+        layout.to_urdf(tmp_path / "arm.urdf")
+    for path in (
+        layout.to_urdf(tmp_path / "arm.urdf", visuals=False),
+        layout.to_drake(tmp_path / "arm.dmd.yaml", visuals=False).with_name("arm_robots")
+        / "panda_pinch"
+        / "panda_pinch.urdf",
+    ):
+        root = ElementTree.parse(path).getroot()
+        assert root.find("link/visual") is None
+        assert len(root.findall("link/collision")) > 8
 
 
 def test_a_wrong_ending_is_refused(tmp_path):

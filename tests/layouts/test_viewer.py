@@ -223,3 +223,17 @@ def test_visuals_have_the_colours_of_their_files():
     panda = read_visuals(RobotRegistry.load("panda").urdf.locate(pictures=True))
     assert len({part.rgba for parts in panda.values() for part in parts}) > 1
     assert len(panda["panda_hand"]) == 2
+
+
+def test_a_robot_without_visual_meshes_is_shown_by_its_collision_shapes(capsys, tmp_path):
+    cell = Cell("pinch", single({"arm": "panda_pinch"}))
+    assert len(cell.notes) == 1
+    assert cell.notes[0].startswith("arm is shown by its collision shapes: ")
+    with serving("127.0.0.1", 0, "pinch") as server:
+        Page(server, cell)
+        nodes = server.scene._handle_from_node_name
+        assert nodes["/arm/collision"].visible
+        assert "/arm/meshes/panda_link0" not in nodes
+    path = tmp_path / "pinch.html"
+    assert main(["view", "single", "arm=panda_pinch", "--html", str(path)]) == 0
+    assert capsys.readouterr().out == f"{cell.notes[0]}\npage: {path}\n"
