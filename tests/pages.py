@@ -20,7 +20,7 @@ FLAGS = (
     " --ignore-gpu-blocklist --disable-quic --no-first-run --disable-background-networking"
     " --disable-component-update --disable-sync"
 ).split()
-PATIENCE = 60.0  # s
+PATIENCE = 120.0  # s; browsers without a graphics card are slow
 SIZE = {"width": 900, "height": 560}
 PLAN = 580  # pixels from the left that no panel covers
 
@@ -76,6 +76,7 @@ def browser_page() -> Iterator[tuple[Any, list[str]]]:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
         page = browser.new_page(viewport=SIZE)
+        page.set_default_timeout(1000 * PATIENCE)
         asked: list[str] = []
         page.on("request", lambda request: asked.append(request.url))
         page.on("websocket", lambda socket: asked.append(socket.url))
