@@ -14,6 +14,7 @@ from layouts.layout import Layout
 from layouts.maniskill import TASKS, from_maniskill
 from layouts.presets import FACING, PRESETS
 from layouts.validate_command import add_check_options
+from layouts.viewer.command import add_view_options
 from robots import LayoutError, RobotLayoutsError, RobotRegistry, UnknownNameError
 
 # What presets take besides the robots.
@@ -168,6 +169,9 @@ def _parser() -> argparse.ArgumentParser:
     check = commands.add_parser("validate", help="check a layout for collisions and reach")
     add_layout_words(check)
     add_check_options(check, chosen_layout)
+    view = commands.add_parser("view", help="look at a layout in a browser, and move its joints")
+    add_layout_words(view)
+    add_view_options(view, chosen_layout)
     return parser
 
 

@@ -370,6 +370,57 @@ class Layout(Mapping[str, Placement]):
             raise LayoutError(f"cannot read the layout {str(path)!r}: {reason}") from error
         return from_yaml(text, str(path))
 
+    def to_urdf(
+        self, path: str | PathLike[str], *, relative: bool = False, visuals: bool = True
+    ) -> Path:
+        """Save the layout as one URDF, in which every robot is fixed to a link ``world``.
+
+        Names of links, joints and materials stand behind their place: ``left/panda_hand``.
+        Meshes stay where they are. Pairs of links that the robots' SRDFs excuse from collision
+        checks are saved beside it, as ``.srdf``. A URDF has no joint positions to start from;
+        transmissions and other programs' extensions are left out.
+
+        Args:
+            path: Where to save; must end in ``.urdf``.
+            relative: Whether meshes are referred to by paths relative to the file's folder, not
+                by absolute ones.
+            visuals: Whether to include what the robots look like; without, only the files that
+                physics needs are looked for.
+
+        Returns:
+            The path of the URDF.
+
+        Raises:
+            LayoutError: If the path ends otherwise.
+            AssetError: If a robot's files cannot be found or make no sense.
+        """
+        from layouts.export import write_urdf
+
+        return write_urdf(self, path, relative=relative, visuals=visuals)
+
+    def to_drake(self, path: str | PathLike[str], *, visuals: bool = True) -> Path:
+        """Save the layout as Drake's model directives: a model, its pose and start per robot.
+
+        The models are called as the robots are here. Drake reads no STL, GLB or PLY meshes, so
+        each robot is saved with converted ones in a folder ``NAME_robots`` beside the file, which
+        is replaced if it exists. The file refers to the folder by its absolute path.
+
+        Args:
+            path: Where to save; must end in ``.dmd.yaml``.
+            visuals: Whether to include what the robots look like.
+
+        Returns:
+            The path of the directives.
+
+        Raises:
+            LayoutError: If the path ends otherwise.
+            AssetError: If a robot's files cannot be found or make no sense.
+            MissingPackageError: If trimesh is not installed.
+        """
+        from layouts.export import write_drake
+
+        return write_drake(self, path, visuals=visuals)
+
     def preview(
         self,
         path: str | PathLike[str],

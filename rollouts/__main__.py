@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from robots import RobotLayoutsError, UnknownNameError
-from rollouts import record_command, replay_command
+from rollouts import record_command, replay_command, view_command
 from rollouts.export import command as export_command
 
 
@@ -52,6 +52,7 @@ def _parser() -> argparse.ArgumentParser:
         ("record", record_command),
         ("replay", replay_command),
         ("export", export_command),
+        ("view", view_command),
     ):
         command = commands.add_parser(name, help=module.DESCRIPTION, description=module.DESCRIPTION)
         module.add_arguments(command)

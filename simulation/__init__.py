@@ -4,6 +4,7 @@ The only room that imports sapien.
 """
 
 from simulation.physics import SAPIEN_DEFAULTS, Friction, PhysicsSettings
+from simulation.scene import build_scene
 from simulation.shapes import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
 from simulation.simulation import Simulation
 from simulation.state import State
@@ -25,4 +26,5 @@ __all__ = [
     "State",
     "World",
     "add_table",
+    "build_scene",
 ]

@@ -29,6 +29,7 @@ class SimulatedBody:
         kind: Whether physics, only the task, or nothing moves it.
         start_pose: Pose it was built at.
         anchored: Whether every reset puts it back to ``start_pose``.
+        shapes: What it is made of.
     """
 
     name: str
@@ -37,6 +38,7 @@ class SimulatedBody:
     kind: BodyKind
     start_pose: sapien.Pose
     anchored: bool
+    shapes: tuple[Shape, ...] = ()
 
 
 class World:
@@ -124,7 +126,7 @@ class World:
             if kind == "static"
             else physx.PhysxRigidDynamicComponent
         )
-        body = SimulatedBody(name, entity, component, kind, pose, anchored)
+        body = SimulatedBody(name, entity, component, kind, pose, anchored, shapes)
         self.bodies[name] = body
         return body
 

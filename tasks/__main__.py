@@ -1,16 +1,19 @@
-"""``python -m tasks``: what there is to achieve, and what a step costs."""
+"""``python -m tasks``: what there is to achieve, what it looks like, what a step costs."""
 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 
 from rich.console import Console
 
+from layouts.viewer import add_page_options, page_words, show
 from robots import RobotLayoutsError, TaskError, UnknownNameError
 from tasks.description import TaskFacts, describe, facts, list_table, parity_verdicts
 from tasks.registry import list_tasks, make
+from tasks.view import task_cell
 
 MIN_WIDTH = 120  # columns that a table may take; a narrower terminal wraps it
 LEGEND = (
@@ -34,8 +37,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _list()
         elif options.command == "bench":
             _bench(options)
-        else:
+        elif options.command == "describe":
             _describe(options.task)
+        else:
+            return _view(options)
     except RobotLayoutsError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2 if isinstance(error, UnknownNameError) else 1
@@ -80,6 +85,18 @@ def _bench(options: argparse.Namespace) -> None:
     _console().print(cost_table(measure(counts, options.kinds, options.blocks)))
 
 
+def _view(options: argparse.Namespace) -> int:
+    """Show a task as it is reset, or hand a recording over to the room that reads recordings."""
+    if options.demo is not None:
+        words = ["view", options.demo, "--task", options.task, "--episode", str(options.episode)]
+        os.execv(sys.executable, [sys.executable, "-m", "rollouts", *words, *page_words(options)])
+    env = make(options.task, obs_mode="none")
+    env.reset(options.seed)
+    status = show(lambda: task_cell(env, f"{env.task_id}, seed {options.seed}"), options)
+    env.close()
+    return status
+
+
 def _console() -> Console:
     console = Console(markup=False, highlight=False)
     console.width = max(console.width, MIN_WIDTH)
@@ -99,6 +116,16 @@ def _parser() -> argparse.ArgumentParser:
     add("--robots", type=int, nargs="+", metavar="N", help="numbers of robots (1 to 8)")
     add("--kinds", nargs="+", default=["panda"], metavar="ROBOT", help="robots, in turn (panda)")
     add("--blocks", type=int, default=20, help="timed blocks of 50 steps (20)")
+    view = commands.add_parser(
+        "view",
+        help="look at a task, or at a demonstration of it, in a browser",
+        epilog="--demo hands over to `python -m rollouts view`.",
+    )
+    view.add_argument("task", metavar="TASK", help="task id or another of its names")
+    view.add_argument("--seed", type=int, default=0, metavar="N", help="of the reset (0)")
+    view.add_argument("--demo", metavar="FILE", help="an h5 file of recorded episodes")
+    view.add_argument("--episode", type=int, default=0, metavar="N", help="the Nth of them (0)")
+    add_page_options(view)
     return parser
 
 

@@ -1,0 +1,172 @@
+"""A layout for Drake: model directives, and each robot's URDF with meshes that Drake can read."""
+
+from __future__ import annotations
+
+import math
+import os
+import posixpath
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
+
+import yaml
+
+from layouts.export.urdf import base_link, rpy
+from layouts.files import written_whole
+from layouts.visuals import Part, load_meshes, read_visuals, require_trimesh, simplified
+from robots import LayoutError, RobotDescriptor
+from robots.urdf_xml import parse_urdf, resolve
+
+if TYPE_CHECKING:
+    from layouts.layout import Layout, Placement
+
+ENDING = ".dmd.yaml"  # by which Drake's parser knows directives
+COPIED = ("material", "link", "joint")  # elements of a robot that are taken over
+
+
+def write_drake(layout: Layout, path: str | os.PathLike[str], *, visuals: bool = True) -> Path:
+    """Write a layout as Drake's model directives; see `layouts.Layout.to_drake`."""
+    target = Path(path)
+    if not target.name.endswith(ENDING):
+        raise LayoutError(
+            f"cannot save model directives as {target.name!r}; the name must end in {ENDING}"
+        )
+    require_trimesh("meshes that Drake can read")
+    folder = target.absolute().with_name(target.name.removesuffix(ENDING) + "_robots")
+    models = _write_models([placement.robot for placement in layout.values()], folder, visuals)
+    directives = [
+        directive
+        for place, placement in layout.items()
+        for directive in _directives(place, placement, models[placement.robot])
+    ]
+    with written_whole(target) as unfinished:
+        text = yaml.dump({"directives": directives}, Dumper=_Dumper, sort_keys=False)
+        unfinished.write_text(text, encoding="utf-8")
+    return target
+
+
+class _Rpy(dict[str, Any]):
+    """What Drake calls ``!Rpy``: a rotation by roll, pitch and yaw."""
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes `_Rpy` with its tag."""
+
+
+_Dumper.add_representer(_Rpy, lambda dumper, rotation: dumper.represent_mapping("!Rpy", rotation))
+
+
+def _directives(place: str, placement: Placement, urdf: Path) -> Iterator[dict[str, Any]]:
+    robot = placement.robot
+    start = zip(robot.joints, placement.start_qpos, strict=True)
+    yield {
+        "add_model": {
+            "name": place,
+            "file": urdf.as_uri(),
+            "default_joint_positions": {joint: [float(value)] for joint, value in start},
+        }
+    }
+    turn = [math.degrees(angle) for angle in rpy(placement.base_quaternion)]
+    yield {
+        "add_weld": {
+            "parent": "world",
+            "child": f"{place}::{base_link(urdf)}",
+            "X_PC": {
+                "translation": list(placement.base_position),
+                "rotation": _Rpy(deg=turn),
+            },
+        }
+    }
+
+
+def _write_models(
+    robots: Sequence[RobotDescriptor], folder: Path, visuals: bool
+) -> dict[RobotDescriptor, Path]:
+    """Write each robot once into a folder, which takes its place whole, and return the URDFs."""
+    names: dict[RobotDescriptor, str] = {}
+    for robot in robots:
+        if robot not in names:
+            twins = sum(other.name == robot.name for other in names)
+            names[robot] = f"{robot.name}_{twins + 1}" if twins else robot.name
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    _expect_own(folder)
+    with tempfile.TemporaryDirectory(dir=folder.parent) as unfinished:
+        made = Path(unfinished) / "robots"
+        for robot, name in names.items():
+            urdf = robot.urdf.locate(pictures=visuals)
+            drawn = read_visuals(urdf) if visuals else {}
+            _write_model(urdf, drawn, made / name, f"{name}.urdf")
+        if folder.exists():
+            shutil.rmtree(folder)
+        made.rename(folder)
+    return {robot: folder / name / f"{name}.urdf" for robot, name in names.items()}
+
+
+def _expect_own(folder: Path) -> None:
+    """Refuse to replace a folder that holds anything but what an export leaves."""
+    strange = [
+        found.name for found in _listed(folder) if not (found / f"{found.name}.urdf").exists()
+    ]
+    if strange:
+        raise LayoutError(
+            f"{folder} would be replaced, but holds {', '.join(strange)}, which no export of a"
+            " layout leaves; move it, or save the directives under another name"
+        )
+
+
+def _listed(folder: Path) -> list[Path]:
+    return sorted(folder.iterdir()) if folder.is_dir() else []
+
+
+def _write_model(
+    urdf: Path, visuals: Mapping[str, tuple[Part, ...]], folder: Path, name: str
+) -> None:
+    """Write a URDF whose meshes are Wavefront files beside it."""
+    folder.mkdir(parents=True)
+    source = parse_urdf(urdf.read_bytes(), str(urdf))
+    robot = Element("robot", source.attrib)
+    for element in source:
+        if element.tag not in COPIED:
+            continue
+        if element.tag == "link":
+            link = element.get("name", "")
+            for visual in element.findall("visual"):
+                element.remove(visual)
+            element.extend(_visuals(visuals.get(link, ()), link, folder))
+            _convert_collisions(element, urdf, folder)
+        robot.append(element)
+    indent(robot)
+    ElementTree(robot).write(folder / name, encoding="utf-8", xml_declaration=True)
+
+
+def _visuals(parts: Sequence[Part], link: str, folder: Path) -> Iterator[Element]:
+    for number, part in enumerate(parts):
+        name = f"{link}_visual_{number}"
+        visual = Element("visual", name=name)
+        _save(simplified(part).mesh, folder / f"{name}.obj")
+        SubElement(SubElement(visual, "geometry"), "mesh", filename=f"{name}.obj")
+        material = SubElement(visual, "material", name=name)
+        SubElement(material, "color", rgba=" ".join(f"{x:.4g}" for x in part.rgba))
+        yield visual
+
+
+def _convert_collisions(link: Element, urdf: Path, folder: Path) -> None:
+    import trimesh
+
+    where = f"{urdf}, link {link.get('name')!r}"
+    for number, mesh in enumerate(link.iterfind("collision/geometry/mesh")):
+        base = posixpath.dirname(urdf.as_posix())
+        path = resolve(mesh.get("filename", ""), base, os.path.isfile)
+        name = f"{link.get('name')}_collision_{number}.obj"
+        _save(trimesh.util.concatenate(load_meshes(path, where)), folder / name)
+        mesh.set("filename", name)
+
+
+def _save(mesh: Any, path: Path) -> None:
+    import trimesh
+
+    bare = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    bare.export(path, include_normals=False, include_texture=False, include_color=False)

@@ -1,0 +1,124 @@
+"""A layout as one URDF: every robot fixed to a link ``world``, its names behind its place."""
+
+from __future__ import annotations
+
+import math
+import os
+import posixpath
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
+
+from layouts.files import written_whole
+from robots import LayoutError
+from robots.descriptor import Quaternion, Vector3
+from robots.urdf_model import read_model
+from robots.urdf_xml import parse_urdf, resolve
+
+if TYPE_CHECKING:
+    from layouts.layout import Layout, Placement
+
+WORLD = "world"
+COPIED = ("material", "link", "joint")  # elements of a robot that are taken over
+
+
+def write_urdf(
+    layout: Layout,
+    path: str | os.PathLike[str],
+    *,
+    relative: bool = False,
+    visuals: bool = True,
+) -> Path:
+    """Write a layout as one URDF; see `layouts.Layout.to_urdf`."""
+    target = Path(path)
+    if target.suffix.lower() != ".urdf":
+        raise LayoutError(f"cannot save a URDF as {target.name!r}; the name must end in .urdf")
+    folder = target.absolute().parent if relative else None
+    urdf, semantics = Element("robot", name=target.stem), Element("robot", name=target.stem)
+    SubElement(urdf, "link", name=WORLD)
+    for place, placement in layout.items():
+        file = placement.robot.urdf.locate(pictures=visuals)
+        urdf.append(_fixed_to_world(place, placement, file))
+        urdf.extend(_renamed(file, place, folder, visuals=visuals))
+        semantics.extend(_excuses(file.with_suffix(".srdf"), place))
+    _write(urdf, target)
+    beside = target.with_suffix(".srdf")
+    if len(semantics):
+        _write(semantics, beside)
+    else:
+        beside.unlink(missing_ok=True)
+    return target
+
+
+def base_link(file: Path) -> str:
+    """Return the name of the link of a URDF that hangs on no joint."""
+    return read_model(file.read_bytes(), str(file)).root
+
+
+def rpy(quaternion: Quaternion) -> Vector3:
+    """Return roll, pitch and yaw (rad) of a rotation (wxyz, unit length), as a URDF means them.
+
+    Where the pitch is a right angle, only roll ± yaw matters, and the roll is 0.
+    """
+    w, x, y, z = quaternion
+    cos_yaw, sin_yaw = 1 - 2 * (y * y + z * z), 2 * (x * y + w * z)  # times cos(pitch)
+    cos_pitch = math.hypot(cos_yaw, sin_yaw)
+    pitch = math.atan2(2 * (w * y - x * z), cos_pitch)
+    if cos_pitch < 1e-7:
+        return (0.0, pitch, math.atan2(2 * (w * z - x * y), 1 - 2 * (x * x + z * z)))
+    roll = math.atan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
+    return (roll, pitch, math.atan2(sin_yaw, cos_yaw))
+
+
+def _fixed_to_world(place: str, placement: Placement, file: Path) -> Element:
+    joint = Element("joint", name=f"{place}/base", type="fixed")
+    SubElement(joint, "parent", link=WORLD)
+    SubElement(joint, "child", link=f"{place}/{base_link(file)}")
+    turn = rpy(placement.base_quaternion)
+    SubElement(joint, "origin", xyz=_text(placement.base_position), rpy=_text(turn))
+    return joint
+
+
+def _renamed(file: Path, place: str, folder: Path | None, *, visuals: bool) -> Iterator[Element]:
+    """Yield the elements of a robot with names behind its place, and files by their paths."""
+    for element in parse_urdf(file.read_bytes(), str(file)):
+        if element.tag not in COPIED:
+            continue
+        for visual in [] if visuals else element.findall("visual"):
+            element.remove(visual)
+        names = [(element, "name"), *((part, "name") for part in element.iter("material"))]
+        names += [(part, "link") for part in element if part.tag in ("parent", "child")]
+        names += [(part, "joint") for part in element.iterfind("mimic")]
+        for part, key in {id(part): (part, key) for part, key in names}.values():
+            if part.get(key):
+                part.set(key, f"{place}/{part.get(key)}")
+        for part in (*element.iter("mesh"), *element.iter("texture")):
+            part.set("filename", _file(part.get("filename", ""), file, folder))
+        yield element
+
+
+def _file(reference: str, urdf: Path, folder: Path | None) -> str:
+    path = resolve(reference, posixpath.dirname(urdf.as_posix()), os.path.isfile)
+    path = os.path.abspath(path)
+    return path if folder is None else Path(os.path.relpath(path, folder)).as_posix()
+
+
+def _excuses(srdf: Path, place: str) -> Iterator[Element]:
+    """Yield the pairs of links that a robot's SRDF excuses from collision checks, renamed."""
+    if not srdf.is_file():
+        return
+    for pair in parse_urdf(srdf.read_bytes(), str(srdf)).iterfind("disable_collisions"):
+        for key in ("link1", "link2"):
+            pair.set(key, f"{place}/{pair.get(key)}")
+        yield pair
+
+
+def _write(root: Element, target: Path) -> None:
+    indent(root)
+    with written_whole(target) as unfinished:
+        ElementTree(root).write(unfinished, encoding="utf-8", xml_declaration=True)
+
+
+def _text(values: Vector3) -> str:
+    return " ".join(repr(value) for value in values)

@@ -1,0 +1,164 @@
+"""What a page shows: a layout, things that stand around, and a motion of both."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+
+from layouts.layout import Layout
+from layouts.validation.bodies import RobotModel, load_model
+from layouts.validation.collisions import stand, touching
+from layouts.validation.kinematics import Floats
+from layouts.visuals import Part, read_visuals
+from robots import AssetError, LayoutError
+
+
+@dataclass(frozen=True, eq=False)
+class Thing:
+    """A body that is no robot.
+
+    Attributes:
+        parts: What it looks like, in its own frame.
+        pose: Where it is: position (m, world), then quaternion (wxyz), (7,).
+    """
+
+    parts: tuple[Part, ...]
+    pose: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Positions of robots and things over T + 1 moments.
+
+    Attributes:
+        step_seconds: Time from one moment to the next (s).
+        qpos: By robot, joint positions in the descriptor's order, (T + 1, dof) (rad, m).
+        poses: By thing, position (m, world) and quaternion (wxyz), (T + 1, 7); what is left out
+            does not move.
+    """
+
+    step_seconds: float
+    qpos: Mapping[str, Floats]
+    poses: Mapping[str, Floats] = field(default_factory=dict[str, Floats])
+
+    def __len__(self) -> int:
+        """Return the number of moments, T + 1."""
+        return len(next(iter(self.qpos.values())))
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Two links that overlap.
+
+    Attributes:
+        robots: Names of their robots; twice the same in a self-collision.
+        links: Their names.
+        depth: By how much (m).
+    """
+
+    robots: tuple[str, str]
+    links: tuple[str, str]
+    depth: float
+
+
+class Cell:
+    """A layout and what is around it.
+
+    Attributes:
+        title: What a page calls it.
+        layout: The robots.
+        things: Other bodies, by name.
+        motion: What they do, or None.
+        start: By robot, the joint positions to begin with, in the descriptor's order (rad, m).
+        models: By robot, its links and hulls.
+        visuals: By robot and link, what it looks like; empty where its files lack that.
+        notes: What a person should be told of the robots' files.
+    """
+
+    def __init__(
+        self,
+        title: str,
+        layout: Layout,
+        things: Mapping[str, Thing] | None = None,
+        motion: Motion | None = None,
+        start: Mapping[str, Floats] | None = None,
+    ) -> None:
+        """Load the robots' collision shapes.
+
+        Args:
+            title: What a page calls it.
+            layout: The robots.
+            things: Other bodies, by name.
+            motion: What they do.
+            start: By robot, joint positions to begin with; by default those of the motion's first
+                moment, else of the keyframe.
+
+        Raises:
+            LayoutError: If the motion is of other robots, or of no moments.
+            AssetError: If a robot's files cannot be found or make no sense.
+            DescriptorError: If a descriptor contradicts its URDF.
+            MissingPackageError: If trimesh or python-fcl is not installed.
+        """
+        self.title, self.layout = title, layout
+        self.things = dict(things or {})
+        self.motion = motion
+        self.models: dict[str, RobotModel] = {n: load_model(p.robot) for n, p in layout.items()}
+        self.visuals: dict[str, Mapping[str, tuple[Part, ...]]] = {}
+        self.notes: list[str] = []
+        for name, placement in layout.items():
+            try:
+                self.visuals[name] = read_visuals(placement.robot.urdf.locate(pictures=True))
+            except AssetError as error:
+                self.visuals[name] = {}
+                self.notes.append(f"{name} is shown by its collision shapes: {error}")
+        if motion is not None:
+            _check_motion(motion, layout, self.things)
+        first = {} if motion is None else {n: rows[0] for n, rows in motion.qpos.items()}
+        self.start: dict[str, Floats] = {
+            name: np.array((start or first).get(name, placement.start_qpos), float)
+            for name, placement in layout.items()
+        }
+
+    def link_poses(self, name: str, qpos: Floats) -> Floats:
+        """Return the poses of a robot's links in the frame of its base, (links, 4, 4).
+
+        Args:
+            name: The robot.
+            qpos: Joint positions in the descriptor's order, (dof,) (rad, m).
+        """
+        return self.models[name].kinematics.forward(np.array([qpos]))[0]
+
+    def contacts(self, qpos: Mapping[str, Floats]) -> list[Contact]:
+        """Return where robots overlap, with each other or with themselves, the deepest first.
+
+        Args:
+            qpos: By robot, joint positions in the descriptor's order, (dof,) (rad, m).
+        """
+        standing = {
+            name: stand(name, placement, self.models[name], np.array([qpos[name]]))
+            for name, placement in self.layout.items()
+        }
+        deepest: dict[tuple[tuple[str, str], tuple[str, str]], float] = {}
+        for one, other in (*((n, n) for n in standing), *combinations(standing, 2)):
+            pairs = self.models[one].self_pairs if one == other else None
+            for approach in touching(standing[one], standing[other], pairs):
+                deepest.setdefault(((one, other), approach.links), -approach.distance)
+        found = [Contact(robots, links, depth) for (robots, links), depth in deepest.items()]
+        return sorted(found, key=lambda contact: -contact.depth)
+
+
+def _check_motion(motion: Motion, layout: Layout, things: Mapping[str, Thing]) -> None:
+    if set(motion.qpos) != set(layout):
+        raise LayoutError(
+            f"the motion is of the robots {', '.join(motion.qpos)}; the layout has"
+            f" {', '.join(layout)}"
+        )
+    unknown = sorted(set(motion.poses) - set(things))
+    if unknown:
+        raise LayoutError(f"the motion moves {', '.join(unknown)}, which are not in the cell")
+    lengths = {len(rows) for rows in (*motion.qpos.values(), *motion.poses.values())}
+    if len(lengths) != 1 or lengths == {0}:
+        raise LayoutError(f"a motion has one number of moments, 1 or more; found {lengths}")

@@ -1,0 +1,207 @@
+"""The three-dimensional side of a page: meshes, frames, reach and collision shapes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from layouts.frames import table_outlines
+from layouts.preview import COLOURS
+from layouts.validation.kinematics import Floats
+from layouts.viewer.cell import Cell, Contact
+from layouts.visuals import Part, simplified
+
+# What can be shown and hidden, and whether it is shown at first.
+OVERLAYS: Mapping[str, bool] = {
+    "meshes": True,
+    "frames": True,
+    "reach": True,
+    "reach sphere": False,
+    "collision": False,
+}
+TOUCHING = (214, 39, 40)
+TABLE_COLOUR = (222, 207, 184)
+FRAME_LENGTH = 0.08  # in reaches
+BASE_FRAME_LENGTH = 0.2  # in reaches
+CIRCLE_POINTS = 97
+LIFT = 0.002  # m, of what lies on the floor
+
+
+class Scene:
+    """A cell drawn on a viser server.
+
+    Nodes are called ``/ROBOT/OVERLAY/…`` and ``/things/NAME``.
+    """
+
+    def __init__(self, api: Any, cell: Cell) -> None:
+        """Draw the cell as it starts.
+
+        Args:
+            api: The ``scene`` of a viser server.
+            cell: What to draw.
+        """
+        self._api, self._cell = api, cell
+        self._overlays: dict[str, dict[str, Any]] = {name: {} for name in cell.layout}
+        self._moving: dict[str, list[tuple[int, Any]]] = {name: [] for name in cell.layout}
+        self._touching: dict[tuple[str, str], Any] = {}
+        self._things: dict[str, Any] = {}
+        self._draw_floor()
+        for number, name in enumerate(cell.layout):
+            colour = _rgb(COLOURS[number % len(COLOURS)])
+            self._draw_robot(name, colour)
+            self.pose(name, cell.start[name])
+        for name, thing in cell.things.items():
+            self._things[name] = _add_parts(api, f"/things/{name}", thing.parts)
+            self.place(name, thing.pose)
+
+    def pose(self, name: str, qpos: Floats) -> None:
+        """Show a robot at joint positions.
+
+        Args:
+            name: The robot.
+            qpos: In the descriptor's order, (dof,) (rad, m).
+        """
+        poses = self._cell.link_poses(name, qpos)
+        places = [(tuple(p[:3, 3]), _wxyz(p[:3, :3])) for p in poses]
+        for link, handle in self._moving[name]:
+            handle.position, handle.wxyz = places[link]
+
+    def place(self, name: str, pose: Floats) -> None:
+        """Show a thing at a pose: position (m, world), quaternion (wxyz), (7,)."""
+        handle = self._things[name]
+        handle.position, handle.wxyz = tuple(pose[:3]), tuple(pose[3:])
+
+    def show(self, overlay: str, visible: bool, names: Iterable[str] | None = None) -> None:
+        """Show or hide one of `OVERLAYS`, of some robots or of all."""
+        for name in self._cell.layout if names is None else names:
+            self._overlays[name][overlay].visible = visible
+
+    def mark(self, contacts: Sequence[Contact]) -> None:
+        """Show the links that overlap in red, and only those."""
+        red = {end for c in contacts for end in zip(c.robots, c.links, strict=True)}
+        for end, handle in self._touching.items():
+            if handle.visible != (end in red):
+                handle.visible = end in red
+
+    def _draw_robot(self, name: str, colour: tuple[int, int, int]) -> None:
+        api, placement = self._api, self._cell.layout[name]
+        pose = placement.base_pose
+        api.add_frame(f"/{name}", show_axes=False, position=pose.position, wxyz=pose.quaternion)
+        for overlay, at_first in OVERLAYS.items():
+            visible = at_first or (overlay == "collision" and not self._cell.visuals[name])
+            self._overlays[name][overlay] = api.add_frame(
+                f"/{name}/{overlay}", show_axes=False, visible=visible
+            )
+        self._draw_meshes(name)
+        self._draw_frames(name)
+        self._draw_hulls(name, colour)
+        reach = placement.robot.reach
+        self._draw_circle(name, reach, colour)
+        api.add_icosphere(
+            f"/{name}/reach sphere/ball", reach, color=colour, opacity=0.12, side="double",
+            subdivisions=4, cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip
+        api.add_label(f"/{name}/label", name, position=(0.0, 0.0, min(0.15, reach / 4)))
+
+    def _draw_meshes(self, name: str) -> None:
+        kinematics = self._cell.models[name].kinematics
+        for link, parts in self._cell.visuals[name].items():
+            node = f"/{name}/meshes/{link}"
+            self._moving[name].append((kinematics.link(link), _add_parts(self._api, node, parts)))
+
+    def _draw_frames(self, name: str) -> None:
+        kinematics = self._cell.models[name].kinematics
+        robot = self._cell.layout[name].robot
+        bodies = sorted({*kinematics.bodies, kinematics.link(robot.tcp_link)})
+        for link in bodies:
+            length = robot.reach * (BASE_FRAME_LENGTH if link == 0 else FRAME_LENGTH)
+            handle = self._api.add_frame(
+                f"/{name}/frames/{kinematics.links[link]}",
+                axes_length=length,
+                axes_radius=length / 25,
+            )
+            self._moving[name].append((link, handle))
+
+    def _draw_hulls(self, name: str, colour: tuple[int, int, int]) -> None:
+        model = self._cell.models[name]
+        touching = self._api.add_frame(f"/{name}/touching", show_axes=False)
+        touching.visible = True
+        for link in sorted({hull.link for hull in model.hulls}):
+            name_of_link = model.kinematics.links[link]
+            vertices, faces = _joined([h.corners for h in model.hulls if h.link == link])
+            for overlay, rgb in (("collision", colour), ("touching", TOUCHING)):
+                handle = self._api.add_mesh_simple(
+                    f"/{name}/{overlay}/{name_of_link}", vertices, faces, color=rgb,
+                    opacity=0.45, flat_shading=True, side="double", cast_shadow=False,
+                    receive_shadow=False, visible=overlay == "collision",
+                )  # fmt: skip
+                self._moving[name].append((link, handle))
+                if overlay == "touching":
+                    self._touching[name, name_of_link] = handle
+
+    def _draw_circle(self, name: str, reach: float, colour: tuple[int, int, int]) -> None:
+        """Draw the reach around the base, in the world's horizontal plane."""
+        w, x, y, z = self._cell.layout[name].base_quaternion
+        level = self._api.add_frame(f"/{name}/reach/level", show_axes=False, wxyz=(w, -x, -y, -z))
+        level.visible = True
+        angles = np.linspace(0, 2 * math.pi, CIRCLE_POINTS)
+        ring = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], 1) * reach
+        ring[:, 2] = LIFT
+        self._api.add_line_segments(
+            f"/{name}/reach/level/circle",
+            points=np.stack([ring[:-1], ring[1:]], 1),
+            colors=colour,
+            thickness=3.0,
+            thickness_units="screen",
+        )
+
+    def _draw_floor(self) -> None:
+        """Draw a grid below the lowest base, and the tables of the layout's frames."""
+        places = np.array([p.base_position for p in self._cell.layout.values()])
+        low = min(0.0, float(places[:, 2].min()))
+        if not self._cell.things:
+            size = 2 * float(np.ceil(np.abs(places[:, :2]).max() + 2))
+            self._api.add_grid(
+                "/floor", size, size, plane="xy", cell_size=0.1, section_size=1.0,
+                position=(0.0, 0.0, low - LIFT), cell_color=(232, 232, 232),
+                section_color=(200, 200, 200),
+            )  # fmt: skip
+        for name, corners in table_outlines(self._cell.layout.frame_poses).items():
+            self._api.add_mesh_simple(
+                f"/tables/{name}",
+                np.array(corners),
+                np.array([[0, 1, 2], [0, 2, 3]]),
+                color=TABLE_COLOUR,
+                side="double",
+                cast_shadow=False,
+            )
+
+
+def _add_parts(api: Any, node: str, parts: Sequence[Part]) -> Any:
+    import trimesh
+
+    scene = trimesh.Scene([simplified(part).mesh for part in parts])
+    data: Any = scene.export(file_type="glb")
+    return api.add_glb(node, data)
+
+
+def _joined(hulls: Sequence[Floats]) -> tuple[Any, Any]:
+    import trimesh
+
+    mesh: Any = trimesh.util.concatenate([trimesh.convex.convex_hull(c) for c in hulls])
+    return np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.uint32)
+
+
+def _wxyz(rotation: Floats) -> tuple[float, ...]:
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, w = Rotation.from_matrix(rotation).as_quat().tolist()
+    return (w, x, y, z)
+
+
+def _rgb(colour: str) -> tuple[int, int, int]:
+    red, green, blue = bytes.fromhex(colour.removeprefix("#"))
+    return (red, green, blue)

@@ -1,0 +1,211 @@
+"""What a robot looks like: the meshes and shapes that its URDF draws, with their colours."""
+
+from __future__ import annotations
+
+import os
+import posixpath
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from layouts.validation.kinematics import Floats, origin_matrix
+from robots import AssetError, MissingPackageError
+from robots.urdf_xml import numbers_of, parse_urdf, resolve
+
+Rgba = tuple[float, float, float, float]  # 0 … 1
+
+GREY: Rgba = (0.7, 0.7, 0.7, 1.0)
+SIDES = 48  # of the polygon that stands for a circle
+MANY_TRIANGLES = 60_000  # of one mesh; with more it is drawn coarser
+CELLS = 300  # along the longest side of a mesh that is drawn coarser
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One mesh of one colour or texture, fixed to a link.
+
+    Attributes:
+        mesh: A trimesh, in the frame of what it is fixed to (m); its material is in ``visual``.
+        rgba: Its colour, or the main colour of its material.
+    """
+
+    mesh: Any
+    rgba: Rgba
+
+
+def read_visuals(urdf: Path) -> dict[str, tuple[Part, ...]]:
+    """Return what a URDF draws of each link that it draws.
+
+    Args:
+        urdf: A URDF with its visual meshes beside it, as ``locate(pictures=True)`` returns it.
+
+    Raises:
+        AssetError: If a mesh is missing or cannot be read, or a shape is unknown.
+        MissingPackageError: If trimesh is not installed.
+    """
+    require_trimesh("drawing a robot")
+    root = parse_urdf(urdf.read_bytes(), str(urdf))
+    colours = dict(_named_colours(root, urdf))
+    drawn: dict[str, tuple[Part, ...]] = {}
+    for link in root.iterfind("link"):
+        parts = tuple(
+            part
+            for visual in link.iterfind("visual")
+            for part in _visual_parts(visual, f"{urdf}, link {link.get('name')!r}", urdf, colours)
+        )
+        if parts:
+            drawn[link.get("name", "")] = parts
+    return drawn
+
+
+def require_trimesh(what: str) -> None:
+    """Say which command installs trimesh.
+
+    Raises:
+        MissingPackageError: If it is not installed.
+    """
+    try:
+        import trimesh  # noqa: F401  # pyright: ignore[reportUnusedImport]
+    except ImportError as error:
+        raise MissingPackageError(
+            f"{what} needs trimesh: pip install 'robot-layouts[view]'"
+        ) from error
+
+
+def coloured(mesh: Any, rgba: Rgba) -> Part:
+    """Return a trimesh as a part of one colour."""
+    from trimesh.visual import TextureVisuals
+    from trimesh.visual.material import PBRMaterial
+
+    mesh.visual = TextureVisuals(
+        material=PBRMaterial(
+            baseColorFactor=np.round(np.array(rgba) * 255).astype(np.uint8),
+            metallicFactor=0.0,
+            roughnessFactor=0.7,
+            alphaMode="BLEND" if rgba[3] < 1 else "OPAQUE",
+        )
+    )
+    return Part(mesh, rgba)
+
+
+def simplified(part: Part) -> Part:
+    """Return a part whose corners lie on a fine grid, if it has very many triangles.
+
+    Corners move by less than 1/300 of the mesh's longest side.
+    """
+    import trimesh
+
+    mesh = part.mesh
+    if len(mesh.faces) <= MANY_TRIANGLES:
+        return part
+    cell = float(np.ptp(mesh.vertices, axis=0).max()) / CELLS
+    places, corner = np.unique(np.round(mesh.vertices / cell), axis=0, return_inverse=True)
+    faces = corner.reshape(-1)[mesh.faces]
+    distinct = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    _, first = np.unique(np.sort(faces[distinct], axis=1), axis=0, return_index=True)
+    faces = faces[distinct][np.sort(first)]
+    return coloured(trimesh.Trimesh(places * cell, faces, process=False), part.rgba)
+
+
+def _named_colours(root: Element, urdf: Path) -> Iterator[tuple[str, Rgba]]:
+    for material in root.iter("material"):
+        color = material.find("color")
+        if color is not None:
+            yield material.get("name", ""), _rgba(color, urdf)
+
+
+def _rgba(color: Element, urdf: Path) -> Rgba:
+    red, green, blue, alpha = numbers_of(color, "rgba", GREY, str(urdf))
+    return (red, green, blue, alpha)
+
+
+def _visual_parts(
+    visual: Element, where: str, urdf: Path, colours: Mapping[str, Rgba]
+) -> Iterator[Part]:
+    geometry = visual.find("geometry")
+    shape = None if geometry is None else next(iter(geometry), None)
+    if shape is None:
+        raise AssetError(f"{where}: a visual without a shape")
+    material = visual.find("material")
+    rgba = None if material is None else colours.get(material.get("name", ""))
+    if material is not None and (color := material.find("color")) is not None:
+        rgba = _rgba(color, urdf)
+    origin = visual.find("origin")
+    xyz, rpy = (numbers_of(origin, key, (0.0, 0.0, 0.0), where) for key in ("xyz", "rpy"))
+    pose = origin_matrix(xyz, rpy)
+    if shape.tag == "mesh":
+        pose = pose @ np.diag([*numbers_of(shape, "scale", (1.0, 1.0, 1.0), where), 1.0])
+        yield from _mesh_parts(shape.get("filename", ""), urdf, where, pose, rgba)
+        return
+    mesh = _primitive(shape, where)
+    mesh.apply_transform(pose)
+    yield coloured(mesh, rgba or GREY)
+
+
+def _primitive(shape: Element, where: str) -> Any:
+    import trimesh
+
+    def size(key: str) -> float:
+        return numbers_of(shape, key, (0.0,), where)[0]
+
+    match shape.tag:
+        case "box":
+            return trimesh.creation.box(numbers_of(shape, "size", (0.0, 0.0, 0.0), where))
+        case "sphere":
+            return trimesh.creation.icosphere(subdivisions=3, radius=size("radius"))
+        case "cylinder":
+            return trimesh.creation.cylinder(size("radius"), size("length"), sections=SIDES)
+        case "capsule":
+            return trimesh.creation.capsule(size("length"), size("radius"), count=[SIDES, SIDES])
+        case other:
+            raise AssetError(
+                f"{where}: a visual of shape {other!r}; choices: mesh, box, sphere, cylinder,"
+                " capsule"
+            )
+
+
+def _mesh_parts(
+    reference: str, urdf: Path, where: str, pose: Floats, rgba: Rgba | None
+) -> Iterator[Part]:
+    path = resolve(reference, posixpath.dirname(urdf.as_posix()), os.path.isfile)
+    for mesh in load_meshes(path, where):
+        mesh.apply_transform(pose)
+        own = _own_colour(mesh)
+        yield coloured(mesh, rgba or GREY) if own is None else Part(mesh, own)
+
+
+def load_meshes(path: str, where: str) -> list[Any]:
+    """Return the trimeshes of a file, each in the file's frame.
+
+    Args:
+        path: The file.
+        where: What refers to it, for error messages.
+
+    Raises:
+        AssetError: If it does not exist, or holds no mesh that can be read.
+    """
+    import trimesh
+
+    if not os.path.isfile(path):
+        raise AssetError(f"{where} refers to a file that does not exist: {path}")
+    try:
+        meshes: list[Any] = trimesh.load_scene(path).dump()
+    except Exception as error:  # a reader of many formats, which raises whatever it meets
+        raise AssetError(f"{where}: cannot read the mesh {path}: {error}") from error
+    meshes = [mesh for mesh in meshes if isinstance(mesh, trimesh.Trimesh)]
+    if not meshes:
+        raise AssetError(f"{where}: the file {path} holds no mesh")
+    return meshes
+
+
+def _own_colour(mesh: Any) -> Rgba | None:
+    """Return the main colour that a mesh file gives its mesh, or None if it gives none."""
+    material = getattr(mesh.visual, "material", None)
+    if material is None:
+        return None
+    red, green, blue, alpha = (np.asarray(material.main_color, float) / 255).tolist()
+    return (red, green, blue, alpha)

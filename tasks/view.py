@@ -1,0 +1,130 @@
+"""A task as a page in the browser: its robots where they start, and its bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from layouts.viewer import Cell, Motion, Thing
+from layouts.visuals import Part, coloured, load_meshes
+from robots import TaskError
+from robots.descriptor import Quaternion
+from simulation import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
+from simulation.world import World
+from tasks.native_format import articulation_keys
+from tasks.task import MultiRobotTask
+
+PLANE_SIZE = 6.0  # m, of what is drawn of an infinite plane
+ROOT = 13  # numbers of a row before the joints: the root's pose and velocities
+
+Floats = NDArray[np.float64]
+
+
+def task_cell(task: MultiRobotTask, title: str, motion: Motion | None = None) -> Cell:
+    """Return what a page shows of a task as it stands now, in its first environment.
+
+    Args:
+        task: A task that has been reset.
+        title: What the page calls it.
+        motion: What its robots and bodies do.
+
+    Raises:
+        AssetError: If a robot's files cannot be found.
+        MissingPackageError: If trimesh or python-fcl is not installed.
+    """
+    world, state = task.simulation.worlds[0], task.simulation.read()
+    things = {
+        name: Thing(parts, state.pose(name)[0].astype(float))
+        for name, body in world.bodies.items()
+        if (parts := body_parts(body.shapes))
+    }
+    start = {name: in_declared_order(world, name, state.qpos(name)[0]) for name in task.layout}
+    return Cell(title, task.layout, things, motion, start)
+
+
+def recorded_motion(
+    task: MultiRobotTask, states: Mapping[str, Mapping[str, NDArray[Any]]]
+) -> Motion:
+    """Return the motion that recorded states describe.
+
+    Args:
+        task: The task they are of, with one environment.
+        states: State dict of `MultiRobotTask.get_state_dict`, each entry (T + 1, k).
+
+    Raises:
+        TaskError: If a robot is not in them, or an entry is of something else.
+    """
+    world = task.simulation.worlds[0]
+    qpos: dict[str, Floats] = {}
+    for name, key in articulation_keys(task.layout).items():
+        rows, joints = states.get("articulations", {}).get(key), len(world.robots[name].joints)
+        if rows is None or rows.shape[1] != ROOT + 2 * joints:
+            raise TaskError(f"the states have no row of {ROOT + 2 * joints} numbers for {key!r}")
+        qpos[name] = in_declared_order(world, name, rows[:, ROOT : ROOT + joints])
+    poses = {
+        name: rows[:, :7].astype(float)
+        for name, rows in states.get("actors", {}).items()
+        if name in world.bodies and body_parts(world.bodies[name].shapes)
+    }
+    return Motion(1 / task.made_from.control_frequency, qpos, poses)
+
+
+def in_declared_order(world: World, robot: str, qpos: NDArray[Any]) -> Floats:
+    """Return joint positions in the order of the descriptor's joints.
+
+    Args:
+        world: The robot's world.
+        robot: Its name in the layout.
+        qpos: In SAPIEN's order, (…, dof) (rad, m).
+    """
+    return qpos[..., world.robots[robot].active_index].astype(float)
+
+
+def body_parts(shapes: tuple[Shape, ...]) -> tuple[Part, ...]:
+    """Return what a body looks like, in its own frame; shapes that are not drawn are left out."""
+    return tuple(part for shape in shapes if shape.visible for part in _parts(shape))
+
+
+def _parts(shape: Shape) -> list[Part]:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = _rotation(shape.quaternion), shape.position
+    meshes = _meshes(shape)
+    for mesh in meshes:
+        mesh.apply_transform(pose)
+    return [coloured(mesh, shape.color) for mesh in meshes]
+
+
+def _meshes(shape: Shape) -> list[Any]:
+    import trimesh
+
+    along_x = trimesh.transformations.rotation_matrix(np.pi / 2, [0.0, 1.0, 0.0])
+    match shape:
+        case Box():
+            return [trimesh.creation.box(2 * np.array(shape.half_size))]
+        case Sphere():
+            return [trimesh.creation.icosphere(subdivisions=3, radius=shape.radius)]
+        case Cylinder():
+            length = 2 * shape.half_length
+            return [trimesh.creation.cylinder(shape.radius, length, transform=along_x)]
+        case Capsule():
+            capsule = trimesh.creation.capsule(2 * shape.half_length, shape.radius)
+            return [capsule.apply_transform(along_x)]
+        case Plane():
+            half = PLANE_SIZE / 2
+            corners = [(0.0, y, z) for y, z in ((-half, -half), (half, -half), (half, half))]
+            corners.append((0.0, -half, half))
+            return [trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]])]
+        case Mesh():
+            meshes = load_meshes(str(shape.file), "a body of the task")
+            return [mesh.apply_scale(shape.scale) for mesh in meshes]
+        case _:
+            raise TypeError(f"no picture for {type(shape).__name__}")
+
+
+def _rotation(quaternion: Quaternion) -> Floats:
+    from trimesh.transformations import quaternion_matrix
+
+    return quaternion_matrix(quaternion)[:3, :3]

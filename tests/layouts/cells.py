@@ -1,0 +1,40 @@
+"""A cell with a robot that stands askew, one on a wall, one under a ceiling, and two of a kind."""
+
+import numpy as np
+import yourdfpy
+
+from layouts import Layout, Placement, ceiling, wall
+from layouts.validation.kinematics import pose_matrix
+
+
+def mixed_cell() -> Layout:
+    return Layout(
+        {
+            "left": Placement("panda_wristcam", (0.0, 0.7, 0.0), rpy=(0.1, 0.2, -1.5)),
+            "hung": Placement("so100", on="wall"),
+            "up": Placement("panda_stick", on="ceiling", rpy=(0.0, 0.0, 1.0)),
+            "left_2": Placement("panda_wristcam", (0.5, -1.2, 0.0), keyframe="rest"),
+        },
+        {"wall": wall((1.3, 0.0, 0.6), yaw=0.7), "ceiling": ceiling(1.5, position=(-0.6, 0.3))},
+    )
+
+
+def random_positions(placement: Placement, random: np.random.Generator) -> dict[str, float]:
+    """Return positions of a robot's joints within their limits, its own mimicry respected."""
+    urdf = yourdfpy.URDF.load(str(placement.robot.urdf.locate()), load_meshes=False)
+    positions = {
+        joint.name: float(random.uniform(joint.limit.lower, joint.limit.upper))
+        for joint in urdf.actuated_joints
+    }
+    for joint in urdf.robot.joints:
+        if joint.mimic is not None:
+            positions[joint.name] = positions[joint.mimic.joint]
+    return positions
+
+
+def link_poses(placement: Placement, positions: dict[str, float]) -> dict[str, np.ndarray]:
+    """Return the world pose of each link, by yourdfpy from the robot's own URDF."""
+    urdf = yourdfpy.URDF.load(str(placement.robot.urdf.locate()), load_meshes=False)
+    urdf.update_cfg({joint.name: positions[joint.name] for joint in urdf.actuated_joints})
+    base = pose_matrix(placement.base_position, placement.base_quaternion)
+    return {link: base @ urdf.get_transform(link) for link in urdf.link_map}

@@ -1,0 +1,137 @@
+"""Drake's model directives of a layout, read back without Drake."""
+
+from pathlib import Path
+from urllib.parse import urlparse
+
+import numpy as np
+import pytest
+import trimesh
+import yaml
+import yourdfpy
+from scipy.spatial.transform import Rotation
+
+from layouts import single
+from robots import LayoutError
+from tests.layouts.cells import link_poses, mixed_cell, random_positions
+
+DRAWS = 5
+READABLE = (".obj", ".vtk", ".gltf")  # by Drake
+
+
+class _Directives(yaml.SafeLoader):
+    pass
+
+
+_Directives.add_constructor("!Rpy", lambda loader, node: loader.construct_mapping(node, deep=True))
+
+
+def read(path: Path) -> tuple[dict, dict]:
+    """Return the models and the poses of their welded links, by name."""
+    directives = yaml.load(path.read_text(), Loader=_Directives)["directives"]
+    models = {d["add_model"]["name"]: d["add_model"] for d in directives if "add_model" in d}
+    welds = {}
+    for weld in (d["add_weld"] for d in directives if "add_weld" in d):
+        assert weld["parent"] == "world"
+        place, link = weld["child"].split("::")
+        pose = np.eye(4)
+        # Drake's Rpy: about fixed x, y and z.
+        turn = Rotation.from_euler("xyz", weld["X_PC"]["rotation"]["deg"], degrees=True)
+        pose[:3, :3] = turn.as_matrix()
+        pose[:3, 3] = weld["X_PC"]["translation"]
+        welds[place] = (link, pose)
+    assert len(directives) == len(models) + len(welds)
+    return models, welds
+
+
+@pytest.fixture(scope="module")
+def cell():
+    return mixed_cell()
+
+
+@pytest.fixture(scope="module")
+def exported(cell, tmp_path_factory):
+    return cell.to_drake(tmp_path_factory.mktemp("drake") / "cell.dmd.yaml")
+
+
+def urdf_of(model: dict) -> Path:
+    return Path(urlparse(model["file"]).path)
+
+
+def test_links_are_where_the_robots_own_urdfs_put_them(cell, exported):
+    models, welds = read(exported)
+    assert list(models) == list(cell)
+    random = np.random.default_rng(0)
+    loaded = {
+        name: yourdfpy.URDF.load(str(urdf_of(model)), load_meshes=False)
+        for name, model in models.items()
+    }
+    compared = 0
+    for _ in range(DRAWS):
+        for name, placement in cell.items():
+            positions = random_positions(placement, random)
+            urdf, (welded, base) = loaded[name], welds[name]
+            urdf.update_cfg({j.name: positions[j.name] for j in urdf.actuated_joints})
+            for link, pose in link_poses(placement, positions).items():
+                found = base @ urdf.get_transform(link, welded)
+                np.testing.assert_allclose(found, pose, rtol=0, atol=1e-9)
+                compared += 1
+    assert compared == DRAWS * 50
+
+
+def test_robots_start_at_their_keyframes(cell, exported):
+    models, _ = read(exported)
+    for name, placement in cell.items():
+        start = {j: [x] for j, x in zip(placement.robot.joints, placement.start_qpos, strict=True)}
+        assert models[name]["default_joint_positions"] == start
+
+
+def test_robots_of_one_kind_share_their_files(exported):
+    models, _ = read(exported)
+    assert models["left"]["file"] == models["left_2"]["file"] != models["up"]["file"]
+
+
+def test_meshes_are_of_kinds_that_drake_reads_and_have_the_same_size(cell, exported):
+    models, _ = read(exported)
+    own = yourdfpy.URDF.load(
+        str(cell["hung"].robot.urdf.locate(pictures=True)),
+        load_collision_meshes=True,
+        build_collision_scene_graph=True,
+    )
+    written = urdf_of(models["hung"])
+    found = yourdfpy.URDF.load(
+        str(written), load_collision_meshes=True, build_collision_scene_graph=True
+    )
+    for before, now in ((own.scene, found.scene), (own.collision_scene, found.collision_scene)):
+        np.testing.assert_allclose(now.bounds, before.bounds, rtol=0, atol=1e-5)
+    files = [path for path in written.parent.iterdir() if path.suffix != ".urdf"]
+    assert len(files) > 20
+    assert all(path.suffix in READABLE for path in files)
+
+
+def test_a_camera_with_very_many_triangles_is_drawn_coarser(cell, exported):
+    models, _ = read(exported)
+    folder = urdf_of(models["left"]).parent
+    camera = trimesh.load(folder / "camera_link_visual_0.obj", force="mesh")
+    original = cell["left"].robot.urdf.locate(pictures=True).parent
+    real = trimesh.load(original / "realsense2_description/meshes/d415.stl", force="mesh")
+    assert len(camera.faces) < len(real.faces) / 2
+    np.testing.assert_allclose(sorted(camera.extents), sorted(real.extents), rtol=0.01)
+
+
+def test_only_a_folder_of_its_own_is_replaced(tmp_path):
+    layout = single({"arm": "so100"})
+    path = layout.to_drake(tmp_path / "arm.dmd.yaml")
+    folder = tmp_path / "arm_robots"
+    (folder / "so100" / "left_over.obj").touch()
+    assert layout.to_drake(path) == path
+    assert not (folder / "so100" / "left_over.obj").exists()
+    (folder / "notes").mkdir()
+    with pytest.raises(LayoutError, match="would be replaced, but holds notes"):
+        layout.to_drake(path)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["arm.dmd.yaml", "arm_robots"]
+
+
+def test_a_wrong_ending_is_refused(tmp_path):
+    with pytest.raises(LayoutError, match=r"'arm.yaml'; the name must end in .dmd.yaml"):
+        single({"arm": "so100"}).to_drake(tmp_path / "arm.yaml")
+    assert list(tmp_path.iterdir()) == []

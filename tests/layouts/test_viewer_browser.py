@@ -1,0 +1,78 @@
+"""``python -m layouts view`` in a real browser."""
+
+from urllib.parse import urlsplit
+
+import pytest
+
+from layouts.__main__ import main
+from tests.pages import browser_page, changed, coloured, served, settled
+
+pytestmark = pytest.mark.browser
+
+BLUE, ORANGE = (0, 114, 178), (213, 94, 0)  # of left and right
+LIGHT = (235, 235, 235)  # of the robots
+CELL = ("face_to_face", "left=panda_wristcam", "right=so100", "--spacing", "0.5")
+
+
+def reach_is_drawn(picture) -> bool:
+    return coloured(picture, BLUE) > 300 and coloured(picture, ORANGE) > 150
+
+
+def reddish(picture) -> int:
+    red, green, blue = picture.transpose(2, 0, 1)
+    return int((red - (green + blue) / 2 > 40).sum())
+
+
+@pytest.mark.long
+def test_robots_are_shown_moved_and_checked(tmp_path):
+    with served("layouts", "view", *CELL, "--port", "0") as view, browser_page() as (page, asked):
+        page.goto(view.url)
+        start = settled(page, reach_is_drawn)
+        page.screenshot(path=tmp_path / "start.png")
+        assert page.get_by_text("No robot touches another or itself.").is_visible()
+
+        page.get_by_label("Meshes").click()
+        bare = settled(page, lambda now: changed(now, start) > 1500)
+        page.get_by_label("Meshes").click()
+        assert changed(settled(page, lambda now: changed(now, bare) > 1500), start) < 50
+
+        page.get_by_label("Collision shapes").click()
+        settled(page, lambda now: changed(now, start) > 1500)
+        page.get_by_label("Collision shapes").click()
+        page.get_by_label("Reach, circle").click()
+        settled(page, lambda now: coloured(now, BLUE) < 50)
+        page.get_by_label("Reach, circle").click()
+
+        shoulder = page.get_by_role("slider").nth(1)
+        shoulder.focus()
+        shoulder.press("End")
+        page.get_by_text("in right.").first.wait_for()
+        assert "left.panda" in page.inner_text("body")
+        moved = settled(page, lambda now: changed(now, start) > 1500)
+        page.screenshot(path=tmp_path / "moved.png")
+        assert reddish(moved) > reddish(start) + 150
+        page.get_by_role("button", name="Back to the start").first.click()
+        page.get_by_text("No robot touches another or itself.").wait_for()
+        assert changed(settled(page), start) < 50
+
+        at = view.url.removeprefix("http://")
+        assert {urlsplit(address.removeprefix("blob:")).netloc for address in asked} <= {at, ""}
+        status, rest = view.interrupt()
+        assert status == 0
+        assert rest == "ended\n"
+
+
+def test_a_saved_page_shows_the_robots_and_asks_for_nothing(tmp_path):
+    file = tmp_path / "cell.html"
+    assert main(["view", *CELL, "--html", str(file)]) == 0
+    with browser_page() as (page, asked):
+        page.goto(file.as_uri())
+        start = settled(page, reach_is_drawn)
+        page.screenshot(path=tmp_path / "saved.png")
+        assert page.title() == "face_to_face left=panda_wristcam right=so100"
+        assert coloured(start, LIGHT, 12) > 1000
+        page.get_by_role("button", name="Show scene tree").last.click()
+        page.locator('[data-scene-node="/left"] .tabler-icon-eye').click()
+        settled(page, lambda now: coloured(now, BLUE) < 50 and coloured(now, ORANGE) > 150)
+        page.screenshot(path=tmp_path / "hidden.png")
+        assert asked == [file.as_uri()]
