@@ -1,6 +1,26 @@
 """Which robots stand where: placements, presets, checks and pictures."""
 
+from layouts.frames import Frame, Pose, ceiling, table, wall
 from layouts.layout import Layout, Placement
-from layouts.presets import face_to_face, side_by_side, single, yaw_quaternion
+from layouts.maniskill import from_maniskill
+from layouts.orientation import rpy_quaternion, yaw_quaternion
+from layouts.presets import around_table, face_to_face, grid, ring, side_by_side, single
 
-__all__ = ["Layout", "Placement", "face_to_face", "side_by_side", "single", "yaw_quaternion"]
+__all__ = [
+    "Frame",
+    "Layout",
+    "Placement",
+    "Pose",
+    "around_table",
+    "ceiling",
+    "face_to_face",
+    "from_maniskill",
+    "grid",
+    "ring",
+    "rpy_quaternion",
+    "side_by_side",
+    "single",
+    "table",
+    "wall",
+    "yaw_quaternion",
+]

@@ -1,4 +1,4 @@
-"""Layouts on the command line: ``python -m layouts show face_to_face left=panda right=panda``."""
+"""Layouts on the command line: ``python -m layouts show ring a=panda b=so100 --radius 0.6``."""
 
 from __future__ import annotations
 
@@ -6,10 +6,18 @@ import argparse
 import inspect
 import sys
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
+from layouts.frames import EDGES
 from layouts.layout import Layout
-from layouts.presets import PRESETS
+from layouts.maniskill import TASKS, from_maniskill
+from layouts.presets import FACING, PRESETS
+from layouts.validate_command import add_check_options
 from robots import LayoutError, RobotLayoutsError, RobotRegistry, UnknownNameError
+
+# What presets take besides the robots.
+OPTIONS = ("spacing", "radius", "facing", "columns", "edges", "table", "inset", "keyframe")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -19,18 +27,74 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: Words after ``python -m layouts``; by default those of this process.
 
     Returns:
-        Exit status: 0 if all went well, 1 after an error that was printed.
+        Exit status: 0 if all went well, 1 after an error that was printed, or if a layout was
+            checked and is not ok.
     """
     options = _parser().parse_args(arguments)
     try:
-        _show(options)
+        return options.run(options) or 0
     except RobotLayoutsError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
-    return 0
 
 
-def build(preset: str, robots: Sequence[str], **options: float | str | None) -> Layout:
+def add_layout_words(parser: argparse.ArgumentParser) -> None:
+    """Add the words and options that say which layout a command is about; see `chosen_layout`."""
+    parser.add_argument(
+        "what",
+        metavar="WHAT",
+        help=f"a layout's file (.yaml), a preset ({', '.join(PRESETS)}), or the id of one of"
+        " ManiSkill's tasks",
+    )
+    parser.add_argument(
+        "robots",
+        nargs="*",
+        metavar="NAME=ROBOT",
+        help=f"for a preset, in action order; robots: {', '.join(RobotRegistry.names())}",
+    )
+    for name, help_text in (
+        ("--spacing", "between neighbouring bases (m)"),
+        ("--radius", "of the bases from the middle (m)"),
+        ("--inset", "of the bases from the table's edge (m)"),
+    ):
+        parser.add_argument(name, type=_distance, metavar="M|auto", help=help_text)
+    parser.add_argument("--facing", metavar="WAY", help=f"in a ring: {', '.join(FACING)}")
+    parser.add_argument("--columns", type=int, metavar="N", help="robots in a row of a grid")
+    parser.add_argument(
+        "--edges", type=_words, metavar="EDGE,…", help=f"of each robot: {', '.join(EDGES)}"
+    )
+    parser.add_argument(
+        "--table", type=float, nargs=2, metavar=("WIDTH", "DEPTH"), help="along x and y (m)"
+    )
+    parser.add_argument("--keyframe", metavar="NAME", help="joint positions to start from")
+
+
+def chosen_layout(options: argparse.Namespace) -> Layout:
+    """Return the layout that the words of `add_layout_words` are about.
+
+    Raises:
+        RobotLayoutsError: If there is none such.
+    """
+    values = {name: getattr(options, name) for name in OPTIONS}
+    given = [f"--{name}" for name, value in values.items() if value is not None]
+    if options.what in PRESETS:
+        return build(options.what, options.robots, **values)
+    if Path(options.what).suffix.lower() in (".yaml", ".yml"):
+        read = Layout.load
+    elif options.what in TASKS:
+        read = from_maniskill
+    else:
+        raise UnknownNameError(
+            "layout preset", options.what, [*PRESETS, *TASKS], "Or give a file ending in .yaml."
+        )
+    if options.robots or given:
+        raise LayoutError(
+            f"{options.what} says it all; it takes no {' '.join([*options.robots, *given])}"
+        )
+    return read(options.what)
+
+
+def build(preset: str, robots: Sequence[str], **options: Any) -> Layout:
     """Build a layout from the words of a command line.
 
     Args:
@@ -70,12 +134,25 @@ def _named_robots(words: Sequence[str]) -> dict[str, str]:
 
 
 def _show(options: argparse.Namespace) -> None:
-    layout = build(
-        options.preset, options.robots, spacing=options.spacing, keyframe=options.keyframe
-    )
+    layout = chosen_layout(options)
     print(layout)
+    if options.save is not None:
+        print(f"layout: {layout.save(options.save)}")
     if options.preview is not None:
         print(f"picture: {layout.preview(options.preview)}")
+
+
+def _distance(word: str) -> float | str:
+    try:
+        return word if word == "auto" else float(word)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{word!r} is no distance; it takes a number (m) or auto"
+        ) from None
+
+
+def _words(word: str) -> list[str]:
+    return word.split(",")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -84,16 +161,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     show = commands.add_parser("show", help="print a layout as a table, and draw it if asked")
-    show.add_argument("preset", metavar="PRESET", help=", ".join(PRESETS))
-    show.add_argument(
-        "robots",
-        nargs="+",
-        metavar="NAME=ROBOT",
-        help=f"in action order; robots: {', '.join(RobotRegistry.names())}",
-    )
-    show.add_argument("--spacing", type=float, metavar="M", help="distance between bases (m)")
-    show.add_argument("--keyframe", metavar="NAME", help="joint positions to start from")
+    add_layout_words(show)
+    show.add_argument("--save", metavar="FILE", help="write the layout as YAML")
     show.add_argument("--preview", metavar="FILE", help="save a top view (.png, .pdf or .svg)")
+    show.set_defaults(run=_show)
+    check = commands.add_parser("validate", help="check a layout for collisions and reach")
+    add_layout_words(check)
+    add_check_options(check, chosen_layout)
     return parser
 
 

@@ -16,9 +16,11 @@ COLUMNS = ("#", "name", "robot", "action", "base x, y, z (m)", "facing", "keyfra
 def describe(layout: Layout) -> str:
     """Return a headline and one line per robot, in action order.
 
-    "facing" is the turn about z from the world's +x (degrees), or the wxyz quaternion of a base
-    that is tilted.
+    "facing" is the turn about z from the world's +x to where the robot reaches out at home
+    (degrees), or the wxyz quaternion of that turn if it tilts the base. "on" is what a robot hangs
+    on, where one hangs.
     """
+    hanging = any(placement.on is not None for placement in layout.values())
     rows = [
         (
             str(number),
@@ -29,10 +31,12 @@ def describe(layout: Layout) -> str:
             facing_text(placement),
             placement.start_keyframe,
             f"{placement.robot.reach:g}",
+            *([placement.on or "–"] if hanging else []),
         )
         for number, (name, placement) in enumerate(layout.items(), start=1)
     ]
-    return "\n".join([headline(layout), *_aligned([COLUMNS, *rows])])
+    columns = (*COLUMNS, "on") if hanging else COLUMNS
+    return "\n".join([headline(layout), *_aligned([columns, *rows])])
 
 
 def headline(layout: Layout) -> str:
@@ -47,11 +51,11 @@ def action_text(numbers: slice) -> str:
 
 
 def facing_text(placement: Placement) -> str:
-    """Return the turn of an upright base in degrees, or the wxyz quaternion of a tilted one."""
-    yaw = yaw_degrees(placement.base_quaternion)
-    if yaw is None:
-        return f"wxyz {', '.join(decimal(x) for x in placement.base_quaternion)}"
-    return f"{decimal(yaw, digits=1)}°"
+    """Return where a robot faces: degrees if its base is upright, a wxyz quaternion if not."""
+    yaw = yaw_degrees(placement.facing)
+    if yaw is not None:
+        return f"{decimal(yaw, digits=1)}°"
+    return f"wxyz {', '.join(decimal(x) for x in placement.facing)}"
 
 
 def decimal(value: float, digits: int = 3) -> str:

@@ -3,32 +3,53 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, TypeVar
 
 from layouts.description import describe
+from layouts.files import written_whole
+from layouts.frames import (
+    ORIGIN,
+    Frame,
+    HangingError,
+    Pose,
+    check_frame_names,
+    check_pose,
+    declared_quaternion,
+    numbers,
+    resolve,
+)
+from layouts.orientation import inverted, multiplied, normalised, yaw_quaternion
 from robots import LayoutError, RobotDescriptor, RobotRegistry, UnknownNameError
-from robots.descriptor import Quaternion, Vector3
+from robots.descriptor import IDENTITY, Quaternion, Vector3
+
+if TYPE_CHECKING:
+    from layouts.validation import Report
 
 RobotLike = str | RobotDescriptor
-
-_UNIT_TOLERANCE = 1e-6  # rounding of a quaternion written with seven digits
 
 
 @dataclass(frozen=True)
 class Placement:
     """One robot's place: where its base is fixed, and the joint positions it starts from.
 
+    A place is in the world, or hangs ``on`` a frame or another robot's base of the same layout.
     What is left out is the robot's own `robots.Home`, so that another robot can take the place.
 
     Attributes:
         robot: Its descriptor; a registry name is accepted and looked up.
-        position: Base position in the world (m), or None for the robot's home.
-        quaternion: Base orientation in the world, wxyz, unit length, or None for home.
+        position: Base position (m) in the world or in what it hangs on. None is the robot's home
+            in the world, and the origin of what it hangs on.
+        quaternion: Base orientation there, wxyz, unit length, or None for home.
         keyframe: Keyframe it starts from, or None for home.
         qpos_noise: Standard deviation of the joint noise added at a reset (rad).
+        rpy: Base orientation as roll, pitch and yaw (rad, about fixed x, y, z as in a URDF),
+            instead of a quaternion.
+        on: Name of the frame or robot it hangs on; None is the world.
     """
 
     robot: RobotDescriptor
@@ -36,35 +57,63 @@ class Placement:
     quaternion: Quaternion | None = None
     keyframe: str | None = None
     qpos_noise: float = 0.02
+    rpy: Vector3 | None = field(default=None, kw_only=True)
+    on: str | None = field(default=None, kw_only=True)
+    _world: Pose | None = field(default=None, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Look a robot's name up, and refuse poses that are no poses."""
         object.__setattr__(self, "robot", load_robot(self.robot))
-        if self.position is not None:
-            object.__setattr__(self, "position", _numbers("position", self.position, 3))
-        if self.quaternion is not None:
-            quaternion = _numbers("quaternion", self.quaternion, 4)
-            length = math.sqrt(sum(x * x for x in quaternion))
-            if abs(length - 1) > _UNIT_TOLERANCE:
-                raise LayoutError(
-                    f"quaternion {quaternion} has length {length:.6g}; a rotation has length 1"
-                    " (order w, x, y, z)"
-                )
-            object.__setattr__(self, "quaternion", quaternion)
+        check_pose(self)
         if self.keyframe is not None:
             self.robot.keyframe(self.keyframe)
-        if not (math.isfinite(self.qpos_noise) and self.qpos_noise >= 0):
+        try:
+            noise = float(self.qpos_noise)
+        except (TypeError, ValueError):
+            noise = math.nan
+        if not (math.isfinite(noise) and noise >= 0):
             raise LayoutError(f"qpos_noise is {self.qpos_noise} rad; it must be 0 or more")
+        object.__setattr__(self, "qpos_noise", noise)
+
+    @property
+    def local_pose(self) -> Pose:
+        """Base pose in the frame it hangs on, or in the world."""
+        if self.position is not None:
+            position = self.position
+        else:
+            position = self.robot.home.position if self.on is None else ORIGIN
+        return Pose(position, declared_quaternion(self, self.robot.home.quaternion))
+
+    @property
+    def base_pose(self) -> Pose:
+        """Base pose in the world.
+
+        Raises:
+            LayoutError: If it hangs on something, and is not in a layout that knows what.
+        """
+        if self.on is None:
+            return self.local_pose
+        if self._world is None:
+            raise LayoutError(
+                f"this placement hangs on {self.on!r}; only a layout that holds both knows where"
+                " that is"
+            )
+        return self._world
 
     @property
     def base_position(self) -> Vector3:
         """Base position in the world (m)."""
-        return self.robot.home.position if self.position is None else self.position
+        return self.base_pose.position
 
     @property
     def base_quaternion(self) -> Quaternion:
         """Base orientation in the world, wxyz."""
-        return self.robot.home.quaternion if self.quaternion is None else self.quaternion
+        return self.base_pose.quaternion
+
+    @property
+    def facing(self) -> Quaternion:
+        """How the robot is turned from its home (wxyz), where it reaches out along +x."""
+        return _without(self.robot.home.quaternion, self.base_quaternion)
 
     @property
     def start_keyframe(self) -> str:
@@ -76,6 +125,26 @@ class Placement:
         """Joint positions of ``start_keyframe``, in the order of the robot's joints (rad, m)."""
         return self.robot.keyframe(self.start_keyframe)
 
+    def with_robot(self, robot: RobotLike) -> Placement:
+        """Return the placement with another robot, which faces the same way.
+
+        Raises:
+            UnknownNameError: If there is no such robot, or it lacks the keyframe.
+        """
+        robot = load_robot(robot)
+        before, after = self.robot.home.quaternion, robot.home.quaternion
+        if before == after or (self.quaternion is None and self.rpy is None):
+            return replace(self, robot=robot)
+        turn = _without(before, self.local_pose.quaternion)
+        return replace(self, robot=robot, rpy=None, quaternion=faced(robot, turn))
+
+
+def faced(robot: RobotDescriptor, turn: Quaternion) -> Quaternion:
+    """Return the base orientation (wxyz) of a robot that is turned from its home by ``turn``."""
+    if robot.home.quaternion == IDENTITY:
+        return turn
+    return normalised(multiplied(turn, robot.home.quaternion))
+
 
 class Layout(Mapping[str, Placement]):
     """Ordered, named placements: a read-only mapping from name to `Placement`.
@@ -84,32 +153,45 @@ class Layout(Mapping[str, Placement]):
     same robots under the same names in the same order.
     """
 
-    __slots__ = ("_placements",)
+    __slots__ = ("_frames", "_placements")
 
-    def __init__(self, placements: Mapping[str, Placement]) -> None:
-        """Take placements in the order given.
+    def __init__(
+        self, placements: Mapping[str, Placement], frames: Mapping[str, Frame] | None = None
+    ) -> None:
+        """Take placements in the order given, and resolve where those that hang are.
 
         Args:
             placements: Placement by name, in action order.
+            frames: Frame by name, for placements and other frames to hang on.
 
         Raises:
-            LayoutError: If there is none, or a name is not an identifier.
+            LayoutError: If there is no placement, a name is not an identifier or is given twice,
+                or something hangs on what is not there or on itself.
         """
+        frames = {} if frames is None else dict(frames)
         if not placements:
             raise LayoutError("a layout needs at least one robot")
         for name, placement in placements.items():
-            if not (isinstance(name, str) and name.isidentifier()):
-                raise LayoutError(
-                    f"robot name {name!r} must be a letter followed by letters, digits and _"
-                )
+            check_name(name)
             if not isinstance(placement, Placement):
                 raise LayoutError(
                     f"{name!r} is a {type(placement).__name__}; a layout holds Placements"
                 )
-        object.__setattr__(self, "_placements", dict(placements))
+            if name in frames:
+                raise HangingError(f"{name!r} names both a robot and a frame; rename one", name)
+        check_frame_names(frames)
+        poses = {name: (thing.on, thing.local_pose) for name, thing in frames.items()}
+        poses.update({name: (thing.on, thing.local_pose) for name, thing in placements.items()})
+        world = resolve(poses)
+        object.__setattr__(self, "_frames", frames)
+        object.__setattr__(
+            self, "_placements", {n: _placed(p, world[n]) for n, p in placements.items()}
+        )
 
     @classmethod
-    def of(cls, *placements: tuple[str, Placement]) -> Layout:
+    def of(
+        cls, *placements: tuple[str, Placement], frames: Mapping[str, Frame] | None = None
+    ) -> Layout:
         """Build from (name, placement) pairs; a name given twice is an error, not an overwrite.
 
         Raises:
@@ -119,7 +201,7 @@ class Layout(Mapping[str, Placement]):
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise LayoutError(f"names {twice} are given twice; each robot needs its own name")
-        return cls(dict(placements))
+        return cls(dict(placements), frames)
 
     def __setattr__(self, name: str, value: object) -> None:
         """Refuse: a layout is frozen."""
@@ -140,18 +222,18 @@ class Layout(Mapping[str, Placement]):
         return len(self._placements)
 
     def __eq__(self, other: object) -> bool:
-        """Compare names, order and placements."""
+        """Compare names, order, placements and frames as they were declared."""
         if not isinstance(other, Layout):
             return NotImplemented
-        return list(self.items()) == list(other.items())
+        return list(self.items()) == list(other.items()) and self._frames == other._frames
 
     def __hash__(self) -> int:
-        """Hash names, order and placements."""
-        return hash(tuple(self.items()))
+        """Hash names, order, placements and frames."""
+        return hash((tuple(self.items()), frozenset(self._frames.items())))
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle by the placements."""
-        return (Layout, (dict(self._placements),))
+        """Pickle by the placements and frames."""
+        return (Layout, (dict(self._placements), self._frames))
 
     def __repr__(self) -> str:
         """Show names and robots in order."""
@@ -160,6 +242,19 @@ class Layout(Mapping[str, Placement]):
     def __str__(self) -> str:
         """Show a table: name, robot, action numbers, base pose, keyframe and reach of each."""
         return describe(self)
+
+    @property
+    def frames(self) -> Mapping[str, Frame]:
+        """The named frames, as they were declared."""
+        return MappingProxyType(self._frames)
+
+    @property
+    def frame_poses(self) -> dict[str, Pose]:
+        """World pose of each frame, by name."""
+        poses = {name: (frame.on, frame.local_pose) for name, frame in self._frames.items()}
+        poses.update({name: (None, placement.base_pose) for name, placement in self.items()})
+        world = resolve(poses)
+        return {name: world[name] for name in self._frames}
 
     @property
     def action_split(self) -> dict[str, slice]:
@@ -177,7 +272,7 @@ class Layout(Mapping[str, Placement]):
         return sum(placement.robot.action_dim for placement in self.values())
 
     def replace_robots(self, **robots: RobotLike) -> Layout:
-        """Return the layout with other robots in some places.
+        """Return the layout with other robots in some places, facing the same way.
 
         Args:
             robots: Robot (name or descriptor) by place name.
@@ -185,15 +280,26 @@ class Layout(Mapping[str, Placement]):
         Raises:
             UnknownNameError: If a place, a robot or the place's keyframe does not exist.
         """
-        for name in robots:
-            self[name]
+        return self._with({name: self[name].with_robot(robot) for name, robot in robots.items()})
+
+    def moved(self, position: Vector3 = ORIGIN, yaw: float = 0.0) -> Layout:
+        """Return the whole layout, its frames included, turned about z and then shifted.
+
+        What hangs on a frame or robot follows it, and stays declared as it was.
+
+        Args:
+            position: Shift (m).
+            yaw: Turn about the world's z axis (rad).
+
+        Raises:
+            LayoutError: If they are not finite.
+        """
+        (yaw,) = numbers("yaw", (yaw,), 1)
+        x, y, z = numbers("position", position, 3)
+        move = Pose((x, y, z), yaw_quaternion(yaw))
         return Layout(
-            {
-                name: replace(placement, robot=load_robot(robots[name]))
-                if name in robots
-                else placement
-                for name, placement in self.items()
-            }
+            {name: _moved(placement, move) for name, placement in self.items()},
+            {name: _moved(frame, move) for name, frame in self._frames.items()},
         )
 
     @property
@@ -209,6 +315,60 @@ class Layout(Mapping[str, Placement]):
             DescriptorError: If a robot lacks the joint limits that the mode needs.
         """
         return self.replace_robots(**{n: p.robot.in_control_mode(mode) for n, p in self.items()})
+
+    def _with(self, changed: Mapping[str, Placement]) -> Layout:
+        return Layout({**self._placements, **changed}, self._frames)
+
+    def to_yaml(self) -> str:
+        """Return the layout as YAML text, as it was declared; robots by their registered names.
+
+        `from_yaml` turns the text into an equal layout.
+
+        Raises:
+            LayoutError: If a robot is not registered, or not as it is here.
+        """
+        from layouts.yaml_format import to_yaml
+
+        return to_yaml(self)
+
+    @classmethod
+    def from_yaml(cls, text: str) -> Layout:
+        """Return the layout that a YAML text describes.
+
+        Raises:
+            LayoutError: If it describes none; the message names the line.
+        """
+        from layouts.yaml_format import from_yaml
+
+        return from_yaml(text)
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the layout to a YAML file, whole or not at all, and return its path.
+
+        Raises:
+            LayoutError: If a robot is not registered, or not as it is here.
+        """
+        text = self.to_yaml()
+        with written_whole(path) as unfinished:
+            unfinished.write_text(text, encoding="utf-8")
+        return Path(path)
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Layout:
+        """Return the layout in a YAML file.
+
+        Raises:
+            LayoutError: If the file cannot be read or describes no layout; the message names the
+                file and the line.
+        """
+        from layouts.yaml_format import from_yaml
+
+        try:
+            text = Path(path).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
+            raise LayoutError(f"cannot read the layout {str(path)!r}: {reason}") from error
+        return from_yaml(text, str(path))
 
     def preview(
         self,
@@ -235,6 +395,45 @@ class Layout(Mapping[str, Placement]):
 
         return preview(self, path, table)
 
+    def validate(
+        self,
+        *,
+        targets: Mapping[str, Sequence[float]] | Sequence[Sequence[float]] = (),
+        samples: int = 20,
+        table: tuple[float, float, float, float] | None = None,
+        seed: int = 0,
+        workspaces: bool = True,
+    ) -> Report:
+        """Check the layout before anything moves, from the robots' real collision shapes.
+
+        Looks for robots that collide with each other, with themselves or with tables at their
+        keyframes and with joint noise, for keyframes beyond the joint limits, and for targets that
+        nobody reaches; measures distances and shared workspaces. Needs the robots' files.
+
+        Args:
+            targets: What some robot must reach, by name or in order: x, y, z of a tool centre
+                point in the world (m), or these and the wxyz quaternion of the TCP link.
+            samples: How many postures with joint noise to look at, besides the keyframes.
+            table: Outline of a table whose top is at z = 0, as x_min, y_min, x_max, y_max (m),
+                besides those that are among the layout's frames. Bases may stand on tables.
+            seed: Of the joint noise.
+            workspaces: Whether to measure how much space robots share, to about a tenth.
+
+        Returns:
+            The report: ``ok``, ``findings``, a readable ``str`` and ``picture(path)``.
+
+        Raises:
+            LayoutError: If an argument makes no sense.
+            AssetError: If a robot's files cannot be found or make no sense.
+            DescriptorError: If a robot's descriptor contradicts its URDF.
+            MissingPackageError: If python-fcl is not installed.
+        """
+        from layouts.validation import validate
+
+        return validate(
+            self, targets=targets, samples=samples, table=table, seed=seed, workspaces=workspaces
+        )
+
 
 def load_robot(robot: RobotLike) -> RobotDescriptor:
     """Return a descriptor as it is, or look a name up in the registry.
@@ -245,11 +444,35 @@ def load_robot(robot: RobotLike) -> RobotDescriptor:
     return robot if isinstance(robot, RobotDescriptor) else RobotRegistry.load(robot)
 
 
-def _numbers(what: str, values: object, count: int) -> tuple[float, ...]:
-    try:
-        numbers = tuple(float(x) for x in values)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
-        raise LayoutError(f"{what} is {values!r}; it takes {count} numbers") from None
-    if len(numbers) != count or not all(math.isfinite(x) for x in numbers):
-        raise LayoutError(f"{what} is {numbers}; it takes {count} finite numbers")
-    return numbers
+def check_name(name: object) -> None:
+    """Refuse a robot's name that is not an identifier.
+
+    Raises:
+        LayoutError: If it is not.
+    """
+    if not (isinstance(name, str) and name.isidentifier()):
+        raise LayoutError(f"robot name {name!r} must be a letter followed by letters, digits and _")
+
+
+_Declared = TypeVar("_Declared", Placement, Frame)
+
+
+def _placed(placement: Placement, world: Pose) -> Placement:
+    """Return a placement that knows where it is, if it hangs."""
+    if placement.on is None:
+        return placement
+    placed = replace(placement)
+    object.__setattr__(placed, "_world", world)
+    return placed
+
+
+def _moved(declared: _Declared, move: Pose) -> _Declared:
+    if declared.on is not None:
+        return declared
+    pose = move.then(declared.local_pose)
+    return replace(declared, position=pose.position, quaternion=pose.quaternion, rpy=None)
+
+
+def _without(home: Quaternion, quaternion: Quaternion) -> Quaternion:
+    """Return what turns a robot from its home orientation to ``quaternion`` (both wxyz)."""
+    return quaternion if home == IDENTITY else multiplied(quaternion, inverted(home))

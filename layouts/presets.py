@@ -1,13 +1,41 @@
-"""Usual ways to place robots: pure functions of an ordered mapping from names to robots."""
+"""Usual ways to place robots: pure functions of an ordered mapping from names to robots.
+
+Every preset turns robots by where they reach out at home (`Placement.facing`), so that a robot
+whose own front is not its base's +x faces like the others.
+
+A distance given as ``"auto"`` comes from the robots' reach. Neighbours stand `HAND_OVER` of the sum
+of their reaches apart: the last eighth of that sum is where both can work, so one can hand an
+object to the other. They never stand so near that one can reach the other's base. Where one
+distance has to serve several pairs of neighbours, it is that of the pair that asks for the least,
+unless somebody could then reach a neighbour's base.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import accumulate, pairwise
+from typing import Literal
 
-from layouts.layout import Layout, Placement, RobotLike, load_robot
-from robots import LayoutError
-from robots.descriptor import Quaternion
+from layouts.frames import EDGES, check_positive
+from layouts.frames import table as table_frames
+from layouts.layout import Layout, Placement, RobotLike, faced, load_robot
+from layouts.orientation import yaw_quaternion
+from robots import LayoutError, RobotDescriptor, UnknownNameError
+from robots.descriptor import Vector3
+
+Distance = float | Literal["auto"]  # m
+
+# Share of the sum of two reaches. ManiSkill's two-robot tasks stand their Pandas 1.5 m apart,
+# which is 0.877 of twice 0.855 m (mani_skill 3.0.1, scene_builder/table).
+HAND_OVER = 7 / 8
+EDGE = 0.1  # from a table's edge to a base's middle (m); native's single Pandas have 0.11 m
+
+FACING: Mapping[str, float] = {  # turn from an outward look along the radius (rad)
+    "centre": math.pi,
+    "out": 0.0,
+    "tangent": math.pi / 2,
+}
 
 
 def single(robots: Mapping[str, RobotLike], *, keyframe: str | None = None) -> Layout:
@@ -24,53 +52,186 @@ def single(robots: Mapping[str, RobotLike], *, keyframe: str | None = None) -> L
 
 
 def side_by_side(
-    robots: Mapping[str, RobotLike], *, spacing: float, keyframe: str = "rest"
+    robots: Mapping[str, RobotLike], *, spacing: Distance, keyframe: str | None = "rest"
 ) -> Layout:
     """Robots in a row along y through the origin, all facing +x; the first at the smallest y.
 
     Args:
         robots: Robot by name, in order.
-        spacing: Distance between neighbouring bases (m).
-        keyframe: Keyframe every robot starts from.
+        spacing: Distance between neighbouring bases (m); ``"auto"`` chooses it for each pair.
+        keyframe: Keyframe every robot starts from; None is each one's home.
     """
-    _expect_positive("spacing", spacing)
-    first = -spacing * (len(robots) - 1) / 2
+    loaded = _loaded(robots)
+    if spacing == "auto":
+        along = _centred([_apart(*pair) for pair in _pairs(loaded)])
+    else:
+        distance = _given("spacing", spacing)
+        first = -distance * (len(loaded) - 1) / 2
+        along = [first + i * distance for i in range(len(loaded))]
     return Layout(
         {
-            name: Placement(
-                load_robot(robot),
-                position=(0.0, first + i * spacing, 0.0),
-                quaternion=yaw_quaternion(0.0),
-                keyframe=keyframe,
-            )
-            for i, (name, robot) in enumerate(robots.items())
+            name: _placed(robot, (0.0, y, 0.0), 0.0, keyframe)
+            for y, (name, robot) in zip(along, loaded.items(), strict=True)
         }
     )
 
 
 def face_to_face(
-    robots: Mapping[str, RobotLike], *, spacing: float, keyframe: str = "rest"
+    robots: Mapping[str, RobotLike], *, spacing: Distance, keyframe: str | None = "rest"
 ) -> Layout:
     """Two robots on the y axis, looking at each other across the origin; the first at -y.
 
     Args:
         robots: Robot by name; the first stands at y = -spacing / 2 and faces +y.
-        spacing: Distance between the two bases (m).
-        keyframe: Keyframe both robots start from.
+        spacing: Distance between the two bases (m), or ``"auto"``.
+        keyframe: Keyframe both robots start from; None is each one's home.
     """
     _expect_count("face_to_face", robots, 2)
-    _expect_positive("spacing", spacing)
+    loaded = _loaded(robots)
+    distance = _apart(*loaded.values()) if spacing == "auto" else _given("spacing", spacing)
     return Layout(
         {
-            name: Placement(
-                load_robot(robot),
-                position=(0.0, side * spacing / 2, 0.0),
-                quaternion=yaw_quaternion(-side * math.pi / 2),
-                keyframe=keyframe,
-            )
-            for side, (name, robot) in zip((-1, 1), robots.items(), strict=True)
+            name: _placed(robot, (0.0, side * distance / 2, 0.0), -side * math.pi / 2, keyframe)
+            for side, (name, robot) in zip((-1, 1), loaded.items(), strict=True)
         }
     )
+
+
+def ring(
+    robots: Mapping[str, RobotLike],
+    *,
+    radius: Distance = "auto",
+    facing: str = "centre",
+    keyframe: str | None = None,
+) -> Layout:
+    """Robots on a circle about the origin, the first at -y, the others counterclockwise.
+
+    Two robots that face the centre stand as in `face_to_face`.
+
+    Args:
+        robots: Robot by name, in order.
+        radius: Distance of the bases from the origin (m), at equal angles. ``"auto"`` puts every
+            two neighbours at their own hand-over distance, which makes the angles equal if the
+            reaches are; a single robot stands where it reaches the centre.
+        facing: ``"centre"``, ``"out"``, or ``"tangent"``: towards the next robot, along the circle.
+        keyframe: Keyframe every robot starts from; None is each one's home.
+
+    Raises:
+        UnknownNameError: If a robot, a keyframe or the way to face does not exist.
+    """
+    if facing not in FACING:
+        raise UnknownNameError("way to face", facing, FACING)
+    loaded = _loaded(robots)
+    if radius == "auto":
+        radius, angles = _automatic_ring(list(loaded.values()))
+    else:
+        radius = _given("radius", radius)
+        angles = [2 * math.pi * i / len(loaded) for i in range(len(loaded))]
+    placements: dict[str, Placement] = {}
+    for angle, (name, robot) in zip(angles, loaded.items(), strict=True):
+        position = (_rounded(radius * math.sin(angle)), _rounded(-radius * math.cos(angle)), 0.0)
+        yaw = math.remainder(angle - math.pi / 2 + FACING[facing], 2 * math.pi)
+        placements[name] = _placed(robot, position, yaw, keyframe)
+    return Layout(placements)
+
+
+def around_table(
+    robots: Mapping[str, RobotLike],
+    *,
+    edges: Mapping[str, str] | Sequence[str] | None = None,
+    table: tuple[float, float] | Literal["auto"] = "auto",
+    inset: Distance = "auto",
+    keyframe: str | None = None,
+) -> Layout:
+    """Robots on a table about the origin, along its edges, facing across it.
+
+    They hang on the frames ``table.north`` (+y), ``table.east`` (+x), ``table.south`` and
+    ``table.west``; see `layouts.frames.table`. Robots on one edge stand in order from right to left
+    as they look at the table: evenly, or at hand-over distance if the table is ``"auto"``.
+
+    Args:
+        robots: Robot by name, in order.
+        edges: Edge of each robot, by name or in order. Left out: south, north, west, east, and
+            again from the south.
+        table: Width (along x) and depth (along y) of the table (m). ``"auto"`` makes it so large
+            that robots on opposite edges are at hand-over distance, or larger if several robots
+            stand on one edge.
+        inset: Distance of the bases from the edge, inwards (m). ``"auto"`` is 0.1 m for the robot
+            that reaches farthest, and more for others, so that they work in the same places.
+        keyframe: Keyframe every robot starts from; None is each one's home.
+
+    Raises:
+        LayoutError: If a robot has no edge, or a size or the inset is no distance or does not fit.
+        UnknownNameError: If an edge, a robot or a keyframe does not exist.
+    """
+    loaded = _loaded(robots)
+    sides = _edges(tuple(loaded), edges)
+    rows = {edge: {n: r for n, r in loaded.items() if sides[n] == edge} for edge in EDGES}
+    if inset != "auto":
+        inset = _given("inset", inset)
+    size = _table_size(table, rows, EDGE if inset == "auto" else inset)
+    farthest = max(robot.reach for robot in loaded.values())
+    along: dict[str, float] = {}
+    for edge, row in rows.items():
+        length = size[0] if edge in ("north", "south") else size[1]
+        gaps = [_apart(*pair) if table == "auto" else length / len(row) for pair in _pairs(row)]
+        along.update(zip(row, _centred(gaps), strict=False))
+    placements: dict[str, Placement] = {}
+    for name, robot in loaded.items():
+        across = size[1] if sides[name] in ("north", "south") else size[0]
+        if inset == "auto":
+            shorter = HAND_OVER * (farthest - robot.reach)
+            inwards = max(EDGE, min(EDGE + shorter, across / 2 - HAND_OVER * robot.reach))
+        else:
+            inwards = inset
+        placements[name] = Placement(
+            robot, (inwards, along[name], 0.0), keyframe=keyframe, on=f"table.{sides[name]}"
+        )
+    return Layout(placements, table_frames(*size))
+
+
+def grid(
+    robots: Mapping[str, RobotLike],
+    *,
+    spacing: Distance = "auto",
+    columns: int | None = None,
+    keyframe: str | None = None,
+) -> Layout:
+    """Robots in rows about the origin, all facing +x; rows along y, the next row at larger x.
+
+    One row stands as in `side_by_side`. A last row that is not full starts like the others.
+
+    Args:
+        robots: Robot by name; the first row is filled first.
+        spacing: Distance between neighbouring bases, along x and along y (m), or ``"auto"``.
+        columns: Robots in a row; left out, as many as make the grid square.
+        keyframe: Keyframe every robot starts from; None is each one's home.
+
+    Raises:
+        LayoutError: If ``columns`` is no count.
+    """
+    loaded = _loaded(robots)
+    count = len(loaded)
+    if columns is None:
+        columns = math.ceil(math.sqrt(count))
+    if isinstance(columns, bool) or not isinstance(columns, int) or columns < 1:
+        raise LayoutError(f"columns is {columns!r}; it must be 1 or a larger whole number")
+    columns = min(columns, max(count, 1))
+    rows = math.ceil(count / columns)
+    cells = {divmod(i, columns): robot for i, robot in enumerate(loaded.values())}
+    neighbours = [
+        (robot, cells[other])
+        for (row, column), robot in cells.items()
+        for other in ((row + 1, column), (row, column + 1))
+        if other in cells
+    ]
+    distance = _shared_distance(neighbours) if spacing == "auto" else _given("spacing", spacing)
+    placements: dict[str, Placement] = {}
+    for i, (name, robot) in enumerate(loaded.items()):
+        row, column = divmod(i, columns)
+        x, y = (row - (rows - 1) / 2) * distance, (column - (columns - 1) / 2) * distance
+        placements[name] = _placed(robot, (x, y, 0.0), 0.0, keyframe)
+    return Layout(placements)
 
 
 # Every preset, by the name it has on the command line.
@@ -78,12 +239,162 @@ PRESETS: Mapping[str, Callable[..., Layout]] = {
     "single": single,
     "side_by_side": side_by_side,
     "face_to_face": face_to_face,
+    "ring": ring,
+    "around_table": around_table,
+    "grid": grid,
 }
 
 
-def yaw_quaternion(yaw: float) -> Quaternion:
-    """Return the wxyz quaternion of a rotation by ``yaw`` (rad) about z."""
-    return (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
+def _loaded(robots: Mapping[str, RobotLike]) -> dict[str, RobotDescriptor]:
+    if not robots:
+        raise LayoutError("a layout needs at least one robot")
+    return {name: load_robot(robot) for name, robot in robots.items()}
+
+
+def _placed(
+    robot: RobotDescriptor, position: Vector3, yaw: float, keyframe: str | None
+) -> Placement:
+    """Place a robot upright so that it reaches out along ``yaw`` (rad from +x)."""
+    return Placement(robot, position, faced(robot, yaw_quaternion(yaw)), keyframe)
+
+
+def _given(what: str, distance: Distance) -> float:
+    """Return a distance (m) that is not automatic."""
+    if isinstance(distance, str):
+        raise LayoutError(f"{what} is {distance!r}; it takes a number (m) or 'auto'")
+    check_positive(what, distance)
+    return distance
+
+
+def _apart(one: RobotDescriptor, other: RobotDescriptor) -> float:
+    """Return the hand-over distance (m) of two bases, from which neither reaches the other one."""
+    return max(HAND_OVER * (one.reach + other.reach), one.reach, other.reach)
+
+
+def _shared_distance(neighbours: Sequence[tuple[RobotDescriptor, RobotDescriptor]]) -> float:
+    """Return one distance (m) for several pairs of neighbours; 0 if there is no pair."""
+    if not neighbours:
+        return 0.0
+    farthest = max(robot.reach for pair in neighbours for robot in pair)
+    return max(min(_apart(*pair) for pair in neighbours), farthest)
+
+
+def _automatic_ring(robots: Sequence[RobotDescriptor]) -> tuple[float, list[float]]:
+    """Return the radius (m) and the angles (rad) that put neighbours at hand-over distance.
+
+    The neighbours' distances are the sides of a polygon whose corners lie on the circle.
+    """
+    count = len(robots)
+    if count == 1:
+        return HAND_OVER * robots[0].reach, [0.0]
+    sides = [_apart(*pair) for pair in pairwise([*robots, robots[0]])]
+    longest = max(range(count), key=lambda i: sides[i])
+    if sides[longest] - min(sides) < 1e-12:
+        radius = sides[0] / (2 * math.sin(math.pi / count))
+        return radius, [2 * math.pi * i / count for i in range(count)]
+    radius = _circumradius(sides)
+    arcs = [2 * math.asin(min(side / (2 * radius), 1.0)) for side in sides]
+    arcs[longest] = 2 * math.pi - (sum(arcs) - arcs[longest])
+    return radius, list(accumulate(arcs[:-1], initial=0.0))
+
+
+def _circumradius(sides: Sequence[float]) -> float:
+    """Return the radius of the circle through the corners of a polygon with these sides (m).
+
+    Each side is shorter than the others together. Found by bisection: the smallest circle that
+    the longest side fits into is half of it.
+    """
+    longest = max(sides)
+
+    def angle(radius: float) -> float:  # half of what all sides but the longest span
+        return sum(math.asin(min(s / (2 * radius), 1.0)) for s in sides) - math.asin(
+            min(longest / (2 * radius), 1.0)
+        )
+
+    # The longest side spans the rest of the circle; more than half of it if the others span less.
+    centre_inside = angle(longest / 2) >= math.pi / 2
+
+    def too_small(radius: float) -> bool:
+        rest = math.asin(longest / (2 * radius))
+        return angle(radius) > math.pi - rest if centre_inside else angle(radius) < rest
+
+    low, high = longest / 2, longest
+    while too_small(high):
+        low, high = high, 2 * high
+    for _ in range(100):
+        middle = (low + high) / 2
+        low, high = (middle, high) if too_small(middle) else (low, middle)
+    return high
+
+
+def _edges(
+    names: Sequence[str], edges: Mapping[str, str] | Sequence[str] | None
+) -> Mapping[str, str]:
+    """Return the edge of each robot."""
+    if edges is None:
+        order = ("south", "north", "west", "east")
+        edges = [order[i % len(order)] for i in range(len(names))]
+    if isinstance(edges, str) or (not isinstance(edges, Mapping) and len(edges) != len(names)):
+        raise LayoutError(f"edges is {edges!r}; it takes one edge for each of {list(names)}")
+    chosen = dict(edges) if isinstance(edges, Mapping) else dict(zip(names, edges, strict=True))
+    for name, edge in chosen.items():
+        if name not in names:
+            raise UnknownNameError("robot at the table", name, names)
+        if edge not in EDGES:
+            raise UnknownNameError("table edge", edge, EDGES)
+    for name in names:
+        if name not in chosen:
+            raise LayoutError(f"edges gives no edge for {name!r}; choices: {', '.join(EDGES)}")
+    return chosen
+
+
+def _table_size(
+    table: tuple[float, float] | Literal["auto"],
+    rows: Mapping[str, Mapping[str, RobotDescriptor]],
+    inset: float,
+) -> tuple[float, float]:
+    """Return width and depth (m)."""
+    if table == "auto":
+        farthest = max(robot.reach for row in rows.values() for robot in row.values())
+        width, depth = (
+            max(_row_length(rows[edge], farthest) for edge in edges) + 2 * inset
+            for edges in (("north", "south"), ("east", "west"))
+        )
+        return width, depth
+    if isinstance(table, str) or len(table) != 2:
+        raise LayoutError(f"table is {table!r}; it takes width and depth (m) or 'auto'")
+    for what, size in zip(("width", "depth"), table, strict=True):
+        check_positive(f"the table's {what}", size)
+        if size <= 2 * inset:
+            raise LayoutError(
+                f"the table's {what} is {size} m; with an inset of {inset} m it must be more than"
+                f" {2 * inset} m"
+            )
+    return table
+
+
+def _row_length(row: Mapping[str, RobotDescriptor], farthest: float) -> float:
+    """Return how long an edge is (m) so that robots keep clear of each other, round corners too.
+
+    One robot works in the middle, as do those on the other edges. Of several, the outer ones stand
+    as far from the corner as any robot round it reaches.
+    """
+    span = sum(_apart(*pair) for pair in _pairs(row))
+    return span + 2 * (farthest if span > 0 else HAND_OVER * farthest)
+
+
+def _pairs(row: Mapping[str, RobotDescriptor]) -> Iterable[tuple[RobotDescriptor, RobotDescriptor]]:
+    return pairwise(row.values())
+
+
+def _centred(gaps: Sequence[float]) -> list[float]:
+    """Return the places of a row with these gaps, from smallest to largest, about 0 (m)."""
+    return list(accumulate(gaps, initial=-sum(gaps) / 2))
+
+
+def _rounded(value: float) -> float:
+    """Round to a picometre, so that a sine of pi is 0; there is no minus zero."""
+    return round(value, 12) + 0.0
 
 
 def _expect_count(preset: str, robots: Mapping[str, RobotLike], count: int) -> None:
@@ -91,8 +402,3 @@ def _expect_count(preset: str, robots: Mapping[str, RobotLike], count: int) -> N
         raise LayoutError(
             f"{preset} places {count} robot{'s' * (count > 1)}; {len(robots)} given: {list(robots)}"
         )
-
-
-def _expect_positive(what: str, value: float) -> None:
-    if not (math.isfinite(value) and value > 0):
-        raise LayoutError(f"{what} is {value} m; it must be finite and greater than 0")

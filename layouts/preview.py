@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from layouts.description import action_text, decimal, facing_text, headline
+from layouts.files import written_whole
+from layouts.frames import table_outlines
 from layouts.orientation import forward, yaw_degrees
 from robots import LayoutError, MissingPackageError
 
@@ -66,7 +67,9 @@ def preview(layout: Layout, path: str | os.PathLike[str], table: Rectangle | Non
         all(math.isfinite(x) for x in table) and table[0] < table[2] and table[1] < table[3]
     ):
         raise LayoutError(f"table is {table}; it must be x_min, y_min, x_max, y_max (m)")
-    _save(draw(layout, table), target)
+    figure = draw(layout, table)
+    with written_whole(target) as unfinished:
+        figure.savefig(unfinished, format=target.suffix[1:].lower())
     return target
 
 
@@ -105,6 +108,8 @@ def draw(layout: Layout, table: Rectangle | None = None) -> Figure:
 def _bounds(layout: Layout, table: Rectangle | None) -> Rectangle:
     """Return the outline of everything drawn, with a margin (m)."""
     boxes: list[Rectangle] = [] if table is None else [table]
+    for corners in table_outlines(layout.frame_poses).values():
+        boxes += [(x, y, x, y) for x, y, _ in corners]
     for placement in layout.values():
         x, y, _ = placement.base_position
         reach = placement.robot.reach
@@ -125,19 +130,16 @@ def _stretched(bounds: Rectangle, aspect: float) -> Rectangle:
 
 
 def _draw_plan(plan: Axes, layout: Layout, bounds: Rectangle, table: Rectangle | None) -> None:
-    from matplotlib.patches import Rectangle as RectanglePatch
+    from matplotlib.patches import Polygon
 
+    outlines = [
+        [(x, y) for x, y, _ in corners] for corners in table_outlines(layout.frame_poses).values()
+    ]
     if table is not None:
-        plan.add_patch(
-            RectanglePatch(
-                (table[0], table[1]),
-                table[2] - table[0],
-                table[3] - table[1],
-                facecolor=TABLE,
-                edgecolor="#C9B99B",
-                zorder=0.5,
-            )
-        )
+        x_min, y_min, x_max, y_max = table
+        outlines.append([(x_min, y_min), (x_max, y_min), (x_max, y_max), (x_min, y_max)])
+    for outline in outlines:
+        plan.add_patch(Polygon(outline, facecolor=TABLE, edgecolor="#C9B99B", zorder=0.5))
     if _draw_overlap(plan, layout, bounds):
         plan.set_title("grey: within reach of two or more", loc="right", color=FAINT, fontsize=10)
     arrow = HEADING * max(bounds[2] - bounds[0], bounds[3] - bounds[1])
@@ -182,7 +184,7 @@ def _draw_robot(plan: Axes, index: int, name: str, placement: Placement, arrow: 
     colour = COLOURS[index % len(COLOURS)]
     x, y, _ = placement.base_position
     reach = placement.robot.reach
-    ahead_x, ahead_y, _ = forward(placement.base_quaternion)
+    ahead_x, ahead_y, _ = forward(placement.facing)
     plan.add_patch(Circle((x, y), reach, facecolor=colour, alpha=0.07, edgecolor="none", zorder=1))
     plan.add_patch(Circle((x, y), reach, fill=False, edgecolor=colour, linewidth=1.6, zorder=2))
     if math.hypot(ahead_x, ahead_y) > 0.1:  # a base that faces up or down has no heading
@@ -269,7 +271,7 @@ def _draw_list(listing: Axes, layout: Layout) -> None:
             _shortened(placement.robot.name, 21),
             action_text(layout.action_split[name]),
             ", ".join(decimal(x) for x in placement.base_position),
-            "tilted" if yaw_degrees(placement.base_quaternion) is None else facing_text(placement),
+            "tilted" if yaw_degrees(placement.facing) is None else facing_text(placement),
             decimal(placement.robot.reach),
         )
         _write_row(listing, row, columns, cells, INK)
@@ -284,17 +286,3 @@ def _write_row(
 
 def _shortened(text: str, length: int) -> str:
     return text if len(text) <= length else f"{text[: length - 1]}…"
-
-
-def _save(figure: Figure, target: Path) -> None:
-    """Write beside the target first, so that nobody sees half a picture."""
-    target.parent.mkdir(parents=True, exist_ok=True)
-    handle, unfinished = tempfile.mkstemp(suffix=target.suffix, dir=target.parent)
-    os.close(handle)
-    try:
-        figure.savefig(unfinished, format=target.suffix[1:].lower())
-        os.chmod(unfinished, 0o644)
-        os.replace(unfinished, target)
-    except BaseException:
-        os.unlink(unfinished)
-        raise

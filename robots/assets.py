@@ -25,9 +25,16 @@ def locate(package: str, urdf: str, *, pictures: bool) -> Path:
 
     Raises:
         UnknownNameError: If the manifest has no such package or URDF.
-        AssetError: If some file could not be had from any source.
+        AssetError: If some file could not be had from any source, or pictures are asked for of a
+            URDF whose visual meshes nobody has.
     """
-    files = load_manifest().package(package).needed(urdf, pictures=pictures)
+    about = load_manifest().package(package)
+    files = about.needed(urdf, pictures=pictures)
+    if pictures and urdf in about.undrawable:
+        raise AssetError(
+            f"{package}/{urdf} cannot be drawn, as {about.origin.wheel} lacks some of its visual"
+            " meshes; without pictures it can be simulated"
+        )
     store = AssetStore(default_root())
     ensure(files, store, default_sources())
     return store.root / package / urdf

@@ -3,14 +3,33 @@
 from __future__ import annotations
 
 import math
+import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import MappingProxyType
-from typing import NoReturn, Protocol
+from typing import Any, NoReturn, Protocol
 
+from robots.action_split import ActionNumber, ActionSplit, JointGroup, names
 from robots.errors import DescriptorError, UnknownNameError
+
+__all__ = [
+    "CONTROL_MODES",
+    "IDENTITY",
+    "ActionNumber",
+    "ActionSplit",
+    "CameraMount",
+    "Fingers",
+    "GripperMaterial",
+    "Home",
+    "JointGroup",
+    "Quaternion",
+    "RobotDescriptor",
+    "UrdfSource",
+    "Vector3",
+    "names",
+]
 
 Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # wxyz
@@ -26,231 +45,6 @@ class UrdfSource(Protocol):
     def locate(self, *, pictures: bool = False) -> Path:
         """Return the path of a complete, checked URDF on this machine."""
         ...
-
-
-def names(prefix: str, first: int, last: int) -> tuple[str, ...]:
-    """Return ``prefix + str(i)`` for i from ``first`` to ``last``, both included."""
-    return tuple(f"{prefix}{i}" for i in range(first, last + 1))
-
-
-@dataclass(frozen=True)
-class JointGroup:
-    """Joints that are driven together, and the action numbers that drive them.
-
-    An action number in [-1, 1] is mapped linearly onto [lower, upper], and clipped before; if the
-    group is not ``normalised`` it is taken as it is. With ``delta`` the result is added to the
-    joint's current position, otherwise it is the target itself. The drive is PhysX's implicit
-    spring-damper in ``force`` mode.
-
-    Attributes:
-        joints: Joint names, in the order of the action numbers.
-        lower: Value at action -1, one number for all joints or one per action number
-            (``unit`` per control step when ``delta``, else ``unit``).
-        upper: Value at action +1, same form as ``lower``.
-        stiffness: Drive stiffness (N·m/rad or N/m).
-        damping: Drive damping (N·m·s/rad or N·s/m).
-        force_limit: Largest drive force (N·m or N).
-        delta: Whether the action moves the target relative to the current position.
-        mimic: Whether one action number drives every joint of the group (a parallel gripper).
-        unit: ``"rad"`` or ``"m"``.
-        friction: Joint friction coefficient (dimensionless).
-        reset_noise: Whether a reset adds joint noise to this group.
-        limits: The (lower, upper) limit of each joint, as its URDF has it (``unit``); needed by
-            control modes in which the action asks for positions.
-        normalised: Whether action numbers lie in [-1, 1]; if not, they are in ``unit`` and lie
-            in [lower, upper], but are not clipped.
-    """
-
-    joints: tuple[str, ...]
-    lower: float | tuple[float, ...]
-    upper: float | tuple[float, ...]
-    stiffness: float
-    damping: float
-    force_limit: float
-    delta: bool = False
-    mimic: bool = False
-    unit: str = "rad"
-    friction: float = 0.0
-    reset_noise: bool = True
-    limits: tuple[tuple[float, float], ...] = ()
-    normalised: bool = True
-
-    def __post_init__(self) -> None:
-        """Refuse empty groups, repeated joints, inverted ranges and non-physical drives."""
-        if not self.joints:
-            raise DescriptorError("a joint group needs at least one joint")
-        if len(set(self.joints)) != len(self.joints):
-            raise DescriptorError(f"a joint group names a joint twice: {self.joints}")
-        if self.unit not in ("rad", "m"):
-            raise DescriptorError(f"unit is {self.unit!r}; it must be 'rad' or 'm'")
-        for name in ("stiffness", "damping", "force_limit", "friction"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                raise DescriptorError(f"{name} is {value}; it must be finite and not negative")
-        for name, value in (("lower", self.lower), ("upper", self.upper)):
-            if isinstance(value, tuple) and len(value) != self.size:
-                raise DescriptorError(
-                    f"{name} has {len(value)} numbers; the group {self.joints} takes {self.size}"
-                )
-        if self.limits and len(self.limits) != len(self.joints):
-            raise DescriptorError(
-                f"limits has {len(self.limits)} pairs; the group has joints {self.joints}"
-            )
-        for low, high in (*self.ranges, *self.limits):
-            if not (math.isfinite(low) and math.isfinite(high) and low < high):
-                raise DescriptorError(f"range [{low}, {high}] of {self.joints} is not increasing")
-
-    @property
-    def size(self) -> int:
-        """How many action numbers the group takes: one if ``mimic``, else one per joint."""
-        return 1 if self.mimic else len(self.joints)
-
-    @property
-    def ranges(self) -> tuple[tuple[float, float], ...]:
-        """The (lower, upper) pair of each action number, in ``unit``."""
-        lower = self.lower if isinstance(self.lower, tuple) else (self.lower,) * self.size
-        upper = self.upper if isinstance(self.upper, tuple) else (self.upper,) * self.size
-        return tuple(zip(lower, upper, strict=True))
-
-    @property
-    def bounds(self) -> tuple[tuple[float, float], ...]:
-        """The least and the largest value of each action number: (-1, 1) if normalised."""
-        return ((-1.0, 1.0),) * self.size if self.normalised else self.ranges
-
-    def by_position(self) -> JointGroup:
-        """Return the group with actions that are joint positions (``unit``) within the limits.
-
-        Raises:
-            DescriptorError: If the group has no limits.
-        """
-        if not self.limits:
-            raise DescriptorError(
-                f"the joint group {self.joints} has no limits, which control by position needs;"
-                " give it limits=((lower, upper), ...), one pair per joint"
-            )
-        limits = self.limits[: self.size]
-        lower, upper = (tuple(limit[side] for limit in limits) for side in (0, 1))
-        return replace(self, lower=lower, upper=upper, delta=False, normalised=False)
-
-
-class ActionSplit(Mapping[str, slice]):
-    """The ordered joint groups of one robot, and the slice of its action that each one takes.
-
-    Behaves as a read-only mapping from group name to slice: for a Panda,
-    ``split["arm"] == slice(0, 7)`` and ``split["gripper"] == slice(7, 8)``.
-    """
-
-    __slots__ = ("_slices", "groups", "size")
-
-    groups: Mapping[str, JointGroup]
-    size: int
-
-    def __init__(self, **groups: JointGroup) -> None:
-        """Lay the groups' action numbers one after the other, in the order given.
-
-        Args:
-            groups: Joint groups by name, for example ``arm=JointGroup(...)``.
-
-        Raises:
-            DescriptorError: If there is no group, or a joint is in two groups.
-        """
-        if not groups:
-            raise DescriptorError("an action split needs at least one joint group")
-        joints = [joint for group in groups.values() for joint in group.joints]
-        twice = sorted({joint for joint in joints if joints.count(joint) > 1})
-        if twice:
-            raise DescriptorError(f"joints {twice} are in more than one group of the action split")
-        slices: dict[str, slice] = {}
-        start = 0
-        for name, group in groups.items():
-            slices[name] = slice(start, start + group.size)
-            start += group.size
-        object.__setattr__(self, "groups", MappingProxyType(dict(groups)))
-        object.__setattr__(self, "_slices", slices)
-        object.__setattr__(self, "size", start)
-
-    def __setattr__(self, name: str, value: object) -> None:
-        """Refuse: a split is frozen."""
-        raise AttributeError(f"ActionSplit is frozen; make a new one to change {name!r}")
-
-    def __getitem__(self, name: str) -> slice:
-        """Return the slice of the robot's action that drives the group ``name``."""
-        if name not in self._slices:
-            raise UnknownNameError("joint group", name, self._slices)
-        return self._slices[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """Iterate over the group names in action order."""
-        return iter(self._slices)
-
-    def __len__(self) -> int:
-        """Return the number of groups."""
-        return len(self._slices)
-
-    def __eq__(self, other: object) -> bool:
-        """Compare groups and their order."""
-        if not isinstance(other, ActionSplit):
-            return NotImplemented
-        return list(self.groups.items()) == list(other.groups.items())
-
-    def __hash__(self) -> int:
-        """Hash groups and their order."""
-        return hash(tuple(self.groups.items()))
-
-    def __repr__(self) -> str:
-        """Show the groups as they would be written."""
-        return f"ActionSplit({', '.join(f'{k}={v!r}' for k, v in self.groups.items())})"
-
-    def __reduce__(self) -> tuple[object, ...]:
-        """Pickle by the groups alone."""
-        return (_split_from_groups, (dict(self.groups),))
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Every driven joint, group after group."""
-        return tuple(joint for group in self.groups.values() for joint in group.joints)
-
-    def replace(self, **groups: JointGroup) -> ActionSplit:
-        """Return a split with some groups exchanged (new names go to the end)."""
-        return ActionSplit(**{**self.groups, **groups})
-
-
-def _split_from_groups(groups: dict[str, JointGroup]) -> ActionSplit:
-    return ActionSplit(**groups)
-
-
-@dataclass(frozen=True)
-class ActionNumber:
-    """One number of an action, as `RobotDescriptor.describe_action` tells it.
-
-    Attributes:
-        index: Position in the robot's action.
-        name: ``group.joint``; a mimic group has one number, named after the group.
-        group: The joint group it belongs to.
-        joints: The joints it drives.
-        unit: Unit of ``lower`` and ``upper``: rad or m, "per step" when relative.
-        lower: Effect of the least value.
-        upper: Effect of the largest value.
-        relative: Whether the effect is added to the current joint position.
-        normalised: Whether the number lies in [-1, 1]; if not, it is in ``unit`` itself, from
-            ``lower`` to ``upper``, and not clipped.
-    """
-
-    index: int
-    name: str
-    group: str
-    joints: tuple[str, ...]
-    unit: str
-    lower: float
-    upper: float
-    relative: bool
-    normalised: bool = True
-
-    def __str__(self) -> str:
-        """Return one readable line."""
-        sign = "+" if self.relative else ""
-        values = f"{self.lower:{sign}g} … {self.upper:{sign}g} {self.unit}"
-        return f"{self.index:>2}  {self.name:<24} {values}"
 
 
 @dataclass(frozen=True)
@@ -388,6 +182,33 @@ class RobotDescriptor:
         object.__setattr__(self, "keyframes", _Frozen(frozen))
         self.keyframe(self.home.keyframe)
 
+    @classmethod
+    def from_urdf(
+        cls,
+        path_or_name: str | os.PathLike[str],
+        name: str | None = None,
+        *,
+        quiet: bool = False,
+        **overrides: Any,
+    ) -> RobotDescriptor:
+        """Guess a robot from its URDF, and say on stderr what was guessed and why.
+
+        See `robots.from_urdf.guess_descriptor` for the arguments, the errors, and the guess with
+        its reasons and the data module to paste.
+
+        Args:
+            path_or_name: A URDF on this machine, or a name of the package robot_descriptions.
+            name: Registry name; None takes that of the URDF.
+            quiet: Whether to say nothing.
+            **overrides: Fields that are known better than guessed.
+        """
+        from robots.from_urdf import guess_descriptor
+
+        found = guess_descriptor(path_or_name, name, **overrides)
+        if not quiet:
+            print(found, file=sys.stderr)
+        return found.descriptor
+
     @property
     def joints(self) -> tuple[str, ...]:
         """Driven joints, in the order of the action split."""
@@ -395,9 +216,13 @@ class RobotDescriptor:
 
     @property
     def arm_joints(self) -> tuple[str, ...]:
-        """Joints of every group that is not called ``gripper``."""
-        groups = self.action_split.groups.items()
-        return tuple(j for name, group in groups if name != "gripper" for j in group.joints)
+        """Joints of every group that is neither called ``gripper`` nor held."""
+        driven = [
+            group
+            for name, group in self.action_split.groups.items()
+            if name != "gripper" and not group.held
+        ]
+        return tuple(joint for group in driven for joint in group.joints)
 
     @property
     def dof(self) -> int:
@@ -447,6 +272,8 @@ class RobotDescriptor:
         """Return name, unit and range of every action number, in order."""
         numbers: list[ActionNumber] = []
         for group_name, group in self.action_split.groups.items():
+            if group.held:
+                continue
             driven = [group.joints] if group.mimic else [(joint,) for joint in group.joints]
             for joints, (lower, upper) in zip(driven, group.ranges, strict=True):
                 numbers.append(

@@ -9,13 +9,15 @@ from pathlib import Path
 
 from robots.asset_sources import SourceError, find_mani_skill
 from robots.asset_store import AssetStore, FileState, default_root
-from robots.descriptor import RobotDescriptor
+from robots.descriptor import JointGroup, RobotDescriptor
 from robots.errors import AssetError, RobotLayoutsError, UnknownNameError
 from robots.fetch_assets import describe_file
 from robots.locator import LocalUrdf, UrdfLocator
 from robots.manifest import AssetFile, AssetPackage, load_manifest
 from robots.progress import size
 from robots.registry import RobotRegistry
+from robots.urdf_model import read_model
+from robots.urdf_reach import link_frame
 from robots.urdf_xml import UrdfJoint, read_joints
 
 
@@ -140,14 +142,24 @@ def _drives(robot: RobotDescriptor) -> Iterator[str]:
         rows.append(
             (
                 name,
-                str(len(group.joints)) + (" on one number" if group.mimic else ""),
-                f"{group.stiffness:g} {per}",
-                f"{group.damping:g} {per.replace('/', '·s/')}",
-                f"{group.force_limit:g} {force}",
+                str(len(group.joints)) + _how_driven(group),
+                f"{_numbers(group.stiffness)} {per}",
+                f"{_numbers(group.damping)} {per.replace('/', '·s/')}",
+                f"{_numbers(group.force_limit)} {force}",
                 f"{group.friction:g}",
             )
         )
     return _table(rows)
+
+
+def _how_driven(group: JointGroup) -> str:
+    if group.held:
+        return " held still"
+    return " on one number" if group.mimic else ""
+
+
+def _numbers(value: float | tuple[float, ...]) -> str:
+    return "/".join(f"{number:g}" for number in (value if isinstance(value, tuple) else (value,)))
 
 
 def _keyframes(robot: RobotDescriptor, urdf: Path | None) -> Iterator[str]:
@@ -159,16 +171,11 @@ def _keyframes(robot: RobotDescriptor, urdf: Path | None) -> Iterator[str]:
 
 def _tcp_places(robot: RobotDescriptor, urdf: Path) -> dict[str, Sequence[float]]:
     """Return the TCP link's position at each keyframe, in the base frame (m)."""
-    from yourdfpy import URDF
-
-    model = URDF.load(str(urdf), build_scene_graph=True, load_meshes=False)
-    places: dict[str, Sequence[float]] = {}
-    for name, qpos in robot.keyframes.items():
-        # By name: yourdfpy moves a mimic joint by itself, and counts it not.
-        by_name = dict(zip(robot.joints, qpos, strict=True))
-        model.update_cfg([by_name.get(joint, 0.0) for joint in model.actuated_joint_names])
-        places[name] = model.get_transform(robot.tcp_link)[:3, 3].tolist()
-    return places
+    model = read_model(_read(urdf), urdf.name)
+    return {
+        name: link_frame(model, robot.tcp_link, dict(zip(robot.joints, qpos, strict=True))).position
+        for name, qpos in robot.keyframes.items()
+    }
 
 
 def _gripper(robot: RobotDescriptor) -> Iterator[str]:

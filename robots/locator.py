@@ -53,8 +53,10 @@ class LocalUrdf:
             pictures: Whether the visual meshes are needed too.
 
         Raises:
-            AssetError: If the URDF or a mesh is missing, or it is no URDF.
+            AssetError: If the URDF or a mesh is missing, or it describes no robot (see
+                `robots.urdf_model.read_model`).
         """
+        from robots.urdf_model import read_model
         from robots.urdf_xml import read_references
 
         path = Path(self.path).expanduser().absolute()
@@ -62,6 +64,7 @@ class LocalUrdf:
             xml = path.read_bytes()
         except OSError as error:
             raise AssetError(f"cannot read the URDF {path}: {error.strerror}") from error
+        read_model(xml, path.as_posix())
         references = read_references(xml, path.as_posix(), exists=os.path.isfile)
         wanted = references.collision + (references.visual if pictures else ())
         missing = [mesh for mesh in wanted if not os.path.isfile(mesh)]

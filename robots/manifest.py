@@ -65,10 +65,17 @@ class AssetFile:
 
 @dataclass(frozen=True)
 class AssetPackage:
-    """The files of one package, sorted by path."""
+    """The files of one package, sorted by path.
+
+    Attributes:
+        origin: Where they come from.
+        files: The files.
+        undrawable: URDFs some of whose visual meshes nobody has; physics does not need them.
+    """
 
     origin: PackageOrigin
     files: tuple[AssetFile, ...]
+    undrawable: tuple[str, ...] = ()
 
     @property
     def urdfs(self) -> tuple[str, ...]:
@@ -80,7 +87,8 @@ class AssetPackage:
 
         Args:
             urdf: Path of the URDF inside the package.
-            pictures: Whether it will also be drawn.
+            pictures: Whether it will also be drawn; of one that is undrawable, physics is all
+                there is.
 
         Raises:
             UnknownNameError: If the package has no such URDF.
@@ -152,11 +160,13 @@ def _package_to_json(package: AssetPackage) -> dict[str, Any]:
         }
         for file in sorted(package.files, key=lambda file: file.path)
     }
-    return {**origin, "files": files}
+    undrawable = {"undrawable": list(package.undrawable)} if package.undrawable else {}
+    return {**origin, **undrawable, "files": files}
 
 
 def _package_from_json(name: str, data: dict[str, Any]) -> AssetPackage:
-    origin = PackageOrigin(name, **{key: data[key] for key in data if key != "files"})
+    about = {key: data[key] for key in data if key not in ("files", "undrawable")}
+    origin = PackageOrigin(name, **about)
     files = tuple(
         AssetFile(
             origin,
@@ -168,4 +178,4 @@ def _package_from_json(name: str, data: dict[str, Any]) -> AssetPackage:
         )
         for path, entry in data["files"].items()
     )
-    return AssetPackage(origin, files)
+    return AssetPackage(origin, files, tuple(data.get("undrawable", ())))

@@ -13,6 +13,7 @@ from robots.descriptor import (
 )
 from robots.locator import UrdfLocator
 
+FINGERS = ("panda_leftfinger", "panda_rightfinger")
 ARM = JointGroup(
     names("panda_joint", 1, 7),
     lower=-0.1,
@@ -50,14 +51,8 @@ PANDA = RobotDescriptor(
         ),
     ),
     tcp_link="panda_hand_tcp",
-    gripper_material=GripperMaterial(
-        links=("panda_leftfinger", "panda_rightfinger"),
-        static_friction=2.0,
-        dynamic_friction=2.0,
-        restitution=0.0,
-        patch_radius=0.1,
-    ),
-    fingers=Fingers(links=("panda_leftfinger", "panda_rightfinger")),
+    gripper_material=GripperMaterial(FINGERS, 2.0, 2.0, 0.0, patch_radius=0.1),
+    fingers=Fingers(FINGERS),
     keyframes={"rest": (0, pi / 8, 0, -5 * pi / 8, 0, 3 * pi / 4, pi / 4, 0.04, 0.04)},
     home=Home(position=(-0.615, 0.0, 0.0)),  # mani_skill 3.0.1, scene_builder/table
     reach=0.855,  # Franka Emika Panda data sheet, 2020

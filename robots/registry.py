@@ -11,10 +11,16 @@ ENTRY_POINT_GROUP = "robot_layouts.robots"
 
 # One line per robot, sorted by name: name -> module:attribute.
 CATALOGUE = {
+    "fetch": "robots.fetch:FETCH",
+    "floating_panda_gripper": "robots.floating_panda_gripper:FLOATING_PANDA_GRIPPER",
+    "koch": "robots.koch:KOCH",
+    "mobile_panda": "robots.mobile_panda:MOBILE_PANDA",
     "panda": "robots.panda:PANDA",
+    "panda_pinch": "robots.panda_pinch:PANDA_PINCH",
     "panda_stick": "robots.panda_stick:PANDA_STICK",
     "panda_wristcam": "robots.panda_wristcam:PANDA_WRISTCAM",
     "so100": "robots.so100:SO100",
+    "xarm7": "robots.xarm7:XARM7",
 }
 
 

@@ -12,6 +12,7 @@ from robots.descriptor import (
 )
 from robots.locator import UrdfLocator
 
+QUARTER = (-1.5708, 1.5708)
 JAWS = ("Fixed_Jaw", "Moving_Jaw")
 
 SO100 = RobotDescriptor(
@@ -26,13 +27,7 @@ SO100 = RobotDescriptor(
             stiffness=1e3,
             damping=1e2,
             force_limit=100.0,
-            limits=(
-                (-2.0, 2.0),
-                (-1.5708, 1.5708),
-                (-1.5708, 1.5708),
-                (-1.8, 1.8),
-                (-3.14159, 3.14159),
-            ),
+            limits=((-2.0, 2.0), QUARTER, QUARTER, (-1.8, 1.8), (-3.14159, 3.14159)),
         ),
         gripper=JointGroup(
             ("gripper",),
@@ -47,13 +42,7 @@ SO100 = RobotDescriptor(
     ),
     tcp_link="Fixed_Jaw",
     tcp_position_links=("Fixed_Jaw_tip", "Moving_Jaw_tip"),
-    gripper_material=GripperMaterial(
-        links=JAWS,
-        static_friction=2.0,
-        dynamic_friction=2.0,
-        restitution=0.0,
-        patch_radius=0.1,
-    ),
+    gripper_material=GripperMaterial(JAWS, 2.0, 2.0, 0.0, patch_radius=0.1),
     fingers=Fingers(links=JAWS, max_angle=110.0),  # the moving jaw swings, it does not slide
     keyframes={
         "rest": (0, -1.5708, 1.5708, 0.66, 0, -1.1),

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import posixpath
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 from xml.etree import ElementTree
 
 from robots.errors import AssetError
+
+Vector3 = tuple[float, float, float]
+
+_XACRO = "www.ros.org/wiki/xacro"  # of the namespace {http://www.ros.org/wiki/xacro}
 
 
 @dataclass(frozen=True)
@@ -59,7 +65,7 @@ def read_joints(xml: bytes, urdf: str) -> tuple[UrdfJoint, ...]:
         AssetError: If it is no URDF.
     """
     joints = parse_urdf(xml, urdf).iterfind("joint")
-    return tuple(_read_joint(joint) for joint in joints if joint.get("type") != "fixed")
+    return tuple(read_joint(joint, urdf) for joint in joints if joint.get("type") != "fixed")
 
 
 def read_links(xml: bytes, urdf: str) -> tuple[str, ...]:
@@ -77,7 +83,8 @@ def read_references(
     """Return the files a URDF refers to, as paths in the same folder tree as ``urdf``.
 
     A reference is relative to the URDF's folder. ``package://name/rest`` is read as ``name/rest``
-    below that folder, or as ``rest`` if only that ``exists``.
+    below that folder, or as ``rest`` there, or as ``name/rest`` below a folder around it,
+    whichever ``exists``.
 
     Args:
         xml: The URDF's contents.
@@ -92,9 +99,9 @@ def read_references(
     found: dict[str, set[str]] = {"collision": set(), "visual": set()}
     for kind, paths in found.items():
         for element in (*root.iterfind(f".//{kind}//mesh"), *root.iterfind(f".//{kind}//texture")):
-            paths.add(_resolve(element.get("filename", ""), folder, exists))
+            paths.add(resolve(element.get("filename", ""), folder, exists))
     for texture in root.iterfind("./material/texture"):
-        found["visual"].add(_resolve(texture.get("filename", ""), folder, exists))
+        found["visual"].add(resolve(texture.get("filename", ""), folder, exists))
     return UrdfReferences(
         collision=tuple(sorted(found["collision"])),
         visual=tuple(sorted(found["visual"] - found["collision"])),
@@ -105,7 +112,7 @@ def parse_urdf(xml: bytes, urdf: str) -> ElementTree.Element:
     """Return the ``<robot>`` element of a URDF.
 
     Raises:
-        AssetError: If the text is no XML, declares entities, or holds no robot.
+        AssetError: If the text is no XML, declares entities, holds no robot, or is a template.
     """
     if re.search(rb"<!(DOCTYPE|ENTITY)", xml, re.IGNORECASE):
         raise AssetError(f"{urdf} declares XML entities; a URDF has no use for them")
@@ -115,13 +122,23 @@ def parse_urdf(xml: bytes, urdf: str) -> ElementTree.Element:
         raise AssetError(f"{urdf} is not a URDF: {error}") from None
     if root.tag != "robot":
         raise AssetError(f"{urdf} is not a URDF: it holds <{root.tag}>, not <robot>")
+    templates = [element.tag for element in root.iter() if _XACRO in element.tag]
+    if templates:
+        raise AssetError(f"{urdf} is a xacro template; `xacro {urdf} > robot.urdf` makes a URDF")
     return root
 
 
-def _read_joint(joint: ElementTree.Element) -> UrdfJoint:
+def read_joint(joint: ElementTree.Element, urdf: str) -> UrdfJoint:
+    """Return what a ``<joint>`` element says of a joint.
+
+    Raises:
+        AssetError: If a limit is no number.
+    """
     limit, mimic = joint.find("limit"), joint.find("mimic")
-    numbers = {key: float(text) for key, text in (limit.items() if limit is not None else ())}
-    bounded = joint.get("type") != "continuous"
+    where = f"{urdf}: joint {joint.get('name', '')!r}"
+    given = [] if limit is None else [key for key in limit.keys() if key in _LIMITS]
+    numbers = {key: numbers_of(limit, key, (0.0,), where)[0] for key in given}
+    bounded = joint.get("type") in ("revolute", "prismatic")
     return UrdfJoint(
         name=joint.get("name", ""),
         type=joint.get("type", ""),
@@ -133,12 +150,61 @@ def _read_joint(joint: ElementTree.Element) -> UrdfJoint:
     )
 
 
-def _resolve(filename: str, folder: str, exists: Callable[[str], bool]) -> str:
+def numbers_of(
+    element: ElementTree.Element | None, attribute: str, default: tuple[float, ...], where: str
+) -> Any:
+    """Return the finite numbers of an attribute, as many as ``default`` has.
+
+    Args:
+        element: The element, or None for the default.
+        attribute: Its attribute.
+        default: What it means to leave the attribute out.
+        where: What the element belongs to, for messages.
+
+    Raises:
+        AssetError: If there are more or fewer numbers, or some that are none or not finite.
+    """
+    text = None if element is None else element.get(attribute)
+    if element is None or text is None:
+        return default
+    try:
+        numbers = tuple(map(float, text.split()))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != len(default) or not all(map(math.isfinite, numbers)):
+        raise AssetError(
+            f"{where} has {attribute}={text!r} in <{element.tag}>; {len(default)} finite"
+            f" number{'s are' if len(default) > 1 else ' is'} needed"
+        )
+    return numbers
+
+
+_LIMITS = ("lower", "upper", "effort", "velocity")
+
+
+def resolve(filename: str, folder: str, exists: Callable[[str], bool]) -> str:
+    """Return the path of a file that a URDF refers to; see `read_references`.
+
+    Args:
+        filename: The reference.
+        folder: Folder of the URDF.
+        exists: Whether a path exists.
+    """
     if filename.startswith("file://"):
         return posixpath.normpath(filename.removeprefix("file://"))
     reference = filename.removeprefix("package://")
     path = posixpath.normpath(posixpath.join(folder, reference))
-    if reference != filename and not exists(path):
-        shorter = posixpath.normpath(posixpath.join(folder, reference.partition("/")[2]))
-        return shorter if exists(shorter) else path
-    return path
+    if reference == filename:
+        return path
+    shorter = posixpath.normpath(posixpath.join(folder, reference.partition("/")[2]))
+    above = (posixpath.join(parent, reference) for parent in _parents(folder))
+    return next((found for found in (path, shorter, *above) if exists(found)), path)
+
+
+def _parents(folder: str) -> list[str]:
+    """Return the folders around an absolute folder, nearest first; none of a relative one."""
+    found: list[str] = []
+    while posixpath.isabs(folder) and posixpath.dirname(folder) != folder:
+        folder = posixpath.dirname(folder)
+        found.append(folder)
+    return found

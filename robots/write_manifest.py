@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import posixpath
+import re
 import sys
 from importlib import metadata
 from pathlib import Path
@@ -87,13 +89,13 @@ def build_package(name: str, mani_skill: Path, urdfs: set[str]) -> AssetPackage:
     )
     physics: dict[str, set[str]] = {}
     pictures: dict[str, set[str]] = {}
-    for urdf in urdfs:
-        _add_needs(folder, urdf, physics, pictures)
+    drawable = [_add_needs(folder, urdf, physics, pictures) for urdf in sorted(urdfs)]
+    undrawable = [urdf for urdf, can in zip(sorted(urdfs), drawable, strict=True) if not can]
     files = (
         _asset_file(origin, folder, path, physics.get(path, set()), pictures.get(path, set()))
         for path in sorted({*physics, *pictures})
     )
-    return AssetPackage(origin, tuple(files))
+    return AssetPackage(origin, tuple(files), tuple(undrawable))
 
 
 def _licence(folder: Path) -> tuple[str, str]:
@@ -104,14 +106,16 @@ def _licence(folder: Path) -> tuple[str, str]:
             "CC BY-NC 4.0",
             "Creative Commons Attribution-NonCommercial 4.0: name the authors, no commercial use",
         )
-    if own.read_text(encoding="utf-8").split()[:4] == ["Apache", "License", "Version", "2.0,"]:
+    beginning = " ".join(own.read_text(encoding="utf-8").split()[:20])  # after a copyright line
+    if "Apache License Version 2.0," in beginning:
         return "Apache-2.0", "Apache License 2.0: keep the licence file with the files"
     raise AssetError(f"{own} is a licence this command does not know; tell it in write_manifest.py")
 
 
 def _add_needs(
     folder: Path, urdf: str, physics: dict[str, set[str]], pictures: dict[str, set[str]]
-) -> None:
+) -> bool:
+    """Note what a URDF needs, and return whether all that its pictures need is there."""
     references = read_references(
         (folder / urdf).read_bytes(), urdf, exists=lambda path: (folder / path).is_file()
     )
@@ -119,8 +123,23 @@ def _add_needs(
     optional = [path for path in beside if (folder / path).is_file()]
     for path in (urdf, *optional, *references.collision):
         physics.setdefault(path, set()).add(urdf)
-    for path in references.visual:
+    visual = [*references.visual]
+    visual += [texture for mesh in references.visual for texture in _textures(folder, mesh)]
+    if not all((folder / path).is_file() for path in visual):
+        return False
+    for path in visual:
         pictures.setdefault(path, set()).add(urdf)
+    return True
+
+
+def _textures(folder: Path, mesh: str) -> list[str]:
+    """Return the images that a Collada mesh names."""
+    if not mesh.lower().endswith(".dae") or not (folder / mesh).is_file():
+        return []
+    text = (folder / mesh).read_text(encoding="utf-8", errors="replace")
+    images = re.findall(r"<init_from>([^<>]+\.(?:png|jpe?g|tga))</init_from>", text, re.IGNORECASE)
+    beside = posixpath.dirname(mesh)
+    return sorted({posixpath.normpath(posixpath.join(beside, image)) for image in images})
 
 
 def _asset_file(

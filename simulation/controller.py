@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from layouts import Layout
+from robots import JointGroup
 from simulation.arrays import Floats
 from simulation.world import World
 
@@ -26,18 +27,16 @@ class JointPositionController:
         self.action_dim = layout.action_dim
         ranges: list[tuple[float, float]] = []  # of each action number
         clipped: list[float] = []  # where each action number is clipped
-        source: list[int] = []  # action number that drives each joint
-        relative: list[bool] = []
+        drives: list[_Drive] = []  # of each driven joint
         active: list[int] = []  # place of each driven joint in the concatenated qpos
         joints_before = 0
         for name, placement in layout.items():
+            start = iter(placement.start_qpos)
             for group in placement.robot.action_split.groups.values():
-                first, count = len(ranges), len(group.joints)
+                drives.extend(_drives(group, len(ranges), [next(start) for _ in group.joints]))
                 # One that is not normalised is its own target: 0 + 1 · number.
                 ranges.extend(group.ranges if group.normalised else [(-1.0, 1.0)] * group.size)
                 clipped.extend([1.0 if group.normalised else np.inf] * group.size)
-                source.extend([first] * count if group.mimic else range(first, first + count))
-                relative.extend([group.delta] * count)
             robot = worlds[0].robots[name]
             active.extend(joints_before + i for i in robot.active_index)
             joints_before += len(robot.joints)
@@ -45,11 +44,13 @@ class JointPositionController:
         half = np.float32(0.5)
         self._highest: Floats = np.array(clipped, np.float32)
         self._lowest: Floats = -self._highest
-        self._source = np.array(source)
-        self._one_to_one = source == list(range(len(ranges)))
-        self._centre: Floats = (half * (high + low))[self._source]
-        self._half_range: Floats = (half * (high - low))[self._source]
-        self._relative = np.array(relative)
+        sources = [drive.source for drive in drives]
+        self._source = np.array(sources) % self.action_dim  # of what is held, any will do
+        self._one_to_one = sources == list(range(len(ranges)))
+        multipliers, offsets = np.array([drive[1:3] for drive in drives], np.float32).T
+        self._centre: Floats = multipliers * (half * (high + low))[self._source] + offsets
+        self._half_range: Floats = multipliers * (half * (high - low))[self._source]
+        self._relative = np.array([drive.relative for drive in drives])
         self._active = slice(None) if active == sorted(active) else np.array(active)
         self._setters: list[list[Any]] = [
             [joint.set_drive_target for robot in world.robots.values() for joint in robot.driven]
@@ -81,3 +82,29 @@ class JointPositionController:
         """
         for set_target, target in zip(self._setters[index], targets[index].tolist(), strict=True):
             set_target(target)
+
+
+class _Drive(NamedTuple):
+    """How one joint follows the action: multiplier · mapped number + offset, or relative to it."""
+
+    source: int
+    multiplier: float
+    offset: float
+    relative: bool
+
+
+def _drives(group: JointGroup, first: int, start: Sequence[float]) -> Iterator[_Drive]:
+    """Yield how each joint of a group is driven.
+
+    Args:
+        group: The group.
+        first: The first of its action numbers.
+        start: Where its joints start (rad, m).
+    """
+    for i, (multiplier, offset) in enumerate(group.followers):
+        if group.held:
+            yield _Drive(first, 0.0, start[i], relative=False)
+        else:
+            source = first if group.mimic else first + i
+            shift = 0.0 if group.delta else offset
+            yield _Drive(source, multiplier, shift, group.delta)

@@ -131,5 +131,7 @@ _ROBOT = "robot of this layout"
 
 
 def _as_slice(indices: list[int]) -> slice | list[int]:
+    if not indices:  # a hand without an arm
+        return slice(0, 0)
     contiguous = indices == list(range(indices[0], indices[0] + len(indices)))
     return slice(indices[0], indices[-1] + 1) if contiguous else indices

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,13 +12,27 @@ from sapien.wrapper.urdf_loader import URDFLoader
 
 from layouts import Placement
 from robots import DescriptorError, RobotDescriptor, UnknownNameError
+from robots.urdf_xml import resolve
 
 
-class _PhysicsOnlyLoader(URDFLoader):
-    """A URDF loader that drops visuals while parsing, so that no render device is needed."""
+class _Loader(URDFLoader):
+    """A URDF loader that finds every mesh that a locator found.
+
+    SAPIEN's own drops meshes of a ``package://`` whose folder has another name, saying so only in
+    its log. Visuals are dropped while parsing, so that no render device is needed.
+    """
+
+    def __init__(self, *, visuals: bool) -> None:
+        super().__init__()
+        self._visuals = visuals
 
     def _build_link(self, link: Any, link_builder: Any) -> None:
-        link.visuals = []
+        if not self._visuals:
+            link.visuals = []
+        for part in (*link.collisions, *link.visuals):
+            mesh = part.geometry.mesh
+            if mesh is not None and mesh.filename.startswith("package://"):
+                mesh.filename = resolve(mesh.filename, str(self.urdf_dir), os.path.isfile)
         super()._build_link(link, link_builder)
 
 
@@ -105,18 +120,16 @@ class SimulatedRobot:
     def _set_drives(self) -> None:
         joints = iter(self.driven)
         for group in self.descriptor.action_split.groups.values():
-            for _ in group.joints:
+            for drive in group.drives:
                 joint = next(joints)
-                joint.set_drive_properties(
-                    group.stiffness, group.damping, group.force_limit, "force"
-                )
+                joint.set_drive_properties(*drive, "force")
                 joint.set_friction(group.friction)
 
 
 def _load(
     scene: sapien.Scene, descriptor: RobotDescriptor, pose: sapien.Pose, *, visuals: bool
 ) -> Any:
-    loader: Any = URDFLoader() if visuals else _PhysicsOnlyLoader()
+    loader: Any = _Loader(visuals=visuals)
     loader.set_scene(scene)
     loader.fix_root_link = True
     if material := descriptor.gripper_material:

@@ -32,6 +32,8 @@ class Scenario:
         headless: No window is opened; the only choice.
         cameras: Cameras to observe with; none are offered yet.
         simulator: ``"sapien3"``.
+        check_layout: Whether to refuse a layout whose robots collide; the task's own layout is
+            never checked.
     """
 
     layout: Layout
@@ -45,6 +47,7 @@ class Scenario:
     headless: bool = True
     cameras: Sequence[Any] = field(default_factory=list[Any])
     simulator: str = "sapien3"
+    check_layout: bool = True
 
     def __setattr__(self, name: str, value: object) -> None:
         """Refuse fields that a scenario does not have."""
@@ -81,6 +84,8 @@ class Scenario:
             if value not in choices:
                 offered = ", ".join(map(repr, choices))
                 raise TaskError(f"{name} {value!r} is not offered; choices: {offered}")
+        if not isinstance(self.check_layout, bool):
+            raise TaskError(f"check_layout is {self.check_layout!r}; it must be True or False")
         if not self.headless:
             raise TaskError("headless=False is not offered: no window is opened; use render_mode")
         if self.cameras:

@@ -17,6 +17,7 @@ from robots import SimulationError, TaskError, unknown_name_message
 from simulation import PhysicsSettings, Simulation, State, World
 from simulation.arrays import Array, Floats
 from tasks.actions import ActionReader
+from tasks.layout_check import refuse_collisions
 from tasks.native_format import (
     StateDict,
     StateTape,
@@ -161,6 +162,7 @@ class MultiRobotTask:
 
         Raises:
             TaskError: If the scenario asks for what the task does not offer.
+            LayoutError: If the robots of a layout other than the task's own collide.
             AssetError: If robot files cannot be found.
         """
         scenario.check(self.reward_modes)
@@ -169,6 +171,8 @@ class MultiRobotTask:
                 f"{type(self).__name__} has the places {list(type(self).layout)};"
                 f" the layout has {list(scenario.layout)}"
             )
+        if scenario.check_layout and scenario.layout != type(self).layout:
+            refuse_collisions(scenario.layout)
         self.made_from = scenario
         self.layout = scenario.layout.in_control_mode(scenario.control_mode)
         self.num_envs = scenario.num_envs

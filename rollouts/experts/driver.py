@@ -41,7 +41,7 @@ class ArmDriver:
         goals = dict(zip(self._arm_joints, goal, strict=True))
         parts: list[Floats] = []
         for name, group in self._groups.items():
-            if name == "gripper":
+            if name == "gripper" or group.held:
                 parts.append(np.full(group.size, gripper))
             else:
                 parts.append(self._towards(group, goals, qpos))

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from layouts import face_to_face, single
+from layouts import Layout, around_table, face_to_face, from_maniskill, grid, ring, single
 from layouts.__main__ import main
 
 
@@ -37,12 +37,59 @@ def test_show_saves_a_picture_and_says_where(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
+    ("words", "layout"),
+    [
+        ("ring a=panda b=so100", ring({"a": "panda", "b": "so100"})),
+        ("ring a=panda --radius 0.5 --facing out", ring({"a": "panda"}, radius=0.5, facing="out")),
+        ("grid a=panda b=panda --columns 1", grid({"a": "panda", "b": "panda"}, columns=1)),
+        (
+            "around_table a=panda b=panda --edges west,west --table 1 2 --inset 0.2",
+            around_table(
+                {"a": "panda", "b": "panda"}, edges=["west", "west"], table=(1.0, 2.0), inset=0.2
+            ),
+        ),
+        (
+            "face_to_face a=panda b=so100 --spacing auto",
+            face_to_face({"a": "panda", "b": "so100"}, spacing="auto"),
+        ),
+        ("PushT-v1", from_maniskill("PushT-v1")),
+    ],
+)
+def test_show_takes_what_presets_take_and_saves_it(words, layout, tmp_path, capsys):
+    path = tmp_path / "cell.yaml"
+    status, out, err = run("show", *words.split(), "--save", str(path), capsys=capsys)
+    assert (status, out, err) == (0, f"{layout}\nlayout: {path}\n", "")
+    assert Layout.load(path) == layout
+
+
+def test_show_reads_a_file(tmp_path, capsys):
+    layout = around_table({"a": "panda", "b": "so100"})
+    path = layout.save(tmp_path / "cell.yaml")
+    assert run("show", str(path), capsys=capsys) == (0, f"{layout}\n", "")
+
+
+def test_show_names_file_and_line(tmp_path, capsys):
+    path = tmp_path / "cell.yml"
+    path.write_text("version: 1\nrobots:\n  a: {robot: pandas}\n")
+    status, out, err = run("show", str(path), capsys=capsys)
+    assert (status, out) == (1, "")
+    assert err.startswith(f"error: {path}, line 3: unknown robot 'pandas'. Did you mean 'panda'?")
+
+
+@pytest.mark.parametrize(
     ("words", "message"),
     [
         ("face_to_fase a=panda b=panda", "unknown layout preset 'face_to_fase'. Did you mean"),
         ("single arm=panda --spacing 1", "single takes no --spacing; it takes --keyframe"),
         ("face_to_face a=panda b=panda", "face_to_face needs --spacing"),
         ("side_by_side a=panda --spacing nan", "spacing is nan m"),
+        ("PushT-v1 arm=panda", "PushT-v1 says it all; it takes no arm=panda"),
+        ("PushT-v1 --radius 1", "PushT-v1 says it all; it takes no --radius"),
+        ("PushT-v2", "unknown layout preset 'PushT-v2'. Did you mean 'PushT-v1'?"),
+        ("none.yaml", "cannot read the layout 'none.yaml': No such file"),
+        ("ring", "a layout needs at least one robot"),
+        ("ring a=panda --facing in", "unknown way to face 'in'"),
+        ("ring a=panda --radius -1", "radius is -1.0 m; it must be finite and greater than 0"),
         ("single arm=pandas", "unknown robot 'pandas'. Did you mean 'panda'?"),
         ("single panda", "'panda' should be name=robot, for example left=panda"),
         ("face_to_face a=panda a=panda --spacing 1", "name 'a' is given twice"),

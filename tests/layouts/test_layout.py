@@ -227,6 +227,11 @@ class TestText:
         assert left.split() == "1 left panda_wristcam 0:8 0, -0.75, 0 90° rest 0.855".split()
         assert right.split() == "2 right panda_stick 8:15 0, 0.75, 0 -90° rest 0.855".split()
 
+    def test_facing_is_where_the_robot_reaches_whatever_its_bases_x_axis(self):
+        for robot in RobotRegistry.names():
+            row = str(side_by_side({"arm": robot}, spacing=1.0, keyframe=None)).splitlines()[2]
+            assert row.split()[4:8] == ["0,", "0,", "0", "0°"]
+
     def test_a_tilted_base_shows_its_quaternion(self):
         layout = Layout({"arm": Placement("panda", quaternion=(0.6, 0.8, 0.0, 0.0))})
         assert "wxyz 0.6, 0.8, 0, 0" in str(layout)
@@ -237,9 +242,8 @@ class TestText:
 
 
 def test_importing_layouts_loads_neither_simulator_nor_arrays():
-    script = (
-        "import sys, layouts; print({'sapien', 'torch', 'numpy', 'matplotlib'} & {*sys.modules})"
-    )
+    heavy = {"sapien", "torch", "numpy", "matplotlib", "yaml", "trimesh", "fcl", "yourdfpy"}
+    script = f"import sys, layouts, layouts.__main__; print({heavy} & {{*sys.modules}})"
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     )

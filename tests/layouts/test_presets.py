@@ -1,18 +1,55 @@
 """Presets: where each puts its robots, which way they face, and what it refuses."""
 
+import dataclasses
 import math
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from layouts import face_to_face, side_by_side, single, yaw_quaternion
-from layouts.orientation import forward, upward, yaw_degrees
-from layouts.presets import PRESETS
-from robots import LayoutError, UnknownNameError
+from layouts import (
+    Layout,
+    around_table,
+    face_to_face,
+    grid,
+    ring,
+    side_by_side,
+    single,
+    yaw_quaternion,
+)
+from layouts.frames import EDGES, table_outlines
+from layouts.orientation import forward, multiplied, rotated, upward, yaw_degrees
+from layouts.presets import HAND_OVER, PRESETS
+from robots import LayoutError, RobotRegistry, UnknownNameError
 
 spacings = st.floats(min_value=1e-3, max_value=100.0)
-counts = {"single": 1, "side_by_side": 3, "face_to_face": 2}
+counts = {
+    "single": 1,
+    "side_by_side": 3,
+    "face_to_face": 2,
+    "ring": 5,
+    "around_table": 6,
+    "grid": 5,
+}
+mixed = st.lists(st.sampled_from(RobotRegistry.names()), min_size=1, max_size=9).map(
+    lambda robots: {f"arm_{i}": robot for i, robot in enumerate(robots)}
+)
+PANDA = RobotRegistry.load("panda")
+# Robots of any size, from a toy to a crane.
+sized = st.lists(st.floats(0.1, 10.0), min_size=1, max_size=9).map(
+    lambda sizes: {
+        f"arm_{i}": dataclasses.replace(PANDA, name=f"robot_{i}", reach=reach)
+        for i, reach in enumerate(sizes)
+    }
+)
+
+
+def distance(layout, first, second):
+    return math.dist(layout[first].base_position, layout[second].base_position)
+
+
+def reaches(layout, *names):
+    return [layout[name].robot.reach for name in names]
 
 
 def build(preset, **options):
@@ -86,7 +123,7 @@ def test_a_wrong_number_of_robots(preset, names, message):
 @pytest.mark.parametrize("preset", PRESETS)
 class TestEveryPreset:
     def options(self, preset):
-        return {} if preset == "single" else {"spacing": 1.0}
+        return {"spacing": 1.0} if preset in ("side_by_side", "face_to_face") else {}
 
     def test_keeps_names_and_order(self, preset):
         layout = build(preset, **self.options(preset))
@@ -95,7 +132,41 @@ class TestEveryPreset:
     def test_robots_stand_upright_on_the_ground(self, preset):
         for placement in build(preset, **self.options(preset)).values():
             assert placement.base_position[2] == 0.0
-            assert upward(placement.base_quaternion) == (0.0, 0.0, 1.0)
+            assert upward(placement.base_quaternion) == pytest.approx((0.0, 0.0, 1.0), abs=1e-12)
+
+    def test_is_pure(self, preset):
+        robots = {f"arm_{i}": "panda" for i in range(counts[preset])}
+        given = dict(robots)
+        one, other = (PRESETS[preset](robots, **self.options(preset)) for _ in range(2))
+        assert one == other
+        assert list(robots.items()) == list(given.items())
+
+    def test_permuting_robots_permutes_slices_and_leaves_every_base_in_its_place(self, preset):
+        robots = {f"arm_{i}": "panda" for i in range(counts[preset])}
+        backwards = dict(reversed(robots.items()))
+        layout = PRESETS[preset](robots, **self.options(preset))
+        permuted = PRESETS[preset](backwards, **self.options(preset))
+        assert list(permuted) == list(backwards)
+        assert [p.base_pose for p in permuted.values()] == [p.base_pose for p in layout.values()]
+        reordered = Layout({name: layout[name] for name in backwards}, layout.frames)
+        assert reordered.action_split == permuted.action_split
+        assert {n: p.base_pose for n, p in reordered.items()} == {
+            n: p.base_pose for n, p in layout.items()
+        }
+
+    def test_no_robot(self, preset):
+        with pytest.raises(LayoutError, match="at least one robot|places . robots?; 0 given"):
+            PRESETS[preset]({}, **self.options(preset))
+
+    def test_a_robot_with_another_front_faces_as_a_panda_would(self, preset):
+        names = [f"arm_{i}" for i in range(counts[preset])]
+        pandas, others = (
+            PRESETS[preset](dict.fromkeys(names, robot), **self.options(preset))
+            for robot in ("panda", "so100")
+        )
+        for name in names:
+            ahead = forward(others[name].facing)
+            assert ahead == pytest.approx(forward(pandas[name].facing), abs=1e-12)
 
     def test_unknown_robot(self, preset):
         robots = {f"arm_{i}": "pandaa" for i in range(counts[preset])}
@@ -105,6 +176,256 @@ class TestEveryPreset:
     def test_unknown_keyframe(self, preset):
         with pytest.raises(UnknownNameError, match="keyframe of panda 'folded'"):
             build(preset, keyframe="folded", **self.options(preset))
+
+
+def test_native_poses_are_exact_to_the_last_bit():
+    layout = face_to_face({"left": "panda_wristcam", "right": "panda_wristcam"}, spacing=1.5)
+    for name, sign in (("left", 1), ("right", -1)):
+        half = sign * math.pi / 4
+        assert layout[name].base_quaternion == (math.cos(half), 0.0, 0.0, math.sin(half))
+        assert str(layout[name].base_position[0]) == "0.0"
+
+
+def apart(layout, *pair):
+    """How far apart two robots stand if nothing else matters (m)."""
+    return max(HAND_OVER * sum(reaches(layout, *pair)), *reaches(layout, *pair))
+
+
+class TestAutomaticDistances:
+    @given(sized)
+    def test_in_a_row_every_pair_of_neighbours_can_hand_over(self, robots):
+        layout = side_by_side(robots, spacing="auto")
+        names = list(layout)
+        for pair in zip(names, names[1:], strict=False):
+            length = distance(layout, *pair)
+            assert length == pytest.approx(apart(layout, *pair))
+            assert length < sum(reaches(layout, *pair)), "workspaces overlap"
+            assert length >= max(reaches(layout, *pair)) - 1e-9, "bases are out of reach"
+        ys = [placement.base_position[1] for placement in layout.values()]
+        assert ys[0] == pytest.approx(-ys[-1])
+
+    @given(sized.filter(lambda robots: len(robots) > 1))
+    def test_in_a_ring_every_pair_of_neighbours_can_hand_over(self, robots):
+        layout = ring(robots, radius="auto")
+        names = list(layout)
+        for pair in zip(names, [*names[1:], names[0]], strict=True):
+            assert distance(layout, *pair) == pytest.approx(apart(layout, *pair), abs=1e-6)
+        radii = [math.hypot(*placement.base_position) for placement in layout.values()]
+        assert max(radii) == pytest.approx(min(radii))
+        for placement in layout.values():
+            inwards = [-x / radii[0] for x in placement.base_position]
+            assert forward(placement.facing) == pytest.approx(inwards, abs=1e-9)
+
+    @pytest.mark.parametrize("count", range(2, 9))
+    def test_a_ring_of_equals_is_regular(self, count):
+        layout = ring({f"arm_{i}": "panda" for i in range(count)}, radius="auto")
+        radius = HAND_OVER * 0.855 / math.sin(math.pi / count)
+        assert layout == ring({f"arm_{i}": "panda" for i in range(count)}, radius=radius)
+
+    @given(sized)
+    def test_in_a_grid_nobody_reaches_a_neighbours_base(self, robots):
+        layout = grid(robots, spacing="auto", columns=2)
+        names = list(layout)
+        pairs = [*zip(names[::2], names[1::2], strict=False), *zip(names, names[2:], strict=False)]
+        if pairs:
+            least = min(apart(layout, *pair) for pair in pairs)
+            farthest = max(reach for pair in pairs for reach in reaches(layout, *pair))
+            lengths = [distance(layout, *pair) for pair in pairs]
+            assert lengths == pytest.approx([max(least, farthest)] * len(pairs))
+
+    @given(sized)
+    def test_across_a_table_every_pair_can_hand_over(self, robots):
+        names = list(robots)[:4]
+        layout = around_table({name: robots[name] for name in names})
+        for pair in (names[:2], names[2:]):
+            if len(pair) == 2:
+                length = HAND_OVER * sum(reaches(layout, *pair))
+                assert distance(layout, *pair) == pytest.approx(length)
+
+    @given(sized)
+    def test_at_any_table_nobody_stands_beyond_its_middle(self, robots):
+        layout = around_table(robots, table=(0.9, 0.5))
+        for placement in layout.values():
+            assert placement.position[0] >= 0.1
+            assert placement.position[0] <= {"n": 0.25, "s": 0.25}.get(placement.on[6], 0.45)
+
+    def test_two_pandas_stand_as_far_apart_as_in_native_to_within_a_centimetre(self):
+        layout = face_to_face({"a": "panda", "b": "panda"}, spacing="auto")
+        assert distance(layout, "a", "b") == pytest.approx(1.5, abs=0.01)
+
+    @given(mixed)
+    def test_one_robot_at_a_table_or_in_a_ring_reaches_the_middle(self, robots):
+        name, robot = next(iter(robots.items()))
+        for layout in (ring({name: robot}), around_table({name: robot})):
+            assert math.hypot(*layout[name].base_position) == pytest.approx(
+                HAND_OVER * layout[name].robot.reach
+            )
+
+    @pytest.mark.parametrize("preset", [side_by_side, face_to_face, grid, ring])
+    def test_another_word_is_refused(self, preset):
+        word = {"radius" if preset is ring else "spacing": "automatic"}
+        with pytest.raises(LayoutError, match="is 'automatic'; it takes a number .* or 'auto'"):
+            preset({"a": "panda", "b": "panda"}, **word)
+
+
+class TestRing:
+    @given(mixed, spacings, st.sampled_from(["centre", "out", "tangent"]))
+    def test_turned_by_one_place_it_is_itself(self, robots, radius, facing):
+        layout = ring(robots, radius=radius, facing=facing)
+        turn = yaw_quaternion(2 * math.pi / len(layout))
+        placements = list(layout.values())
+        for one, following in zip(placements, [*placements[1:], placements[0]], strict=True):
+            turned = rotated(turn, one.base_position)
+            assert turned == pytest.approx(following.base_position, abs=1e-9 * (1 + radius))
+            ahead = forward(multiplied(turn, one.facing))
+            assert ahead == pytest.approx(forward(following.facing), abs=1e-9)
+
+    @given(mixed, spacings, st.integers(1, 8))
+    def test_robots_given_from_another_one_on_stand_in_the_same_ring_turned(
+        self, robots, radius, shift
+    ):
+        names = list(robots)
+        shift %= len(names)
+        shifted = {name: robots[name] for name in [*names[shift:], *names[:shift]]}
+        turned = ring(shifted, radius=radius).moved(yaw=shift * 2 * math.pi / len(names))
+        for name, placement in ring(robots, radius=radius).items():
+            expected = pytest.approx(placement.base_position, abs=1e-9 * (1 + radius))
+            assert turned[name].base_position == expected
+            ahead = pytest.approx(forward(placement.facing), abs=1e-9)
+            assert forward(turned[name].facing) == ahead
+
+    @pytest.mark.parametrize(("facing", "sign"), [("centre", -1), ("out", 1)])
+    def test_robots_face_the_centre_or_away(self, facing, sign):
+        layout = ring({f"arm_{i}": "so100" for i in range(5)}, radius=2.0, facing=facing)
+        for placement in layout.values():
+            outwards = [sign * x / 2.0 for x in placement.base_position]
+            assert forward(placement.facing) == pytest.approx(outwards, abs=1e-9)
+
+    def test_tangent_is_counterclockwise_towards_the_next(self):
+        layout = ring({f"arm_{i}": "panda" for i in range(4)}, radius=1.0, facing="tangent")
+        assert [yaw_degrees(p.facing) for p in layout.values()] == pytest.approx(
+            [0, 90, 180, -90]
+        ) or yaw_degrees(layout["arm_2"].facing) == pytest.approx(-180)
+        assert layout["arm_1"].base_position == (1.0, 0.0, 0.0)
+
+    @given(spacings)
+    def test_two_stand_face_to_face(self, radius):
+        robots = {"a": "panda", "b": "so100"}
+        two = ring(robots, radius=radius, keyframe="rest")
+        pair = face_to_face(robots, spacing=2 * radius)
+        for name in robots:
+            assert two[name].base_position == pytest.approx(pair[name].base_position)
+            assert two[name].base_quaternion == pytest.approx(pair[name].base_quaternion)
+
+    def test_each_robot_starts_from_its_home_keyframe(self):
+        layout = ring({"a": "panda_wristcam", "b": "panda"})
+        assert [p.start_keyframe for p in layout.values()] == ["tabletop", "rest"]
+
+    @pytest.mark.parametrize("radius", [0, -1.0, math.nan, math.inf, True])
+    def test_a_radius_that_is_no_distance(self, radius):
+        with pytest.raises(LayoutError, match="radius is .* m; it must be finite and greater"):
+            ring({"a": "panda"}, radius=radius)
+
+    def test_an_unknown_way_to_face(self):
+        with pytest.raises(UnknownNameError, match="'center'. Did you mean 'centre'"):
+            ring({"a": "panda"}, facing="center")
+
+
+class TestAroundTable:
+    def test_four_stand_at_the_middles_of_the_edges_and_look_across(self):
+        robots = {f"arm_{i}": "panda" for i in range(4)}
+        layout = around_table(robots, table=(1.2, 0.8), inset=0.1)
+        expected = [(0, -0.3), (0, 0.3), (-0.5, 0), (0.5, 0)]
+        for placement, (x, y) in zip(layout.values(), expected, strict=True):
+            assert placement.base_position == pytest.approx((x, y, 0), abs=1e-12)
+            length = math.hypot(x, y)
+            towards = (-x / length, -y / length, 0)
+            assert forward(placement.facing) == pytest.approx(towards, abs=1e-12)
+
+    @given(mixed, st.randoms(use_true_random=False))
+    def test_everyone_stands_on_the_table_near_its_own_edge(self, robots, random):
+        edges = {name: random.choice(list(EDGES)) for name in robots}
+        layout = around_table(robots, edges=edges, inset=0.1)
+        corners = next(iter(table_outlines(layout.frame_poses).values()))
+        width, depth = (2 * max(corner[i] for corner in corners) for i in (0, 1))
+        sides = {
+            "north": lambda x, y: depth / 2 - y,
+            "east": lambda x, y: width / 2 - x,
+            "south": lambda x, y: depth / 2 + y,
+            "west": lambda x, y: width / 2 + x,
+        }
+        for name, placement in layout.items():
+            x, y, _ = placement.base_position
+            assert sides[edges[name]](x, y) == pytest.approx(0.1)
+            assert all(margin(x, y) >= 0.1 - 1e-9 for margin in sides.values())
+
+    def test_robots_on_one_edge_share_it_from_right_to_left(self):
+        robots = {"a": "panda", "b": "panda", "c": "panda"}
+        layout = around_table(robots, edges=["south", "south", "south"], table=(3.0, 1.0))
+        assert [p.base_position[0] for p in layout.values()] == pytest.approx([1.0, 0.0, -1.0])
+
+    def test_neighbours_on_one_edge_of_an_automatic_table_can_hand_over(self):
+        robots = {"a": "panda", "b": "so100", "c": "so100"}
+        layout = around_table(robots, edges=["west", "west", "west"], inset=0.1)
+        assert distance(layout, "a", "b") == pytest.approx(HAND_OVER * (0.855 + 0.44))
+        assert distance(layout, "b", "c") == pytest.approx(HAND_OVER * 2 * 0.44)
+
+    def test_edges_by_name_may_come_in_any_order(self):
+        robots = {"a": "panda", "b": "panda"}
+        layout = around_table(robots, edges={"b": "north", "a": "east"})
+        assert [placement.on for placement in layout.values()] == ["table.east", "table.north"]
+
+    @pytest.mark.parametrize(
+        ("options", "error", "message"),
+        [
+            ({"edges": ["north", "sout"]}, UnknownNameError, "table edge 'sout'. .*'south'"),
+            ({"edges": ["north"]}, LayoutError, r"takes one edge for each of \['a', 'b'\]"),
+            ({"edges": "ns"}, LayoutError, "edges is 'ns'; it takes one edge for each"),
+            ({"edges": {"a": "north"}}, LayoutError, "edges gives no edge for 'b'"),
+            ({"edges": {"a": "north", "c": "north"}}, UnknownNameError, "robot at the table 'c'"),
+            ({"table": "large"}, LayoutError, "table is 'large'; it takes width and depth"),
+            ({"table": (1.0,)}, LayoutError, "it takes width and depth"),
+            ({"table": (1.0, math.nan)}, LayoutError, "the table's depth is nan m; it must"),
+            ({"table": (1.0, 0.2)}, LayoutError, "with an inset of 0.1 m it must be more than 0.2"),
+            ({"inset": -0.1}, LayoutError, "inset is -0.1 m; it must be finite and greater than 0"),
+            ({"inset": "far"}, LayoutError, "inset is 'far'; it takes a number"),
+        ],
+    )
+    def test_refusals(self, options, error, message):
+        with pytest.raises(error, match=message):
+            around_table({"a": "panda", "b": "panda"}, **options)
+
+
+class TestGrid:
+    @given(mixed, st.integers(1, 10), spacings)
+    def test_neighbours_are_one_spacing_apart_in_rows_along_y(self, robots, columns, spacing):
+        layout = grid(robots, columns=columns, spacing=spacing)
+        places = [placement.base_position for placement in layout.values()]
+        per_row = min(columns, len(places))
+        for i, (x, y, _) in enumerate(places):
+            row, column = divmod(i, per_row)
+            assert x - places[0][0] == pytest.approx(row * spacing)
+            assert y - places[0][1] == pytest.approx(column * spacing)
+        assert places[0][1] == pytest.approx(-(per_row - 1) / 2 * spacing)
+
+    @given(st.integers(1, 6), spacings)
+    def test_one_row_stands_side_by_side(self, count, spacing):
+        robots = {f"arm_{i}": "panda" for i in range(count)}
+        row = grid(robots, spacing=spacing, columns=10, keyframe="rest")
+        pair = side_by_side(robots, spacing=spacing)
+        for name in robots:
+            assert row[name].base_position == pytest.approx(pair[name].base_position)
+            assert row[name].base_quaternion == pair[name].base_quaternion
+
+    def test_left_out_columns_make_it_square(self):
+        layout = grid({f"arm_{i}": "panda" for i in range(9)}, spacing=1.0)
+        places = {placement.base_position[:2] for placement in layout.values()}
+        assert places == {(x, y) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)}
+
+    @pytest.mark.parametrize("columns", [0, -1, 1.5, "2", True])
+    def test_columns_that_are_no_count(self, columns):
+        with pytest.raises(LayoutError, match="columns is .*; it must be 1 or a larger whole"):
+            grid({"a": "panda"}, columns=columns)
 
 
 @given(st.floats(min_value=-179.9, max_value=179.9))

@@ -6,33 +6,44 @@ import sys
 import numpy as np
 import pytest
 
-from layouts import Layout, Placement, face_to_face, side_by_side, single, yaw_quaternion
+from layouts import (
+    Layout,
+    Placement,
+    around_table,
+    ceiling,
+    face_to_face,
+    grid,
+    ring,
+    side_by_side,
+    single,
+    wall,
+)
 from layouts.preview import DOTS_PER_INCH, SUPPORTED, WIDTH, draw
 from robots import LayoutError, MissingPackageError
 
 
-def ring(count, radius=0.9):
-    """Place robots on a circle, facing its centre."""
+def mixed(count):
     robots = ("panda", "panda_stick", "panda_wristcam")
-    angles = [2 * math.pi * i / count for i in range(count)]
-    return Layout(
-        {
-            f"arm_{i}": Placement(
-                robots[i % len(robots)],
-                position=(radius * math.cos(angle), radius * math.sin(angle), 0.0),
-                quaternion=yaw_quaternion(angle + math.pi),
-            )
-            for i, angle in enumerate(angles)
-        }
-    )
+    return {f"arm_{i}": robots[i % len(robots)] for i in range(count)}
 
 
 LAYOUTS = {
     "one": single({"arm": "panda"}),
     "two": face_to_face({"left": "panda_wristcam", "right": "panda_stick"}, spacing=1.5),
     "three": side_by_side({"a": "panda", "b": "panda_stick", "c": "panda"}, spacing=0.7),
-    "six": ring(6),
-    "many": ring(13),
+    "six": ring(mixed(6), radius=0.9),
+    "many": ring(mixed(13), radius=0.9),
+    "eight": ring({**mixed(7), "small": "so100"}),
+    "table": around_table(mixed(5)),
+    "grid": grid(mixed(7)),
+    "hanging": Layout(
+        {
+            "above": Placement("panda", on="roof"),
+            "beside": Placement("panda_stick", on="wall"),
+            "second": Placement("so100", (0.0, 0.5, 0.0), on="above"),
+        },
+        {"roof": ceiling(1.5), "wall": wall((1.0, 0.5, 0.5), yaw=math.pi)},
+    ),
     "upwards": Layout({"arm": Placement("panda", quaternion=(0.5**0.5, 0, -(0.5**0.5), 0))}),
 }
 
@@ -172,3 +183,14 @@ def test_a_failed_save_keeps_the_old_picture(monkeypatch, tmp_path):
         LAYOUTS["two"].preview(path)
     assert path.read_text() == "old"
     assert [file.name for file in tmp_path.iterdir()] == ["cell.png"]
+
+
+def test_a_table_of_frames_is_drawn():
+    layout = around_table({"arm": "panda"}, table=(2.0, 1.0)).moved(yaw=0.3)
+    image, _ = pixels(layout)
+    on_table, off_table = (
+        image[len(image) - round(y), round(x)].tolist()
+        for x, y in draw(layout).axes[0].transData.transform([(0.74, 0.648), (-0.9, 0.4)])
+    )
+    assert on_table != [255, 255, 255]
+    assert off_table == [255, 255, 255]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from robots import AssetError, RobotRegistry, UnknownNameError, UrdfLocator, ass
 from robots.asset_sources import InstalledManiSkill, LocalCopy, SourceError
 from robots.asset_store import AssetStore, FileState, default_root
 from robots.assets import ensure
+from robots.manifest import load_manifest
 from robots.urdf_xml import read_references
 from tests.robots.conftest import PANDA, contents
 
@@ -41,12 +43,17 @@ def right(files) -> dict[str, bytes]:
 @pytest.mark.parametrize("pictures", [False, True])
 def test_locate_returns_a_urdf_whose_files_are_all_there(robot, pictures, monkeypatch):
     monkeypatch.setattr("robots.assets.default_sources", lambda: [InstalledManiSkill()])
-    urdf = RobotRegistry.load(robot).urdf.locate(pictures=pictures)
-    references = read_references(urdf.read_bytes(), urdf.as_posix())
-    wanted = references.collision + (references.visual if pictures else ())
+    locator = RobotRegistry.load(robot).urdf
+    package = load_manifest().package(locator.package)
+    drawn = pictures and locator.file not in package.undrawable
+    urdf = locator.locate(pictures=drawn)
+    references = read_references(urdf.read_bytes(), urdf.as_posix(), os.path.isfile)
+    wanted = references.collision + (references.visual if drawn else ())
     assert wanted
     assert [path for path in wanted if not Path(path).is_file()] == []
-    assert urdf.with_suffix(".srdf").is_file()
+    paths = {file.path for file in package.files}
+    srdf = locator.file.replace(".urdf", ".srdf")
+    assert urdf.with_suffix(".srdf").is_file() == (srdf in paths)
 
 
 def test_locate_tries_the_hub_then_the_installed_package(capfd):
@@ -237,4 +244,5 @@ def test_the_local_copy_is_where_it_is_said_to_be(monkeypatch, tmp_path):
 def test_pictures_are_a_superset_of_physics():
     for urdf in PANDA.urdfs:
         physics = set(PANDA.needed(urdf, pictures=False))
-        assert physics < set(PANDA.needed(urdf, pictures=True))
+        pictures = set(PANDA.needed(urdf, pictures=True))
+        assert physics == pictures if urdf in PANDA.undrawable else physics < pictures

@@ -28,6 +28,11 @@ def group(**changes) -> JointGroup:
         ({"damping": math.nan}, "damping is nan; it must be finite and not negative"),
         ({"force_limit": math.inf}, "force_limit is inf; it must be finite"),
         ({"friction": -0.1}, "friction is -0.1; it must be finite"),
+        ({"stiffness": (1.0,)}, "stiffness has 1 numbers; the group has joints ('a', 'b')"),
+        ({"damping": (1.0, -2.0)}, "damping is -2.0; it must be finite and not negative"),
+        ({"multipliers": (1.0, -1.0)}, "only a mimic group has multipliers; ('a', 'b') is none"),
+        ({"mimic": True, "offsets": (0.0,)}, "offsets has 1 numbers; the group has joints"),
+        ({"mimic": True, "offsets": (0.0, math.nan)}, "offsets of ('a', 'b') are not finite"),
         ({"lower": (-1.0,)}, "lower has 1 numbers; the group ('a', 'b') takes 2"),
         ({"upper": (1.0, 2.0), "mimic": True}, "upper has 2 numbers; the group ('a', 'b') takes 1"),
         ({"upper": -1.0}, "range [-1.0, -1.0] of ('a', 'b') is not increasing"),
@@ -38,6 +43,20 @@ def test_a_joint_group_refuses_nonsense(changes, message):
     with pytest.raises(DescriptorError) as error:
         group(**changes)
     assert message in str(error.value)
+
+
+def test_a_held_group_takes_no_number():
+    held = JointGroup.hold(("lift", "turn"), stiffness=1e5, damping=1e3, force_limit=1e4)
+    assert (held.size, held.ranges, held.bounds) == (0, (), ())
+    split = ActionSplit(base=held, arm=group())
+    assert dict(split) == {"base": slice(0, 0), "arm": slice(0, 2)}
+    with pytest.raises(DescriptorError, match="needs at least one joint group to drive"):
+        ActionSplit(base=held)
+
+
+def test_drives_are_one_for_all_joints_or_one_each():
+    drives = group(stiffness=(1.0, 2.0)).drives
+    assert drives == ((1.0, 1e2, 100.0), (2.0, 1e2, 100.0))
 
 
 def test_a_mimic_group_takes_one_number():
@@ -69,7 +88,7 @@ def test_a_home_at_an_unknown_keyframe_is_refused():
 
 
 def test_an_action_split_refuses_nonsense():
-    with pytest.raises(DescriptorError, match="needs at least one joint group"):
+    with pytest.raises(DescriptorError, match="needs at least one joint group to drive"):
         ActionSplit()
     with pytest.raises(DescriptorError, match=r"joints \['a', 'b'\] are in more than one group"):
         ActionSplit(arm=group(), hand=group())

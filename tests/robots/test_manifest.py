@@ -37,15 +37,21 @@ def test_a_stale_manifest_is_noticed_and_rewritten(tmp_path, monkeypatch, capsys
     assert written == (CHECKOUT_CACHE / "manifest.json").read_text()
 
 
+DUTIES = {
+    "CC BY-NC 4.0": "name the authors, no commercial use",
+    "Apache-2.0": "keep the licence file",
+}
+APACHE = ("maniskill_koch", "maniskill_so100")
+
+
 def test_every_package_says_its_origin_and_licence():
-    licences = {
-        "maniskill_panda": ("CC BY-NC 4.0", "name the authors, no commercial use"),
-        "maniskill_so100": ("Apache-2.0", "keep the licence file"),
-    }
-    for name, package in load_manifest().packages.items():
-        assert package.origin.licence == licences[name][0]
-        assert licences[name][1] in package.origin.licence_note
+    packages = load_manifest().packages
+    for package in packages.values():
+        assert DUTIES[package.origin.licence] in package.origin.licence_note
         assert package.origin.wheel == "mani_skill==3.0.1"
+    for name in ("maniskill_fetch", "maniskill_panda", "maniskill_xarm7", *APACHE):
+        licence = "Apache-2.0" if name in APACHE else "CC BY-NC 4.0"
+        assert packages[name].origin.licence == licence
 
 
 def test_a_licence_that_is_not_known_is_refused(tmp_path):
@@ -64,9 +70,19 @@ def test_convex_hulls_beside_the_meshes_are_left_out():
 
 def test_physics_is_small_and_the_camera_is_in_the_pictures():
     package = load_manifest().package("maniskill_panda")
-    assert sum(file.bytes for file in package.files if file.physics) < 200_000
+    arms = ("panda_v2.urdf", "panda_v3.urdf", "panda_stick.urdf")
+    physics = {file for urdf in arms for file in package.needed(urdf, pictures=False)}
+    assert sum(file.bytes for file in physics) < 200_000
     pictures = {file.path for file in package.needed("panda_v3.urdf", pictures=True)}
     assert "realsense2_description/meshes/d415.stl" in pictures
+
+
+def test_the_images_that_a_collada_mesh_names_are_pictures_too():
+    package = load_manifest().package("maniskill_fetch")
+    pictures = {file.path for file in package.needed("fetch.urdf", pictures=True)}
+    assert "fetch_description/meshes/head_pan_uv.png" in pictures
+    physics = {file.path for file in package.needed("fetch.urdf", pictures=False)}
+    assert not [path for path in physics if path.endswith(".png")]
 
 
 def test_another_robot_needs_no_more_than_writing_the_manifest_again():

@@ -205,3 +205,39 @@ def test_several_placements_of_one_robot_are_separate_articulations():
     )
     world = World(layout)
     assert len({id(a) for a in world.articulations}) == 4
+
+
+def controlled(**changes) -> tuple[Simulation, JointPositionController]:
+    """Make a Panda whose gripper's group is changed, and its controller."""
+    panda = RobotRegistry.load("panda")
+    gripper = dataclasses.replace(panda.action_split.groups["gripper"], **changes)
+    split = panda.action_split.replace(gripper=gripper)
+    layout = single({"arm": dataclasses.replace(panda, action_split=split)})
+    simulation = Simulation(layout, lambda world, _: None, 2, PhysicsSettings())
+    stand(simulation)
+    return simulation, JointPositionController(layout, simulation.worlds)
+
+
+def targets(simulation: Simulation, controller: JointPositionController, number: float):
+    action = np.full((2, controller.action_dim), number, np.float32)
+    found = controller.targets(action, simulation.read().joint_positions)
+    for i in range(2):
+        controller.drive(found, i)
+    return found[:, 7:]
+
+
+def test_mimic_joints_follow_with_their_multipliers_and_offsets():
+    simulation, controller = controlled(multipliers=(1.0, -0.5), offsets=(0.0, 0.02))
+    np.testing.assert_allclose(targets(simulation, controller, 1.0), [[0.04, 0.0]] * 2, atol=1e-7)
+    np.testing.assert_allclose(
+        targets(simulation, controller, -1.0), [[-0.01, 0.025]] * 2, atol=1e-7
+    )
+
+
+def test_a_held_group_stays_where_the_layout_starts_it_whatever_the_action():
+    simulation, controller = controlled(held=True)
+    assert controller.action_dim == 7
+    for number in (-1.0, 1.0):
+        np.testing.assert_allclose(
+            targets(simulation, controller, number), [[0.04, 0.04]] * 2, atol=1e-7
+        )

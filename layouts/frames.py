@@ -1,0 +1,278 @@
+"""Named frames that robots hang on: edges of tables, walls, ceilings; resolved to world poses."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from layouts.orientation import multiplied, normalised, rotated, rpy_quaternion
+from robots import LayoutError, UnknownNameError
+from robots.descriptor import IDENTITY, Quaternion, Vector3
+
+ORIGIN: Vector3 = (0.0, 0.0, 0.0)
+
+# The edges of a table, and the turn about z (rad) from a table's +x to what each one faces: the
+# middle of the table.
+EDGES: Mapping[str, float] = {
+    "north": -math.pi / 2,
+    "east": math.pi,
+    "south": math.pi / 2,
+    "west": 0.0,
+}
+
+_UNIT_TOLERANCE = 1e-6  # rounding of a quaternion written with seven digits
+
+
+class HangingError(LayoutError):
+    """A robot or frame that hangs on nothing that exists, or on itself; ``name`` says which."""
+
+    def __init__(self, message: str, name: str) -> None:
+        """Keep the message and the name of the robot or frame at fault."""
+        super().__init__(message, name)
+        self.name = name
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where a frame is, in another one.
+
+    Attributes:
+        position: Its origin (m).
+        quaternion: Its orientation, wxyz, unit length.
+    """
+
+    position: Vector3 = ORIGIN
+    quaternion: Quaternion = IDENTITY
+
+    def then(self, local: Pose) -> Pose:
+        """Return what is at ``local`` in this frame, in the frame that this pose is given in."""
+        x, y, z = (
+            a + b
+            for a, b in zip(self.position, rotated(self.quaternion, local.position), strict=True)
+        )
+        return Pose((x, y, z), normalised(multiplied(self.quaternion, local.quaternion)))
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A named place that robots and other frames can hang on.
+
+    Attributes:
+        position: Its origin in the frame it hangs on (m).
+        quaternion: Its orientation there, wxyz, unit length; None is no turn.
+        rpy: Its orientation as roll, pitch and yaw (rad, about fixed x, y, z as in a URDF),
+            instead of a quaternion.
+        on: Name of the frame or robot it hangs on; None is the world.
+    """
+
+    position: Vector3 = ORIGIN
+    quaternion: Quaternion | None = None
+    rpy: Vector3 | None = None
+    on: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse poses that are no poses."""
+        check_pose(self)
+
+    @property
+    def local_pose(self) -> Pose:
+        """Its pose in the frame it hangs on."""
+        return Pose(self.position, declared_quaternion(self, IDENTITY))
+
+
+def table(
+    width: float,
+    depth: float,
+    *,
+    position: Vector3 = ORIGIN,
+    yaw: float = 0.0,
+    name: str = "table",
+) -> dict[str, Frame]:
+    """Return the frames of a table top: its middle, and the middle of each edge.
+
+    The north edge is the one at +y, the east edge at +x. A robot without a turn of its own that
+    hangs on ``table.north`` faces the middle of the table.
+
+    Args:
+        width: Size along x (m).
+        depth: Size along y (m).
+        position: Middle of the top (m, world).
+        yaw: Turn of the table about z (rad).
+        name: Name of the middle; the edges are ``NAME.north`` and so on.
+
+    Raises:
+        LayoutError: If a size is not positive.
+    """
+    for what, size in (("width", width), ("depth", depth)):
+        check_positive(f"a table's {what}", size)
+    half_width, half_depth = width / 2, depth / 2
+    places = {
+        "north": (0.0, half_depth, 0.0),
+        "east": (half_width, 0.0, 0.0),
+        "south": (0.0, -half_depth, 0.0),
+        "west": (-half_width, 0.0, 0.0),
+    }
+    edges = {
+        f"{name}.{edge}": Frame(place, rpy=(0.0, 0.0, EDGES[edge]), on=name)
+        for edge, place in places.items()
+    }
+    return {name: Frame(position, rpy=(0.0, 0.0, yaw)), **edges}
+
+
+def table_outlines(frames: Mapping[str, Pose]) -> dict[str, list[Vector3]]:
+    """Return the four corners of each table, by the name of its middle (m).
+
+    A table is a frame ``NAME`` with frames ``NAME.north``, ``NAME.east`` and so on.
+
+    Args:
+        frames: World pose by name, as `Layout.frame_poses`.
+    """
+    corners: dict[str, list[Vector3]] = {}
+    for name, middle in frames.items():
+        if all(f"{name}.{edge}" in frames for edge in EDGES):
+            north, east, south, west = (frames[f"{name}.{edge}"].position for edge in EDGES)
+            corners[name] = [
+                _sum(a, b, middle.position)
+                for a, b in ((north, east), (east, south), (south, west), (west, north))
+            ]
+    return corners
+
+
+def wall(position: Vector3, *, yaw: float = 0.0) -> Frame:
+    """Return a frame on a wall: z points out of the wall, x down.
+
+    Args:
+        position: A point on the wall (m, world).
+        yaw: Turn about z from the world's +x to the direction in which the wall faces (rad).
+    """
+    return Frame(position, rpy=(0.0, math.pi / 2, yaw))
+
+
+def ceiling(height: float, *, position: tuple[float, float] = (0.0, 0.0)) -> Frame:
+    """Return a frame under a ceiling: z points down, x along the world's x.
+
+    Args:
+        height: Height of the ceiling (m).
+        position: x and y of the frame (m, world).
+    """
+    return Frame((*position, height), quaternion=(0.0, 1.0, 0.0, 0.0))
+
+
+def resolve(poses: Mapping[str, tuple[str | None, Pose]]) -> dict[str, Pose]:
+    """Return world poses.
+
+    Args:
+        poses: By name, what each one hangs on (None is the world) and its pose there.
+
+    Raises:
+        HangingError: If one hangs on a name that is not there, or in the end on itself.
+    """
+    world: dict[str, Pose] = {}
+    for name in poses:
+        chain: list[str] = []  # from ``name`` towards the world, as far as it is not known yet
+        at: str | None = name
+        while at is not None and at not in world:
+            if at in chain:
+                circle = " on ".join(map(repr, [*chain[chain.index(at) :], at]))
+                raise HangingError(f"these hang on each other: {circle}; let one stand free", at)
+            chain.append(at)
+            at = _support(at, poses)
+        for at in reversed(chain):
+            on, local = poses[at]
+            world[at] = local if on is None else world[on].then(local)
+    return world
+
+
+def check_frame_names(frames: Mapping[str, object]) -> None:
+    """Refuse frame names that are not words, or words joined by dots.
+
+    Raises:
+        LayoutError: If one is not, or is not a `Frame`.
+    """
+    for name, frame in frames.items():
+        if not (isinstance(name, str) and re.fullmatch(r"[^\W\d]\w*(\.\w+)*", name)):
+            raise LayoutError(
+                f"frame name {name!r} must be a letter followed by letters, digits and _,"
+                " with dots in between if wanted: 'table.north'"
+            )
+        if not isinstance(frame, Frame):
+            raise LayoutError(
+                f"frame {name!r} is a {type(frame).__name__}; it must be a layouts.Frame"
+            )
+
+
+def check_pose(declared: Any) -> None:
+    """Check position, quaternion, rpy and ``on`` of a frozen declaration, and make them tuples.
+
+    Raises:
+        LayoutError: If one is no such thing, or both quaternion and rpy are given.
+    """
+    for what, count in (("position", 3), ("quaternion", 4), ("rpy", 3)):
+        value = getattr(declared, what)
+        if value is not None:
+            object.__setattr__(declared, what, numbers(what, value, count))
+    if declared.quaternion is not None:
+        if declared.rpy is not None:
+            raise LayoutError(
+                f"quaternion {declared.quaternion} and rpy {declared.rpy} are both given;"
+                " give one of them"
+            )
+        length = math.sqrt(sum(x * x for x in declared.quaternion))
+        if abs(length - 1) > _UNIT_TOLERANCE:
+            raise LayoutError(
+                f"quaternion {declared.quaternion} has length {length:.6g}; a rotation has"
+                " length 1 (order w, x, y, z)"
+            )
+    if declared.on is not None and not isinstance(declared.on, str):
+        raise LayoutError(f"on is {declared.on!r}; it takes the name of a frame or robot")
+
+
+def declared_quaternion(declared: Any, default: Quaternion) -> Quaternion:
+    """Return the wxyz quaternion of a checked declaration, or the default if it gives no turn."""
+    if declared.rpy is not None:
+        return rpy_quaternion(declared.rpy)
+    return default if declared.quaternion is None else declared.quaternion
+
+
+def check_positive(what: str, value: Any) -> None:
+    """Refuse a distance that is not a finite number greater than 0 (m).
+
+    Raises:
+        LayoutError: If it is not.
+    """
+    if isinstance(value, (str, bool)) or not (math.isfinite(value) and value > 0):
+        raise LayoutError(f"{what} is {value} m; it must be finite and greater than 0")
+
+
+def numbers(what: str, values: object, count: int) -> tuple[float, ...]:
+    """Return ``count`` finite floats.
+
+    Raises:
+        LayoutError: If ``values`` are not that.
+    """
+    try:
+        floats = tuple(float(x) for x in values)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        raise LayoutError(f"{what} is {values!r}; it takes {count} numbers") from None
+    if len(floats) != count or not all(math.isfinite(x) for x in floats):
+        raise LayoutError(f"{what} is {floats}; it takes {count} finite numbers")
+    return floats
+
+
+def _support(name: str, poses: Mapping[str, tuple[str | None, Pose]]) -> str | None:
+    on = poses[name][0]
+    if on is not None and on not in poses:
+        problem = UnknownNameError(
+            "frame or robot", on, [other for other in poses if other != name]
+        )
+        raise HangingError(f"{name!r} hangs on an {problem}", name)
+    return on
+
+
+def _sum(first: Vector3, second: Vector3, start: Vector3) -> Vector3:
+    """Return the point at ``first`` and ``second`` from ``start``, all given in the world."""
+    x, y, z = (a + b - c for a, b, c in zip(first, second, start, strict=True))
+    return (x, y, z)

@@ -1,0 +1,443 @@
+"""A check of a layout before anything moves: collisions, limits, workspaces, targets."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from layouts.frames import table_outlines
+from layouts.layout import Layout, Placement
+from layouts.validation.bodies import RobotModel, load_model, slab_hull
+from layouts.validation.collisions import (
+    Approach,
+    Postures,
+    fixed,
+    nearer_than,
+    nearest,
+    stand,
+    touching,
+)
+from layouts.validation.kinematics import Floats
+from layouts.validation.reach import Reach, Solution, Workspace
+from layouts.validation.report import (
+    Clearance,
+    Finding,
+    LinkPair,
+    Point,
+    Report,
+    SharedWorkspace,
+    TargetReach,
+    length_text,
+    links_text,
+)
+from robots import LayoutError
+
+Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)
+Targets = Mapping[str, Sequence[float]] | Sequence[Sequence[float]]
+
+TABLE_DEPTH = 0.9  # m; tables are solid, from their tops down
+NARROW = 0.02  # m; less clearance than this is worth a warning
+LIMIT_TOLERANCE = 1e-4  # rad or m; limits and keyframes are written with four digits
+FARTHEST_MOVE = 3.0  # m; of the search for a distance that is clear
+MOVE_STEP = 0.01  # m
+PATIENCE = 2.0  # s; longer checks tell how far they are
+
+
+def validate(
+    layout: Layout,
+    *,
+    targets: Targets = (),
+    samples: int = 20,
+    table: Rectangle | None = None,
+    seed: int = 0,
+    workspaces: bool = True,
+) -> Report:
+    """Check a layout; see `layouts.Layout.validate`."""
+    if not (isinstance(samples, int) and samples >= 0):
+        raise LayoutError(f"samples is {samples!r}; it must be an integer of 0 or more")
+    if table is not None and not (
+        all(math.isfinite(x) for x in table) and table[0] < table[2] and table[1] < table[3]
+    ):
+        raise LayoutError(f"table is {table}; it must be x_min, y_min, x_max, y_max (m)")
+    return _Check(layout, _named_targets(targets), samples, table, seed).run(workspaces)
+
+
+class _Check:
+    """One check of one layout, with everything loaded that it needs."""
+
+    def __init__(
+        self,
+        layout: Layout,
+        targets: Mapping[str, tuple[float, ...]],
+        samples: int,
+        table: Rectangle | None,
+        seed: int,
+    ) -> None:
+        self._layout, self._targets, self._draws = layout, targets, samples
+        self._tops = _table_tops(layout, table)
+        self._progress = _Progress()
+        self._models = dict(self._load())
+        random = np.random.default_rng(seed)
+        self._robots = {
+            name: stand(name, p, self._models[name], _noisy(p, samples, random))
+            for name, p in layout.items()
+        }
+        self._surfaces = {
+            name: fixed(name, slab_hull(np.array(top), TABLE_DEPTH, name), samples + 1)
+            for name, top in self._tops.items()
+        }
+
+    def _load(self) -> Iterator[tuple[str, RobotModel]]:
+        for name, placement in self._layout.items():
+            self._progress.tell(f"files of {name}")
+            yield name, load_model(placement.robot)
+
+    def run(self, workspaces: bool) -> Report:
+        findings = [*self._limits(), *self._self_collisions()]
+        clearances: list[Clearance] = []
+        for one, other, pairs in self._neighbours():
+            found, clearance = self._compare(one, other, pairs)
+            findings += found
+            clearances += clearance
+        spaces = self._workspaces() if workspaces else {}
+        reaches = tuple(self._reaches())
+        findings += self._missed(reaches)
+        return Report(
+            layout=self._layout,
+            draws=self._draws,
+            tables=self._tops,
+            targets={name: target[:3] for name, target in self._targets.items()},
+            findings=tuple(sorted(findings, key=lambda finding: not finding.serious)),
+            clearances=tuple(clearances),
+            shared=tuple(_shared(spaces)),
+            workspaces={name: space.volume for name, space in spaces.items()},
+            reaches=reaches,
+            outlines={name: _outline(robot) for name, robot in self._robots.items()},
+        )
+
+    # -- joint limits ------------------------------------------------------------------------
+
+    def _limits(self) -> Iterator[Finding]:
+        for name, placement in self._layout.items():
+            limits = self._models[name].kinematics.limits
+            for joint, value, (low, high) in zip(
+                placement.robot.joints, placement.start_qpos, limits.tolist(), strict=True
+            ):
+                excess = max(low - value, value - high)
+                if excess > LIMIT_TOLERANCE:
+                    unit = self._unit(placement, joint)
+                    yield Finding(
+                        "joint limit",
+                        True,
+                        (name,),
+                        (),
+                        excess,
+                        unit,
+                        f"keyframe {placement.start_keyframe!r} of {name} puts {joint} at"
+                        f" {value:g} {unit}, {excess:.3g} {unit} beyond its limits"
+                        f" {low:g} … {high:g}",
+                        f"keep {joint} within its limits, or start from another keyframe:"
+                        f" {_others(placement)}",
+                    )
+
+    @staticmethod
+    def _unit(placement: Placement, joint: str) -> str:
+        groups = placement.robot.action_split.groups.values()
+        return next(group.unit for group in groups if joint in group.joints)
+
+    # -- collisions --------------------------------------------------------------------------
+
+    def _self_collisions(self) -> Iterator[Finding]:
+        for name, robot in self._robots.items():
+            self._progress.tell(f"{name} with itself")
+            overlaps = touching(robot, robot, self._models[name].self_pairs)
+            if overlaps:
+                pairs = _worst(overlaps)
+                yield Finding(
+                    "self-collision",
+                    True,
+                    (name,),
+                    pairs,
+                    pairs[0].depth,
+                    "m",
+                    f"{name} touches itself {self._when(overlaps)}:"
+                    f" {links_text(pairs, (name, name))}",
+                    self._keyframe_advice(name, overlaps),
+                )
+
+    def _neighbours(
+        self,
+    ) -> Iterator[tuple[Postures, Postures, Sequence[tuple[int, int]] | None]]:
+        for one, other in combinations(self._robots.values(), 2):
+            yield one, other, None
+        for name, robot in self._robots.items():
+            for surface in self._surfaces.values():
+                yield robot, surface, _moving_hulls(self._models[name])
+
+    def _compare(
+        self, one: Postures, other: Postures, pairs: Sequence[tuple[int, int]] | None
+    ) -> tuple[list[Finding], list[Clearance]]:
+        self._progress.tell(f"{one.name} with {other.name}")
+        first = slice(0, 1)
+        still = nearest(one.only(first), other.only(first), pairs)
+        near = nearest(one, other, pairs)
+        if still is None or near is None:
+            return [], []
+        between, table = (one.name, other.name), other.name in self._surfaces
+        clearance = Clearance(
+            between, table, still.links, still.distance, near.links, near.distance, still.points
+        )
+        if near.distance < 0:
+            return [self._collision(one, other, touching(one, other, pairs))], [clearance]
+        if near.distance < NARROW and not table:
+            return [self._narrow(one, other, near)], [clearance]
+        return [], [clearance]
+
+    def _collision(self, one: Postures, other: Postures, overlaps: list[Approach]) -> Finding:
+        pairs, between = _worst(overlaps), (one.name, other.name)
+        at_table = other.name in self._surfaces
+        return Finding(
+            "table" if at_table else "collision",
+            True,
+            between[:1] if at_table else between,
+            pairs,
+            pairs[0].depth,
+            "m",
+            f"{one.name} and {other.name} collide {self._when(overlaps)}:"
+            f" {links_text(pairs, between, table=at_table)}",
+            self._table_advice(one, overlaps) if at_table else self._distance_advice(one, other),
+        )
+
+    def _narrow(self, one: Postures, other: Postures, near: Approach) -> Finding:
+        first, second = near.links
+        return Finding(
+            "clearance",
+            False,
+            (one.name, other.name),
+            (),
+            near.distance,
+            "m",
+            f"{one.name}.{first} comes within {length_text(near.distance)} of"
+            f" {other.name}.{second}",
+            self._distance_advice(one, other),
+        )
+
+    def _when(self, overlaps: list[Approach]) -> str:
+        """Say in which postures: at the keyframes, or only with joint noise."""
+        if any(overlap.posture == 0 for overlap in overlaps):
+            return "at the keyframes"
+        noisy = len({overlap.posture for overlap in overlaps})
+        return f"with joint noise ({noisy} of {self._draws} draws)"
+
+    # -- what to change ----------------------------------------------------------------------
+
+    def _distance_advice(self, one: Postures, other: Postures) -> str:
+        """Say how far apart two robots are clear of each other, found by trying."""
+        places = [np.array(self._layout[r.name].base_position) for r in (one, other)]
+        between = places[1] - places[0]
+        between[2] = 0.0
+        now = float(np.linalg.norm(between))
+        way = between / now if now > 1e-6 else np.array([0.0, 1.0, 0.0])
+        move = _clear_move(one, other, way)
+        if move is None:
+            return f"even {FARTHEST_MOVE:g} m farther apart they collide; use another keyframe"
+        return (
+            f"stand {one.name} and {other.name} {move:.3f} m farther apart"
+            f" ({now + move:.3f} m between their bases instead of {now:.3f} m), which leaves"
+            f" {length_text(NARROW)} or more"
+        )
+
+    def _keyframe_advice(self, name: str, overlaps: list[Approach]) -> str:
+        placement = self._layout[name]
+        noise = ""
+        if all(overlap.posture > 0 for overlap in overlaps):
+            noise = f"; or less joint noise than qpos_noise={placement.qpos_noise:g} rad"
+        return (
+            f"give {name} another keyframe than {placement.start_keyframe!r}:"
+            f" {_others(placement)}{noise}"
+        )
+
+    def _table_advice(self, robot: Postures, overlaps: list[Approach]) -> str:
+        lift = MOVE_STEP - overlaps[0].distance
+        placement = self._layout[robot.name]
+        return (
+            f"raise the base of {robot.name} by {lift:.3f} m, or give it another keyframe than"
+            f" {placement.start_keyframe!r}: {_others(placement)}"
+        )
+
+    # -- reach -------------------------------------------------------------------------------
+
+    def _workspaces(self) -> dict[str, Workspace]:
+        spaces: dict[str, Workspace] = {}
+        for name, placement in self._layout.items():
+            self._progress.tell(f"workspace of {name}")
+            spaces[name] = Workspace(placement, self._models[name])
+        return {name: space for name, space in spaces.items() if space.sampled}
+
+    def _reaches(self) -> Iterator[TargetReach]:
+        for name, placement in self._layout.items() if self._targets else ():
+            arm = Reach(placement, self._models[name])
+            for target, numbers in self._targets.items():
+                self._progress.tell(f"{name} to {target}")
+                quaternion = np.array(numbers[3:]) if len(numbers) == 7 else None
+                solutions = arm.solve(np.array(numbers[:3]), quaternion)
+                free = next((s for s in solutions if s.solved and self._free(name, s)), None)
+                best = free or solutions[0]
+                yield TargetReach(
+                    target,
+                    name,
+                    free is not None,
+                    best.missing,
+                    free is None and best.solved,
+                    best.qpos,
+                )
+
+    def _free(self, name: str, solution: Solution) -> bool:
+        """Tell whether a robot touches nothing there, with the others at their keyframes."""
+        model, first = self._models[name], slice(0, 1)
+        robot = stand(name, self._layout[name], model, np.array([solution.qpos]))
+        others = [r.only(first) for n, r in self._robots.items() if n != name]
+        if touching(robot, robot, model.self_pairs) or any(touching(robot, o) for o in others):
+            return False
+        surfaces = [surface.only(first) for surface in self._surfaces.values()]
+        return not any(touching(robot, s, _moving_hulls(model)) for s in surfaces)
+
+    def _missed(self, reaches: Sequence[TargetReach]) -> Iterator[Finding]:
+        for target in self._targets:
+            told = [reach for reach in reaches if reach.target == target]
+            if any(reach.reached for reach in told):
+                continue
+            best = min(told, key=lambda reach: (not reach.blocked, reach.missing))
+            if best.blocked:
+                what, advice = (
+                    f"no robot reaches {target} without a collision",
+                    f"give {best.robot} more room, or move {target}",
+                )
+            else:
+                what, advice = (
+                    f"no robot reaches {target}; {best.robot} stays"
+                    f" {length_text(best.missing)} away",
+                    f"move {best.robot} or {target} by as much towards each other, or choose"
+                    " another orientation of it",
+                )
+            yield Finding("target", True, (best.robot,), (), best.missing, "m", what, advice)
+
+
+class _Progress:
+    """Tells on stderr what is being looked at, once a check takes longer than `PATIENCE`."""
+
+    def __init__(self) -> None:
+        self._told = time.monotonic()
+
+    def tell(self, what: str) -> None:
+        now = time.monotonic()
+        if now - self._told > PATIENCE:
+            self._told = now
+            print(f"checking the layout: {what}", file=sys.stderr, flush=True)
+
+
+def _table_tops(layout: Layout, table: Rectangle | None) -> dict[str, tuple[Point, ...]]:
+    """Return the corners of each table's top (m): those of the layout's frames, and the one given.
+
+    The one given takes the place of a frame called ``table``.
+    """
+    tops: dict[str, tuple[Point, ...]] = {
+        name: tuple(map(tuple, corners))
+        for name, corners in table_outlines(layout.frame_poses).items()
+    }
+    if table is not None:
+        x_min, y_min, x_max, y_max = table
+        outline = ((x_min, y_min), (x_max, y_min), (x_max, y_max), (x_min, y_max))
+        tops["table"] = tuple((x, y, 0.0) for x, y in outline)
+    return tops
+
+
+def _named_targets(targets: Targets) -> dict[str, tuple[float, ...]]:
+    named = (
+        dict(targets)
+        if isinstance(targets, Mapping)
+        else {f"target {i}": target for i, target in enumerate(targets, start=1)}
+    )
+    return {name: _target(name, numbers) for name, numbers in named.items()}
+
+
+def _target(name: str, numbers: Sequence[float]) -> tuple[float, ...]:
+    try:
+        target = tuple(float(x) for x in numbers)
+    except (TypeError, ValueError):
+        target = ()
+    if len(target) not in (3, 7) or not all(math.isfinite(x) for x in target):
+        raise LayoutError(
+            f"target {name!r} is {numbers!r}; it takes x, y, z (m), or these and w, x, y, z of the"
+            " TCP's orientation"
+        )
+    length = math.hypot(*target[3:])
+    if target[3:] and abs(length - 1) > 1e-3:
+        raise LayoutError(
+            f"the quaternion {target[3:]} of target {name!r} has length {length:.4g}; a rotation"
+            " has length 1 (order w, x, y, z)"
+        )
+    return (*target[:3], *(x / length for x in target[3:]))
+
+
+def _noisy(placement: Placement, draws: int, random: np.random.Generator) -> Floats:
+    """Return the keyframe, then draws with joint noise as at a reset, (1 + draws, dof)."""
+    groups = placement.robot.action_split.groups.values()
+    noisy = [group.reset_noise for group in groups for _ in group.joints]
+    noise = random.normal(0.0, placement.qpos_noise, (draws, len(noisy))) * noisy
+    return np.array(placement.start_qpos) + np.concatenate([np.zeros((1, len(noisy))), noise])
+
+
+def _moving_hulls(model: RobotModel) -> list[tuple[int, int]]:
+    """Pair with the table's one hull all hulls of links that move; the base stands on it."""
+    bodies = model.kinematics.bodies
+    return [(i, 0) for i, hull in enumerate(model.hulls) if bodies[hull.link] != 0]
+
+
+def _worst(overlaps: Sequence[Approach]) -> tuple[LinkPair, ...]:
+    """Return the deepest overlap of each pair of links, the deepest first."""
+    pairs: dict[tuple[str, str], LinkPair] = {}
+    for overlap in overlaps:
+        middle = tuple((a + b) / 2 for a, b in zip(*overlap.points, strict=True))
+        pairs.setdefault(overlap.links, LinkPair(overlap.links, -overlap.distance, middle))
+    return tuple(pairs.values())
+
+
+def _clear_move(one: Postures, other: Postures, way: Floats) -> float | None:
+    """Return by how much ``other`` has to move along ``way`` (m), rounded up, or None."""
+    steps = round(FARTHEST_MOVE / MOVE_STEP)
+    low, high = 0, 1
+    while nearer_than(one, other.moved(high * MOVE_STEP * way), NARROW):
+        low, high = high, high * 2
+        if high > steps:
+            return None
+    while high - low > 1:
+        middle = (low + high) // 2
+        near = nearer_than(one, other.moved(middle * MOVE_STEP * way), NARROW)
+        low, high = (middle, high) if near else (low, middle)
+    return high * MOVE_STEP
+
+
+def _shared(spaces: Mapping[str, Workspace]) -> Iterator[SharedWorkspace]:
+    for (one, space), (other, other_space) in combinations(spaces.items(), 2):
+        volume = space.shared_with(other_space)
+        if volume > 0:
+            shares = volume / space.volume, volume / other_space.volume
+            yield SharedWorkspace((one, other), volume, shares)
+
+
+def _outline(robot: Postures) -> tuple[tuple[Point, ...], ...]:
+    return tuple(
+        tuple(map(tuple, (hull.corners @ pose[:3, :3].T + pose[:3, 3]).tolist()))
+        for hull, pose in zip(robot.hulls, robot.poses[0], strict=True)
+    )
+
+
+def _others(placement: Placement) -> str:
+    others = [name for name in placement.robot.keyframes if name != placement.start_keyframe]
+    return ", ".join(others) if others else f"{placement.robot.name} has no other"

@@ -1,0 +1,235 @@
+"""The picture of a report: links from above, with clearances, overlaps and targets marked."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from layouts.description import decimal, headline
+from layouts.files import written_whole
+from layouts.preview import COLOURS, FAINT, INK, SUPPORTED, TABLE
+from layouts.validation.kinematics import Floats
+from layouts.validation.report import Clearance, Report, length_text
+from robots import LayoutError, MissingPackageError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+GOOD, BAD, NARROW = "#1B7837", "#B2182B", "#B35806"
+
+WIDTH, HEIGHT = 10.0, 8.5  # inches; 1500 × 1275 pixels
+DOTS_PER_INCH = 150
+MARGIN = 0.08  # free space around the robots, in shares of the plan's larger side
+NAME_GAP = 0.05  # m, between a robot and its name
+SHOWN_FINDINGS = 3
+
+
+def save_picture(report: Report, path: str | os.PathLike[str]) -> Path:
+    """Draw a report and save the picture, whole or not at all; see `Report.picture`."""
+    target = Path(path)
+    if target.suffix.lower() not in SUPPORTED:
+        raise LayoutError(
+            f"cannot save a picture as {target.name!r}; the name must end in"
+            f" {', '.join(SUPPORTED[:-1])} or {SUPPORTED[-1]}"
+        )
+    figure = draw(report)
+    with written_whole(target) as unfinished:
+        figure.savefig(unfinished, format=target.suffix[1:].lower())
+    return target
+
+
+def draw(report: Report) -> Figure:
+    """Return the figure that `save_picture` saves.
+
+    Raises:
+        MissingPackageError: If matplotlib is not installed.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise MissingPackageError(
+            "a picture needs matplotlib: pip install 'robot-layouts[preview]'"
+        ) from error
+    figure = Figure(figsize=(WIDTH, HEIGHT), dpi=DOTS_PER_INCH, facecolor="white")
+    lines = _captions(report)
+    below = 0.1 + 0.028 * len(lines)
+    plan = figure.add_axes((0.08, below, 0.89, 0.93 - below))
+    _draw_tables(plan, report)
+    for index, name in enumerate(report.layout):
+        _draw_robot(plan, report, index, name)
+    for clearance in _nearest_neighbours(report):
+        _draw_clearance(plan, clearance)
+    _draw_overlaps(plan, report)
+    for name, position in report.targets.items():
+        _draw_target(plan, report, name, position)
+    _frame(plan, report)
+    for row, (text, colour) in enumerate(lines):
+        figure.text(0.08, 0.028 * (len(lines) - row) - 0.008, text, color=colour, fontsize=9.5)
+    return figure
+
+
+def _draw_tables(plan: Axes, report: Report) -> None:
+    from matplotlib.patches import Polygon
+
+    for corners in report.tables.values():
+        outline = np.array(corners)[:, :2]
+        plan.add_patch(Polygon(outline, facecolor=TABLE, edgecolor="#C9B99B", zorder=0.5))
+
+
+def _draw_robot(plan: Axes, report: Report, index: int, name: str) -> None:
+    """Draw each hull's outline from above, the base, and the name below it."""
+    from matplotlib.patches import Polygon
+
+    colour = COLOURS[index % len(COLOURS)]
+    for corners in report.outlines[name]:
+        outline = _outline(np.array(corners)[:, :2])
+        plan.add_patch(Polygon(outline, facecolor=colour, alpha=0.16, edgecolor="none", zorder=2))
+        plan.add_patch(Polygon(outline, fill=False, edgecolor=colour, linewidth=0.9, zorder=3))
+    x, y, _ = report.layout[name].base_position
+    plan.plot(x, y, "o", color="white", markeredgecolor=colour, markersize=8, zorder=4)
+    (x, y), behind = _behind(report, name)
+    side = "right" if behind[0] < -0.5 else "left" if behind[0] > 0.5 else "center"
+    _write(plan, x, y, name, colour, size=11, weight="bold", side=side)
+
+
+def _behind(report: Report, name: str) -> tuple[Floats, Floats]:
+    """Return a place behind a robot's back (m), and the direction from its base to there."""
+    base = np.array(report.layout[name].base_position[:2])
+    corners = np.array([c[:2] for hull in report.outlines[name] for c in hull]) - base
+    ahead = corners.mean(axis=0)
+    length = float(np.linalg.norm(ahead))
+    behind = -ahead / length if length > 0.02 else np.array([0.0, -1.0])
+    return base + behind * (float((corners @ behind).max()) + NAME_GAP), behind
+
+
+def _nearest_neighbours(report: Report) -> list[Clearance]:
+    """Return, without repetition, the least clearance that each robot has from another."""
+    chosen: list[Clearance] = []
+    for name in report.layout:
+        own = [c for c in report.clearances if name in c.between and not c.table]
+        least = min(own, key=lambda clearance: clearance.distance, default=None)
+        if least is not None and least.distance > 0 and least not in chosen:
+            chosen.append(least)
+    return chosen
+
+
+def _draw_clearance(plan: Axes, clearance: Clearance) -> None:
+    """Join the nearest points of two robots."""
+    (x, y, _), (to_x, to_y, _) = clearance.points
+    colour = NARROW if clearance.noisy_distance < 0.02 else INK
+    plan.plot([x, to_x], [y, to_y], "-", color=colour, linewidth=1.4, zorder=6)
+    plan.plot([x, to_x], [y, to_y], "o", color=colour, markersize=3, zorder=6)
+    text = length_text(clearance.distance)
+    _write(plan, (x + to_x) / 2, (y + to_y) / 2, f"  {text}", colour, size=9, side="left")
+
+
+def _draw_overlaps(plan: Axes, report: Report) -> None:
+    for finding in report.findings:
+        for number, pair in enumerate(finding.links):
+            x, y, _ = pair.point
+            deepest = number == 0
+            plan.plot(
+                x,
+                y,
+                "X",
+                color=BAD,
+                markeredgecolor="white",
+                markersize=13 if deepest else 6,
+                alpha=1.0 if deepest else 0.6,
+                zorder=8 if deepest else 7,
+            )
+
+
+def _draw_target(plan: Axes, report: Report, name: str, position: tuple[float, ...]) -> None:
+    told = [reach for reach in report.reaches if reach.target == name]
+    reached = any(reach.reached for reach in told)
+    colour = GOOD if reached else BAD
+    plan.plot(*position[:2], "*", color=colour, markeredgecolor="white", markersize=15, zorder=8)
+    _write(plan, position[0], position[1] + NAME_GAP, name, colour, size=9)
+    for reach in told:
+        if reach.reached:
+            x, y, _ = report.layout[reach.robot].base_position
+            plan.plot([x, position[0]], [y, position[1]], ":", color=GOOD, linewidth=1, zorder=1)
+
+
+def _write(
+    plan: Axes,
+    x: float,
+    y: float,
+    text: str,
+    colour: str,
+    *,
+    size: float,
+    weight: str = "normal",
+    side: str = "center",
+) -> None:
+    from matplotlib.patheffects import withStroke
+
+    plan.text(
+        x,
+        y,
+        text,
+        color=colour,
+        fontsize=size,
+        fontweight=weight,
+        ha=side,
+        va="center",
+        path_effects=[withStroke(linewidth=3, foreground="white", alpha=0.85)],
+        zorder=9,
+    )
+
+
+def _frame(plan: Axes, report: Report) -> None:
+    """Show robots and targets with a margin, to scale, under a title with the verdict."""
+    points = [corner[:2] for hulls in report.outlines.values() for hull in hulls for corner in hull]
+    points += [position[:2] for position in report.targets.values()]
+    points += [tuple(_behind(report, name)[0]) for name in report.layout]
+    low, high = np.min(points, axis=0), np.max(points, axis=0)
+    margin = MARGIN * float((high - low).max())
+    middle, half = (low + high) / 2, (high - low) / 2 + margin
+    box = plan.get_window_extent()
+    half = np.maximum(half, half[::-1] * (box.width / box.height, box.height / box.width))
+    plan.set_xlim(middle[0] - half[0], middle[0] + half[0])
+    plan.set_ylim(middle[1] - half[1], middle[1] + half[1])
+    plan.set_aspect("equal")
+    verdict = "ok" if report.ok else "not ok"
+    colour = GOOD if report.ok else BAD
+    plan.set_title(headline(report.layout), loc="left", color=INK, fontsize=13, fontweight="bold")
+    plan.set_title(verdict, loc="right", color=colour, fontsize=13, fontweight="bold")
+    plan.set_xlabel("x (m)", color=INK)
+    plan.set_ylabel("y (m)", color=INK)
+    plan.grid(color="#DDDDDD", linewidth=0.6)
+    plan.set_axisbelow(True)
+    plan.tick_params(colors=INK, labelsize=9, length=0)
+    for spine in plan.spines.values():
+        spine.set_color("#BBBBBB")
+
+
+def _captions(report: Report) -> list[tuple[str, str]]:
+    """Return the first findings and what the marks mean, each with its colour."""
+    lines = [
+        (_shortened(finding.what), BAD if finding.serious else NARROW)
+        for finding in report.findings[:SHOWN_FINDINGS]
+    ]
+    hidden = len(report.findings) - len(lines)
+    if hidden:
+        lines.append((f"and {decimal(hidden)} more", FAINT))
+    marks = "links' hulls at the keyframes; lines: to the nearest neighbour"
+    marks += "; ✕: overlaps" * any(finding.links for finding in report.findings)
+    marks += "; stars: targets, dotted to who reaches them" * bool(report.targets)
+    return [*lines, (marks, FAINT)]
+
+
+def _shortened(text: str, length: int = 125) -> str:
+    return text if len(text) <= length else f"{text[: length - 1]}…"
+
+
+def _outline(points: Floats) -> Floats:
+    """Return the corners of the convex hull of points in the plane, in order, (n, 2)."""
+    from scipy.spatial import ConvexHull
+
+    return points[ConvexHull(points).vertices]

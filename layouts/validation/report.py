@@ -1,0 +1,276 @@
+"""What a check of a layout found, as data, as text and as a picture."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from layouts.description import decimal, headline
+
+if TYPE_CHECKING:
+    from layouts.layout import Layout
+
+Point = tuple[float, ...]  # (3,) (m), world
+
+SPOKEN_LINKS = 3  # pairs of links that a finding names in its text
+SPOKEN_PAIRS = 12  # pairs of robots that the text tells distances and shared workspaces of
+
+
+@dataclass(frozen=True)
+class LinkPair:
+    """Two links that overlap.
+
+    Attributes:
+        links: Their names; the second may be a table's.
+        depth: By how much at worst (m).
+        point: Where, in the world (m).
+    """
+
+    links: tuple[str, str]
+    depth: float
+    point: Point
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is wrong with a layout, or nearly.
+
+    Attributes:
+        kind: ``collision``, ``self-collision``, ``table``, ``joint limit``, ``target`` or
+            ``clearance``.
+        serious: Whether it makes the layout unusable; if not, it is a warning.
+        robots: Names of the robots it is about.
+        links: The links that overlap, the deepest first.
+        amount: How much: depth of an overlap, excess over a limit, what is missing to a target,
+            or the clearance that is left (``unit``).
+        unit: ``m`` or ``rad``.
+        what: What was found, in a sentence.
+        advice: What to change, in a sentence.
+    """
+
+    kind: str
+    serious: bool
+    robots: tuple[str, ...]
+    links: tuple[LinkPair, ...]
+    amount: float
+    unit: str
+    what: str
+    advice: str
+
+    def __str__(self) -> str:
+        """Return what was found and what to change, on two lines."""
+        return f"{self.kind}: {self.what}\n  {self.advice}"
+
+
+@dataclass(frozen=True)
+class Clearance:
+    """How near two robots come, or a robot and the table.
+
+    Attributes:
+        between: Names of both robots, or of a robot and a table.
+        table: Whether the second is a table.
+        links: The links that come nearest at the keyframes.
+        distance: Between them at the keyframes (m); negative if they overlap.
+        noisy_links: The links that come nearest with joint noise.
+        noisy_distance: The smallest distance with joint noise (m).
+        points: The nearest points at the keyframes, world (m).
+    """
+
+    between: tuple[str, str]
+    table: bool
+    links: tuple[str, str]
+    distance: float
+    noisy_links: tuple[str, str]
+    noisy_distance: float
+    points: tuple[Point, Point]
+
+
+@dataclass(frozen=True)
+class SharedWorkspace:
+    """What two robots' tool centre points both get to, collisions aside.
+
+    Attributes:
+        robots: Names of both.
+        volume: Of the shared space (m³).
+        shares: The same, as a share of each one's own workspace.
+    """
+
+    robots: tuple[str, str]
+    volume: float
+    shares: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class TargetReach:
+    """Whether a robot reaches a target.
+
+    Attributes:
+        target: Name of the target.
+        robot: Name of the robot.
+        reached: Whether it does, without touching itself, the table or the others at their
+            keyframes.
+        missing: How far its tool centre point stays from the target (m).
+        blocked: Whether it would reach it, were it not for a collision.
+        qpos: Joint positions that come nearest, in the descriptor's order (rad, m).
+    """
+
+    target: str
+    robot: str
+    reached: bool
+    missing: float
+    blocked: bool
+    qpos: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """What a check of a layout found.
+
+    Attributes:
+        layout: The layout.
+        draws: How many postures with joint noise were looked at, besides the keyframes.
+        tables: Corners of each table's top (m), by name.
+        targets: Position of each target in the world (m).
+        findings: What is wrong, serious findings first.
+        clearances: Between robots, and between robots and tables; what is farther than 10 m
+            apart is left out.
+        shared: Workspaces that overlap; empty if they were not looked at.
+        workspaces: Volume of each robot's workspace (m³), to about a tenth; empty if they were not
+            looked at. A robot that slides for many metres is left out.
+        reaches: For each target and robot, whether it gets there.
+        outlines: For each robot the corners of its hulls at the keyframe, world (m).
+    """
+
+    layout: Layout
+    draws: int
+    tables: dict[str, tuple[Point, ...]]
+    targets: dict[str, Point]
+    findings: tuple[Finding, ...]
+    clearances: tuple[Clearance, ...]
+    shared: tuple[SharedWorkspace, ...]
+    workspaces: dict[str, float]
+    reaches: tuple[TargetReach, ...]
+    outlines: dict[str, tuple[tuple[Point, ...], ...]]
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing serious was found."""
+        return not any(finding.serious for finding in self.findings)
+
+    def __str__(self) -> str:
+        """Return the verdict, the findings with what to change, and the figures."""
+        return "\n".join(_lines(self))
+
+    def picture(self, path: str | os.PathLike[str]) -> Path:
+        """Save a view from above: links, clearances, overlaps and targets.
+
+        Args:
+            path: Where to save; the ending chooses the format (.png, .pdf or .svg).
+
+        Returns:
+            The path of the picture.
+
+        Raises:
+            LayoutError: If the ending names no supported format.
+            MissingPackageError: If matplotlib is not installed.
+        """
+        from layouts.validation.picture import save_picture
+
+        return save_picture(self, path)
+
+
+def length_text(metres: float) -> str:
+    """Return a length as people write it: ``4.1 cm``, ``1.20 m``."""
+    return f"{metres:.2f} m" if abs(metres) >= 1 else f"{metres * 100:.1f} cm"
+
+
+def links_text(pairs: Sequence[LinkPair], between: tuple[str, str], *, table: bool = False) -> str:
+    """Name pairs of links, the deepest first: ``left.panda_hand with right.panda_link7``."""
+    one, other = between
+    spoken = [
+        f"{one}.{a} with {b if table else f'{other}.{b}'} ({length_text(pair.depth)})"
+        for pair in pairs[:SPOKEN_LINKS]
+        for a, b in [pair.links]
+    ]
+    rest = len(pairs) - len(spoken)
+    return ", ".join(spoken) + (f" and {rest} more pairs of links" if rest else "")
+
+
+def _lines(report: Report) -> Iterator[str]:
+    serious = sum(finding.serious for finding in report.findings)
+    warnings = len(report.findings) - serious
+    verdict = "ok" if report.ok else "not ok"
+    counts = [_count(serious, "problem")] * bool(serious) + [_count(warnings, "warning")] * bool(
+        warnings
+    )
+    yield f"{verdict}: {headline(report.layout)}{''.join(f', {text}' for text in counts)}"
+    yield (
+        f"looked at the keyframes and {report.draws} draws of joint noise"
+        if report.draws
+        else "looked at the keyframes, without joint noise"
+    )
+    for finding in report.findings:
+        yield f"{'problem' if finding.serious else 'warning'}, {finding}"
+    yield from _section("distances (at the keyframes; with joint noise)", _distances(report))
+    yield from _section("tool centre points reach", _spaces(report))
+    yield from _section("targets", _targets(report))
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'s' * (number != 1)}"
+
+
+def _section(title: str, rows: Iterator[str]) -> Iterator[str]:
+    lines = list(rows)
+    if lines:
+        yield f"{title}:"
+        yield from (f"  {line}" for line in lines)
+
+
+def _distances(report: Report) -> Iterator[str]:
+    ordered = sorted(report.clearances, key=lambda clearance: clearance.noisy_distance)
+    yield from map(_near, ordered[:SPOKEN_PAIRS])
+    if len(ordered) > SPOKEN_PAIRS:
+        yield f"and {len(ordered) - SPOKEN_PAIRS} pairs that stay farther apart"
+
+
+def _near(clearance: Clearance) -> str:
+    one, other = clearance.between
+    first, second = clearance.links
+    ends = f"{one}.{first} – {second if clearance.table else f'{other}.{second}'}"
+    return (
+        f"{one} – {other}: {length_text(clearance.distance)};"
+        f" {length_text(clearance.noisy_distance)} ({ends})"
+    )
+
+
+def _spaces(report: Report) -> Iterator[str]:
+    if not report.workspaces:
+        return
+    yield ", ".join(f"{n} {volume:.2f} m³" for n, volume in report.workspaces.items())
+    ordered = sorted(report.shared, key=lambda shared: -shared.volume)
+    for shared in ordered[:SPOKEN_PAIRS]:
+        (one, other), (share, other_share) = shared.robots, shared.shares
+        yield (
+            f"{one} and {other} share {shared.volume:.2f} m³:"
+            f" {share:.0%} of {one}'s, {other_share:.0%} of {other}'s"
+        )
+    if len(ordered) > SPOKEN_PAIRS:
+        yield f"and {len(ordered) - SPOKEN_PAIRS} pairs that share less"
+
+
+def _targets(report: Report) -> Iterator[str]:
+    for name, position in report.targets.items():
+        told = [_reach_text(reach) for reach in report.reaches if reach.target == name]
+        yield f"{name} ({', '.join(decimal(x) for x in position)}): {', '.join(told)}"
+
+
+def _reach_text(reach: TargetReach) -> str:
+    if reach.reached:
+        return f"{reach.robot} reaches it"
+    if reach.blocked:
+        return f"{reach.robot} would collide there"
+    return f"{reach.robot} stays {length_text(reach.missing)} away"

@@ -1,0 +1,41 @@
+"""A task builds no layout whose robots collide, unless told to."""
+
+from __future__ import annotations
+
+import warnings
+from functools import lru_cache
+
+from layouts import Layout
+from robots import LayoutError, MissingPackageError
+
+
+def refuse_collisions(layout: Layout) -> None:
+    """Refuse a layout whose robots collide with each other, themselves or the layout's tables.
+
+    Looks at their keyframes and at some draws of joint noise. The verdict on a layout is
+    remembered. Where python-fcl is not installed it cannot look, and warns instead.
+
+    Raises:
+        LayoutError: If robots collide; names the links, and says what to change.
+        AssetError: If robot files cannot be found.
+    """
+    try:
+        collisions = _collisions(layout)
+    except MissingPackageError as error:
+        warnings.warn(
+            f"the layout is built unchecked: {error} (or say so, with check_layout=False)",
+            stacklevel=2,
+        )
+        return
+    if collisions:
+        raise LayoutError(
+            f"the robots of this layout collide:\n{collisions}\n"
+            "check_layout=False builds it all the same; layout.validate() tells more"
+        )
+
+
+@lru_cache(maxsize=256)
+def _collisions(layout: Layout) -> str:
+    findings = layout.validate(workspaces=False).findings
+    kinds = ("collision", "self-collision", "table")
+    return "\n".join(str(finding) for finding in findings if finding.kind in kinds)

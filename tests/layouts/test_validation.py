@@ -1,0 +1,610 @@
+"""What a check of a layout finds, how much, and what it says to change."""
+
+import itertools
+import math
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from layouts import (
+    Layout,
+    Placement,
+    around_table,
+    face_to_face,
+    side_by_side,
+    yaw_quaternion,
+)
+from layouts.validation.bodies import load_model
+from layouts.validation.collisions import nearest, stand, touching
+from robots import AssetError, DescriptorError, LayoutError, MissingPackageError, RobotRegistry
+from tests.layouts.small_robots import (
+    FOLDING,
+    TURNTABLE,
+    folding,
+    joint,
+    link,
+    robot,
+    turntable,
+    urdf,
+)
+
+PANDAS = {"left": "panda", "right": "panda"}
+TABLE = (-0.7245, -1.209, 0.4845, 1.209)
+MIXED = ("panda", "panda_stick", "so100", "panda", "so100", "panda_stick", "so100", "panda")
+
+
+def pair(robot_, distance, **placement):
+    """Two robots side by side along y, still."""
+    return Layout(
+        {
+            name: Placement(robot_, (0, y, 0), (1, 0, 0, 0), qpos_noise=0.0, **placement)
+            for name, y in (("one", 0.0), ("other", distance))
+        }
+    )
+
+
+def circle(kinds, radius):
+    """Robots around a centre that they face."""
+    placements = {}
+    for i, kind in enumerate(kinds):
+        angle = 2 * math.pi * i / len(kinds)
+        ahead = math.pi / 2 if kind == "so100" else 0.0  # it reaches out along its own -y
+        placements[f"arm_{i}"] = Placement(
+            kind,
+            (radius * math.cos(angle), radius * math.sin(angle), 0.0),
+            yaw_quaternion(angle + math.pi + ahead),
+            keyframe="rest",
+        )
+    return Layout(placements)
+
+
+def kinds(report):
+    return [finding.kind for finding in report.findings]
+
+
+class TestPandas:
+    def test_at_ten_centimetres_they_are_refused_with_the_links_named(self):
+        report = side_by_side(PANDAS, spacing=0.1).validate(workspaces=False)
+        (finding,) = report.findings
+        assert not report.ok
+        assert (finding.kind, finding.robots) == ("collision", ("left", "right"))
+        assert ("panda_link2", "panda_link1") in [pair.links for pair in finding.links]
+        assert finding.amount == pytest.approx(0.110, abs=0.001)
+        assert "left.panda_link2 with right.panda_link1 (11.0 cm)" in str(report)
+
+    @pytest.mark.parametrize(("spacing", "clearance"), [(0.3, 0.041), (0.6, 0.341)])
+    def test_farther_apart_they_pass_with_their_clearance(self, spacing, clearance):
+        report = side_by_side(PANDAS, spacing=spacing).validate(workspaces=False)
+        (between,) = report.clearances
+        assert report.ok
+        assert not report.findings
+        assert between.distance == pytest.approx(clearance, abs=0.001)
+        assert between.noisy_distance <= between.distance
+        assert between.links == ("panda_link2", "panda_link1")
+        assert f"left – right: {clearance * 100:.1f} cm" in str(report)
+
+    def test_the_distance_that_it_advises_is_clear(self):
+        crowded = side_by_side(PANDAS, spacing=0.1).validate(workspaces=False)
+        advised = float(crowded.findings[0].advice.split("(")[1].split(" m ")[0])
+        assert 0.2 < advised < 0.3
+        moved = side_by_side(PANDAS, spacing=advised).validate(workspaces=False)
+        assert not moved.findings
+        nearer = side_by_side(PANDAS, spacing=advised - 0.02).validate(workspaces=False)
+        assert nearer.findings
+
+    def test_four_robots_take_less_than_a_second_once_loaded(self):
+        layout = circle(("panda", "panda_stick", "panda_wristcam", "so100"), 0.9)
+        layout.validate()
+        start = time.process_time()
+        report = layout.validate(table=(-1.5, -1.5, 1.5, 1.5), targets=[(0.3, 0.0, 0.3)])
+        assert time.process_time() - start < 1.0
+        assert report.ok
+        assert len(report.clearances) == 6 + 4
+
+    def test_eight_mixed_robots_in_a_ring(self):
+        report = circle(MIXED, 1.2).validate()
+        assert report.ok, str(report)
+        assert len(report.clearances) == 28
+        assert "and 16 pairs that stay farther apart" in str(report)
+
+    def test_eight_in_too_small_a_ring_are_refused(self):
+        report = circle(MIXED, 0.5).validate(workspaces=False)
+        assert not report.ok
+        assert "collision" in kinds(report)
+
+
+class TestDistances:
+    def test_between_boxes_they_are_exact(self, tmp_path):
+        report = pair(turntable(tmp_path), 0.25).validate(workspaces=False)
+        (between,) = report.clearances
+        assert between.distance == between.noisy_distance == pytest.approx(0.15, abs=1e-9)
+        near, far = between.points
+        assert math.dist(near, far) == pytest.approx(0.15, abs=1e-9)
+
+    @pytest.mark.parametrize("distance", [0.03, 0.08, 0.0999])
+    def test_overlaps_are_as_deep_as_they_are(self, distance, tmp_path):
+        report = pair(turntable(tmp_path), distance).validate(workspaces=False)
+        (finding,) = report.findings
+        assert finding.amount == pytest.approx(0.1 - distance, abs=1e-6)
+        assert [pair.links for pair in finding.links] == [("base", "base"), ("top", "top")]
+
+    def test_a_turned_box_comes_nearer(self, tmp_path):
+        arm = turntable(tmp_path, keyframes={"rest": [math.pi / 4]})
+        (between,) = pair(arm, 0.25).validate(workspaces=False).clearances
+        assert between.distance == pytest.approx(0.25 - 0.1 * math.sqrt(2), abs=1e-6)
+        assert between.links == ("top", "top")
+
+    def test_less_than_two_centimetres_is_a_warning(self, tmp_path):
+        report = pair(turntable(tmp_path), 0.115).validate(workspaces=False)
+        (finding,) = report.findings
+        assert report.ok
+        assert (finding.kind, finding.serious) == ("clearance", False)
+        assert finding.amount == pytest.approx(0.015)
+        assert "0.010 m farther apart (0.125 m between their bases" in finding.advice
+
+    def test_the_nearest_boxes_need_not_be_those_of_the_nearest_bounds(self, tmp_path):
+        """The turned tops' boxes along the axes are 11.3 cm apart, but the tops 11.7 cm."""
+        text = TURNTABLE.replace('size="0.1 0.1 0.1"', 'size="0.1 0.135 0.1"', 1)
+        arm = robot(tmp_path, text, ["turn"], rest=[math.pi / 6])
+        (between,) = pair(arm, 0.25).validate(samples=0, workspaces=False).clearances
+        assert between.links == ("base", "base")
+        assert between.distance == pytest.approx(0.115, abs=1e-9)
+
+    def test_turned_boxes_are_moved_no_farther_than_they_need(self, tmp_path):
+        """Their sides face each other, though not along the world's axes."""
+        arm, half = turntable(tmp_path), 0.5**0.5
+        corner = {"one": 0.0, "other": 0.095 * half}
+        turned = yaw_quaternion(math.pi / 4)
+        placements = {n: Placement(arm, (x, x, 0), turned) for n, x in corner.items()}
+        (finding,) = Layout(placements).validate(samples=0, workspaces=False).findings
+        assert "0.030 m farther apart (0.125 m between" in finding.advice
+
+    @pytest.mark.parametrize("seed", range(6))
+    def test_the_nearest_links_are_the_nearest_of_all(self, seed):
+        """Compared with FCL's answer for every pair of hulls, in random postures."""
+        import fcl
+
+        random = np.random.default_rng(seed)
+        model = load_model(RobotRegistry.load("panda"))
+        bodies = [
+            stand(
+                name,
+                Placement("panda", (x, 0.0, 0.0), yaw_quaternion(x)),
+                model,
+                random.uniform(*model.kinematics.limits.T, (3, 9)),
+            )
+            for name, x in (("one", 0.0), ("other", 0.9))
+        ]
+        distances = [
+            fcl.distance(
+                *(
+                    fcl.CollisionObject(hull.geometry, fcl.Transform(pose[:3, :3], pose[:3, 3]))
+                    for hull, pose in ends
+                ),
+                fcl.DistanceRequest(enable_signed_distance=True),
+            )
+            for posture in range(3)
+            for ends in itertools.product(
+                *(zip(body.hulls, body.poses[posture], strict=True) for body in bodies)
+            )
+        ]
+        assert nearest(*bodies).distance == pytest.approx(min(distances), abs=1e-9)
+        assert len(touching(*bodies)) == sum(distance < 0 for distance in distances)
+
+    def test_a_mesh_counts_as_its_convex_hull(self, tmp_path):
+        import trimesh
+
+        sides = [trimesh.creation.box(bounds=b) for b in ([[0, 0, 0], [1, 0.1, 0.1]],)]
+        sides.append(trimesh.creation.box(bounds=[[0, 0, 0], [0.1, 1, 0.1]]))
+        trimesh.util.concatenate(sides).export(tmp_path / "corner.stl")
+        shape = '<mesh filename="corner.stl" scale="0.1 0.1 0.1"/>'
+        text = urdf(link("base", shape), link("top", ""), joint("turn", "base", "top"))
+        arm = robot(tmp_path, text, ["turn"])
+        placements = {
+            "one": Placement(arm, (0, 0, 0), (1, 0, 0, 0)),
+            "other": Placement(arm, (0.2, 0.2, 0), yaw_quaternion(math.pi)),
+        }
+        (between,) = Layout(placements).validate(workspaces=False).clearances
+        # The L's own distance would be larger: its hull is cut off by the line from tip to tip.
+        assert between.distance == pytest.approx((0.2 - 0.11) * math.sqrt(2), abs=1e-5)
+
+    @pytest.mark.parametrize("shape", ['<cylinder radius="0.05" length="0.1"/>'])
+    def test_round_shapes_are_nearly_round(self, shape, tmp_path):
+        text = urdf(link("base", shape), link("top", ""), joint("turn", "base", "top"))
+        (between,) = pair(robot(tmp_path, text, ["turn"]), 0.3).validate().clearances
+        assert between.distance == pytest.approx(0.2, abs=5e-4)
+
+    @pytest.mark.parametrize("move", [(0.0, 0.0, 0.0, 1.0), (1.5, -2.0, 0.3, 2.5)])
+    def test_a_layout_moved_as_a_whole_keeps_them(self, move):
+        *shift, yaw = move
+        layout = face_to_face({"left": "panda", "right": "so100"}, spacing=0.8)
+        turned = {}
+        for name, placement in layout.items():
+            x, y, z = placement.base_position
+            w, _, _, k = placement.base_quaternion
+            angle = 2 * math.atan2(k, w) + yaw
+            c, s = math.cos(yaw), math.sin(yaw)
+            place = (c * x - s * y + shift[0], s * x + c * y + shift[1], z + shift[2])
+            turned[name] = replace(placement, position=place, quaternion=yaw_quaternion(angle))
+        (before,), (after,) = (
+            one.validate(workspaces=False).clearances for one in (layout, Layout(turned))
+        )
+        assert after.distance == pytest.approx(before.distance, abs=1e-6)
+        assert after.links == before.links
+        assert after.noisy_distance == pytest.approx(before.noisy_distance, abs=1e-6)
+
+
+class TestSelfCollisions:
+    def fold(self, tmp_path, elbow, noise=0.0, **more):
+        arm = folding(tmp_path, elbow)
+        return Layout({"arm": Placement(arm, qpos_noise=noise)}).validate(**more)
+
+    def test_links_that_fold_into_each_other_are_named(self, tmp_path):
+        report = self.fold(tmp_path, math.pi - 0.01)
+        (finding,) = report.findings
+        assert finding.kind == "self-collision"
+        assert [pair.links for pair in finding.links] == [("base", "lower")]
+        assert finding.amount == pytest.approx(0.1, abs=0.01)
+        assert "arm touches itself at the keyframes: arm.base with arm.lower" in finding.what
+
+    def test_stretched_out_they_are_none(self, tmp_path):
+        assert self.fold(tmp_path, 0.0).ok
+
+    def test_noise_alone_can_cause_them(self, tmp_path):
+        still = self.fold(tmp_path, 2.7)
+        noisy = self.fold(tmp_path, 2.7, noise=0.3, samples=50)
+        assert still.ok
+        (finding,) = noisy.findings
+        assert "with joint noise (" in finding.what
+        assert "less joint noise than qpos_noise=0.3 rad" in finding.advice
+
+    def test_neighbours_may_touch(self, tmp_path):
+        text = FOLDING.replace('<origin xyz="0.2 0 0"/>', '<origin xyz="0.09 0 0"/>')
+        arm = robot(tmp_path, text, ["shoulder", "elbow"], tcp="lower")
+        assert Layout({"arm": Placement(arm, qpos_noise=0.0)}).validate().ok
+
+    @pytest.mark.parametrize("reason", ["Default", "Never", "Adjacent"])
+    def test_the_srdf_excuses_pairs(self, reason, tmp_path):
+        (tmp_path / "small.srdf").write_text(
+            f'<robot name="small"><disable_collisions link1="lower" link2="base"'
+            f' reason="{reason}"/></robot>'
+        )
+        assert self.fold(tmp_path, math.pi - 0.01).ok
+
+    @pytest.mark.parametrize("name", RobotRegistry.names())
+    def test_no_keyframe_of_ours_has_one(self, name):
+        for keyframe in RobotRegistry.load(name).keyframes:
+            layout = Layout({"arm": Placement(name, keyframe=keyframe)})
+            report = layout.validate(workspaces=False)
+            assert report.ok, str(report)
+
+
+class TestTable:
+    def validate(self, table=TABLE, **placement):
+        layout = Layout({"arm": Placement("panda", qpos_noise=0.0, **placement)})
+        return layout.validate(table=table, workspaces=False)
+
+    def test_a_base_may_stand_on_it(self):
+        report = self.validate()
+        assert report.ok
+        (above,) = report.clearances
+        assert above.between == ("arm", "table")
+        assert above.distance == pytest.approx(0.141, abs=0.001)
+
+    def test_what_sinks_in_is_named_with_how_far_to_raise_it(self):
+        (finding,) = self.validate(position=(0.0, 0.0, -0.2)).findings
+        assert finding.kind == "table"
+        assert finding.links[0].links == ("panda_link1", "table")
+        assert finding.amount == pytest.approx(0.2 - 0.141, abs=0.001)
+        assert "raise the base of arm by 0.069 m" in finding.advice
+
+    def test_tables_of_the_layout_count(self):
+        layout = around_table({"a": "panda", "b": "so100"}, edges=["north", "south"])
+        report = layout.validate(workspaces=False)
+        assert report.ok
+        assert {c.between for c in report.clearances if c.table} == {("a", "table"), ("b", "table")}
+        sunk = Layout({"a": replace(layout["a"], position=(0.1, 0, -0.3))}, layout.frames)
+        assert kinds(sunk.validate(workspaces=False)) == ["table"]
+
+    def test_beside_it_there_is_none(self):
+        assert self.validate(position=(2.0, 0.0, -0.2)).ok
+
+    @pytest.mark.parametrize("table", [(1, 0, 0, 1), (0, 0, 1, math.nan)])
+    def test_one_that_is_no_rectangle_is_refused(self, table):
+        with pytest.raises(LayoutError, match="it must be x_min, y_min, x_max, y_max"):
+            self.validate(table)
+
+
+class TestJointLimits:
+    def test_a_keyframe_beyond_them_is_found(self):
+        panda = RobotRegistry.load("panda")
+        bent = replace(panda, keyframes={"rest": (0, 0.39, 0, 0.5, 0, 2.36, 0.78, 0.04, 0.04)})
+        report = Layout({"arm": Placement(bent)}).validate(workspaces=False)
+        finding = next(f for f in report.findings if f.kind == "joint limit")
+        assert not report.ok
+        assert "puts panda_joint4 at 0.5 rad, 0.57 rad beyond its limits" in finding.what
+        assert finding.amount == pytest.approx(0.5698, abs=1e-3)
+
+
+class TestTargets:
+    def test_who_reaches_what(self):
+        layout = side_by_side({"left": "panda", "small": "so100"}, spacing=1.0)
+        report = layout.validate(targets={"cube": (0.5, -0.5, 0.1)}, workspaces=False)
+        reached = {reach.robot: reach.reached for reach in report.reaches}
+        assert reached == {"left": True, "small": False}
+        assert report.ok
+        assert "cube (0.5, -0.5, 0.1): left reaches it, small stays" in str(report)
+
+    def test_a_target_that_nobody_reaches_is_a_problem(self):
+        layout = side_by_side(PANDAS, spacing=0.6)
+        report = layout.validate(targets=[(3.0, 0.3, 0.5)], workspaces=False)
+        (finding,) = report.findings
+        assert (finding.kind, finding.robots) == ("target", ("right",))
+        assert finding.amount == pytest.approx(2.0, abs=0.2)
+        assert "no robot reaches target 1; right stays" in str(report)
+
+    def test_a_target_inside_another_robot_is_reached_by_none(self):
+        layout = side_by_side(PANDAS, spacing=0.6)
+        inside = (0.0, 0.3, 0.5)
+        report = layout.validate(targets={"shoulder": inside}, workspaces=False)
+        left = next(reach for reach in report.reaches if reach.robot == "left")
+        assert not left.reached
+        assert left.blocked
+
+    def test_one_below_the_table_is_reached_only_without_it(self):
+        layout = Layout({"arm": Placement("panda")})
+        below = {"below": (0.0, 0.0, -0.1)}
+        free = layout.validate(targets=below, workspaces=False)
+        report = layout.validate(targets=below, table=TABLE, workspaces=False)
+        assert free.ok
+        assert not report.ok
+        assert "would collide there" in str(report)
+
+    @pytest.mark.parametrize(
+        ("target", "message"),
+        [
+            ((1, 2), "target 'cube' is .* it takes x, y, z"),
+            ("here", "target 'cube' is 'here'"),
+            ((0, 0, math.nan), "target 'cube' is"),
+            ((0, 0, 0, 1, 1, 0, 0), "has length 1.414; a rotation has length 1"),
+        ],
+    )
+    def test_what_is_no_place_is_refused(self, target, message):
+        layout = Layout({"arm": Placement("panda")})
+        with pytest.raises(LayoutError, match=message):
+            layout.validate(targets={"cube": target})
+
+
+class TestWorkspaces:
+    def test_nearer_robots_share_more(self):
+        near, far = (side_by_side(PANDAS, spacing=d).validate(samples=0) for d in (0.4, 1.2))
+        assert near.shared[0].volume > 2 * far.shared[0].volume > 0
+        assert 0 < far.shared[0].shares[0] < near.shared[0].shares[0] < 1
+        assert "left and right share" in str(near)
+
+    def test_robots_out_of_reach_share_nothing(self):
+        report = side_by_side(PANDAS, spacing=3.0).validate(samples=0)
+        assert not report.shared
+        assert set(report.workspaces) == {"left", "right"}
+
+    def test_one_too_large_to_sample_is_left_out(self):
+        report = Layout({"arm": Placement("floating_panda_gripper")}).validate(samples=0)
+        assert report.workspaces == {}
+
+    def test_a_volume_that_can_be_told_by_hand(self, tmp_path):
+        """A slide along x and one along y: the TCP fills a square of 2 m × 2 m."""
+        slides = urdf(
+            link("base", ""),
+            link("middle", ""),
+            link("top", ""),
+            joint("x", "base", "middle", kind="prismatic", axis="1 0 0", xyz="0 0 0.05"),
+            joint("y", "middle", "top", kind="prismatic", axis="0 1 0"),
+        ).replace('lower="-4" upper="4"', 'lower="-0.999" upper="0.999"')
+        arm = robot(tmp_path, slides, ["x", "y"])
+        report = Layout({"arm": Placement(arm)}).validate()
+        assert report.workspaces["arm"] == pytest.approx(20 * 20 * 1e-3)
+
+
+class TestDraws:
+    def test_the_same_seed_gives_the_same_report(self):
+        layout = side_by_side(PANDAS, spacing=0.3)
+        one, same, other = (
+            layout.validate(seed=seed, workspaces=False).clearances[0] for seed in (1, 1, 2)
+        )
+        assert one == same
+        assert one.noisy_distance != other.noisy_distance
+        assert one.distance == other.distance
+
+    def test_without_noise_only_the_keyframes_count(self):
+        report = side_by_side(PANDAS, spacing=0.3).validate(samples=0, workspaces=False)
+        assert report.clearances[0].noisy_distance == report.clearances[0].distance
+        assert "looked at the keyframes, without joint noise" in str(report)
+
+    @pytest.mark.parametrize("samples", [-1, 1.5, "many"])
+    def test_a_number_of_draws_that_is_none(self, samples):
+        with pytest.raises(LayoutError, match="samples is .* it must be an integer of 0 or more"):
+            side_by_side(PANDAS, spacing=0.3).validate(samples=samples)
+
+    def test_a_long_check_tells_how_far_it_is(self, monkeypatch, capsys):
+        monkeypatch.setattr("layouts.validation.check.PATIENCE", 0.0)
+        side_by_side(PANDAS, spacing=0.3).validate()
+        assert "checking the layout: left with right\n" in capsys.readouterr().err
+
+    def test_a_short_one_does_not(self, capsys):
+        pair("panda_stick", 0.6).validate(workspaces=False, samples=0)
+        pair("panda_stick", 0.6).validate(workspaces=False, samples=0)
+        assert capsys.readouterr().err == ""
+
+
+class TestPicture:
+    def picture(self, spacing, path, **more):
+        from matplotlib.image import imread
+
+        report = side_by_side(PANDAS, spacing=spacing).validate(workspaces=False, **more)
+        assert report.picture(path) == path
+        return (imread(path)[..., :3] * 255).astype(int)
+
+    def test_overlaps_are_marked_in_red(self, tmp_path):
+        red = np.array([0xB2, 0x18, 0x2B])
+        marked = [
+            (np.abs(self.picture(d, tmp_path / f"{d}.png") - red).max(axis=-1) < 20)[100:1050].sum()
+            for d in (0.1, 0.3)
+        ]
+        assert marked[0] > 150
+        assert marked[1] == 0
+
+    def test_it_says_names_clearance_targets_and_verdict(self):
+        from layouts.validation.picture import draw
+
+        layout = side_by_side(PANDAS, spacing=0.3)
+        figure = draw(layout.validate(table=TABLE, targets={"cube": (0.4, 0, 0.1)}))
+        plan = figure.axes[0]
+        written = [text.get_text().strip() for text in plan.texts]
+        assert {"left", "right", "cube", "4.1 cm"} <= set(written)
+        assert plan.get_title(loc="right") == "ok"
+
+    def test_an_unsupported_ending_names_the_supported_ones(self, tmp_path):
+        report = Layout({"arm": Placement("panda")}).validate(workspaces=False)
+        with pytest.raises(LayoutError, match=r"must end in .png, .pdf or .svg"):
+            report.picture(tmp_path / "cell.jpg")
+
+    def test_without_matplotlib_the_error_names_the_command(self, monkeypatch, tmp_path):
+        report = Layout({"arm": Placement("panda")}).validate(workspaces=False)
+        monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+        with pytest.raises(MissingPackageError, match=r"pip install 'robot-layouts\[preview\]'"):
+            report.picture(tmp_path / "cell.png")
+
+
+class TestBadRobots:
+    def validate(self, tmp_path, text, joints=("turn",), **more):
+        arm = robot(tmp_path, text, joints, **more)
+        return Layout({"arm": Placement(arm)}).validate()
+
+    @pytest.mark.parametrize(
+        ("text", "message"),
+        [
+            (
+                urdf(link("base"), joint("turn", "base", "base")),
+                "no link is without a joint that carries it",
+            ),
+            (
+                urdf(
+                    link("base"),
+                    link("top"),
+                    joint("turn", "base", "top"),
+                    joint("turn", "base", "top"),
+                ),
+                "more than one joint called 'turn'",
+            ),
+            (
+                urdf(link("base"), link("base"), joint("turn", "base", "base")),
+                "more than one link called 'base'",
+            ),
+            (
+                urdf(link("base"), link("top"), joint("turn", "base", "tip")),
+                "joint 'turn' names the link 'tip', which does not exist",
+            ),
+            (
+                urdf(link("base"), link("top"), joint("turn", "base", "top", kind="floating")),
+                "joint 'turn' is 'floating'; only revolute",
+            ),
+            (
+                urdf(
+                    link("base"),
+                    link("top"),
+                    link("a"),
+                    link("b"),
+                    joint("turn", "base", "top"),
+                    joint("ab", "a", "b"),
+                    joint("ba", "b", "a"),
+                ),
+                r"the joints of links \['a', 'b'\] go in a circle",
+            ),
+            (
+                urdf(link("base"), link("top"), joint("turn", "base", "top", axis="0 0 0")),
+                "joint 'turn' has the axis 0 0 0",
+            ),
+            (
+                urdf(link("base"), link("top"), joint("turn", "base", "top", xyz="0 0 up")),
+                "joint 'turn' has xyz='0 0 up' in <origin>; 3 finite",
+            ),
+            (
+                urdf(link("base", "<cone/>"), link("top"), joint("turn", "base", "top")),
+                "a collision of shape 'cone'; choices: mesh, box",
+            ),
+            (
+                urdf(
+                    link("base", '<box size="0.1 0.1 0"/>'),
+                    link("top"),
+                    joint("turn", "base", "top"),
+                ),
+                "link 'base': a collision shape without a volume",
+            ),
+            (
+                '<!DOCTYPE robot [<!ENTITY x SYSTEM "file:///etc/hostname">]>'
+                '<robot name="&x;"><link name="base"/></robot>',
+                "declares XML entities",
+            ),
+            ("<robot", "is not a URDF"),
+        ],
+    )
+    def test_an_urdf_that_makes_no_sense_is_refused(self, text, message, tmp_path):
+        with pytest.raises(AssetError, match=message):
+            self.validate(tmp_path, text)
+
+    def test_one_without_a_joint_that_moves_is_refused(self, tmp_path):
+        still = urdf(link("base"), link("top"), joint("turn", "base", "top", kind="fixed"))
+        with pytest.raises(DescriptorError, match=r"'small' has no moving joints \['turn'\]"):
+            self.validate(tmp_path, still)
+
+    def test_one_whose_moving_link_weighs_nothing_is_refused(self, tmp_path):
+        nothing = '<inertial><mass value="0"/><inertia ixx="0" iyy="0" izz="0"/></inertial></link>'
+        top = link("top").replace("</link>", nothing)
+        text = urdf(link("base"), top, joint("turn", "base", "top"))
+        with pytest.raises(AssetError, match="'top'"):
+            self.validate(tmp_path, text)
+
+    def test_a_missing_mesh_is_named(self, tmp_path):
+        shape = '<mesh filename="gone.stl"/>'
+        text = urdf(link("base", shape), link("top"), joint("turn", "base", "top"))
+        with pytest.raises(AssetError, match="gone.stl"):
+            self.validate(tmp_path, text)
+
+    @pytest.mark.parametrize("contents", ["", "not a mesh at all"])
+    def test_a_mesh_that_is_none_is_named(self, contents, tmp_path):
+        (tmp_path / "bad.stl").write_text(contents)
+        shape = '<mesh filename="bad.stl"/>'
+        text = urdf(link("base", shape), link("top"), joint("turn", "base", "top"))
+        with pytest.raises(AssetError, match="link 'base'"):
+            self.validate(tmp_path, text)
+
+    def test_an_entity_in_the_srdf_is_refused(self, tmp_path):
+        (tmp_path / "small.srdf").write_text('<!DOCTYPE r [<!ENTITY x "y">]><robot/>')
+        with pytest.raises(AssetError, match="declares XML entities"):
+            Layout({"arm": Placement(turntable(tmp_path))}).validate()
+
+    def test_a_changed_file_is_read_again(self, tmp_path):
+        arm = turntable(tmp_path)
+        before = pair(arm, 0.25).validate(workspaces=False).clearances[0].distance
+        text = (tmp_path / "small.urdf").read_text()
+        (tmp_path / "small.urdf").write_text(text.replace("0.1 0.1 0.1", "0.2 0.2 0.1"))
+        after = pair(arm, 0.25).validate(workspaces=False).clearances[0].distance
+        assert before - after == pytest.approx(0.1)
+
+
+def test_without_fcl_the_error_names_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "fcl", None)
+    with pytest.raises(MissingPackageError, match=r"pip install 'robot-layouts\[checks\]'"):
+        side_by_side(PANDAS, spacing=0.3).validate()
+
+
+def test_importing_layouts_loads_none_of_it():
+    script = "import sys, layouts; print({'fcl', 'trimesh', 'scipy', 'yourdfpy'} & {*sys.modules})"
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "set()"

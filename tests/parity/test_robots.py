@@ -1,0 +1,114 @@
+"""Robots alone in a world move as native's agents do, to the last bit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import sapien
+
+from layouts import Layout, Placement
+from robots import RobotDescriptor, RobotRegistry
+from simulation import PhysicsSettings, Simulation
+from tests.native import NATIVE
+
+pytestmark = NATIVE
+
+STEPS = 100
+HEIGHT = 1.5  # m over native's ground, so that nothing touches it
+AGENTS = {
+    "fetch": "fetch",
+    "floating_panda_gripper": "floating_panda_gripper",
+    "koch": "koch-v1.1",
+    "panda": "panda",
+    "panda_stick": "panda_stick",
+    "panda_wristcam": "panda_wristcam",
+    "so100": "so100",
+}
+BASE_NUMBERS = {"fetch": 2}  # of native's action, at its end; here the base stands still
+
+
+def native_motion(name: str, actions: np.ndarray) -> np.ndarray:
+    """Return qpos and qvel after every step, (steps, 2, dof), SAPIEN's order."""
+    import gymnasium
+    import mani_skill.envs  # noqa: F401
+    import torch
+
+    env = gymnasium.make(
+        "Empty-v1",
+        robot_uids=AGENTS[name],
+        control_mode="pd_joint_delta_pos",
+        sim_backend="physx_cpu",
+        reconfiguration_freq=0,
+    )
+    native = env.unwrapped
+    native.reset(seed=0)
+    agent = native.agent
+    agent.reset(torch.from_numpy(start(name)[None]))
+    agent.robot.set_pose(sapien.Pose([0.0, 0.0, HEIGHT]))
+    assert [joint.name for joint in agent.robot.active_joints] == active(name)
+    rows = []
+    for action in actions:
+        native.step(np.concatenate([action, np.zeros(BASE_NUMBERS.get(name, 0), np.float32)]))
+        rows.append([agent.robot.get_qpos()[0].numpy(), agent.robot.get_qvel()[0].numpy()])
+    env.close()
+    return np.array(rows)
+
+
+def ours(robot: str | RobotDescriptor) -> Simulation:
+    layout = Layout({"arm": Placement(robot)})
+    return Simulation(layout, lambda world, _: None, 1, PhysicsSettings())
+
+
+def active(name: str) -> list[str]:
+    return [joint.name for joint in ours(name).worlds[0].robots["arm"].joints]
+
+
+def start(name: str) -> np.ndarray:
+    """Return the first keyframe in SAPIEN's order."""
+    robot = RobotRegistry.load(name)
+    qpos = dict(zip(robot.joints, next(iter(robot.keyframes.values())), strict=True))
+    return np.array([qpos[joint] for joint in active(name)], np.float32)
+
+
+def our_motion(robot: str | RobotDescriptor, actions: np.ndarray) -> np.ndarray:
+    simulation = ours(robot)
+    arm = simulation.worlds[0].robots["arm"]
+    arm.reset(next(iter(arm.descriptor.keyframes.values())))
+    arm.articulation.set_root_pose(sapien.Pose([0.0, 0.0, HEIGHT]))  # built elsewhere, as native
+    simulation.touched()
+    rows = []
+    for action in actions:
+        simulation.step(action[None], simulation.read().joint_positions)
+        rows.append([arm.articulation.get_qpos(), arm.articulation.get_qvel()])
+    return np.array(rows)
+
+
+def random_actions(name: str) -> np.ndarray:
+    size = RobotRegistry.load(name).action_dim
+    return np.random.default_rng(0).uniform(-1.2, 1.2, (STEPS, size)).astype(np.float32)
+
+
+@pytest.mark.parametrize("name", AGENTS)
+def test_a_robot_moves_as_its_native_agent(name):
+    actions = random_actions(name)
+    expected = native_motion(name, actions)
+    assert np.abs(expected[-1, 0] - expected[0, 0]).max() > 0.1
+    np.testing.assert_array_equal(our_motion(name, actions), expected)
+
+
+@pytest.mark.parametrize(
+    ("name", "group", "change"),
+    [
+        ("koch", "gripper", {"stiffness": 93.4}),
+        ("fetch", "base_turn", {"damping": 990.0}),
+        ("floating_panda_gripper", "rotation", {"upper": 0.101}),
+    ],
+)
+def test_a_robot_that_is_driven_otherwise_is_told_apart(name, group, change):
+    actions = random_actions(name)
+    robot = RobotRegistry.load(name)
+    other = replace(robot.action_split.groups[group], **change)
+    mutant = replace(robot, action_split=robot.action_split.replace(**{group: other}))
+    assert not np.array_equal(our_motion(mutant, actions), our_motion(robot, actions))

@@ -1,0 +1,160 @@
+"""Every robot of the catalogue stands, and each of its action numbers moves its own joints."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+import sapien
+
+from layouts import single
+from robots import ActionNumber, RobotRegistry
+from robots.asset_sources import find_mani_skill
+from robots.from_urdf import guess_descriptor
+from robots.registry import CATALOGUE
+from robots.urdf_model import read_model
+from robots.urdf_reach import link_frame
+from robots.urdf_xml import parse_urdf
+from simulation import PhysicsSettings, Simulation
+from simulation.controller import JointPositionController
+
+ROBOTS = tuple(CATALOGUE)
+STEPS = 5
+
+
+@functools.cache
+def simulation_of(robot: str) -> Simulation:
+    return Simulation(single({"arm": robot}), lambda world, _: None, 1, PhysicsSettings())
+
+
+def stand(robot: str, keyframe: str | None = None) -> tuple[Simulation, np.ndarray]:
+    """Stand the robot at a keyframe; return joint positions in the descriptor's order."""
+    simulation = simulation_of(robot)
+    placement = simulation.layout["arm"]
+    start = np.array(placement.robot.keyframe(keyframe) if keyframe else placement.start_qpos)
+    for world in simulation.worlds:
+        world.robots["arm"].reset(start)
+    simulation.touched()
+    return simulation, start
+
+
+def qpos(simulation: Simulation) -> np.ndarray:
+    """Joint positions in the descriptor's order."""
+    order = simulation.worlds[0].robots["arm"].active_index
+    return simulation.read().joint_positions[0, order]
+
+
+def play(simulation: Simulation, action: np.ndarray, steps: int) -> np.ndarray:
+    for _ in range(steps):
+        simulation.step(action[None], simulation.read().joint_positions)
+    return qpos(simulation)
+
+
+def staying(robot: str, start: np.ndarray) -> np.ndarray:
+    """Return the action that asks for nothing: 0, or the position itself where it is absolute."""
+    descriptor = RobotRegistry.load(robot)
+    action = np.zeros(descriptor.action_dim, np.float32)
+    for number in descriptor.describe_action():
+        if not number.relative:
+            value = start[descriptor.joints.index(number.joints[0])]
+            middle = (number.upper + number.lower) / 2
+            action[number.index] = (value - middle) / ((number.upper - number.lower) / 2)
+    return action
+
+
+def numbers() -> list[tuple[str, ActionNumber]]:
+    return [(name, n) for name in ROBOTS for n in RobotRegistry.load(name).describe_action()]
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_every_collision_shape_of_its_urdf_is_there(robot):
+    root = parse_urdf(RobotRegistry.load(robot).urdf.locate().read_bytes(), robot)
+    expected = {str(e.get("name")): len(e.findall("collision")) for e in root.iterfind("link")}
+    links = simulation_of(robot).worlds[0].robots["arm"].links
+    assert {name: len(link.collision_shapes) for name, link in links.items()} == expected
+    assert sum(expected.values()) > 0
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_it_stays_at_every_keyframe(robot):
+    for keyframe in RobotRegistry.load(robot).keyframes:
+        simulation, start = stand(robot, keyframe)
+        after = play(simulation, staying(robot, start), 20)
+        np.testing.assert_allclose(after, start, atol=0.02, err_msg=keyframe)
+
+
+@pytest.mark.parametrize(("robot", "number"), numbers(), ids=lambda x: getattr(x, "name", x))
+def test_an_action_number_moves_its_own_joints_and_no_others(robot, number):
+    simulation, start = stand(robot)
+    still = staying(robot, start)
+    mine = [simulation.layout["arm"].robot.joints.index(joint) for joint in number.joints]
+    joints = simulation.worlds[0].robots["arm"].driven
+    low, high = np.concatenate([joints[i].limits for i in mine]).min(0)
+    room_above = high - start[mine[0]] > start[mine[0]] - low
+    action = still.copy()
+    action[number.index] = 0.8 if room_above else -0.8
+
+    controller = JointPositionController(simulation.layout, simulation.worlds)
+    now = simulation.read().joint_positions
+    change = controller.targets(action[None], now) - controller.targets(still[None], now)
+    assert np.flatnonzero(change[0]).tolist() == mine
+
+    moved = np.abs(play(simulation, action, STEPS) - start)
+    own, others = moved[mine], np.delete(moved, mine)
+    assert (own > 0.003).all()
+    assert others.max(initial=0.0) < 0.4 * max(own.max(), 0.02)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_links_are_where_the_urdf_alone_says(robot):
+    simulation, start = stand(robot)
+    descriptor, arm = simulation.layout["arm"].robot, simulation.worlds[0].robots["arm"]
+    arm.articulation.set_root_pose(sapien.Pose())
+    model = read_model(descriptor.urdf.locate().read_bytes(), robot)
+    positions = dict(zip(descriptor.joints, start, strict=True))
+    for name, link in arm.links.items():
+        frame, pose = link_frame(model, name, positions), link.entity_pose
+        np.testing.assert_allclose(frame.position, pose.p, atol=2e-6, err_msg=name)
+        matrix = pose.to_transformation_matrix()[:3, :3]
+        np.testing.assert_allclose(frame.rotation, matrix, atol=5e-6, err_msg=name)
+
+
+@pytest.mark.parametrize("robot", ["panda", "koch", "xarm7"])
+def test_no_pose_is_farther_than_the_reach_and_some_come_near(robot):
+    found = guess_descriptor(RobotRegistry.load(robot).urdf.locate()).descriptor
+    simulation, _ = stand(robot)
+    arm = simulation.worlds[0].robots["arm"]
+    arm.articulation.set_root_pose(sapien.Pose())
+    limits = np.concatenate([joint.limits for joint in arm.joints])
+    rng = np.random.default_rng(0)
+    farthest = 0.0
+    for _ in range(3000):
+        arm.articulation.set_qpos(rng.uniform(*limits.T))
+        points = found.tcp_position_links or (found.tcp_link,)
+        middle = np.mean([arm.links[link].entity_pose.p for link in points], axis=0)
+        farthest = max(farthest, float(np.hypot(*middle[:2])))
+    assert 0.9 * found.reach < farthest < found.reach + 1e-3
+
+
+HANDS = ("dclaw/dclaw_gripper_glb.urdf", "allegro/allegro_hand_right.urdf")
+
+
+@pytest.mark.parametrize("robot", [*ROBOTS, *HANDS])
+def test_a_robot_that_was_only_guessed_stands_and_moves(robot):
+    if robot in HANDS:
+        path = find_mani_skill() / "assets" / "robots" / robot
+    else:
+        path = RobotRegistry.load(robot).urdf.locate()
+    guessed = guess_descriptor(path, "guessed").descriptor
+    simulation = Simulation(single({"arm": guessed}), lambda world, _: None, 1, PhysicsSettings())
+    simulation.worlds[0].robots["arm"].reset(guessed.keyframe("rest"))
+    simulation.touched()
+    before = qpos(simulation)
+    action = np.full(guessed.action_dim, 0.3, np.float32)
+    after = play(simulation, action, STEPS)
+    assert np.isfinite(after).all()
+    held = [j for g in guessed.action_split.groups.values() if g.held for j in g.joints]
+    moved = dict(zip(guessed.joints, np.abs(after - before), strict=True))
+    assert all(moved[joint] < 0.01 for joint in held)
+    assert max(moved.values()) > 0.02
