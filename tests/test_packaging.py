@@ -90,7 +90,7 @@ class TestRepository:
 class TestDependencies:
     def test_the_rooms_import_what_is_declared(self):
         declared = names_of(PROJECT["dependencies"])
-        for extra in ("checks", "preview", "video", "export", "parity"):
+        for extra in ("checks", "preview", "video", "export", "parity", "pettingzoo"):
             declared |= names_of(PROJECT["optional-dependencies"][extra])
         used = {module for room in ROOMS for module in imports_of(room, everywhere=True)}
         assert distributions(used) <= declared
@@ -114,7 +114,7 @@ class TestDependencies:
 
 
 # Imported inside functions only, after its extra was found to be installed.
-LOADED_WITH_ITS_EXTRA = {"rollouts/export/lerobot.py"}
+LOADED_WITH_ITS_EXTRA = {"rollouts/export/lerobot.py", "tasks/fronts/parallel.py"}
 
 
 def modules_of(room):
