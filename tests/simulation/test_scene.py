@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+import sapien
 import sapien.physx as physx
+from sapien.wrapper.urdf_loader import URDFLoader
 
 from simulation import World
-from simulation.robot import _PhysicsOnlyLoader
 from simulation.scene import build_scene
 from tests.layouts.cells import link_poses, mixed_cell, random_positions
 
@@ -59,13 +60,11 @@ def test_it_steps_as_the_settings_say(cell):
 
 
 def test_the_merged_urdf_is_the_same_robots_in_sapien(cell, tmp_path):
-    import sapien
-
     scene = sapien.Scene([physx.PhysxCpuSystem()])
-    loader = _PhysicsOnlyLoader()
+    loader = URDFLoader()
     loader.set_scene(scene)
     loader.fix_root_link = True
-    merged = loader.load(str(cell.to_urdf(tmp_path / "cell.urdf")))
+    merged = loader.load(str(cell.to_urdf(tmp_path / "cell.urdf", visuals=False)))
     random = np.random.default_rng(1)
     for _ in range(DRAWS):
         positions = {name: random_positions(p, random) for name, p in cell.items()}
