@@ -86,13 +86,13 @@ def test_one_server_error_is_retried(hub: HubServer, store, physics):
     [
         (403, r"hand\.stl: access refused \(403\)"),
         (500, r"hand\.stl: HTTP error 500"),
-        (429, r"nothing arrived for 2 s \(it warned: .*429"),
+        (429, r"nothing arrived for 4 s \(it warned: .*429"),
     ],
 )
 def test_a_file_that_stays_refused_is_named(hub: HubServer, store, physics, code, reason):
     hub.fail("GET", HAND, status(code))
     with pytest.raises(AssetError, match=reason):
-        fetch_from_hub(store, physics, patience=2.0)
+        fetch_from_hub(store, physics, patience=4.0)
 
 
 def test_a_missing_mesh_is_named_and_the_others_are_kept(hub: HubServer, store, physics):
@@ -112,8 +112,8 @@ def test_a_truncated_body_is_resumed(hub: HubServer, store, physics):
 def test_a_slow_download_that_goes_on_is_not_given_up(hub: HubServer, store):
     large = next(file for file in PANDA.files if file.path.endswith("visual/link0.glb"))
     hub.files[f"{large.origin.hub_folder}/{large.path}"] = contents(large)
-    hub.fail("GET", large.path, drip(pieces=12, pause=0.25), times=1)
-    fetch_from_hub(store, [large], patience=2.0)
+    hub.fail("GET", large.path, drip(pieces=16, pause=0.3), times=1)
+    fetch_from_hub(store, [large], patience=4.0)
     assert_all_verified(store, [large])
     assert len(hub.downloads()) == 1
 
@@ -122,7 +122,7 @@ def test_a_server_dying_midway_leaves_the_rest_to_the_next_source(
     hub: HubServer, store, physics, capfd
 ):
     hub.fail("GET", HAND, die, times=1)
-    ensure(physics, store, [HubSource(patience=2.0), InstalledManiSkill()])
+    ensure(physics, store, [HubSource(patience=4.0), InstalledManiSkill()])
     assert_all_verified(store, physics)
     said = capfd.readouterr().err
     assert "Hugging Face Hub" in said
