@@ -14,7 +14,7 @@ from layouts.layout import Layout
 from layouts.maniskill import TASKS, from_maniskill
 from layouts.presets import FACING, PRESETS
 from layouts.validate_command import add_check_options
-from layouts.viewer.command import add_view_options
+from layouts.view_command import add_view_options
 from robots import LayoutError, RobotLayoutsError, RobotRegistry, UnknownNameError
 
 # What presets take besides the robots.

@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from layouts.viewer import Cell, Motion, add_page_options, show
+from layouts.view_command import add_page_options, show
+from layouts.viewer import Cell, Motion
 
 if TYPE_CHECKING:
     from rollouts.trajectory import Trajectory, TrajectoryFile

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from rich.console import Console
 
-from layouts.viewer import add_page_options, page_words, show
+from layouts.view_command import add_page_options, page_words, show
 from robots import RobotLayoutsError, TaskError, UnknownNameError
 from tasks.description import TaskFacts, describe, facts, list_table, parity_verdicts
 from tasks.registry import list_tasks, make

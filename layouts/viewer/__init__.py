@@ -1,7 +1,6 @@
 """A layout as a web page: robots with their meshes, sliders, overlays, and motions to scrub."""
 
 from layouts.viewer.cell import Cell, Motion, Thing
-from layouts.viewer.command import add_page_options, page_words, show
 from layouts.viewer.server import ViewerError
 
-__all__ = ["Cell", "Motion", "Thing", "ViewerError", "add_page_options", "page_words", "show"]
+__all__ = ["Cell", "Motion", "Thing", "ViewerError"]

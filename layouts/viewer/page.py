@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from layouts.files import written_whole
 from layouts.validation.kinematics import Floats
+from layouts.view_command import LOOPBACK
 from layouts.viewer.cell import Cell, Contact
 from layouts.viewer.scene import OVERLAYS, Scene
-from layouts.viewer.server import LOOPBACK, ViewerError, address, serving
+from layouts.viewer.server import ViewerError, address, serving
 from robots import JointGroup
 
 PAUSE = 0.02  # s between looks at what has changed

@@ -11,7 +11,6 @@ from typing import Any
 
 from robots import MissingPackageError, RobotLayoutsError
 
-LOOPBACK = "127.0.0.1"
 LAST_PORT = 65535
 
 

@@ -10,6 +10,7 @@ import tasks
 from layouts import single
 from robots import TaskError, UnknownNameError
 from simulation import Friction, PhysicsSettings, State, World
+from tasks import registry
 
 
 @pytest.mark.parametrize("task_id", tasks.list_clones())
@@ -147,7 +148,9 @@ class Still(tasks.MultiRobotTask):
         return {"success": torch.zeros(state.num_envs, dtype=torch.bool)}
 
 
-def test_a_user_can_declare_a_task():
+def test_a_user_can_declare_a_task(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(registry, "_registered", dict(registry._registered))
+    monkeypatch.setattr(registry, "_listed", list(registry._listed))
     tasks.register_task("Still-v0", "test.still")(Still)
     env = tasks.make("test.STILL", num_envs=2)
     assert "Still-v0" in tasks.list_tasks()

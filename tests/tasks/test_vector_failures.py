@@ -205,10 +205,11 @@ def test_no_ending_leaves_a_process_or_memory(tmp_path, ending, code):
     try:
         assert process.stdout is not None
         worker = int(process.stdout.readline())
-        assert lives(worker)
         if ending == "interrupted":
+            assert lives(worker)
             os.killpg(process.pid, signal.SIGINT)  # as a terminal does
         elif ending == "killed":
+            assert lives(worker)
             process.kill()
         _, said = process.communicate(timeout=PATIENCE)
         assert process.returncode == code, said

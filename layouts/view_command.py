@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from layouts.layout import Layout
-from layouts.viewer.cell import Cell
-from layouts.viewer.server import LOOPBACK, import_viser
 
+if TYPE_CHECKING:
+    from layouts.viewer import Cell
+
+LOOPBACK = "127.0.0.1"
 PORT = 8080
 
 
@@ -57,8 +60,10 @@ def show(cell: Callable[[], Cell], options: argparse.Namespace) -> int:
     Raises:
         RobotLayoutsError: If the page cannot be served or saved.
     """
-    import_viser()
     from layouts.viewer.page import save_html, serve
+    from layouts.viewer.server import import_viser
+
+    import_viser()
 
     try:
         made = cell()
@@ -74,4 +79,6 @@ def show(cell: Callable[[], Cell], options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace, layout: Layout) -> int:
+    from layouts.viewer import Cell
+
     return show(lambda: Cell(" ".join([options.what, *options.robots]), layout), options)
