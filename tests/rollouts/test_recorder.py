@@ -424,39 +424,6 @@ def test_a_read_only_folder(tmp_path, push_t):
         subprocess.run(["umount", place], check=True)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("task_id", ["PushT-v1", "TwoRobotPickCube-v1"])
-def test_recording_costs_little(tmp_path, task_id):
-    """Processor time of playing the same episodes, with and without recording them."""
-    env = tasks.make(task_id)
-    rng = np.random.default_rng(0)
-    shape = 60, env.layout.action_dim
-    episodes = [(seed, rng.uniform(-1, 1, shape).astype(np.float32)) for seed in range(12)]
-
-    def bare(_):
-        for seed, actions in episodes:
-            env.reset(seed, options={"reconfigure": True})
-            for action in actions:
-                env.step(action)
-
-    def recorded(number):
-        with Recorder(tmp_path / f"{number}.h5", env) as recorder:
-            for seed, actions in episodes:
-                recorder.add(play(env, seed, actions))
-
-    def least_seconds(run):
-        seconds = []
-        for number in range(6):
-            start = time.process_time()
-            run(number)
-            seconds.append(time.process_time() - start)
-        return min(seconds[1:])
-
-    extra = least_seconds(recorded) / least_seconds(bare) - 1
-    print(f"{task_id}: {extra:.1%}")
-    assert extra < 0.25  # 0.12 to 0.15 on a quiet machine
-
-
 def test_an_existing_recording_is_not_overwritten_unasked(tmp_path):
     env = tasks.make("PushT-v1")
     path = tmp_path / "twice.h5"
