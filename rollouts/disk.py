@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
-from collections.abc import Generator, Mapping
+from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 from robots import RecordingError
 
@@ -48,19 +46,14 @@ def disk_errors(path: Path) -> Generator[None]:
         raise RecordingError(f"cannot write {path}: {_reason(error)}") from error
 
 
-def json_text(summary: Mapping[str, Any]) -> str:
-    """Return a json file's text."""
-    return json.dumps(summary, indent=1) + "\n"
-
-
-def write_json(path: Path, summary: Mapping[str, Any]) -> None:
-    """Replace a json file in one step.
+def write_text(path: Path, text: str) -> None:
+    """Replace a text file in one step.
 
     Raises:
         RecordingError: If it cannot be written.
     """
     with replaced(path) as partial:
-        partial.write_text(json_text(summary))
+        partial.write_text(text)
 
 
 def _reason(error: Exception) -> str:

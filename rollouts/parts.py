@@ -8,6 +8,7 @@ while episodes are played, where an h5 file of as many arrays would cost fifteen
 from __future__ import annotations
 
 import json
+import math
 import os
 import zlib
 from collections.abc import Mapping
@@ -123,8 +124,8 @@ def list_earlier_parts(folder: Path) -> list[Path]:
     return sorted(folder.glob(f"seed-*{_EARLIER}"))
 
 
-def read_part(path: Path) -> tuple[dict[str, Any], Stored]:
-    """Return the header of a part, and its episode.
+def read_part(path: Path) -> tuple[bytes, Stored]:
+    """Return the header of a part, as json, and its episode.
 
     Raises:
         RecordingError: If it is damaged.
@@ -139,11 +140,10 @@ def read_part(path: Path) -> tuple[dict[str, Any], Stored]:
     arrays: dict[str, NDArray[Any]] = {}
     start = 0
     for name, kind, shape in said["arrays"]:
-        count = int(np.prod(shape))
-        rows = np.frombuffer(numbers, kind, count, start)
+        rows = np.frombuffer(numbers, kind, math.prod(shape), start)
         arrays[name] = rows.reshape(shape).copy()  # which also aligns it
         start += rows.nbytes
-    return json.loads(header), Stored(said["attributes"], arrays)
+    return header, Stored(said["attributes"], arrays)
 
 
 def _arrays(episode: Episode) -> dict[str, NDArray[Any]]:

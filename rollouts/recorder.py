@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import glob
+import json
 import os
 import shutil
 import weakref
@@ -14,7 +15,7 @@ from types import TracebackType
 from typing import Any, NamedTuple
 
 from robots import RecordingError
-from rollouts.disk import PARTIAL, disk_errors, json_text, write_json
+from rollouts.disk import PARTIAL, disk_errors, write_text
 from rollouts.episode import Episode
 from rollouts.joined import join, read_joined
 from rollouts.parts import (
@@ -201,7 +202,7 @@ class Recorder:
         except RecordingError:  # by a power cut, say: its episode is recorded again
             part.unlink()
             return
-        self._expect_same(part, header)
+        self._expect_same(part, json.loads(header))
         if seed_of(part) in joined:
             part.unlink()
 
@@ -228,9 +229,9 @@ class Recorder:
             }
         abouts = enumerate(entry.about for entry in self._joined.values())
         episodes = [{"episode_id": number, **about} for number, about in abouts]
-        summary = {**self._header, "episodes": episodes}
-        if not self._json_says(json_text(summary)):
-            write_json(self.json_path, summary)
+        text = json.dumps({**self._header, "episodes": episodes}, indent=1) + "\n"
+        if not self._json_says(text):
+            write_text(self.json_path, text)
         shutil.rmtree(self.parts, ignore_errors=True)  # the next Recorder removes what is left
 
     def _json_says(self, text: str) -> bool:

@@ -107,10 +107,9 @@ class StateTape:
             self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
         row = self._rows[self._length]
         parts = [state.poses(self._frames), state.joint_positions, state.joint_velocities]
-        parts = [part.ravel() for part in parts]
         for body in self._components:
             parts += (body.linear_velocity, body.angular_velocity)
-        np.concatenate(parts, out=row[: self._ends[-1]])
+        np.concatenate(parts, axis=None, out=row[: self._ends[-1]])
         if not self._length:  # roots are fixed: after a step they have no velocity
             velocities = [(root.linear_velocity, root.angular_velocity) for root in self._roots]
             row[self._ends[-1] :] = np.ravel(velocities)

@@ -191,7 +191,7 @@ def test_a_part_says_what_it_is(tmp_path, push_t):
         recorder.add(episodes[3])
         (part,) = recorder.parts.iterdir()
         header, stored = read_part(part)
-        assert header["layout"]["arm"]["robot"] == "panda_stick"
+        assert json.loads(header)["layout"]["arm"]["robot"] == "panda_stick"
         assert stored.about["episode_seed"] == 3
         np.testing.assert_array_equal(stored.arrays["actions"], episodes[3].actions)
         tee = stored.arrays["env_states/actors/Tee"]
