@@ -66,18 +66,23 @@ class PartWriter:
         Raises:
             RecordingError: If it cannot be written.
         """
-        path = part_path(self.folder, episode.seed)
+        self.store(episode.seed, self.encode(episode))
+
+    def store(self, seed: int, part: bytes) -> None:
+        """Write an episode that was encoded, perhaps on another machine; else as `write`."""
+        path = part_path(self.folder, seed)
         partial = path.with_name(f"{path.name}.{os.getpid()}{PARTIAL}")
         with disk_errors(path):
             try:
-                partial.write_bytes(self._encode(episode))
+                partial.write_bytes(part)
                 os.replace(partial, path)
             except OSError:
                 with suppress(OSError):
                     partial.unlink()
                 raise
 
-    def _encode(self, episode: Episode) -> bytes:
+    def encode(self, episode: Episode) -> bytes:
+        """Return what `write` writes."""
         # In memory, because HDF5 does not recover from a disk that is full.
         with h5py.File(
             "part", "w", driver="core", backing_store=False, libver=(_FORMAT, "latest")
