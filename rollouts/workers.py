@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import signal
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn
 
@@ -30,8 +30,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def chosen_executor(options: argparse.Namespace) -> Executor:
+def chosen_executor(options: argparse.Namespace, modules: Sequence[str] = ()) -> Executor:
     """Return who plays.
+
+    Args:
+        options: What was chosen.
+        modules: Modules that other machines need besides this library.
 
     Raises:
         MissingPackageError: If Ray is asked for and not installed.
@@ -39,7 +43,7 @@ def chosen_executor(options: argparse.Namespace) -> Executor:
     if options.ray is not None:
         from rollouts.ray_executor import RayExecutor
 
-        return RayExecutor(options.ray, options.workers)
+        return RayExecutor(options.ray, options.workers, modules=modules)
     from rollouts.executor import ProcessExecutor
 
     return ProcessExecutor(options.workers or 1)
