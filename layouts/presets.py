@@ -6,8 +6,8 @@ whose own front is not its base's +x faces like the others.
 A distance given as ``"auto"`` comes from the robots' reach. Neighbours stand `HAND_OVER` of the sum
 of their reaches apart: the last eighth of that sum is where both can work, so one can hand an
 object to the other. They never stand so near that one can reach the other's base. Where one
-distance has to serve several pairs of neighbours, it is that of the pair that asks for the least,
-unless somebody could then reach a neighbour's base.
+distance has to serve several pairs of neighbours, it is that of the pair that asks for the most.
+Any mix of the catalogue's robots keeps clear of each other so, which `Layout.validate` confirms.
 """
 
 from __future__ import annotations
@@ -29,6 +29,9 @@ Distance = float | Literal["auto"]  # m
 # Share of the sum of two reaches. ManiSkill's two-robot tasks stand their Pandas 1.5 m apart,
 # which is 0.877 of twice 0.855 m (mani_skill 3.0.1, scene_builder/table).
 HAND_OVER = 7 / 8
+# The same where robots also stand round a corner of a table: at 7/8 their hands would meet over its
+# middle. Pandas need 0.93 to start 5 cm apart there, with joint noise.
+ROUND_CORNERS = 15 / 16
 EDGE = 0.1  # from a table's edge to a base's middle (m); native's single Pandas have 0.11 m
 
 FACING: Mapping[str, float] = {  # turn from an outward look along the radius (rad)
@@ -154,8 +157,8 @@ def around_table(
         edges: Edge of each robot, by name or in order. Left out: south, north, west, east, and
             again from the south.
         table: Width (along x) and depth (along y) of the table (m). ``"auto"`` makes it so large
-            that robots on opposite edges are at hand-over distance, or larger if several robots
-            stand on one edge.
+            that robots on opposite edges are at hand-over distance; a little larger if robots
+            stand round its corners, and larger if several stand on one edge.
         inset: Distance of the bases from the edge, inwards (m). ``"auto"`` is 0.1 m for the robot
             that reaches farthest, and more for others, so that they work in the same places.
         keyframe: Keyframe every robot starts from; None is each one's home.
@@ -169,7 +172,8 @@ def around_table(
     rows = {edge: {n: r for n, r in loaded.items() if sides[n] == edge} for edge in EDGES}
     if inset != "auto":
         inset = _given("inset", inset)
-    size = _table_size(table, rows, EDGE if inset == "auto" else inset)
+    share = ROUND_CORNERS if _meet(rows) else HAND_OVER
+    size = _table_size(table, rows, EDGE if inset == "auto" else inset, share)
     farthest = max(robot.reach for robot in loaded.values())
     along: dict[str, float] = {}
     for edge, row in rows.items():
@@ -180,8 +184,8 @@ def around_table(
     for name, robot in loaded.items():
         across = size[1] if sides[name] in ("north", "south") else size[0]
         if inset == "auto":
-            shorter = HAND_OVER * (farthest - robot.reach)
-            inwards = max(EDGE, min(EDGE + shorter, across / 2 - HAND_OVER * robot.reach))
+            shorter = share * (farthest - robot.reach)
+            inwards = max(EDGE, min(EDGE + shorter, across / 2 - share * robot.reach))
         else:
             inwards = inset
         placements[name] = Placement(
@@ -225,7 +229,10 @@ def grid(
         for other in ((row + 1, column), (row, column + 1))
         if other in cells
     ]
-    distance = _shared_distance(neighbours) if spacing == "auto" else _given("spacing", spacing)
+    if spacing == "auto":
+        distance = max((_apart(*pair) for pair in neighbours), default=0.0)
+    else:
+        distance = _given("spacing", spacing)
     placements: dict[str, Placement] = {}
     for i, (name, robot) in enumerate(loaded.items()):
         row, column = divmod(i, columns)
@@ -269,14 +276,6 @@ def _given(what: str, distance: Distance) -> float:
 def _apart(one: RobotDescriptor, other: RobotDescriptor) -> float:
     """Return the hand-over distance (m) of two bases, from which neither reaches the other one."""
     return max(HAND_OVER * (one.reach + other.reach), one.reach, other.reach)
-
-
-def _shared_distance(neighbours: Sequence[tuple[RobotDescriptor, RobotDescriptor]]) -> float:
-    """Return one distance (m) for several pairs of neighbours; 0 if there is no pair."""
-    if not neighbours:
-        return 0.0
-    farthest = max(robot.reach for pair in neighbours for robot in pair)
-    return max(min(_apart(*pair) for pair in neighbours), farthest)
 
 
 def _automatic_ring(robots: Sequence[RobotDescriptor]) -> tuple[float, list[float]]:
@@ -348,16 +347,31 @@ def _edges(
     return chosen
 
 
+def _meet(rows: Mapping[str, object]) -> bool:
+    """Tell whether robots stand on two edges of a table that meet in a corner."""
+    return any(rows[edge] for edge in ("north", "south")) and any(
+        rows[edge] for edge in ("east", "west")
+    )
+
+
 def _table_size(
     table: tuple[float, float] | Literal["auto"],
     rows: Mapping[str, Mapping[str, RobotDescriptor]],
     inset: float,
+    share: float,
 ) -> tuple[float, float]:
-    """Return width and depth (m)."""
+    """Return width and depth (m).
+
+    Args:
+        table: As it was given.
+        rows: The robots of each edge.
+        inset: Of the bases from the edge (m).
+        share: Of the longest reach, from a robot's base to the middle of an automatic table.
+    """
     if table == "auto":
         farthest = max(robot.reach for row in rows.values() for robot in row.values())
         width, depth = (
-            max(_row_length(rows[edge], farthest) for edge in edges) + 2 * inset
+            max(_row_length(rows[edge], farthest, share) for edge in edges) + 2 * inset
             for edges in (("north", "south"), ("east", "west"))
         )
         return width, depth
@@ -373,14 +387,14 @@ def _table_size(
     return table
 
 
-def _row_length(row: Mapping[str, RobotDescriptor], farthest: float) -> float:
+def _row_length(row: Mapping[str, RobotDescriptor], farthest: float, share: float) -> float:
     """Return how long an edge is (m) so that robots keep clear of each other, round corners too.
 
     One robot works in the middle, as do those on the other edges. Of several, the outer ones stand
     as far from the corner as any robot round it reaches.
     """
     span = sum(_apart(*pair) for pair in _pairs(row))
-    return span + 2 * (farthest if span > 0 else HAND_OVER * farthest)
+    return span + 2 * (farthest if span > 0 else share * farthest)
 
 
 def _pairs(row: Mapping[str, RobotDescriptor]) -> Iterable[tuple[RobotDescriptor, RobotDescriptor]]:

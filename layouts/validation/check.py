@@ -42,6 +42,7 @@ Targets = Mapping[str, Sequence[float]] | Sequence[Sequence[float]]
 
 TABLE_DEPTH = 0.9  # m; tables are solid, from their tops down
 NARROW = 0.02  # m; less clearance than this is worth a warning
+SHALLOW = 0.005  # m; a folded arm's hulls overlap by less where its links do not
 LIMIT_TOLERANCE = 1e-4  # rad or m; limits and keyframes are written with four digits
 FARTHEST_MOVE = 3.0  # m; of the search for a distance that is clear
 MOVE_STEP = 0.01  # m
@@ -158,9 +159,10 @@ class _Check:
             overlaps = touching(robot, robot, self._models[name].self_pairs)
             if overlaps:
                 pairs = _worst(overlaps)
+                still = any(overlap.posture == 0 for overlap in overlaps)
                 yield Finding(
                     "self-collision",
-                    True,
+                    still or pairs[0].depth > SHALLOW,
                     (name,),
                     pairs,
                     pairs[0].depth,

@@ -258,6 +258,14 @@ class TestSelfCollisions:
         assert "with joint noise (" in finding.what
         assert "less joint noise than qpos_noise=0.3 rad" in finding.advice
 
+    def test_a_graze_of_a_folded_arm_that_noise_alone_causes_is_a_warning(self):
+        layout = Layout({"arm": Placement("koch", keyframe="rest")})
+        report = layout.validate(samples=300, workspaces=False)
+        (finding,) = report.findings
+        assert report.ok
+        assert (finding.kind, finding.serious) == ("self-collision", False)
+        assert 0 < finding.amount < 0.005
+
     def test_neighbours_may_touch(self, tmp_path):
         text = FOLDING.replace('<origin xyz="0.2 0 0"/>', '<origin xyz="0.09 0 0"/>')
         arm = robot(tmp_path, text, ["shoulder", "elbow"], tcp="lower")
