@@ -19,8 +19,9 @@ from typing import Literal
 
 from layouts.frames import EDGES, check_positive
 from layouts.frames import table as table_frames
-from layouts.layout import Layout, Placement, RobotLike, faced, load_robot
+from layouts.layout import Layout
 from layouts.orientation import yaw_quaternion
+from layouts.placement import Placement, RobotLike, faced, load_robot
 from robots import LayoutError, RobotDescriptor, UnknownNameError
 from robots.descriptor import Vector3
 

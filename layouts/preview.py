@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from layouts.layout import Layout, Placement
+    from layouts.layout import Layout
+    from layouts.placement import Placement
 
 Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)
 

@@ -11,7 +11,8 @@ from itertools import combinations
 import numpy as np
 
 from layouts.frames import table_outlines
-from layouts.layout import Layout, Placement
+from layouts.layout import Layout
+from layouts.placement import Placement
 from layouts.validation.bodies import RobotModel, load_model, slab_hull
 from layouts.validation.collisions import (
     Approach,
