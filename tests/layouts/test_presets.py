@@ -17,9 +17,10 @@ from layouts import (
     single,
     yaw_quaternion,
 )
+from layouts.distances import HAND_OVER, ROUND_CORNERS
 from layouts.frames import EDGES, table_outlines
 from layouts.orientation import forward, multiplied, rotated, upward, yaw_degrees
-from layouts.presets import HAND_OVER, PRESETS, ROUND_CORNERS
+from layouts.presets import PRESETS
 from robots import LayoutError, RobotRegistry, UnknownNameError
 
 spacings = st.floats(min_value=1e-3, max_value=100.0)
