@@ -17,6 +17,7 @@ COMMANDS = {
     "render": ("parity.render", "show native and ours side by side, with their difference"),
     "sweep": ("parity.sweep", "rollouts, agreement and clips of every task, into one summary"),
     "report": ("parity.page", "make one HTML page of a sweep and the recorded comparison"),
+    "bench": ("parity.bench", "time steps, resets and vectors beside native"),
     "readme": ("parity.readme", "write the recorded results into README.md, or check them there"),
 }
 
