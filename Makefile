@@ -11,7 +11,7 @@ help:
 	@echo "make demo      two robots hand a cube over, ten times"
 	@echo "make test      the tests"
 	@echo "make test-all  the tests, those that take minutes included"
-	@echo "make check     lint, format, types, which room imports which, README's table"
+	@echo "make check     lint, format, types, which room imports which, README's tables"
 	@echo "make bench     what steps, resets and vectors cost beside native ManiSkill"
 	@echo "make parity    every task beside native ManiSkill; writes README.md's table"
 	@echo "make clean     remove .venv"
@@ -36,6 +36,7 @@ check: $(VENV)/.check
 # ARGS="--record" keeps the figures for README.md.
 bench: $(VENV)/.test
 	OMP_NUM_THREADS=1 $(RUN) -m parity bench --out runs/bench $(ARGS)
+	$(RUN) -m parity readme
 
 # ARGS="--demos DIR" plays recorded demonstrations as well.
 parity: $(VENV)/.test

@@ -8,7 +8,6 @@ import logging
 import sys
 from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -16,6 +15,7 @@ from gymnasium.vector import AsyncVectorEnv
 
 import tasks
 from layouts.files import written_whole
+from parity.bench_table import RECORD
 from parity.native import make_native, native_action, quiet
 from robots import RobotLayoutsError, TaskError
 from rollouts.bench.catalogue import BENCHMARKS
@@ -28,7 +28,6 @@ from rollouts.bench.settings import Benchmark, Settings
 from rollouts.bench.steps import PHYSICS, Played
 from tasks import MultiRobotTask, get_task_class, list_clones
 
-RECORD = Path(__file__).with_name("bench.json")
 NATIVE, HERE = "native", "here"
 PROCESSES = 2  # of native's vector and of ours
 FRONT_TASKS = 2  # of a run, whose vectors are timed
@@ -110,7 +109,7 @@ def vectors(settings: Settings) -> Measurement:
             native.close()
     return Measurement(
         name="vector",
-        title=f"Rate of {PROCESSES} × {share} environments; native: an AsyncVectorEnv of {PROCESSES}",
+        title=f"Rate of {PROCESSES} × {share} environments; native: AsyncVectorEnv of {PROCESSES}",
         unit=RATE,
         variable="task",
         values=task_ids,

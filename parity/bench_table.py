@@ -3,16 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
-from rollouts.bench.measurement import Measurement, number_text
+from parity.results import ResultsError
+from rollouts.bench import report
+from rollouts.bench.measurement import BenchmarkError, Measurement, number_text
 from rollouts.bench.report import Report, markdown_table
 
+RECORD = Path(__file__).with_name("bench.json")
+COMMAND = "make bench ARGS=--record"
 SMALL = ("start", "memory", "recording", "validation")  # go into one table, a row per value
 
 
-def markdown(report: Report) -> Iterator[str]:
+def read(path: Path = RECORD) -> Report:
+    """Return the recorded benchmarks.
+
+    Raises:
+        ResultsError: If they cannot be read.
+    """
+    try:
+        return report.read(path)
+    except BenchmarkError as error:
+        raise ResultsError(f"{error}; `{COMMAND}` writes it") from error
+
+
+def markdown(recorded: Report) -> Iterator[str]:
     """Yield the lines: one row per task, then the vectors, then what is told in one number."""
-    step, reset = report.find("step"), report.find("reset")
+    step, reset = recorded.find("step"), recorded.find("reset")
     if step.values != reset.values:
         raise ValueError("step and reset were not measured on the same tasks")
     yield from markdown_table(
@@ -22,15 +39,15 @@ def markdown(report: Report) -> Iterator[str]:
             for (name, *cells), (_, *others) in zip(step.rows(), reset.rows(), strict=True)
         ),
     )
-    vector = report.find("vector")
+    vector = recorded.find("vector")
     yield ""
     yield f"{vector.title}, {vector.unit}:"
     yield ""
     yield from markdown_table(vector.headings(), vector.rows())
     yield ""
-    yield from markdown_table(["what", "", "measured"], _small(report))
+    yield from markdown_table(["what", "", "measured"], _small(recorded))
     yield ""
-    yield report.told()
+    yield recorded.told()
 
 
 def _headings(measurement: Measurement, what: str) -> list[str]:
@@ -39,13 +56,14 @@ def _headings(measurement: Measurement, what: str) -> list[str]:
     return [*series, *measurement.headings()[1 + len(series) :]]
 
 
-def _small(report: Report) -> Iterator[list[str]]:
+def _small(recorded: Report) -> Iterator[list[str]]:
     """Yield a row for each value; the last series is what counts, or its ratio if it has one."""
     for name in SMALL:
-        measurement = report.find(name)
+        measurement = recorded.find(name)
         for value in measurement.values:
             told = f"{number_text(measurement.median([*measurement.samples][-1], value))}"
             told += f" {measurement.unit}"
             for pair in measurement.ratios:
                 told += f", {' / '.join(pair)} {measurement.ratio(*pair, value):.2f}"
-            yield [measurement.title, f"{value} {measurement.variable}", told]
+            at = f"{value} {measurement.variable}" if isinstance(value, int) else f"`{value}`"
+            yield [measurement.title, at, told]

@@ -13,7 +13,7 @@ from robots import RobotLayoutsError
 Key = TypeVar("Key", bound=Hashable)
 Value = int | str
 SomeValue = TypeVar("SomeValue", int, str)
-DIGITS = 5  # significant, of a sample that is written to a file
+DIGITS = 5  # significant, of a sample: no clock is better
 
 
 class BenchmarkError(RobotLayoutsError, RuntimeError):
@@ -45,7 +45,7 @@ def interleave(
     for number, (key, variant) in product(numbers, variants.items()):
         sample = variant(number)
         if number > 0:
-            samples[key].append(sample)
+            samples[key].append(_rounded(sample))
         tick(1 / (len(numbers) * len(variants)))
     return samples
 
@@ -110,17 +110,12 @@ class Measurement:
 
     def as_json(self) -> dict[str, Any]:
         """Return everything as plain data, the medians and ratios included."""
-        rounded = {
-            series: [[float(f"{x:.{DIGITS}g}") for x in samples] for samples in at_values]
-            for series, at_values in self.samples.items()
-        }
+        medians = {s: [self.median(s, v) for v in self.values] for s in self.samples}
+        ratios = {f"{a} / {b}": [self.ratio(a, b, v) for v in self.values] for a, b in self.ratios}
         return {
             **asdict(self),
-            "samples": rounded,
-            "medians": {s: [self.median(s, v) for v in self.values] for s in self.samples},
-            "median_ratios": {
-                f"{a} / {b}": [self.ratio(a, b, v) for v in self.values] for a, b in self.ratios
-            },
+            "medians": {name: list(map(_rounded, found)) for name, found in medians.items()},
+            "median_ratios": {name: list(map(_rounded, found)) for name, found in ratios.items()},
         }
 
     @staticmethod
@@ -151,6 +146,10 @@ def by_series(
     """Sort samples by series, in the order in which the series come first."""
     names = dict.fromkeys(series for series, _ in samples)
     return {series: [samples.get((series, value), []) for value in values] for series in names}
+
+
+def _rounded(number: Any) -> Any:
+    return None if number is None else float(f"{number:.{DIGITS}g}")
 
 
 def number_text(number: float | None) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 from collections.abc import Callable, Generator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -157,7 +157,8 @@ class PhysicsProcesses:
         actions = timed.actions(number)
         for i, connection in enumerate(used):
             own = actions[:, i * size : (i + 1) * size]
-            connection.send((own, number + i * size, timed.clock))
+            with suppress(OSError):  # it died: that is found when it should answer
+                connection.send((own, number + i * size, timed.clock))
         return timed.clock.rate((timed.steps * size, _answer(one)) for one in used)
 
     def close(self) -> None:
@@ -189,7 +190,7 @@ def _work(connection: Connection, task_id: str, num_envs: int) -> None:
 def _answer(connection: Connection) -> float:
     try:
         return connection.recv()
-    except EOFError:
+    except (EOFError, OSError):
         raise BenchmarkError("a process that only does physics ended by itself") from None
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from rollouts.bench.measurement import Key, Measurement, interleave
 
-CORES = len(os.sched_getaffinity(0))
+CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @dataclass(frozen=True)
