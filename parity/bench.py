@@ -22,7 +22,7 @@ from rollouts.bench.catalogue import BENCHMARKS
 from rollouts.bench.command import add_arguments, run_benchmarks, settings_of
 from rollouts.bench.episodes import timed_resets
 from rollouts.bench.measurement import BenchmarkError, Measurement, by_series
-from rollouts.bench.processes import RATE, PhysicsProcesses, TimedVector, vector
+from rollouts.bench.processes import PhysicsProcesses, TimedVector, vector
 from rollouts.bench.report import Report
 from rollouts.bench.settings import Benchmark, Settings
 from rollouts.bench.steps import PHYSICS, Played
@@ -110,7 +110,7 @@ def vectors(settings: Settings) -> Measurement:
     return Measurement(
         name="vector",
         title=f"Rate of {PROCESSES} × {share} environments; native: AsyncVectorEnv of {PROCESSES}",
-        unit=RATE,
+        unit=clock.rate_unit,
         variable="task",
         values=task_ids,
         samples=by_series(task_ids, samples),

@@ -69,7 +69,9 @@ def recording(settings: Settings) -> Measurement:
         unit="ms per episode",
         variable="task",
         values=settings.tasks,
-        samples=by_series(settings.tasks, settings.interleave(variants)),
+        samples=by_series(
+            settings.tasks, settings.interleave(variants, rounds=min(settings.rounds, 5))
+        ),
         ratios=((RECORDED, STEPPED),),
     )
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLUMNS = 2  # panels side by side
+TITLE = 62  # characters of a line
 DOTS_PER_INCH = 120
 PANEL_WIDTH, PANEL_HEIGHT, BAR_HEIGHT, FOOT = 6.5, 3.6, 0.2, 0.7  # inches
 
@@ -61,7 +62,9 @@ def _height(measurement: Measurement) -> float:
 
 
 def _panel(axes: Axes, measurement: Measurement) -> None:
-    axes.set_title(measurement.title, loc="left", color=INK, fontsize=11, fontweight="bold")
+    axes.set_title(
+        fill(measurement.title, TITLE), loc="left", color=INK, fontsize=11, fontweight="bold"
+    )
     axes.tick_params(colors=INK, labelsize=9, length=0)
     axes.set_axisbelow(True)
     for spine in axes.spines.values():

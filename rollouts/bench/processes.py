@@ -18,7 +18,6 @@ from rollouts.bench.settings import CORES, Clock, Settings
 from rollouts.bench.steps import PHYSICS, random_actions
 
 VECTOR = "vector"
-RATE = "environment steps per second"
 FEW, MANY = 4, 36  # environments in a worker whose memory is compared
 
 _context = multiprocessing.get_context("spawn")  # SAPIEN does not survive a fork
@@ -41,8 +40,8 @@ def workers(settings: Settings) -> Measurement:
     return Measurement(
         name="workers",
         title=f"Rate of {share} environments per worker, {task_id}",
-        unit=RATE,
-        variable="workers (0: no process of their own)",
+        unit=settings.clock.rate_unit,
+        variable="workers (0: in this process)",
         values=settings.workers,
         samples=by_series(settings.workers, samples),
         floors=(PHYSICS,),

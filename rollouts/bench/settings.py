@@ -32,6 +32,11 @@ class Clock:
             return time.perf_counter()
         return time.process_time() + sum(map(_processor_seconds, others))
 
+    @property
+    def rate_unit(self) -> str:
+        """Unit of `rate` where environments are stepped."""
+        return "environment steps per second" + " of processor time" * self.processor
+
     def rate(self, work: Iterable[tuple[float, float]]) -> float:
         """Return how much is done per second by all of several processes that run at once.
 
@@ -81,7 +86,7 @@ class Settings:
     kinds: tuple[str, ...] = ("panda", "so100", "panda_stick")
     cubes: tuple[int, ...] = (0, 8, 16, 32, 64)
     started: tuple[int, ...] = (1, 64)
-    episodes: int = 4
+    episodes: int = 12
     checked: tuple[int, ...] = (1, 2, 4)
 
     def interleave(

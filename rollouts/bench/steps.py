@@ -71,7 +71,7 @@ def environments(settings: Settings) -> Measurement:
     """Time a step with one environment, with some, and with many in this process."""
     task_id = settings.tasks[0]
     envs = {count: tasks.make(task_id, num_envs=count) for count in settings.environments}
-    title = f"One step, shared among the environments of one process, {task_id}"
+    title = f"One step per environment of one process, {task_id}"
     return _beside_physics(settings, "environments", title, "environments", {STEP: envs})
 
 
@@ -82,7 +82,7 @@ def robots(settings: Settings) -> Measurement:
         name: {count: make_crowd(count, kinds) for count in settings.robots}
         for name, kinds in rings.items()
     }
-    title = f"One step of a ring of {settings.kinds[0]}, or of {', '.join(settings.kinds)} in turn"
+    title = f"One step of a ring of robots: {settings.kinds[0]}, or {' + '.join(settings.kinds)}"
     return _beside_physics(settings, "robots", title, "robots", envs)
 
 
