@@ -76,10 +76,15 @@ class PartWriter:
         Raises:
             RecordingError: If it cannot be written.
         """
-        with replaced(part_path(self.folder, episode.seed), f".{os.getpid()}") as partial:
-            partial.write_bytes(self._encode(episode))
+        self.store(episode.seed, self.encode(episode))
 
-    def _encode(self, episode: Episode) -> bytes:
+    def store(self, seed: int, part: bytes) -> None:
+        """Write an episode that was encoded, perhaps on another machine; else as `write`."""
+        with replaced(part_path(self.folder, seed), f".{os.getpid()}") as partial:
+            partial.write_bytes(part)
+
+    def encode(self, episode: Episode) -> bytes:
+        """Return what `write` writes."""
         arrays = _arrays(episode)
         about = {
             "attributes": {
