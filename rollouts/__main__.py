@@ -9,6 +9,7 @@ from pathlib import Path
 
 from robots import RobotLayoutsError, UnknownNameError
 from rollouts import evaluate_command, record_command, replay_command, view_command
+from rollouts.bench import command as bench_command
 from rollouts.export import command as export_command
 
 
@@ -54,6 +55,7 @@ def _parser() -> argparse.ArgumentParser:
         ("replay", replay_command),
         ("export", export_command),
         ("view", view_command),
+        ("bench", bench_command),
     ):
         command = commands.add_parser(name, help=module.DESCRIPTION, description=module.DESCRIPTION)
         module.add_arguments(command)
