@@ -192,7 +192,8 @@ class _Actors:
     @property
     def cpus(self) -> int:
         """How many CPUs the cluster has."""
-        cpus = int(self._ray.cluster_resources().get("CPU", 0))
+        alive = [about["Resources"] for about in self._ray.nodes() if about["Alive"]]
+        cpus = sum(int(resources.get("CPU", 0)) for resources in alive)
         if not cpus:
             raise WorkerError("no node of the Ray cluster offers a CPU; add one with `ray start`")
         return cpus

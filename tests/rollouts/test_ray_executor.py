@@ -63,6 +63,13 @@ class Nodes:
         while len(self.workers) < count:
             self.workers.append(self._add(num_cpus=1))
 
+    def shrink(self) -> None:
+        """Have no node with a CPU, and wait until the cluster knows."""
+        while self.workers:
+            self.kill(self.workers[0])
+        while sum(about["Alive"] for about in self._cluster.global_state.node_table()) > 1:
+            time.sleep(0.1)
+
     def kill(self, node) -> None:
         self.workers.remove(node)
         self._cluster.remove_node(node, allow_graceful=False)
@@ -124,6 +131,18 @@ def _cheap_expert(monkeypatch):
 
 def run(nodes, prepare, seeds, workers=None):
     return list(RayExecutor(nodes.address, workers, modules=MODULES).run(prepare, seeds))
+
+
+@pytest.mark.long
+def test_a_cluster_without_room(cluster, monkeypatch):
+    cluster.shrink()
+    with pytest.raises(WorkerError, match="no node of the Ray cluster offers a CPU"):
+        run(cluster, Play(), range(3))
+    monkeypatch.setattr(rollouts.ray_executor, "_SILENCE", 1.0)
+    events = RayExecutor(cluster.address, 1, modules=MODULES).run(Play(), range(3))
+    assert "no worker could begin for 1 s: 0 CPUs of the Ray cluster are free" in next(events).said
+    cluster.grow(1)
+    assert len(squares(list(events))) == 3
 
 
 class Disturbance:
@@ -227,19 +246,6 @@ def test_what_cannot_begin(nodes, monkeypatch):
     monkeypatch.setattr(rollouts.ray_executor, "_versions", lambda: {"sapien": "0.1"})
     with pytest.raises(WorkerError, match=r"node 127.* has sapien 3.*, this machine sapien 0\.1;"):
         run(nodes, Play(), range(3))
-
-
-@pytest.mark.long
-def test_a_cluster_without_room(cluster, monkeypatch):
-    while cluster.workers:
-        cluster.kill(cluster.workers[0])
-    with pytest.raises(WorkerError, match="no node of the Ray cluster offers a CPU"):
-        run(cluster, Play(), range(3))
-    monkeypatch.setattr(rollouts.ray_executor, "_SILENCE", 1.0)
-    events = RayExecutor(cluster.address, 1, modules=MODULES).run(Play(), range(3))
-    assert "no worker could begin for 1 s: 0 CPUs of the Ray cluster are free" in next(events).said
-    cluster.grow(1)
-    assert len(squares(list(events))) == 3
 
 
 def test_a_cluster_that_is_not_there():
