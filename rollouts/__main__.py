@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from robots import RobotLayoutsError, UnknownNameError
-from rollouts import record_command, replay_command, view_command
+from rollouts import record_command, replay_command, soak_command, view_command
 from rollouts.export import command as export_command
 
 
@@ -53,6 +53,7 @@ def _parser() -> argparse.ArgumentParser:
         ("replay", replay_command),
         ("export", export_command),
         ("view", view_command),
+        ("soak", soak_command),
     ):
         command = commands.add_parser(name, help=module.DESCRIPTION, description=module.DESCRIPTION)
         module.add_arguments(command)
