@@ -23,6 +23,7 @@ COMMANDS = {
         "parity.report.command",
         "make one HTML page of a sweep and the recorded results",
     ),
+    "bench": ("parity.bench", "time steps, resets and vectors beside native"),
     "readme": ("parity.readme", "write the recorded results into README.md, or check them there"),
 }
 
