@@ -16,14 +16,16 @@ from parity.sweep.entries import SUMMARY, Entry, is_done, line, read_summary, wr
 from parity.sweep.plan import Plan, plan
 from parity.sweep.processes import Progressed, sweep
 from parity.sweep.stages import STAGES
-from robots import RobotLayoutsError
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
     Returns:
-        0 if every task was swept and is equal, 1 if not, 2 for bad usage, 130 if interrupted.
+        0 if every task was swept and is equal, 1 if not, 130 if interrupted.
+
+    Raises:
+        RobotLayoutsError: If the arguments make no sense.
     """
     parser = argparse.ArgumentParser(
         prog="python -m parity sweep",
@@ -44,9 +46,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = parser.parse_args(argv)
     try:
         return _run(args)
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
     except KeyboardInterrupt:
         print("stopped; the same command goes on from here", file=sys.stderr)
         return 130
