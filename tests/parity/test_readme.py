@@ -145,8 +145,8 @@ def test_benchmarks_are_shown(files):
     row = "`PushT-v1` | 2.00 | 6.00 | 1.00 | 3.00 | 2.00 | 2.00 | 6.00 | 3.00"
     assert f"| {row} |" in lines
     assert "| A-v1 | 70.0 | 10.0 | 7.00 |" in lines
-    assert "| About start | 64 task | 4.50 s |" in lines
-    assert "| About recording | `A-v1` | 11.0 ms, recorded / stepped 1.10 |" in lines
+    assert "| About start (s) | 1 task: 4.50; 64 task: 4.50 |" in lines
+    assert "| About recording (ms) | `A-v1`: 11.0 (recorded / stepped 1.10) |" in lines
     assert "A processor (Linux), 2 cores, load average 0.5 to 1.5; time that went by" in shown
 
 
