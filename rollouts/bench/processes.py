@@ -30,7 +30,7 @@ def workers(settings: Settings) -> Measurement:
     with PhysicsProcesses(task_id, max(1, *settings.workers), share) as floor:
         for count in settings.workers:
             with vector(task_id, max(1, count) * share, count) as env:
-                timed = TimedVector(env, settings.clock, settings.steps)
+                timed = TimedVector(env, settings.clock, settings.batch_steps)
                 variants = {
                     (VECTOR, count): timed.rate,
                     (PHYSICS, count): lambda number, timed=timed: floor.rate(timed, number),

@@ -16,7 +16,9 @@ from rollouts.bench.settings import Settings
 from rollouts.bench.steps import Played
 from tests.native import NATIVE
 
-TINY = Settings(rounds=1, steps=3, worker_envs=2, tasks=("PickCube-v1", "TwoRobotPickCube-v1"))
+TINY = Settings(
+    rounds=1, steps=3, batch_steps=3, worker_envs=2, tasks=("PickCube-v1", "TwoRobotPickCube-v1")
+)
 
 
 class TestBesideNative:

@@ -29,6 +29,7 @@ TINY = Settings(
     rounds=2,
     tasks=("PickCube-v1",),
     steps=2,
+    batch_steps=2,
     environments=(1, 2),
     workers=(0, 1),
     worker_envs=2,
