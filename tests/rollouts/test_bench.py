@@ -126,13 +126,15 @@ class TestWhatIsTimed:
         played.step(4)
         assert not np.array_equal(played.env.simulation.read().joint_positions, ends[0])
 
-    def test_cubes_of_a_pile_touch_and_stay_awake(self):
-        env = make_pile(64)
+    @pytest.mark.parametrize(("cubes", "pairs"), [(0, 1), (8, 25), (64, 400)])
+    def test_cubes_of_a_pile_touch_and_stay_awake(self, cubes, pairs):
+        env = make_pile(cubes)
         for _ in range(40):
             env.step(np.zeros((1, 8), np.float32))
-        bodies = [env.simulation.worlds[0].body(f"pile{i}").component for i in range(64)]
-        assert not any(body.is_sleeping for body in bodies)
-        assert env.touching() > 200
+        world = env.simulation.worlds[0]
+        bodies = [world.body(name) for name in ("cube", *(f"pile{i}" for i in range(cubes)))]
+        assert not any(body.component.is_sleeping for body in bodies)
+        assert env.touching() >= pairs
 
     def test_kinds_of_a_crowd_take_turns(self):
         layout = crowd(3, ("panda", "so100"))
