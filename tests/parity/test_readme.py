@@ -215,13 +215,6 @@ class TestStale:
         files.write_bench(replace(report, measurements=(replace(step, samples=faster), *others)))
         self.expect(files, capsys, "README.md is stale")
 
-    def test_a_task_that_was_never_timed(self, files, capsys):
-        files.write_bench(some_benchmarks(*sorted(CATALOGUE)[1:]))
-        assert files.run() == 0
-        capsys.readouterr()
-        lacks = f"the record lacks {min(CATALOGUE)}; run `make bench ARGS=--record`"
-        self.expect(files, capsys, lacks)
-
     def test_a_task_that_is_gone(self, files, capsys):
         files.write(a_record(*CATALOGUE, "Gone-v1"))
         files.run()

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import tasks
-from robots import MissingPackageError
+from robots import MissingPackageError, SimulationError
 from rollouts.__main__ import main
 from rollouts.bench import command, processes
 from rollouts.bench.catalogue import BENCHMARKS, measure
@@ -232,9 +232,10 @@ class TestCommand:
         assert command.EPILOG.startswith(f"Benchmarks: {', '.join(BENCHMARKS)}.")
 
 
-def test_what_cannot_be_measured_is_left_out(capsys):
+@pytest.mark.parametrize("error", [MissingPackageError, SimulationError, BenchmarkError])
+def test_what_cannot_be_measured_is_left_out(error, capsys):
     def fail(settings):
-        raise MissingPackageError("pip install something")
+        raise error("pip install something")
 
     catalogue = {"broken": Benchmark("nothing", fail), "names": Benchmark("", lambda _: NAMES)}
     with LiveLine(2) as line:
