@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robots import MissingPackageError
+from rollouts.record_command import INTERRUPTED
 
 if TYPE_CHECKING:
     from rollouts.bench.report import Report
@@ -42,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; returns its exit code, 1 if nothing could be measured.
+    """Run the command; returns its exit code, 1 if nothing could be measured, 130 if interrupted.
 
     Raises:
         RobotLayoutsError: If it makes no sense.
@@ -71,8 +73,12 @@ def run_benchmarks(
 
     names = list(dict.fromkeys(options.only or catalogue))
     expect_known(names, catalogue)
-    with LiveLine(len(names), "benchmarks") as line:
-        report = measure(names, catalogue, settings, line)
+    try:
+        with LiveLine(len(names), "benchmarks") as line:
+            report = measure(names, catalogue, settings, line)
+    except KeyboardInterrupt:
+        print("stopped; nothing is kept", file=sys.stderr)
+        return INTERRUPTED, None
     if not report.measurements:
         return 1, None
     console = Console(markup=False, highlight=False)
