@@ -90,7 +90,16 @@ class TestRepository:
 class TestDependencies:
     def test_the_rooms_import_what_is_declared(self):
         declared = names_of(PROJECT["dependencies"])
-        for extra in ("checks", "preview", "view", "video", "export", "parity", "pettingzoo"):
+        for extra in (
+            "checks",
+            "preview",
+            "view",
+            "video",
+            "export",
+            "parity",
+            "pettingzoo",
+            "sb3",
+        ):
             declared |= names_of(PROJECT["optional-dependencies"][extra])
         used = {module for room in ROOMS for module in imports_of(room, everywhere=True)}
         assert distributions(used) <= declared
@@ -114,7 +123,11 @@ class TestDependencies:
 
 
 # Imported inside functions only, after its extra was found to be installed.
-LOADED_WITH_ITS_EXTRA = {"rollouts/export/lerobot.py", "tasks/fronts/parallel.py"}
+LOADED_WITH_ITS_EXTRA = {
+    "rollouts/export/lerobot.py",
+    "tasks/fronts/parallel.py",
+    "tasks/fronts/sb3.py",
+}
 
 
 def modules_of(room):
