@@ -29,6 +29,7 @@ class Part:
         start: Its first environment's number in the vector.
         stop: One more than its last environment's number.
         autoreset: When an environment whose episode ended begins a new one.
+        ignore_terminations: Whether episodes go on after success, until they are truncated.
     """
 
     task: type[MultiRobotTask]
@@ -36,6 +37,7 @@ class Part:
     start: int
     stop: int
     autoreset: AutoresetMode
+    ignore_terminations: bool = False
 
     @property
     def env_ids(self) -> range:
@@ -140,7 +142,7 @@ class Batch:
         self._write(obs, info)
         rows = self._rows
         rows["reward"][:] = reward.numpy()
-        rows["terminated"][:] = terminated.numpy()
+        rows["terminated"][:] = False if self._part.ignore_terminations else terminated.numpy()
         rows["truncated"][:] = truncated.numpy()
 
     def _restart(self, ended: NDArray[np.bool_]) -> None:

@@ -52,6 +52,7 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         num_envs: int = 1,
         num_workers: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        ignore_terminations: bool = False,
         timeout: float | None = 60.0,
         render_mode: str | None = None,
         **fields: Any,
@@ -66,6 +67,9 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
                 step begins a new one, without reading the action; with ``SAME_STEP`` the same
                 step does, and ``info`` keeps ``final_obs`` and ``final_info``; with ``DISABLED``
                 nothing does, and stepping past the end is allowed.
+            ignore_terminations: Whether nothing ends an episode but its last step, and
+                ``terminated`` is always false; ``info`` still tells of success. A policy that
+                learns from dense rewards, which success would cut short, else learns to avoid it.
             timeout: Seconds that workers may take for a step or a reset; None waits for ever.
             render_mode: ``"rgb_array"`` to draw pictures, which needs a Vulkan driver.
             fields: Other arguments of `tasks.make`.
@@ -91,7 +95,7 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         self._everywhere = np.ones(num_envs, bool)
         bounds = [(i * num_envs) // max(workers, 1) for i in range(max(workers, 1) + 1)]
         parts = [
-            Part(cls, scenario, start, stop, mode)
+            Part(cls, scenario, start, stop, mode, ignore_terminations)
             for start, stop in zip(bounds, bounds[1:], strict=False)
         ]
         for placement in layout.values():
