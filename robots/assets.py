@@ -40,6 +40,19 @@ def locate(package: str, urdf: str, *, pictures: bool) -> Path:
     return store.root / package / urdf
 
 
+def locate_file(package: str, path: str) -> Path:
+    """Return one file of the local copy, fetching it if it is not there.
+
+    Raises:
+        UnknownNameError: If the manifest has no such package or file.
+        AssetError: If it could not be had from any source.
+    """
+    file = load_manifest().package(package).file(path)
+    store = AssetStore(default_root())
+    ensure([file], store, default_sources())
+    return store.path(file)
+
+
 def default_sources(*, offline: bool = False, revision: str | None = None) -> list[AssetSource]:
     """Return the sources after the local copy, in the order in which they are tried.
 

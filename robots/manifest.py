@@ -102,6 +102,20 @@ class AssetPackage:
         )
 
 
+    def file(self, path: str) -> AssetFile:
+        """Return one file.
+
+        Raises:
+            UnknownNameError: If the package has no such file.
+        """
+        for file in self.files:
+            if file.path == path:
+                return file
+        raise UnknownNameError(
+            f"file of {self.origin.name}", path, [file.path for file in self.files]
+        )
+
+
 @dataclass(frozen=True)
 class Manifest:
     """Every package of robot files, by name."""
