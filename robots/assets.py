@@ -41,15 +41,15 @@ def locate(package: str, urdf: str, *, pictures: bool) -> Path:
 
 
 def locate_file(package: str, path: str) -> Path:
-    """Return one file of the local copy, fetching it if it is not there.
+    """Return one file of the local copy, fetching its package if something of that is not there.
 
     Raises:
         UnknownNameError: If the manifest has no such package or file.
         AssetError: If it could not be had from any source.
     """
-    file = load_manifest().package(package).file(path)
-    store = AssetStore(default_root())
-    ensure([file], store, default_sources())
+    about = load_manifest().package(package)
+    file, store = about.file(path), AssetStore(default_root())
+    ensure(about.files, store, default_sources())
     return store.path(file)
 
 

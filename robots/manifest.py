@@ -101,7 +101,6 @@ class AssetPackage:
             if urdf in file.physics or (pictures and urdf in file.pictures)
         )
 
-
     def file(self, path: str) -> AssetFile:
         """Return one file.
 

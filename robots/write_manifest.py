@@ -10,12 +10,12 @@ import sys
 from importlib import metadata
 from pathlib import Path
 
+from robots import scenery
 from robots.asset_sources import find_mani_skill
 from robots.errors import AssetError, RobotLayoutsError
 from robots.locator import UrdfLocator
 from robots.manifest import CHECKOUT_CACHE, AssetFile, AssetPackage, Manifest, PackageOrigin
 from robots.registry import CATALOGUE, RobotRegistry
-from robots import scenery
 from robots.urdf_xml import read_references
 
 HUB_DATASET = "RoboVerseOrg/roboverse_data"

@@ -221,20 +221,20 @@ def look_at(eye: Vector3, target: Vector3) -> sapien.Pose:
     Raises:
         SimulationError: If the two points coincide.
     """
-    start, end = torch.tensor(eye, dtype=torch.float32), torch.tensor(target, dtype=torch.float32)
+    start, end = torch.tensor([eye, target], dtype=torch.float32)
     if torch.equal(start, end):
         raise SimulationError(f"a camera at {eye} cannot look at the point where it is")
-    forward = _unit(end - start)
-    up = torch.tensor([0.0, 0.0, 1.0])
+    forward = _unit((end - start)[None])
+    up = torch.tensor([[0.0, 0.0, 1.0]])
     if torch.linalg.vector_norm(torch.linalg.cross(up, forward)) < 1e-6:
-        up = torch.tensor([1.0, 0.0, 0.0])  # straight down or up: +x is up in the picture
+        up = torch.tensor([[1.0, 0.0, 0.0]])  # straight down or up: +x is up in the picture
     left = _unit(torch.linalg.cross(up, forward))
     axes = torch.stack([forward, left, torch.linalg.cross(forward, left)], dim=-1)
-    return sapien.Pose(start.numpy(), quaternion(axes).numpy())
+    return sapien.Pose(start.numpy(), quaternion(axes[0]).numpy())
 
 
-def _unit(vector: torch.Tensor) -> torch.Tensor:
-    return vector / torch.linalg.vector_norm(vector)
+def _unit(rows: torch.Tensor) -> torch.Tensor:
+    return rows / torch.linalg.vector_norm(rows, dim=-1, keepdim=True)
 
 
 @functools.cache

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,12 @@ class Finish:
 
 MATT = Finish()
 POLISHED = Finish(metallic=1.0, roughness=0.0, specular=1.0)
+
+
+def linear(code: str) -> Color:
+    """Return the colour of a code like ``"#FFD289"``, which is of light as screens encode it."""
+    red, green, blue = ((int(code[i : i + 2], 16) / 255) ** 2.2 for i in (1, 3, 5))
+    return red, green, blue, 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,7 +148,7 @@ class Floor(Shape):
     texture: Path
     size: int = 100
     tile: float = 4.0
-    collides: bool = False
+    collides: bool = field(default=False, kw_only=True)
 
 
 def add_collision(builder: Any, shape: Shape) -> None:

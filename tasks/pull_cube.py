@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from layouts import single
-from simulation import PhysicsSettings, State, World, add_table
+from simulation import Camera, PhysicsSettings, State, World, add_table
 from simulation.arrays import Array, Floats, constants, norm
 from tasks.props import DARK_BLUE, FACE_UP, TARGET_HEIGHT, add_cube, add_target
 from tasks.randomness import EpisodeRandom
@@ -36,6 +36,8 @@ class PullCube(MultiRobotTask):
     physics = PhysicsSettings()
     max_episode_steps = 50
     max_reward = 3
+    cameras = (Camera((-0.5, 0.0, 0.25), (0.2, 0.0, -0.5)),)
+    sensed = ("tcp_pose", "goal_pos")
 
     def build(self, world: World) -> None:
         """Add the table, the cube and the target."""
