@@ -139,7 +139,7 @@ class _Studio:
         for direction, color in LAMPS:
             self._scene.add_directional_light(list(direction), list(color))
         self._cameras: dict[tuple[Any, ...], Any] = {}
-        self._markers = [
+        self._markers: list[Any] = [
             body.entity.find_component_by_type(sapien.render.RenderBodyComponent)
             for body in world.bodies.values()
             if body.marker
@@ -230,7 +230,7 @@ def look_at(eye: Vector3, target: Vector3) -> sapien.Pose:
         up = torch.tensor([[1.0, 0.0, 0.0]])  # straight down or up: +x is up in the picture
     left = _unit(torch.linalg.cross(up, forward))
     axes = torch.stack([forward, left, torch.linalg.cross(forward, left)], dim=-1)
-    return sapien.Pose(start.numpy(), quaternion(axes[0]).numpy())
+    return sapien.Pose(start.tolist(), quaternion(axes[0]).tolist())
 
 
 def _unit(rows: torch.Tensor) -> torch.Tensor:

@@ -28,6 +28,8 @@ STATE_FORMS = ("state", "state_dict")  # what may be joined to images
 OBS_MODES = (*PLAIN_MODES, "rgb", "rgbd", "rgb+depth+state", "depth", "rgb+segmentation")
 """Examples of observation modes; images and a form of state are joined in any order."""
 
+_IMAGE_DTYPES = ("uint8", "int16")
+
 _tensor = torch.from_numpy
 
 
@@ -154,6 +156,18 @@ class Observer:
             return {**images, "state": self._flat(state, parts)}
         return {**self._named(state, parts), **images}
 
+    def senses(self, part: str) -> bool:
+        """Tell whether a part of `tasks.MultiRobotTask.observe` is told beside images."""
+        return any(fnmatchcase(part, pattern) for pattern in self._sensed)
+
+    def seen_by(self, robot: str) -> list[str]:
+        """Return the names of the cameras that stand still, and of those that ride on a robot."""
+        return [
+            name
+            for name, camera in self.cameras.items()
+            if not isinstance(camera, RobotCamera) or camera.robot == robot
+        ]
+
     def changed(self, env_ids: Iterable[int]) -> None:
         """Note that these environments do not look any more as they did."""
         if self._eyes is not None:
@@ -198,11 +212,7 @@ class Observer:
         for name in self._sensed:
             if "*" not in name and name not in parts:
                 raise TaskError(unknown_name_message("part that is sensed", name, parts))
-        return {
-            key: x
-            for key, x in parts.items()
-            if any(fnmatchcase(key, pattern) for pattern in self._sensed)
-        }
+        return {key: x for key, x in parts.items() if self.senses(key)}
 
 
 class _Eyes:
@@ -265,4 +275,4 @@ def space_of(values: Any, *, batched: bool = False) -> Space[Any]:
 def told_dtype(values: Any) -> Any:
     """Return the dtype in which an observation is told: of images their own, else float32."""
     dtype = np.dtype(str(values.dtype).removeprefix("torch."))
-    return dtype.type if dtype in (np.uint8, np.int16) else np.float32
+    return dtype.type if dtype.name in _IMAGE_DTYPES else np.float32

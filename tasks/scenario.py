@@ -59,6 +59,11 @@ class Scenario:
             raise UnknownScenarioField("scenario field", name, known)
         object.__setattr__(self, name, value)
 
+    @property
+    def draws(self) -> bool:
+        """Whether anything is drawn: for people, or for cameras that observe."""
+        return self.render_mode is not None or bool(read_mode(self.obs_mode).textures)
+
     def check(self, reward_modes: Sequence[str]) -> None:
         """Refuse values that no task can be made with.
 

@@ -204,7 +204,7 @@ class MultiRobotTask:
             self.num_envs,
             scenario.physics,
             control_frequency=scenario.control_frequency,
-            visuals=scenario.render_mode is not None or bool(self.observer.mode.textures),
+            visuals=scenario.draws,
         )
         self._camera: Any = None
         self._responds = type(self).respond is not MultiRobotTask.respond
