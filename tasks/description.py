@@ -174,9 +174,9 @@ def describe(env: MultiRobotTask) -> Iterator[RenderableType]:
     yield f"\nLayout: {env.layout}\n"
     yield action_sentence(env.layout)
     yield action_table(env.layout)
-    yield f"Observation, {observation_size(env)} numbers; * marks what is told beside images too"
+    yield f"Observation, {observation_size(env)} numbers"
     yield observation_table(env.observation_slices, env.observer.senses)
-    yield "Cameras, with obs_mode='rgb' or 'rgbd'"
+    yield "Cameras, with obs_mode='rgb' or 'rgbd'; beside images only what is sensed is told"
     yield camera_table(cameras_of(env.layout, cls.cameras))
 
 
@@ -217,10 +217,10 @@ def observation_table(slices: dict[str, slice], senses: Callable[[str], bool]) -
         slices: Where each entry stands.
         senses: Tells of an entry whether real robots know it, so that it is told beside images.
     """
-    rows = _table("entry", "slice", "size", "", numbers=(1, 2))
+    rows = _table("entry", "slice", "size", "sensed", numbers=(1, 2))
     for name, part in slices.items():
         size, joints = str(part.stop - part.start), name.endswith((".qpos", ".qvel"))
-        told = "*" if joints or senses(name) else ""
+        told = "yes" if joints or senses(name) else "no"
         rows.add_row(name, f"{part.start}:{part.stop}", size, told)
     return rows
 
