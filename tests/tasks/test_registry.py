@@ -83,7 +83,7 @@ def test_an_unknown_field_raises():
     [
         ({"num_envs": 0}, "num_envs is 0"),
         ({"num_envs": 1.5}, "num_envs is 1.5"),
-        ({"obs_mode": "rgbb"}, "Unknown obs_mode 'rgbb'. Did you mean 'rgbd'"),
+        ({"obs_mode": "rgbb"}, "unknown obs_mode 'rgbb'. Did you mean 'rgb'"),
         ({"obs_mode": "rgb+normal"}, "any of rgb, depth, segmentation, position are joined by"),
         ({"obs_mode": "rgb+state+state_dict"}, "'rgb.state.state_dict' makes no sense"),
         ({"obs_mode": "state+state_dict"}, "makes no sense: at least one of rgb, depth"),
