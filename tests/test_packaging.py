@@ -90,7 +90,16 @@ class TestRepository:
 class TestDependencies:
     def test_the_rooms_import_what_is_declared(self):
         declared = names_of(PROJECT["dependencies"])
-        for extra in ("checks", "preview", "view", "video", "export", "parity", "pettingzoo"):
+        for extra in (
+            "checks",
+            "preview",
+            "view",
+            "video",
+            "export",
+            "parity",
+            "pettingzoo",
+            "ray",
+        ):
             declared |= names_of(PROJECT["optional-dependencies"][extra])
         used = {module for room in ROOMS for module in imports_of(room, everywhere=True)}
         assert distributions(used) <= declared
