@@ -22,6 +22,7 @@ from typing import Any
 from robots import MissingPackageError, UnknownNameError
 from robots.manifest import load_manifest
 from rollouts.executor import (
+    DEATHS_ALLOWED,
     UNSENDABLE,
     Event,
     Play,
@@ -52,7 +53,13 @@ class RayExecutor:
     """
 
     def __init__(
-        self, address: str = "auto", workers: int | None = None, *, modules: Sequence[str] = ()
+        self,
+        address: str = "auto",
+        workers: int | None = None,
+        *,
+        modules: Sequence[str] = (),
+        attempts: int = DEATHS_ALLOWED,
+        fresh: bool = False,
     ) -> None:
         """Choose a cluster that this machine has joined.
 
@@ -61,12 +68,16 @@ class RayExecutor:
             workers: How many actors, each on one CPU; None: one for each CPU of the cluster.
             modules: More packages or modules of yours that the nodes get, such as those that your
                 tasks, experts and policies import.
+            attempts: How many workers may die of one episode before it is given up; those that are
+                out of reach do not count.
+            fresh: Whether every episode gets a process of its own.
 
         Raises:
             MissingPackageError: If Ray is not installed.
         """
         self._ray = import_ray()
         self._address, self._workers, self._modules = address, workers, tuple(modules)
+        self._attempts, self._fresh = attempts, fresh
 
     def run(self, prepare: Callable[[], Play], seeds: Iterable[int]) -> Generator[Event]:
         """Play the episode of every seed; see `rollouts.executor.Executor`."""
@@ -76,7 +87,9 @@ class RayExecutor:
         modules = [*self._modules, *filter(_is_own, getattr(prepare, "modules", ()))]
         with _joined(self._ray, self._address, modules):
             crew = _Actors(self._ray, prepare)
-            yield from Shift(crew, seeds, self._workers or crew.cpus).events()
+            count = self._workers or crew.cpus
+            shift = Shift(crew, seeds, count, attempts=self._attempts, fresh=self._fresh)
+            yield from shift.events()
 
 
 def import_ray() -> Any:

@@ -16,6 +16,7 @@ from parity.sweep.entries import SUMMARY, Entry, is_done, line, read_summary, wr
 from parity.sweep.plan import Plan, plan
 from parity.sweep.processes import Progressed, sweep
 from parity.sweep.stages import STAGES
+from rollouts.executor import Executor
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -41,6 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     add("--episodes", type=int, default=3, metavar="N", help="episodes of each task (3)")
     add("--out", type=Path, default=Path("runs"), metavar="DIR", help="default %(default)s")
     add("--workers", type=int, default=1, metavar="W", help="tasks at a time (1)")
+    add("--ray", metavar="ADDRESS", help="sweep on a Ray cluster whose machines share all DIRs")
     add("--again", action="store_true", help="sweep tasks again that are done")
     add("--no-video", action="store_true", help="no film of native and no clip")
     args = parser.parse_args(argv)
@@ -52,6 +54,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(args: argparse.Namespace) -> int:
+    if args.ray is not None:  # whose workers are in folders of their own
+        args.out, args.demos = args.out.absolute(), args.demos and args.demos.absolute()
     plans = plan(args)
     path = args.out / SUMMARY
     known = {} if args.again and args.tasks is None else read_summary(path)["tasks"]
@@ -60,7 +64,7 @@ def _run(args: argparse.Namespace) -> int:
     for done in [p for p in plans if p not in waiting]:
         print(f"{line(found[done.task_id])}  (done before)")
     with _bars(waiting) as (show, hide):
-        for entry in sweep(waiting, args.workers, show):
+        for entry in sweep(waiting, args.workers, show, executor=_cluster(args)):
             found[entry["task"]] = entry
             write_summary(path, found)
             hide(entry["task"])
@@ -73,6 +77,14 @@ def _run(args: argparse.Namespace) -> int:
         f" both succeed and no pixel differs. Written to {path}"
     )
     return 0 if good == len(entries) else 1
+
+
+def _cluster(args: argparse.Namespace) -> Executor | None:
+    if args.ray is None:
+        return None
+    from rollouts.ray_executor import RayExecutor
+
+    return RayExecutor(args.ray, args.workers, attempts=1, fresh=True)
 
 
 @contextmanager

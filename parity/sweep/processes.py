@@ -13,11 +13,12 @@ from pathlib import Path
 
 import torch
 
+import tasks
 from parity.sweep.entries import Entry, blank
 from parity.sweep.plan import Plan
 from parity.sweep.stages import sweep_task
 from robots import RecordingError, RobotLayoutsError
-from rollouts.executor import ProcessExecutor, WorkersDied, report
+from rollouts.executor import Executor, ProcessExecutor, WorkersDied, modules_of, report
 
 LOG = "sweep.log"
 
@@ -28,6 +29,8 @@ def sweep(
     plans: Iterable[Plan],
     workers: int = 1,
     progressed: Progressed = lambda task_id, stage, share: None,
+    *,
+    executor: Executor | None = None,
 ) -> Generator[Entry]:
     """Carry out plans, each in a process of its own, and yield an entry as each is done.
 
@@ -37,6 +40,8 @@ def sweep(
         plans: What to do.
         workers: How many at a time.
         progressed: Called now and then with task, stage and the share of the stage that is done.
+        executor: Who carries them out instead of ``workers`` processes, such as a cluster whose
+            machines share the plans' folders.
 
     Raises:
         RecordingError: If a folder cannot be made.
@@ -45,7 +50,7 @@ def sweep(
     plans = tuple(plans)
     for plan in plans:
         _make_folder(plan.folder)
-    executor = ProcessExecutor(workers, attempts=1, fresh=True)
+    executor = executor or ProcessExecutor(workers, attempts=1, fresh=True)
     with closing(executor.run(SweepJob(plans), range(len(plans)))) as events:
         for event in events:
             if event.seed is None:
@@ -69,6 +74,11 @@ class SweepJob:
     """
 
     plans: tuple[Plan, ...]
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """What other machines may need."""
+        return modules_of(self, *(tasks.get_task_class(plan.task_id) for plan in self.plans))
 
     def __call__(self) -> Callable[[int], Entry]:
         """Return what carries out a plan, and tells how far it is."""
