@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from robots import unknown_name_message
+from robots import RobotLayoutsError, unknown_name_message
 
 # Command -> the module whose ``main(argv)`` runs it, and what it does.
 COMMANDS = {
@@ -15,14 +15,21 @@ COMMANDS = {
     "replay": ("parity.replay", "play recorded actions beside native, episode by episode"),
     "rollout": ("parity.rollout", "play one episode in native and here, and keep its arrays"),
     "render": ("parity.render", "show native and ours side by side, with their difference"),
-    "sweep": ("parity.sweep", "rollouts, agreement and clips of every task, into one summary"),
-    "report": ("parity.page", "make one HTML page of a sweep and the recorded comparison"),
+    "sweep": (
+        "parity.sweep.command",
+        "rollouts, agreement and clips of every task, in one summary",
+    ),
+    "report": (
+        "parity.report.command",
+        "make one HTML page of a sweep and the recorded results",
+    ),
+    "bench": ("parity.bench", "time steps, resets and vectors beside native"),
     "readme": ("parity.readme", "write the recorded results into README.md, or check them there"),
 }
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command; returns its exit code, 2 if there is no such command."""
+    """Run a command; returns its exit code, 2 if there is no such command or it makes no sense."""
     command, *rest = list(sys.argv[1:] if argv is None else argv) or ["--help"]
     if command in ("-h", "--help"):
         print(f"usage: python -m parity {{{','.join(COMMANDS)}}} ...\n")
@@ -32,7 +39,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     if command not in COMMANDS:
         print(f"error: {unknown_name_message('command', command, COMMANDS)}", file=sys.stderr)
         return 2
-    return import_module(COMMANDS[command][0]).main(rest)
+    try:
+        return import_module(COMMANDS[command][0]).main(rest)
+    except RobotLayoutsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
 
 
 if __name__ == "__main__":
