@@ -6,7 +6,7 @@ Importing this tells Gymnasium the tasks. What needs torch or sapien is loaded w
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from tasks.fronts import parallel_env, register
+from tasks.fronts import parallel_env, register, sb3_vec_env
 
 if TYPE_CHECKING:
     from tasks.randomness import EpisodeRandom
@@ -24,6 +24,7 @@ __all__ = [
     "make",
     "parallel_env",
     "register_task",
+    "sb3_vec_env",
 ]
 
 _MODULES = {

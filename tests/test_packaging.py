@@ -21,6 +21,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 ROBOT_FILES = (".urdf", ".srdf", ".stl", ".obj", ".dae", ".glb", ".gltf", ".ply")
 RECORDINGS = (".h5", ".hdf5", ".png", ".jpg", ".mp4", ".npz", ".parquet")
+FIGURES = "docs/*.png"  # drawn by this project's own commands
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +70,8 @@ class TestWheel:
 class TestRepository:
     def test_no_robot_file_or_recording_is_committed(self, files):
         assert len(files) > 20
-        assert not [f.name for f in files if f.name.lower().endswith(ROBOT_FILES + RECORDINGS)]
+        others = {*files} - {*ROOT.glob(FIGURES)}
+        assert not [f.name for f in others if f.name.lower().endswith(ROBOT_FILES + RECORDINGS)]
 
     @pytest.mark.parametrize(
         ("what", "pattern"),
@@ -90,7 +92,16 @@ class TestRepository:
 class TestDependencies:
     def test_the_rooms_import_what_is_declared(self):
         declared = names_of(PROJECT["dependencies"])
-        for extra in ("checks", "preview", "view", "video", "export", "parity", "pettingzoo"):
+        for extra in (
+            "checks",
+            "preview",
+            "view",
+            "video",
+            "export",
+            "parity",
+            "pettingzoo",
+            "sb3",
+        ):
             declared |= names_of(PROJECT["optional-dependencies"][extra])
         used = {module for room in ROOMS for module in imports_of(room, everywhere=True)}
         assert distributions(used) <= declared
@@ -114,7 +125,11 @@ class TestDependencies:
 
 
 # Imported inside functions only, after its extra was found to be installed.
-LOADED_WITH_ITS_EXTRA = {"rollouts/export/lerobot.py", "tasks/fronts/parallel.py"}
+LOADED_WITH_ITS_EXTRA = {
+    "rollouts/export/lerobot.py",
+    "tasks/fronts/parallel.py",
+    "tasks/fronts/sb3.py",
+}
 
 
 def modules_of(room):

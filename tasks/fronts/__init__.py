@@ -1,4 +1,4 @@
-"""Tasks behind the interfaces of other libraries: Gymnasium, its vectors, and PettingZoo.
+"""Tasks behind the interfaces of Gymnasium, its vectors, PettingZoo and Stable-Baselines3.
 
 Importing this loads neither torch nor sapien; each front is loaded when one is made.
 """
@@ -14,12 +14,13 @@ from tasks.registry import list_tasks
 
 if TYPE_CHECKING:
     from tasks.fronts.parallel import ParallelTask
+    from tasks.fronts.sb3 import SB3Task
 
 NAMESPACE = "RobotLayouts"  # Gymnasium ids are RobotLayouts/PickCube-v1
 
 _GYMNASIUM_NAME = re.compile(r"[\w.-]+-v\d+")
 
-__all__ = ["NAMESPACE", "parallel_env", "register"]
+__all__ = ["NAMESPACE", "parallel_env", "register", "sb3_vec_env"]
 
 
 def register() -> None:
@@ -50,7 +51,7 @@ def parallel_env(
         robot_reward: What each robot earns; None gives every robot the task's reward. Called as
             ``robot_reward(robot, observation, reward, info)`` with its place, what it observes
             now, the task's reward and the info of the step.
-        fields: Other arguments of `tasks.make`; ``num_envs`` and ``obs_mode`` are not offered.
+        fields: Other arguments of `tasks.make`; ``num_envs`` is not offered.
 
     Raises:
         MissingPackageError: If pettingzoo is not installed.
@@ -66,3 +67,36 @@ def parallel_env(
             "parallel_env needs pettingzoo; pip install 'robot-layouts[pettingzoo]'"
         ) from error
     return ParallelTask(task_id, robot_reward, **fields)
+
+
+def sb3_vec_env(
+    task_id: str, num_envs: int = 1, num_workers: int | None = None, **fields: Any
+) -> SB3Task:
+    """Make a Stable-Baselines3 ``VecEnv`` of a task, with the environments of its vector.
+
+    Its policies learn from a flat state, ``"MlpPolicy"``, or from named parts of one,
+    ``"MultiInputPolicy"`` with ``obs_mode="state_dict"``.
+
+    Args:
+        task_id: The task's id or another of its names.
+        num_envs: Number of environments.
+        num_workers: Number of processes; None takes one per core, 0 this process.
+        fields: ``ignore_terminations``, ``timeout`` and ``render_mode``, as
+            ``gymnasium.make_vec`` takes them, and other arguments of `tasks.make`.
+
+    Raises:
+        MissingPackageError: If stable-baselines3 is not installed.
+        UnknownNameError: If the task, a place, a robot or a field is unknown.
+        TaskError: If the task cannot be made like that.
+        AssetError: If robot files cannot be found.
+        WorkerError: If a worker ends before it is ready.
+    """
+    try:
+        from tasks.fronts.sb3 import SB3Task
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.partition(".")[0] != "stable_baselines3":
+            raise
+        raise MissingPackageError(
+            "sb3_vec_env needs stable-baselines3; pip install 'robot-layouts[sb3]'"
+        ) from error
+    return SB3Task(task_id, num_envs, num_workers=num_workers, **fields)

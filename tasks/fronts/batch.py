@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from robots import TaskError
 from tasks.fronts.board import Arrays, Shapes
+from tasks.observation import told_dtype
 from tasks.scenario import Scenario
 from tasks.task import FIRST_SEED, MultiRobotTask
 
@@ -29,6 +30,7 @@ class Part:
         start: Its first environment's number in the vector.
         stop: One more than its last environment's number.
         autoreset: When an environment whose episode ended begins a new one.
+        ignore_terminations: Whether episodes go on after success, until they are truncated.
     """
 
     task: type[MultiRobotTask]
@@ -36,6 +38,7 @@ class Part:
     start: int
     stop: int
     autoreset: AutoresetMode
+    ignore_terminations: bool = False
 
     @property
     def env_ids(self) -> range:
@@ -140,7 +143,7 @@ class Batch:
         self._write(obs, info)
         rows = self._rows
         rows["reward"][:] = reward.numpy()
-        rows["terminated"][:] = terminated.numpy()
+        rows["terminated"][:] = False if self._part.ignore_terminations else terminated.numpy()
         rows["truncated"][:] = truncated.numpy()
 
     def _restart(self, ended: NDArray[np.bool_]) -> None:
@@ -181,4 +184,4 @@ def _leaves(name: str, tree: Any) -> Iterator[tuple[str, NDArray[Any]]]:
             yield from _leaves(f"{name}/{key}", part)
     else:
         array: NDArray[Any] = tree.numpy()
-        yield name, array.astype(np.float32, copy=False)
+        yield name, array.astype(told_dtype(array), copy=False)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
-from gymnasium.spaces import Box, Dict, Space
+from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from tasks.actions import ActionReader
 from tasks.fronts.batch import FINAL, INFO, OBSERVATION, Beginning, Part
 from tasks.fronts.gymnasium import RENDER_MODES
 from tasks.fronts.workers import Failure, InProcess, WorkerError, Workers, WorkersFailed
+from tasks.observation import space_of
 from tasks.registry import get_task_class, make_scenario
 from tasks.task import FIRST_SEED
 
@@ -52,6 +53,7 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         num_envs: int = 1,
         num_workers: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        ignore_terminations: bool = False,
         timeout: float | None = 60.0,
         render_mode: str | None = None,
         **fields: Any,
@@ -66,6 +68,9 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
                 step begins a new one, without reading the action; with ``SAME_STEP`` the same
                 step does, and ``info`` keeps ``final_obs`` and ``final_info``; with ``DISABLED``
                 nothing does, and stepping past the end is allowed.
+            ignore_terminations: Whether nothing ends an episode but its last step, and
+                ``terminated`` is always false; ``info`` still tells of success. A policy that
+                learns from dense rewards, which success would cut short, else learns to avoid it.
             timeout: Seconds that workers may take for a step or a reset; None waits for ever.
             render_mode: ``"rgb_array"`` to draw pictures, which needs a Vulkan driver.
             fields: Other arguments of `tasks.make`.
@@ -91,11 +96,11 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         self._everywhere = np.ones(num_envs, bool)
         bounds = [(i * num_envs) // max(workers, 1) for i in range(max(workers, 1) + 1)]
         parts = [
-            Part(cls, scenario, start, stop, mode)
+            Part(cls, scenario, start, stop, mode, ignore_terminations)
             for start, stop in zip(bounds, bounds[1:], strict=False)
         ]
-        for placement in layout.values():
-            placement.robot.urdf.locate()  # fetched here, not by all workers at once
+        for placement in layout.values():  # fetched here, not by all workers at once
+            placement.robot.urdf.locate(pictures=scenario.draws)
         try:
             self._crew = Workers(parts, timeout) if workers else InProcess(parts[0])
         except WorkersFailed as failed:
@@ -104,7 +109,7 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         low, high = np.array(layout.action_bounds, np.float32).T
         self.single_action_space = Box(low, high, dtype=np.float32)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self.single_observation_space = _space(self._observation())
+        self.single_observation_space = space_of(self._observation(), batched=True)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
 
     def reset(
@@ -368,12 +373,6 @@ def _checked_workers(num_workers: int | None, num_envs: int) -> int:
             f" environments, {num_envs}"
         )
     return num_workers
-
-
-def _space(batch: Any) -> Space[Any]:
-    if isinstance(batch, Mapping):
-        return Dict({key: _space(part) for key, part in batch.items()})
-    return Box(-np.inf, np.inf, batch.shape[1:], np.float32)
 
 
 def _row(batch: Any, env: int) -> Any:

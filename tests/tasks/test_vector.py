@@ -171,6 +171,22 @@ def test_an_ended_environment_stands_still_while_others_move(monkeypatch):
     assert env.step(action)[4]["elapsed_steps"].tolist() == [2, 33, 2]
 
 
+@pytest.mark.parametrize("ignored", [False, True])
+def test_terminations_may_be_ignored(ignored):
+    env = make(ignore_terminations=ignored, autoreset_mode="SAME_STEP")
+    env.reset(seed=0)
+    task = env._crew._batch._task
+    state = task.get_state_dict()
+    state["actors"]["cube"][1, :2] = state["actors"]["goal_region"][1, :2]
+    task.set_state_dict(state)
+    _, _, terminated, truncated, info = env.step(np.zeros((NUM_ENVS, 8), np.float32))
+    assert terminated.tolist() == [False, not ignored, False]
+    assert not truncated.any()
+    assert info["elapsed_steps"].tolist() == [1, ignored, 1]
+    last = info if ignored else info["final_info"]
+    assert last["success"].tolist() == [False, True, False]
+
+
 def test_a_step_of_some_environments_leaves_the_others_as_they_are():
     task = tasks.make("PickCube-v1", num_envs=NUM_ENVS)
     task.reset(seed=0)

@@ -1,0 +1,217 @@
+"""A task as a Stable-Baselines3 ``VecEnv``: many environments, in worker processes or here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, NoReturn
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Dict, Space
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env.base_vec_env import (
+    VecEnv,
+    VecEnvIndices,
+    VecEnvObs,
+)
+
+from robots import TaskError, UnknownNameError, unknown_name_message
+from tasks.fronts import NAMESPACE
+from tasks.fronts.vector import RESET_OPTIONS, VectorTask
+from tasks.registry import get_task_class
+
+_OPTIONS = tuple(option for option in RESET_OPTIONS if option != "reset_mask")
+
+
+class SB3Task(VecEnv):
+    """What `tasks.sb3_vec_env` gives: a `VectorTask` that speaks Stable-Baselines3's language.
+
+    An environment whose episode ends begins the next one in the same step. What it said then is
+    in its info: ``terminal_observation``, ``TimeLimit.truncated`` (its time was up, and it had not
+    terminated), and ``is_success``, from which Stable-Baselines3 takes its success rates. Parts of
+    a ``state_dict`` observation are called by their way, ``extra/tcp_pose``: nested spaces are
+    unknown to Stable-Baselines3. ``VecMonitor`` adds the returns and lengths of episodes.
+
+    Attributes:
+        vector: The Gymnasium vector behind it; ``vector.restart`` replaces workers that are gone.
+        spec: What Gymnasium calls the task; None if it does not know it.
+    """
+
+    def __init__(self, task_id: str, num_envs: int = 1, **fields: Any) -> None:
+        """Start the workers and build the worlds; see `tasks.sb3_vec_env`."""
+        if "autoreset_mode" in fields:
+            raise TaskError(
+                "sb3_vec_env takes no autoreset_mode: Stable-Baselines3 resets in the same step"
+            )
+        fields["autoreset_mode"] = AutoresetMode.SAME_STEP
+        self.vector = VectorTask(task_id, num_envs, **fields)
+        task = get_task_class(task_id)
+        self.spec = gymnasium.registry.get(f"{NAMESPACE}/{task.task_id}")
+        observation = _flat_space(self.vector.single_observation_space)
+        self._shared: dict[str, Any] = {
+            "action_space": self.vector.single_action_space,
+            "action_split": self.vector.action_split,
+            "max_episode_steps": task.max_episode_steps,
+            "metadata": self.vector.metadata,
+            "observation_space": observation,
+            "render_mode": self.vector.render_mode,
+            "spec": self.spec,
+            "task_id": task.task_id,
+        }
+        super().__init__(num_envs, observation, self.vector.single_action_space)
+        self.metadata = self.vector.metadata
+        self._actions: Any = None
+
+    def reset(self) -> VecEnvObs:
+        """Begin new episodes, with what `seed` and `set_options` said for this once.
+
+        ``set_options({"reconfigure": True})`` rebuilds the worlds.
+
+        Returns:
+            Observation of all environments.
+
+        Raises:
+            TaskError: If a seed or an option makes no sense; nothing is reset then.
+            WorkerError: If workers die, hang or fail.
+        """
+        rebuilt = np.array([_reconfigures(options) for options in self._options])
+        obs: Any = None
+        for mask, rebuild in ((rebuilt, True), (~rebuilt, False)):
+            if mask.any():
+                options = {"reset_mask": mask, "reconfigure": rebuild}
+                obs, info = self.vector.reset(seed=self._seeds, options=options)
+                rows = _rows(info, self.num_envs)
+                for i in np.flatnonzero(mask).tolist():
+                    self.reset_infos[i] = rows[i]
+        self._reset_seeds()
+        self._reset_options()
+        return _flat(obs)
+
+    def step_async(self, actions: Any) -> None:
+        """Take the actions of the next step.
+
+        Args:
+            actions: (N, A) floating, in the order of ``action_split``.
+        """
+        self._actions = actions
+
+    def step_wait(
+        self,
+    ) -> tuple[VecEnvObs, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+        """Advance every environment by one control step.
+
+        Returns:
+            Observation, reward (N,) float32, done (N,), and the info of each environment.
+
+        Raises:
+            ActionError: If the action has a wrong shape, type or number; nothing moves then.
+            WorkerError: If workers die, hang or fail.
+        """
+        obs, reward, terminated, truncated, info = self.vector.step(self._actions)
+        done = terminated | truncated
+        told = _rows(info, self.num_envs)
+        if done.any():
+            final = _rows(info["final_info"], self.num_envs)
+            for i in np.flatnonzero(done).tolist():
+                self.reset_infos[i], told[i] = told[i], final[i]
+                told[i]["terminal_observation"] = _flat(info["final_obs"][i])
+        for own, late in zip(told, (truncated & ~terminated).tolist(), strict=True):
+            own["TimeLimit.truncated"] = late
+            own["is_success"] = own["success"]
+        return _flat(obs), reward, done, told
+
+    def close(self) -> None:
+        """End the workers; closing twice is allowed."""
+        self.vector.close()
+
+    def get_images(self) -> list[NDArray[np.uint8] | None]:
+        """Return a picture of every environment, (512, 512, 3) uint8 each.
+
+        Raises:
+            TaskError: If it was not made with ``render_mode="rgb_array"``.
+        """
+        return list(self.vector.render())
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """Return what some environments say of themselves; it is the same for all.
+
+        Raises:
+            UnknownAttributeError: If environments say nothing of that (also an
+                ``AttributeError``).
+        """
+        if attr_name not in self._shared:
+            raise UnknownAttributeError("attribute", attr_name, self._shared)
+        return [self._shared[attr_name] for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> NoReturn:
+        """Refuse: environments stay as they were made.
+
+        Raises:
+            TaskError: Always.
+        """
+        raise TaskError(
+            f"{attr_name} cannot be set: environments stay as they were made, and share a task"
+            " with others; give sb3_vec_env what they should be like"
+        )
+
+    def env_method(
+        self,
+        method_name: str,
+        *method_args: Any,
+        indices: VecEnvIndices = None,
+        **method_kwargs: Any,
+    ) -> NoReturn:
+        """Refuse: environments are rows of a batch and have no methods of their own.
+
+        Raises:
+            UnknownAttributeError: Always (also an ``AttributeError``).
+        """
+        hint = "Environments are rows of a batch; the vector they are in is `vector`."
+        raise UnknownAttributeError("method of an environment", method_name, (), hint)
+
+    def env_is_wrapped(
+        self,
+        wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]],
+        indices: VecEnvIndices = None,
+    ) -> list[bool]:
+        """Return whether environments are in a Gymnasium wrapper: none is."""
+        return [False for _ in self._get_indices(indices)]
+
+
+class UnknownAttributeError(UnknownNameError, AttributeError):
+    """An attribute that environments do not have (also an ``AttributeError``)."""
+
+
+def _reconfigures(options: Mapping[str, Any]) -> bool:
+    for key in options:
+        if key not in _OPTIONS:
+            raise TaskError(unknown_name_message("reset option", key, _OPTIONS))
+    return bool(options.get("reconfigure", False))
+
+
+def _rows(info: Mapping[str, Any], num_envs: int) -> list[dict[str, Any]]:
+    """Return the info of each environment: Python numbers, and arrays where it has them."""
+    columns = {
+        key: list(value) if value.ndim > 1 else value.tolist()
+        for key, value in info.items()
+        if f"_{key}" in info and not key.startswith("final_")
+    }
+    return [{key: column[i] for key, column in columns.items()} for i in range(num_envs)]
+
+
+def _flat_space(space: Space[Any]) -> Space[Any]:
+    return Dict(dict(_leaves(space, ""))) if isinstance(space, Dict) else space
+
+
+def _flat(observation: Any) -> Any:
+    return dict(_leaves(observation, "")) if isinstance(observation, Mapping) else observation
+
+
+def _leaves(tree: Any, way: str) -> Iterator[tuple[str, Any]]:
+    """Go through a nested mapping by the way to each of its leaves."""
+    if isinstance(tree, Mapping):
+        for key, part in tree.items():
+            yield from _leaves(part, f"{way}/{key}" if way else key)
+    else:
+        yield way, tree

@@ -1,0 +1,270 @@
+"""Tasks behind Stable-Baselines3's interface."""
+
+import sys
+from contextlib import closing
+
+import gymnasium
+import numpy as np
+import pytest
+
+import tasks
+from robots import ActionError, MissingPackageError, TaskError, UnknownNameError
+from rollouts.experts import find_expert
+from simulation.rendering import vulkan_problem
+
+pytest.importorskip("stable_baselines3")
+
+from stable_baselines3 import PPO
+from stable_baselines3.common.env_checker import check_env
+from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import (
+    DummyVecEnv,
+    VecCheckNan,
+    VecFrameStack,
+    VecMonitor,
+    VecNormalize,
+)
+
+TASK = "PushCube-v1"
+NUM_ENVS, STEPS = 3, 55  # an episode has 50
+SOLVED, SEED = 1, 7  # which environment succeeds; environment i gets SEED + i
+
+
+def make(num_workers=0, num_envs=NUM_ENVS, **fields):
+    return tasks.sb3_vec_env(TASK, num_envs, num_workers, **fields)
+
+
+@pytest.fixture(scope="module")
+def spread():
+    """The same in worker processes."""
+    with closing(make(num_workers=2)) as env:
+        yield env
+
+
+@pytest.fixture(scope="module")
+def actions():
+    """Random ones, but environment 1 does what solves its first episode."""
+    rng = np.random.default_rng(0)
+    numbers = rng.uniform(-1, 1, (STEPS, NUM_ENVS, 8)).astype(np.float32)
+    plan = find_expert(TASK)(tasks.make(TASK), SEED + SOLVED)
+    numbers[: len(plan), SOLVED] = plan
+    return numbers
+
+
+def play(env, actions):
+    """Everything that an environment says while episodes end at different times."""
+    env.seed(SEED)
+    said = [env.reset(), [*env.reset_infos]]
+    for action in actions:
+        said.append((*env.step(action), [*env.reset_infos]))
+    return said
+
+
+def ends(said, env):
+    """In which steps episodes of one environment end."""
+    return [step for step, (_, _, done, _, _) in enumerate(said[2:]) if done[env]]
+
+
+def without(said, *keys):
+    """Leave out some of what infos tell, at any depth."""
+    if isinstance(said, dict):
+        return {k: without(v, *keys) for k, v in said.items() if k not in keys}
+    return [without(x, *keys) for x in said] if isinstance(said, (list, tuple)) else said
+
+
+def test_it_says_what_their_own_vector_says(actions):
+    """Of Gymnasium environments, which say so when they rebuild, and do not call it is_success."""
+    env = DummyVecEnv([lambda: gymnasium.make(f"RobotLayouts/{TASK}") for _ in range(NUM_ENVS)])
+    theirs, ours = play(env, actions), play(make(), actions)
+    np.testing.assert_equal(without(ours, "is_success"), without(theirs, "reconfigure"))
+    (step, *_) = ends(ours, SOLVED)
+    assert step < 49
+    assert ends(ours, 0) == [49]
+
+
+def test_workers_change_nothing(spread, actions):
+    np.testing.assert_equal(play(spread, actions), play(make(), actions))
+
+
+def test_an_episode_that_succeeds(actions):
+    said = play(make(), actions)
+    step, *_ = ends(said, SOLVED)
+    obs, reward, done, infos, reset_infos = said[2 + step]
+    assert done.tolist() == [False, True, False]
+    assert reward[SOLVED] == 1.0
+    assert infos[SOLVED]["TimeLimit.truncated"] is False
+    assert infos[SOLVED]["is_success"] is infos[SOLVED]["success"] is True
+    assert infos[SOLVED]["elapsed_steps"] == step + 1
+    assert reset_infos[SOLVED]["elapsed_steps"] == 0
+    assert [new is old for new, old in zip(reset_infos, said[1], strict=True)] == [1, 0, 1]
+    assert not np.array_equal(infos[SOLVED]["terminal_observation"], obs[SOLVED])
+    assert "terminal_observation" not in infos[0]
+
+
+def test_an_episode_whose_time_is_up(actions):
+    env, task = make(), tasks.make(TASK, num_envs=NUM_ENVS)
+    env.seed(SEED)
+    env.reset()
+    task.reset(seed=SEED)
+    for _ in range(50):
+        obs, _, done, infos = env.step(actions[0] * 0)
+        last, *_ = task.step(actions[0] * 0)
+    assert done.all()
+    for own, end in zip(infos, last.numpy(), strict=True):
+        assert (own["TimeLimit.truncated"], own["is_success"]) == (True, False)
+        np.testing.assert_array_equal(own["terminal_observation"], end)
+    np.testing.assert_array_equal(obs, task.reset()[0].numpy())
+
+
+def test_success_in_the_last_step_is_no_lack_of_time(actions):
+    env = make(num_envs=1)
+    env.reset()
+    for _ in range(49):
+        env.step(actions[0, :1] * 0)
+    task = env.vector._crew._batch._task
+    state = task.get_state_dict()
+    state["actors"]["cube"][:, :2] = state["actors"]["goal_region"][:, :2]
+    task.set_state_dict(state)
+    _, _, done, infos = env.step(actions[0, :1] * 0)
+    assert done.all()
+    assert (infos[0]["is_success"], infos[0]["TimeLimit.truncated"]) == (True, False)
+
+
+def test_terminations_may_be_ignored(actions):
+    said = play(make(ignore_terminations=True), actions)
+    first, *_ = ends(play(make(), actions), SOLVED)
+    assert [ends(said, env) for env in range(NUM_ENVS)] == [[49]] * NUM_ENVS
+    assert said[2 + first][3][SOLVED]["is_success"] is True
+    assert said[2 + 49][3][SOLVED]["TimeLimit.truncated"] is True
+
+
+def test_seeds_and_options_count_once():
+    env = make()
+    assert env.seed(5) == [5, 6, 7]
+    first = env.reset()
+    assert not np.array_equal(env.reset(), first)
+    env.seed(5)
+    np.testing.assert_array_equal(env.reset(), first)
+    env.set_options({"reset_mask": np.ones(3, bool)})
+    with pytest.raises(TaskError, match="unknown reset option 'reset_mask'.*reconfigure"):
+        env.reset()
+
+
+def test_worlds_are_rebuilt_where_asked(monkeypatch):
+    env = make()
+    simulation = env.vector._crew._batch._task.simulation
+    rebuilt, rebuild = [], simulation.rebuild
+    monkeypatch.setattr(simulation, "rebuild", lambda ids: (rebuilt.append(ids), rebuild(ids)))
+    env.seed(5)
+    first = env.reset()
+    env.seed(5)
+    env.set_options([{"reconfigure": True}, {}, {}])
+    np.testing.assert_array_equal(env.reset(), first)
+    env.reset()
+    assert rebuilt == [[0]]
+
+
+def test_named_observations_have_no_nested_names():
+    env, task = make(obs_mode="state_dict"), tasks.make(TASK, NUM_ENVS, obs_mode="state_dict")
+    env.seed(0)
+    obs, tree = env.reset(), task.reset(seed=0)[0]
+    assert set(obs) == set(env.observation_space.spaces)
+    np.testing.assert_array_equal(obs["agent/qpos"], tree["agent"]["qpos"])
+    np.testing.assert_array_equal(obs["extra/tcp_pose"], tree["extra"]["tcp_pose"])
+    for _ in range(50):
+        *_, infos = env.step(np.zeros((3, 8), np.float32))
+    assert set(infos[0]["terminal_observation"]) == set(obs)
+    model = PPO("MultiInputPolicy", env, n_steps=2, batch_size=6, n_epochs=1, device="cpu")
+    model.learn(6)
+
+
+def test_their_wrappers():
+    env = VecMonitor(VecCheckNan(make(), raise_exception=True), info_keywords=("is_success",))
+    env = VecFrameStack(VecNormalize(env), 2)
+    assert env.reset().shape == (NUM_ENVS, 70)
+    for _ in range(50):
+        *_, infos = env.step(np.zeros((NUM_ENVS, 8), np.float32))
+    episode = infos[0]["episode"]
+    assert (episode["l"], episode["is_success"]) == (50, False)
+    assert episode["r"] > 0
+    assert infos[0]["terminal_observation"].shape == (70,)
+
+
+def test_a_training_run_does_not_depend_on_workers(spread, tmp_path):
+    fresh = make()
+    for env in (fresh, spread):
+        env.set_options({"reconfigure": True})
+    models = [trained(fresh), trained(spread)]
+    first, second = (model.policy.state_dict() for model in models)
+    assert all((first[name] == second[name]).all() for name in first)
+    models[0].save(tmp_path / "policy")
+    again = PPO.load(tmp_path / "policy", make(), device="cpu")
+    assert evaluate(models[0]) == evaluate(again)
+
+
+def trained(env):
+    model = PPO("MlpPolicy", VecMonitor(env), n_steps=52, batch_size=78, seed=3, device="cpu")
+    return model.learn(2 * 52 * NUM_ENVS)
+
+
+def evaluate(model):
+    env = VecMonitor(make())
+    env.seed(0)
+    return evaluate_policy(model, env, n_eval_episodes=NUM_ENVS, return_episode_rewards=True)
+
+
+def test_what_environments_say_of_themselves():
+    env = make()
+    assert env.get_attr("max_episode_steps", [0, 2]) == [50, 50]
+    assert env.get_attr("action_space", 1) == [env.action_space]
+    assert env.has_attr("task_id")
+    assert not env.has_attr("task")
+    assert env.env_is_wrapped(Monitor) == [False] * NUM_ENVS
+    assert env.env_is_wrapped(Monitor, [1]) == [False]
+    assert env.spec.id == f"RobotLayouts/{TASK}"
+    assert env.metadata["render_fps"] == 20
+    with pytest.raises(AttributeError, match="Did you mean 'task_id'"):
+        env.get_attr("taskid")
+    with pytest.raises(AttributeError, match="rows of a batch"):
+        env.env_method("compute_reward")
+    with pytest.raises(TaskError, match="reward_mode cannot be set"):
+        env.set_attr("reward_mode", "sparse")
+
+
+def test_wrong_arguments():
+    env = make()
+    env.reset()
+    with pytest.raises(ActionError, match=r"must be \(3, 8\)"):
+        env.step(np.zeros((2, 8), np.float32))
+    with pytest.raises(UnknownNameError, match="Did you mean 'obs_mode'"):
+        make(obs_mod="state")
+    with pytest.raises(TaskError, match="takes no autoreset_mode"):
+        make(autoreset_mode="NEXT_STEP")
+    with pytest.raises(TaskError, match="render_mode='rgb_array'"):
+        env.get_images()
+    env.close()
+    env.close()
+
+
+def test_without_stable_baselines3_the_command_is_named(monkeypatch):
+    for name in [name for name in sys.modules if name.startswith("stable_baselines3")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "stable_baselines3", None)
+    monkeypatch.delitem(sys.modules, "tasks.fronts.sb3", raising=False)
+    with pytest.raises(MissingPackageError, match=r"pip install 'robot-layouts\[sb3\]'"):
+        make()
+
+
+@pytest.mark.parametrize("task_id", [TASK, "TwoRobotPickCube-v1"])
+def test_their_own_checks_of_single_environments(task_id):
+    check_env(gymnasium.make(f"RobotLayouts/{task_id}").unwrapped, skip_render_check=True)
+
+
+@pytest.mark.long
+def test_pictures():
+    if problem := vulkan_problem():
+        pytest.skip(problem)
+    with closing(make(num_envs=2, render_mode="rgb_array", timeout=None)) as env:
+        env.reset()
+        assert env.render("rgb_array").shape == (512, 1024, 3)
