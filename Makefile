@@ -11,8 +11,8 @@ help:
 	@echo "make demo      two robots hand a cube over, ten times"
 	@echo "make test      the tests"
 	@echo "make test-all  the tests, those that take minutes included"
-	@echo "make check     lint, format, types, which room imports which, README's table"
-	@echo "make bench     speed of a step beside native ManiSkill"
+	@echo "make check     lint, format, types, which room imports which, README's tables"
+	@echo "make bench     what steps, resets and vectors cost beside native ManiSkill"
 	@echo "make parity    every task beside native ManiSkill; writes README.md's table"
 	@echo "make clean     remove .venv"
 
@@ -33,8 +33,10 @@ check: $(VENV)/.check
 	$(VENV)/bin/lint-imports
 	$(RUN) -m parity readme --check
 
+# ARGS="--record" keeps the figures for README.md.
 bench: $(VENV)/.test
-	OMP_NUM_THREADS=1 $(RUN) -m parity.bench $(ARGS)
+	OMP_NUM_THREADS=1 $(RUN) -m parity bench --out runs/bench $(ARGS)
+	$(RUN) -m parity readme
 
 # ARGS="--demos DIR" plays recorded demonstrations as well.
 parity: $(VENV)/.test

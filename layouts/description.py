@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from layouts.orientation import yaw_degrees
 
 if TYPE_CHECKING:
-    from layouts.layout import Layout, Placement
+    from layouts.layout import Layout
+    from layouts.placement import Placement
 
 COLUMNS = ("#", "name", "robot", "action", "base x, y, z (m)", "facing", "keyframe", "reach (m)")
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
@@ -18,132 +17,16 @@ from layouts.frames import (
     HangingError,
     Pose,
     check_frame_names,
-    check_pose,
-    declared_quaternion,
     numbers,
     resolve,
 )
-from layouts.orientation import inverted, multiplied, normalised, yaw_quaternion
-from robots import LayoutError, RobotDescriptor, RobotRegistry, UnknownNameError
-from robots.descriptor import IDENTITY, Quaternion, Vector3
+from layouts.orientation import yaw_quaternion
+from layouts.placement import Placement, RobotLike, placed
+from robots import LayoutError, UnknownNameError
+from robots.descriptor import Vector3
 
 if TYPE_CHECKING:
     from layouts.validation import Report
-
-RobotLike = str | RobotDescriptor
-
-
-@dataclass(frozen=True)
-class Placement:
-    """One robot's place: where its base is fixed, and the joint positions it starts from.
-
-    A place is in the world, or hangs ``on`` a frame or another robot's base of the same layout.
-    What is left out is the robot's own `robots.Home`, so that another robot can take the place.
-
-    Attributes:
-        robot: Its descriptor; a registry name is accepted and looked up.
-        position: Base position (m) in the world or in what it hangs on. None is the robot's home
-            in the world, and the origin of what it hangs on.
-        quaternion: Base orientation there, wxyz, unit length, or None for home.
-        keyframe: Keyframe it starts from, or None for home.
-        qpos_noise: Standard deviation of the joint noise added at a reset (rad).
-        rpy: Base orientation as roll, pitch and yaw (rad, about fixed x, y, z as in a URDF),
-            instead of a quaternion.
-        on: Name of the frame or robot it hangs on; None is the world.
-    """
-
-    robot: RobotDescriptor
-    position: Vector3 | None = None
-    quaternion: Quaternion | None = None
-    keyframe: str | None = None
-    qpos_noise: float = 0.02
-    rpy: Vector3 | None = field(default=None, kw_only=True)
-    on: str | None = field(default=None, kw_only=True)
-    _world: Pose | None = field(default=None, init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        """Look a robot's name up, and refuse poses that are no poses."""
-        object.__setattr__(self, "robot", load_robot(self.robot))
-        check_pose(self)
-        if self.keyframe is not None:
-            self.robot.keyframe(self.keyframe)
-        try:
-            noise = float(self.qpos_noise)
-        except (TypeError, ValueError):
-            noise = math.nan
-        if not (math.isfinite(noise) and noise >= 0):
-            raise LayoutError(f"qpos_noise is {self.qpos_noise} rad; it must be 0 or more")
-        object.__setattr__(self, "qpos_noise", noise)
-
-    @property
-    def local_pose(self) -> Pose:
-        """Base pose in the frame it hangs on, or in the world."""
-        if self.position is not None:
-            position = self.position
-        else:
-            position = self.robot.home.position if self.on is None else ORIGIN
-        return Pose(position, declared_quaternion(self, self.robot.home.quaternion))
-
-    @property
-    def base_pose(self) -> Pose:
-        """Base pose in the world.
-
-        Raises:
-            LayoutError: If it hangs on something, and is not in a layout that knows what.
-        """
-        if self.on is None:
-            return self.local_pose
-        if self._world is None:
-            raise LayoutError(
-                f"this placement hangs on {self.on!r}; only a layout that holds both knows where"
-                " that is"
-            )
-        return self._world
-
-    @property
-    def base_position(self) -> Vector3:
-        """Base position in the world (m)."""
-        return self.base_pose.position
-
-    @property
-    def base_quaternion(self) -> Quaternion:
-        """Base orientation in the world, wxyz."""
-        return self.base_pose.quaternion
-
-    @property
-    def facing(self) -> Quaternion:
-        """How the robot is turned from its home (wxyz), where it reaches out along +x."""
-        return _without(self.robot.home.quaternion, self.base_quaternion)
-
-    @property
-    def start_keyframe(self) -> str:
-        """Name of the keyframe the robot starts from."""
-        return self.robot.home.keyframe if self.keyframe is None else self.keyframe
-
-    @property
-    def start_qpos(self) -> tuple[float, ...]:
-        """Joint positions of ``start_keyframe``, in the order of the robot's joints (rad, m)."""
-        return self.robot.keyframe(self.start_keyframe)
-
-    def with_robot(self, robot: RobotLike) -> Placement:
-        """Return the placement with another robot, which faces the same way.
-
-        Raises:
-            UnknownNameError: If there is no such robot, or it lacks the keyframe.
-        """
-        robot = load_robot(robot)
-        before, after = self.robot.home.quaternion, robot.home.quaternion
-        if before == after or (self.quaternion is None and self.rpy is None):
-            return replace(self, robot=robot)
-        turn = _without(before, self.local_pose.quaternion)
-        return replace(self, robot=robot, rpy=None, quaternion=faced(robot, turn))
-
-
-def faced(robot: RobotDescriptor, turn: Quaternion) -> Quaternion:
-    """Return the base orientation (wxyz) of a robot that is turned from its home by ``turn``."""
-    if robot.home.quaternion == IDENTITY:
-        return turn
-    return normalised(multiplied(turn, robot.home.quaternion))
 
 
 class Layout(Mapping[str, Placement]):
@@ -185,7 +68,7 @@ class Layout(Mapping[str, Placement]):
         world = resolve(poses)
         object.__setattr__(self, "_frames", frames)
         object.__setattr__(
-            self, "_placements", {n: _placed(p, world[n]) for n, p in placements.items()}
+            self, "_placements", {n: placed(p, world[n]) for n, p in placements.items()}
         )
 
     @classmethod
@@ -361,14 +244,9 @@ class Layout(Mapping[str, Placement]):
             LayoutError: If the file cannot be read or describes no layout; the message names the
                 file and the line.
         """
-        from layouts.yaml_format import from_yaml
+        from layouts.yaml_format import read_layout
 
-        try:
-            text = Path(path).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
-            raise LayoutError(f"cannot read the layout {str(path)!r}: {reason}") from error
-        return from_yaml(text, str(path))
+        return read_layout(path)
 
     def to_urdf(
         self, path: str | PathLike[str], *, relative: bool = False, visuals: bool = True
@@ -486,15 +364,6 @@ class Layout(Mapping[str, Placement]):
         )
 
 
-def load_robot(robot: RobotLike) -> RobotDescriptor:
-    """Return a descriptor as it is, or look a name up in the registry.
-
-    Raises:
-        UnknownNameError: If no robot has that name.
-    """
-    return robot if isinstance(robot, RobotDescriptor) else RobotRegistry.load(robot)
-
-
 def check_name(name: object) -> None:
     """Refuse a robot's name that is not an identifier.
 
@@ -508,22 +377,8 @@ def check_name(name: object) -> None:
 _Declared = TypeVar("_Declared", Placement, Frame)
 
 
-def _placed(placement: Placement, world: Pose) -> Placement:
-    """Return a placement that knows where it is, if it hangs."""
-    if placement.on is None:
-        return placement
-    placed = replace(placement)
-    object.__setattr__(placed, "_world", world)
-    return placed
-
-
 def _moved(declared: _Declared, move: Pose) -> _Declared:
     if declared.on is not None:
         return declared
     pose = move.then(declared.local_pose)
     return replace(declared, position=pose.position, quaternion=pose.quaternion, rpy=None)
-
-
-def _without(home: Quaternion, quaternion: Quaternion) -> Quaternion:
-    """Return what turns a robot from its home orientation to ``quaternion`` (both wxyz)."""
-    return quaternion if home == IDENTITY else multiplied(quaternion, inverted(home))

@@ -11,7 +11,8 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from math import hypot
 
-from layouts.layout import Layout, Placement
+from layouts.layout import Layout
+from layouts.placement import Placement
 from layouts.presets import face_to_face, single
 from robots import UnknownNameError
 

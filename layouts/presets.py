@@ -3,32 +3,28 @@
 Every preset turns robots by where they reach out at home (`Placement.facing`), so that a robot
 whose own front is not its base's +x faces like the others.
 
-A distance given as ``"auto"`` comes from the robots' reach. Neighbours stand `HAND_OVER` of the sum
-of their reaches apart: the last eighth of that sum is where both can work, so one can hand an
-object to the other. They never stand so near that one can reach the other's base. Where one
-distance has to serve several pairs of neighbours, it is that of the pair that asks for the least,
-unless somebody could then reach a neighbour's base.
+A distance given as ``"auto"`` comes from the robots' reach; see `layouts.distances`. Where it has
+to serve several pairs of neighbours, it is that of the pair that asks for the most.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from itertools import accumulate, pairwise
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import Literal
 
+from layouts.distances import apart, centred, gaps, ring_of, share_at_table, table_for
 from layouts.frames import EDGES, check_positive
 from layouts.frames import table as table_frames
-from layouts.layout import Layout, Placement, RobotLike, faced, load_robot
+from layouts.layout import Layout
 from layouts.orientation import yaw_quaternion
+from layouts.placement import Placement, RobotLike, faced, load_robot
 from robots import LayoutError, RobotDescriptor, UnknownNameError
 from robots.descriptor import Vector3
 
 Distance = float | Literal["auto"]  # m
 
-# Share of the sum of two reaches. ManiSkill's two-robot tasks stand their Pandas 1.5 m apart,
-# which is 0.877 of twice 0.855 m (mani_skill 3.0.1, scene_builder/table).
-HAND_OVER = 7 / 8
 EDGE = 0.1  # from a table's edge to a base's middle (m); native's single Pandas have 0.11 m
 
 FACING: Mapping[str, float] = {  # turn from an outward look along the radius (rad)
@@ -63,7 +59,7 @@ def side_by_side(
     """
     loaded = _loaded(robots)
     if spacing == "auto":
-        along = _centred([_apart(*pair) for pair in _pairs(loaded)])
+        along = centred(gaps(loaded.values()))
     else:
         distance = _given("spacing", spacing)
         first = -distance * (len(loaded) - 1) / 2
@@ -88,7 +84,7 @@ def face_to_face(
     """
     _expect_count("face_to_face", robots, 2)
     loaded = _loaded(robots)
-    distance = _apart(*loaded.values()) if spacing == "auto" else _given("spacing", spacing)
+    distance = apart(*loaded.values()) if spacing == "auto" else _given("spacing", spacing)
     return Layout(
         {
             name: _placed(robot, (0.0, side * distance / 2, 0.0), -side * math.pi / 2, keyframe)
@@ -123,7 +119,7 @@ def ring(
         raise UnknownNameError("way to face", facing, FACING)
     loaded = _loaded(robots)
     if radius == "auto":
-        radius, angles = _automatic_ring(list(loaded.values()))
+        radius, angles = ring_of(list(loaded.values()))
     else:
         radius = _given("radius", radius)
         angles = [2 * math.pi * i / len(loaded) for i in range(len(loaded))]
@@ -154,8 +150,8 @@ def around_table(
         edges: Edge of each robot, by name or in order. Left out: south, north, west, east, and
             again from the south.
         table: Width (along x) and depth (along y) of the table (m). ``"auto"`` makes it so large
-            that robots on opposite edges are at hand-over distance, or larger if several robots
-            stand on one edge.
+            that robots on opposite edges are at hand-over distance; a little larger if robots
+            stand round its corners, and larger if several stand on one edge.
         inset: Distance of the bases from the edge, inwards (m). ``"auto"`` is 0.1 m for the robot
             that reaches farthest, and more for others, so that they work in the same places.
         keyframe: Keyframe every robot starts from; None is each one's home.
@@ -166,24 +162,24 @@ def around_table(
     """
     loaded = _loaded(robots)
     sides = _edges(tuple(loaded), edges)
-    rows = {edge: {n: r for n, r in loaded.items() if sides[n] == edge} for edge in EDGES}
-    if inset != "auto":
-        inset = _given("inset", inset)
-    size = _table_size(table, rows, EDGE if inset == "auto" else inset)
-    farthest = max(robot.reach for robot in loaded.values())
+    rows = {edge: [n for n in loaded if sides[n] == edge] for edge in EDGES}
+    standing = {edge: [loaded[name] for name in row] for edge, row in rows.items()}
+    least = EDGE if inset == "auto" else _given("inset", inset)
+    size = table_for(standing, least) if table == "auto" else _given_table(table, least)
+    lengths = {edge: size[0] if edge in ("north", "south") else size[1] for edge in EDGES}
     along: dict[str, float] = {}
     for edge, row in rows.items():
-        length = size[0] if edge in ("north", "south") else size[1]
-        gaps = [_apart(*pair) if table == "auto" else length / len(row) for pair in _pairs(row)]
-        along.update(zip(row, _centred(gaps), strict=False))
+        even = [lengths[edge] / len(row) for _ in pairwise(row)]
+        spaces = gaps(standing[edge]) if table == "auto" else even
+        along.update(zip(row, centred(spaces), strict=False))
+    share = share_at_table(standing)
+    farthest = max(robot.reach for robot in loaded.values())
     placements: dict[str, Placement] = {}
     for name, robot in loaded.items():
         across = size[1] if sides[name] in ("north", "south") else size[0]
-        if inset == "auto":
-            shorter = HAND_OVER * (farthest - robot.reach)
-            inwards = max(EDGE, min(EDGE + shorter, across / 2 - HAND_OVER * robot.reach))
-        else:
-            inwards = inset
+        shorter = share * (farthest - robot.reach)
+        to_middle = across / 2 - share * robot.reach
+        inwards = max(EDGE, min(EDGE + shorter, to_middle)) if inset == "auto" else least
         placements[name] = Placement(
             robot, (inwards, along[name], 0.0), keyframe=keyframe, on=f"table.{sides[name]}"
         )
@@ -225,7 +221,10 @@ def grid(
         for other in ((row + 1, column), (row, column + 1))
         if other in cells
     ]
-    distance = _shared_distance(neighbours) if spacing == "auto" else _given("spacing", spacing)
+    if spacing == "auto":
+        distance = max((apart(*pair) for pair in neighbours), default=0.0)
+    else:
+        distance = _given("spacing", spacing)
     placements: dict[str, Placement] = {}
     for i, (name, robot) in enumerate(loaded.items()):
         row, column = divmod(i, columns)
@@ -266,67 +265,6 @@ def _given(what: str, distance: Distance) -> float:
     return distance
 
 
-def _apart(one: RobotDescriptor, other: RobotDescriptor) -> float:
-    """Return the hand-over distance (m) of two bases, from which neither reaches the other one."""
-    return max(HAND_OVER * (one.reach + other.reach), one.reach, other.reach)
-
-
-def _shared_distance(neighbours: Sequence[tuple[RobotDescriptor, RobotDescriptor]]) -> float:
-    """Return one distance (m) for several pairs of neighbours; 0 if there is no pair."""
-    if not neighbours:
-        return 0.0
-    farthest = max(robot.reach for pair in neighbours for robot in pair)
-    return max(min(_apart(*pair) for pair in neighbours), farthest)
-
-
-def _automatic_ring(robots: Sequence[RobotDescriptor]) -> tuple[float, list[float]]:
-    """Return the radius (m) and the angles (rad) that put neighbours at hand-over distance.
-
-    The neighbours' distances are the sides of a polygon whose corners lie on the circle.
-    """
-    count = len(robots)
-    if count == 1:
-        return HAND_OVER * robots[0].reach, [0.0]
-    sides = [_apart(*pair) for pair in pairwise([*robots, robots[0]])]
-    longest = max(range(count), key=lambda i: sides[i])
-    if sides[longest] - min(sides) < 1e-12:
-        radius = sides[0] / (2 * math.sin(math.pi / count))
-        return radius, [2 * math.pi * i / count for i in range(count)]
-    radius = _circumradius(sides)
-    arcs = [2 * math.asin(min(side / (2 * radius), 1.0)) for side in sides]
-    arcs[longest] = 2 * math.pi - (sum(arcs) - arcs[longest])
-    return radius, list(accumulate(arcs[:-1], initial=0.0))
-
-
-def _circumradius(sides: Sequence[float]) -> float:
-    """Return the radius of the circle through the corners of a polygon with these sides (m).
-
-    Each side is shorter than the others together. Found by bisection: the smallest circle that
-    the longest side fits into is half of it.
-    """
-    longest = max(sides)
-
-    def angle(radius: float) -> float:  # half of what all sides but the longest span
-        return sum(math.asin(min(s / (2 * radius), 1.0)) for s in sides) - math.asin(
-            min(longest / (2 * radius), 1.0)
-        )
-
-    # The longest side spans the rest of the circle; more than half of it if the others span less.
-    centre_inside = angle(longest / 2) >= math.pi / 2
-
-    def too_small(radius: float) -> bool:
-        rest = math.asin(longest / (2 * radius))
-        return angle(radius) > math.pi - rest if centre_inside else angle(radius) < rest
-
-    low, high = longest / 2, longest
-    while too_small(high):
-        low, high = high, 2 * high
-    for _ in range(100):
-        middle = (low + high) / 2
-        low, high = (middle, high) if too_small(middle) else (low, middle)
-    return high
-
-
 def _edges(
     names: Sequence[str], edges: Mapping[str, str] | Sequence[str] | None
 ) -> Mapping[str, str]:
@@ -348,19 +286,8 @@ def _edges(
     return chosen
 
 
-def _table_size(
-    table: tuple[float, float] | Literal["auto"],
-    rows: Mapping[str, Mapping[str, RobotDescriptor]],
-    inset: float,
-) -> tuple[float, float]:
-    """Return width and depth (m)."""
-    if table == "auto":
-        farthest = max(robot.reach for row in rows.values() for robot in row.values())
-        width, depth = (
-            max(_row_length(rows[edge], farthest) for edge in edges) + 2 * inset
-            for edges in (("north", "south"), ("east", "west"))
-        )
-        return width, depth
+def _given_table(table: tuple[float, float] | Literal["auto"], inset: float) -> tuple[float, float]:
+    """Return width and depth (m) that are not automatic."""
     if isinstance(table, str) or len(table) != 2:
         raise LayoutError(f"table is {table!r}; it takes width and depth (m) or 'auto'")
     for what, size in zip(("width", "depth"), table, strict=True):
@@ -371,25 +298,6 @@ def _table_size(
                 f" {2 * inset} m"
             )
     return table
-
-
-def _row_length(row: Mapping[str, RobotDescriptor], farthest: float) -> float:
-    """Return how long an edge is (m) so that robots keep clear of each other, round corners too.
-
-    One robot works in the middle, as do those on the other edges. Of several, the outer ones stand
-    as far from the corner as any robot round it reaches.
-    """
-    span = sum(_apart(*pair) for pair in _pairs(row))
-    return span + 2 * (farthest if span > 0 else HAND_OVER * farthest)
-
-
-def _pairs(row: Mapping[str, RobotDescriptor]) -> Iterable[tuple[RobotDescriptor, RobotDescriptor]]:
-    return pairwise(row.values())
-
-
-def _centred(gaps: Sequence[float]) -> list[float]:
-    """Return the places of a row with these gaps, from smallest to largest, about 0 (m)."""
-    return list(accumulate(gaps, initial=-sum(gaps) / 2))
 
 
 def _rounded(value: float) -> float:

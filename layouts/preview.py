@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from itertools import accumulate
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,14 +20,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from layouts.layout import Layout, Placement
+    from layouts.layout import Layout
+    from layouts.placement import Placement
 
 Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)
 
 SUPPORTED = (".png", ".pdf", ".svg")
 
-# Okabe and Ito's colours, told apart with any kind of colour vision, darkest first.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+# Okabe and Ito's colours, told apart with any kind of colour vision, darkest first; then two of
+# Paul Tol's.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#882255", "#999933")
 INK, FAINT, TABLE = "#2B2B2B", "#8A8A8A", "#EFE6D8"
 
 WIDTH = 8.0  # inches; 1200 pixels
@@ -37,6 +39,9 @@ MARGIN = 0.06  # free space on each side of the robots, in shares of the plan's 
 HEADING = 0.085  # length of the arrows, in the same shares
 PLAN_HEIGHTS = (3.5, 6.5)  # smallest and largest height of the plan (inches)
 ROW_HEIGHT = 0.3  # of the list under the plan (inches)
+LIST_START, LIST_WIDTH = 0.12, 0.87  # of the list's words, in shares of the picture's width
+LIST_SIZE, LIST_LETTERS = 10.5, 78  # of its letters (points), and how many of these fit on a line
+LONGEST_NAME, LONGEST_ROBOT = 16, 24  # letters
 TILE = 241  # grid points per side, from which the overlap is drawn
 
 
@@ -203,7 +208,7 @@ def _draw_robot(plan: Axes, index: int, name: str, placement: Placement, arrow: 
             zorder=3,
         )
     _draw_base(plan, x, y, index)
-    _write_name(plan, (x, y), (-ahead_x, -ahead_y), name)
+    _write_name(plan, (x, y), (-ahead_x, -ahead_y), _shortened(name, LONGEST_NAME))
 
 
 def _draw_base(axes: Axes, x: float, y: float, index: int) -> None:
@@ -257,31 +262,32 @@ def _write_name(
 
 def _draw_list(listing: Axes, layout: Layout) -> None:
     """List name, robot, action numbers and pose of every robot under the plan."""
-    columns = (0.12, 0.265, 0.46, 0.56, 0.76, 0.89)
     heads = ("name", "robot", "action", "base x, y, z (m)", "facing", "reach (m)")
+    rows = [heads, *(_cells(layout, name) for name in layout)]
+    widths = [max(map(len, column)) + 2 for column in zip(*rows, strict=True)]
+    places = [LIST_START + LIST_WIDTH * x / sum(widths) for x in accumulate(widths, initial=0)]
+    size = min(LIST_SIZE, LIST_SIZE * LIST_LETTERS / sum(widths))
     listing.set_xlim(0, 1)
     listing.set_ylim(len(layout) + 0.9, -0.6)
     listing.axis("off")
-    _write_row(listing, 0, columns, heads, FAINT)
-    for index, (name, placement) in enumerate(layout.items()):
-        row = index + 1
-        _draw_base(listing, 0.085, row, index)
-        cells = (
-            _shortened(name, 15),
-            _shortened(placement.robot.name, 21),
-            action_text(layout.action_split[name]),
-            ", ".join(decimal(x) for x in placement.base_position),
-            "tilted" if yaw_degrees(placement.facing) is None else facing_text(placement),
-            decimal(placement.robot.reach),
-        )
-        _write_row(listing, row, columns, cells, INK)
+    for row, cells in enumerate(rows):
+        if row:
+            _draw_base(listing, LIST_START - 0.035, row, row - 1)
+        for x, cell in zip(places, cells, strict=False):
+            colour = INK if row else FAINT
+            listing.text(x, row, cell, color=colour, fontsize=size, va="center_baseline")
 
 
-def _write_row(
-    listing: Axes, row: int, columns: Sequence[float], cells: Sequence[str], colour: str
-) -> None:
-    for x, cell in zip(columns, cells, strict=True):
-        listing.text(x, row, cell, color=colour, fontsize=10.5, va="center_baseline")
+def _cells(layout: Layout, name: str) -> tuple[str, ...]:
+    placement = layout[name]
+    return (
+        _shortened(name, LONGEST_NAME),
+        _shortened(placement.robot.name, LONGEST_ROBOT),
+        action_text(layout.action_split[name]),
+        ", ".join(decimal(x) for x in placement.base_position),
+        "tilted" if yaw_degrees(placement.facing) is None else facing_text(placement),
+        decimal(placement.robot.reach),
+    )
 
 
 def _shortened(text: str, length: int) -> str:

@@ -12,12 +12,15 @@ import re
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, replace
+from os import PathLike
+from pathlib import Path
 from typing import Any, NoReturn
 
 import yaml
 
 from layouts.frames import Frame, HangingError, check_frame_names
-from layouts.layout import Layout, Placement, check_name
+from layouts.layout import Layout, check_name
+from layouts.placement import Placement
 from robots import LayoutError, RobotDescriptor, RobotLayoutsError, RobotRegistry, UnknownNameError
 
 VERSION = 1
@@ -63,6 +66,16 @@ def from_yaml(text: str, source: str = "") -> Layout:
         LayoutError: If it describes none; the message names the line.
     """
     return _Reader(source).layout(text)
+
+
+def read_layout(path: str | PathLike[str]) -> Layout:
+    """Return the layout in a file; see `layouts.Layout.load`."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
+        raise LayoutError(f"cannot read the layout {str(path)!r}: {reason}") from error
+    return from_yaml(text, str(path))
 
 
 class _Loader(yaml.SafeLoader):

@@ -15,8 +15,15 @@ COMMANDS = {
     "replay": ("parity.replay", "play recorded actions beside native, episode by episode"),
     "rollout": ("parity.rollout", "play one episode in native and here, and keep its arrays"),
     "render": ("parity.render", "show native and ours side by side, with their difference"),
-    "sweep": ("parity.sweep", "rollouts, agreement and clips of every task, into one summary"),
-    "report": ("parity.page", "make one HTML page of a sweep and the recorded comparison"),
+    "sweep": (
+        "parity.sweep.command",
+        "rollouts, agreement and clips of every task, in one summary",
+    ),
+    "report": (
+        "parity.report.command",
+        "make one HTML page of a sweep and the recorded results",
+    ),
+    "bench": ("parity.bench", "time steps, resets and vectors beside native"),
     "readme": ("parity.readme", "write the recorded results into README.md, or check them there"),
 }
 

@@ -1,172 +1,207 @@
-"""How long one step takes: native, ours, and the physics alone, interleaved in one run."""
+"""``python -m parity bench``: every benchmark, with native ManiSkill in turns with ours."""
 
 from __future__ import annotations
 
 import argparse
-import json
+import gc
 import logging
-import statistics
 import sys
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from functools import partial
 from typing import Any
 
-import numpy as np
-import torch
-from rich.console import Console
-from rich.progress import Progress
-from rich.table import Table
+import gymnasium
+from gymnasium.vector import AsyncVectorEnv
 
 import tasks
-from parity.native import make_native, native_action
-from tasks import MultiRobotTask
+from layouts.files import written_whole
+from parity.bench_table import RECORD
+from parity.native import make_native, native_action, quiet
+from robots import RobotLayoutsError, TaskError
+from rollouts.bench.catalogue import BENCHMARKS
+from rollouts.bench.command import add_arguments, run_benchmarks, settings_of
+from rollouts.bench.episodes import timed_resets
+from rollouts.bench.measurement import BenchmarkError, Measurement, by_series
+from rollouts.bench.processes import PhysicsProcesses, TimedVector, vector
+from rollouts.bench.report import Report
+from rollouts.bench.settings import Benchmark, Settings
+from rollouts.bench.steps import PHYSICS, Played
+from tasks import MultiRobotTask, get_task_class, list_clones
 
-BLOCK = 50  # steps timed in one go; one block of each contestant, then the next
+NATIVE, HERE = "native", "here"
+PROCESSES = 2  # of native's vector and of ours
+FRONT_TASKS = 2  # of a run, whose vectors are timed
 
-
-@dataclass(frozen=True)
-class StepTimes:
-    """Medians over blocks (µs per environment and step).
-
-    Attributes:
-        task: Task id.
-        native: Native's ``step`` with observation, reward and success.
-        ours: Our ``step`` with observation, reward and success.
-        physics: The physics substeps of the same motion alone.
-        batched: Our ``step`` with ``batch`` environments in this process.
-        batched_physics: The physics substeps of that batch alone.
-        batch: Number of environments of the batch.
-    """
-
-    task: str
-    native: float
-    ours: float
-    physics: float
-    batched: float
-    batched_physics: float
-    batch: int
-
-    @property
-    def speedup(self) -> float:
-        """How many times faster than native one environment steps."""
-        return self.native / self.ours
-
-    @property
-    def overhead(self) -> float:
-        """Cost of a batch's step as a multiple of its physics."""
-        return self.batched / self.batched_physics
+Variants = dict[tuple[str, str], Callable[[int], float]]
 
 
-def measure(task_id: str, blocks: int, batch: int, tick: Callable[[], None]) -> StepTimes:
-    """Time one task with random actions, one block of each contestant after the other.
+def benchmarks(task_ids: Sequence[str]) -> dict[str, Benchmark]:
+    """Return every benchmark; those that native can run are run beside it, on some tasks."""
+    return {
+        "step": Benchmark("a step of one environment", partial(step, task_ids)),
+        "reset": Benchmark("a reset of one environment", partial(reset, task_ids)),
+        "vector": Benchmark("many environments on two cores", vectors),
+        **{name: one for name, one in BENCHMARKS.items() if name not in ("step", "reset")},
+    }
 
-    Args:
-        task_id: The task.
-        blocks: Number of timed blocks of each contestant.
-        batch: Environments in the batched contestant.
-        tick: Called after every round of blocks.
-    """
-    native = make_native(task_id)
-    ours, floor = tasks.make(task_id), tasks.make(task_id)
-    many, many_floor = (tasks.make(task_id, num_envs=batch) for _ in range(2))
-    width = ours.single_action_space.shape[0]  # type: ignore[index]
-    rng = np.random.RandomState(0)
-    times: dict[str, list[float]] = {k: [] for k in ("native", "ours", "physics", "many", "floor")}
-    for block in range(blocks + 1):
-        single = rng.uniform(-1, 1, (BLOCK, 1, width)).astype(np.float32)
-        wide = rng.uniform(-1, 1, (BLOCK // 5, batch, width)).astype(np.float32)
-        for env in (native, ours, floor, many, many_floor):
-            env.reset(seed=block)
-        round_times = {
-            "native": _time_native(native, single),
-            "ours": _time_steps(ours, single),
-            "physics": _time_physics(floor, single),
-            "many": _time_steps(many, wide) / batch,
-            "floor": _time_physics(many_floor, wide) / batch,
+
+def step(task_ids: Sequence[str], settings: Settings) -> Measurement:
+    """Time one environment of tasks."""
+
+    def variants(task_id: str, native: Any, ours: MultiRobotTask) -> Variants:
+        played = Played(ours, settings)
+        return {
+            (HERE, task_id): played.step,
+            (NATIVE, task_id): lambda number: _native_steps(native, played, number, settings),
+            (PHYSICS, task_id): played.physics,
         }
-        if block > 0:  # the first round warms up
-            for name, value in round_times.items():
-                times[name].append(value)
-        tick()
-    median = {name: statistics.median(values) for name, values in times.items()}
-    return StepTimes(
-        task_id,
-        median["native"],
-        median["ours"],
-        median["physics"],
-        median["many"],
-        median["floor"],
-        batch,
+
+    return Measurement(
+        name="step",
+        title="One step with observation, reward and success",
+        unit="µs per step",
+        variable="task",
+        values=tuple(task_ids),
+        samples=_beside_native(task_ids, settings, variants),
+        floors=(PHYSICS,),
+        ratios=((NATIVE, HERE), (HERE, PHYSICS)),
     )
 
 
-def _time_native(env: Any, actions: np.ndarray) -> float:
-    prepared = [native_action(env, action[0]) for action in actions]
-    start = time.perf_counter()
-    for action in prepared:
-        env.step(action)
-    return (time.perf_counter() - start) / len(actions) * 1e6
+def reset(task_ids: Sequence[str], settings: Settings) -> Measurement:
+    """Time resets of one environment of tasks."""
+
+    def variants(task_id: str, native: Any, ours: MultiRobotTask) -> Variants:
+        return {
+            (HERE, task_id): timed_resets(ours.reset, settings.clock),
+            (NATIVE, task_id): timed_resets(lambda seed: native.reset(seed=seed), settings.clock),
+        }
+
+    return Measurement(
+        name="reset",
+        title="A reset of one environment",
+        unit="ms per reset",
+        variable="task",
+        values=tuple(task_ids),
+        samples=_beside_native(task_ids, settings, variants),
+        ratios=((NATIVE, HERE),),
+    )
 
 
-def _time_steps(env: MultiRobotTask, actions: np.ndarray) -> float:
-    prepared = [torch.from_numpy(action) for action in actions]
-    start = time.perf_counter()
-    for action in prepared:
-        env.step(action)
-    return (time.perf_counter() - start) / len(actions) * 1e6
+def vectors(settings: Settings) -> Measurement:
+    """Measure the rate of a vector beside Gymnasium's own vector over native, on as many cores."""
+    share, clock, steps = settings.worker_envs, settings.clock, settings.steps
+    task_ids = settings.tasks[:FRONT_TASKS]
+    samples: dict[tuple[str, str], list[float]] = {}
+    for task_id in task_ids:
+        native = _native_vector(task_id)
+        with (
+            PhysicsProcesses(task_id, PROCESSES, share) as floor,
+            vector(task_id, PROCESSES * share, PROCESSES) as ours,
+        ):
+            here = TimedVector(ours, clock, steps)
+            variants: Variants = {(HERE, task_id): here.rate}
+            if native is not None:
+                variants[NATIVE, task_id] = TimedVector(native, clock, steps).rate
+            variants[PHYSICS, task_id] = lambda number, here=here: floor.rate(here, number)
+            samples.update(settings.interleave(variants, part=1 / len(task_ids)))
+        if native is not None:
+            native.close()
+    return Measurement(
+        name="vector",
+        title=f"Rate of {PROCESSES} × {share} environments; native: AsyncVectorEnv of {PROCESSES}",
+        unit=clock.rate_unit,
+        variable="task",
+        values=task_ids,
+        samples=by_series(task_ids, samples),
+        floors=(PHYSICS,),
+        ratios=((HERE, NATIVE), (HERE, PHYSICS)),
+    )
 
 
-def _time_physics(env: MultiRobotTask, actions: np.ndarray) -> float:
-    total = 0.0
+def _beside_native(
+    task_ids: Sequence[str],
+    settings: Settings,
+    variants: Callable[[str, Any, MultiRobotTask], Variants],
+) -> dict[str, list[list[float]]]:
+    """Take samples of one task after the other, with native's environment and ours."""
+    samples: dict[tuple[str, str], list[float]] = {}
+    for task_id in task_ids:
+        native = make_native(task_id)
+        native.reset(seed=0)
+        gc.freeze()  # native collects garbage when it builds a scene; ours is not to count
+        both = variants(task_id, native, tasks.make(task_id))
+        samples.update(settings.interleave(both, part=1 / len(task_ids)))
+        native.close()
+        gc.unfreeze()
+    return by_series(task_ids, samples)
+
+
+def _native_steps(native: Any, played: Played, number: int, settings: Settings) -> float:
+    """Return the time of one of native's steps, in the motion that ours plays (µs)."""
+    actions = [native_action(native, action[0]) for action in played.actions(number)]
+    native.reset(seed=number)
+    start = settings.clock.now()
     for action in actions:
-        total += env.simulation.timed_step(action)
-    return total / len(actions) * 1e6
+        native.step(action)
+    return (settings.clock.now() - start) / len(actions) * 1e6
 
 
-def table(results: Sequence[StepTimes]) -> Table:
-    """Return the results as a table."""
-    batch = results[0].batch
-    rows = Table(title="One step with observation, reward and success (µs, medians)")
-    for column in ("task", "native", "ours", "physics", "native/ours", f"{batch} envs, per env",
-                   f"{batch} envs, physics", "envs/physics"):  # fmt: skip
-        rows.add_column(column, justify="left" if column == "task" else "right", no_wrap=True)
-    for r in results:
-        rows.add_row(
-            r.task,
-            f"{r.native:.0f}",
-            f"{r.ours:.0f}",
-            f"{r.physics:.0f}",
-            f"{r.speedup:.2f}",
-            f"{r.batched:.0f}",
-            f"{r.batched_physics:.0f}",
-            f"{r.overhead:.2f}",
-        )
-    return rows
+def _native_vector(task_id: str) -> AsyncVectorEnv | None:
+    """Return Gymnasium's vector over native; native's wrapper cannot run several robots: None."""
+    if len(get_task_class(task_id).layout) > 1:
+        return None
+    return AsyncVectorEnv([partial(_native_front, task_id)] * PROCESSES, context="spawn")
+
+
+def _native_front(task_id: str) -> gymnasium.Env[Any, Any]:
+    """Make native's environment with NumPy observations, in a process of its own."""
+    import torch
+
+    torch.set_num_threads(1)
+    logging.disable(logging.WARNING)
+    native = make_native(task_id)
+    with quiet():
+        from mani_skill.utils.wrappers.gymnasium import CPUGymWrapper
+
+        return CPUGymWrapper(native)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the benchmark from the command line."""
-    parser = argparse.ArgumentParser(prog="python -m parity.bench", description=__doc__)
-    parser.add_argument("--task", action="append", help="task id; all clones if left out")
-    parser.add_argument("--blocks", type=int, default=20, help=f"timed blocks of {BLOCK} steps")
-    parser.add_argument("--batch", type=int, default=16, help="environments of the batched run")
-    parser.add_argument("--json", type=Path, help="write the figures to this file")
-    args = parser.parse_args(argv)
-    torch.set_num_threads(1)
+    """Run the command; returns its exit code."""
+    parser = argparse.ArgumentParser(prog="python -m parity bench", description=__doc__)
+    add_arguments(parser)
+    parser.epilog = f"Benchmarks: {', '.join(benchmarks(()))}. All of them take some minutes."
+    parser.add_argument("--record", action="store_true", help=f"keep all of it in {RECORD.name}")
+    options = parser.parse_args(argv)
     logging.disable(logging.WARNING)
-    task_ids = args.task or tasks.list_clones()
-    results: list[StepTimes] = []
-    with Progress(console=Console(stderr=True)) as progress:
-        bar = progress.add_task("timing", total=len(task_ids) * (args.blocks + 1))
-        for task_id in task_ids:
-            progress.update(bar, description=f"timing {task_id}")
-            results.append(measure(task_id, args.blocks, args.batch, lambda: progress.advance(bar)))
-    Console(width=120).print(table(results))
-    if args.json:
-        args.json.write_text(json.dumps([asdict(r) for r in results], indent=1))
-    return 0
+    try:
+        if options.record and (options.only or options.task):
+            raise BenchmarkError("a record holds every benchmark; leave out --only and --task")
+        settings = settings_of(options)
+        task_ids = settings.tasks if options.task else list_clones()
+        _expect_clones(task_ids)
+        status, report = run_benchmarks(options, benchmarks(task_ids), settings)
+        if options.record and report is not None:
+            _keep(report)
+    except RobotLayoutsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return status
+
+
+def _expect_clones(task_ids: Sequence[str]) -> None:
+    for task_id in task_ids:
+        if task_id not in list_clones():
+            raise TaskError(f"{task_id} clones no native task, so there is nothing beside it")
+
+
+def _keep(report: Report) -> None:
+    if report.left_out:
+        raise BenchmarkError(f"nothing is recorded, as {', '.join(report.left_out)} was left out")
+    with written_whole(RECORD) as unfinished:
+        unfinished.write_text(report.as_json(), encoding="utf-8")
+    print(f"{RECORD}: recorded; `python -m parity readme` shows it in README.md")
 
 
 if __name__ == "__main__":

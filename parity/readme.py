@@ -1,4 +1,4 @@
-"""``python -m parity readme``: the recorded results as a table in README.md, and its check."""
+"""``python -m parity readme``: the records as tables in README.md, and their check."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from parity import bench_table
 from parity.results import RESULTS, ResultsError, read
 from parity.summary import REWARD_MODES, number_text, reward_text, success_text
 from robots import RobotLayoutsError
 from tasks import list_clones
 
 README = Path(__file__).parents[1] / "README.md"
-BEGIN = "<!-- parity table: begin; written by `python -m parity readme` -->"
-END = "<!-- parity table: end -->"
+PARITY_TABLE, BENCH_TABLES = "parity table", "benchmarks"  # what the markers call them
 DIFFERENCES = ("object pose", "qpos", "observation")  # the rest stands in the record
 
 
@@ -23,26 +23,34 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
     Returns:
-        0 if README.md shows the record, 1 if a check finds that it does not or that the record
+        0 if README.md shows the records, 1 if a check finds that it does not or that a record
         does not hold exactly the tasks there are, 2 if a file cannot be read.
     """
     parser = argparse.ArgumentParser(
         prog="python -m parity readme",
-        description="Write what `python -m parity compare --all --record` found into README.md.",
+        description="Write what `python -m parity compare --all --record` and `python -m parity"
+        " bench --record` found into README.md.",
     )
-    parser.add_argument("--check", action="store_true", help="write nothing; tell what is stale")
-    parser.add_argument("--readme", type=Path, default=README, help="the README (this project's)")
-    parser.add_argument("--results", type=Path, default=RESULTS, help="the record (this project's)")
+    add = parser.add_argument
+    add("--check", action="store_true", help="write nothing; tell what is stale")
+    add("--readme", type=Path, default=README, help="the README (this project's)")
+    add("--results", type=Path, default=RESULTS, help="the comparison (this project's)")
+    add("--bench", type=Path, default=bench_table.RECORD, help="the benchmarks (this project's)")
     args = parser.parse_args(argv)
     try:
-        record, text = read(args.results), _read_text(args.readme)
-        fresh = with_table(text, record)
+        record, measured = read(args.results), bench_table.read(args.bench)
+        text = _read_text(args.readme)
+        fresh = with_lines(text, PARITY_TABLE, _lines(markdown(record), "make parity"))
+        shown = _lines(bench_table.markdown(measured), bench_table.COMMAND)
+        fresh = with_lines(fresh, BENCH_TABLES, shown)
         if not args.check and fresh != text:
             args.readme.write_text(fresh, encoding="utf-8")
     except (RobotLayoutsError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     complaints = list(missing_and_extra(record["tasks"], list_clones()))
+    timed = map(str, measured.find("step").values)
+    complaints += missing_and_extra(timed, list_clones(), bench_table.COMMAND)
     if args.check and fresh != text:
         complaints.append(f"{args.readme.name} is stale; run `python -m parity readme`")
     for complaint in complaints:
@@ -50,30 +58,36 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 1 if args.check and complaints else 0
 
 
-def with_table(readme: str, record: Mapping[str, Any]) -> str:
-    """Return a README with the record's table between the two markers.
+def begin(name: str) -> str:
+    """Return the line after which something generated stands."""
+    return f"<!-- {name}: begin; written by `python -m parity readme` -->"
+
+
+def end(name: str) -> str:
+    """Return the line before which something generated stands."""
+    return f"<!-- {name}: end -->"
+
+
+def with_lines(readme: str, name: str, lines: Iterable[str]) -> str:
+    """Return a README with lines between the two markers of a name.
 
     Raises:
-        ResultsError: If there is not exactly one of each marker, in order, or the record lacks
-            something that the table shows.
+        ResultsError: If there is not exactly one of each marker, in order.
     """
-    for marker in (BEGIN, END):
+    for marker in (begin(name), end(name)):
         if readme.count(marker) != 1:
             raise ResultsError(
                 f"the README has the line {marker!r} {readme.count(marker)} times; it needs it once"
             )
-    before, _, rest = readme.partition(BEGIN)
-    if END not in rest:
-        raise ResultsError(f"the README has the line {END!r} before {BEGIN!r}")
-    try:
-        table = "\n".join(markdown(record))
-    except (KeyError, TypeError, ValueError) as error:
-        raise ResultsError(f"the record is not complete: {error!r}; run `make parity`") from error
-    return f"{before}{BEGIN}\n\n{table}\n\n{END}{rest.partition(END)[2]}"
+    before, _, rest = readme.partition(begin(name))
+    if end(name) not in rest:
+        raise ResultsError(f"the README has the line {end(name)!r} before {begin(name)!r}")
+    _, _, after = rest.partition(end(name))
+    return "\n".join([f"{before}{begin(name)}", "", *lines, "", f"{end(name)}{after}"])
 
 
 def markdown(record: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the lines of the table, one row per task, and what it was measured with."""
+    """Yield the lines of the parity table, a row per task, and what it was measured with."""
     modes = [f"reward, {mode}" for mode in REWARD_MODES]
     numbers = ("obs", "actions", "episodes", "steps", "contact steps", *DIFFERENCES, *modes)
     last = ("success and info", "succeeded native / here")
@@ -95,14 +109,34 @@ def markdown(record: Mapping[str, Any]) -> Iterator[str]:
     yield f"Measured on {record['machine']} with {versions}."
 
 
-def missing_and_extra(recorded: Iterable[str], tasks: Iterable[str]) -> Iterator[str]:
-    """Yield a complaint if tasks are not in the record, and one if it holds what is no task."""
+def missing_and_extra(
+    recorded: Iterable[str], tasks: Iterable[str], command: str = "make parity"
+) -> Iterator[str]:
+    """Yield a complaint if tasks are not in a record, and one if it holds what is no task.
+
+    Args:
+        recorded: Tasks in the record.
+        tasks: Tasks that there are.
+        command: What writes the record.
+    """
     recorded, tasks = set(recorded), set(tasks)
     if tasks - recorded:
-        yield f"the record lacks {', '.join(sorted(tasks - recorded))}; run `make parity`"
+        yield f"the record lacks {', '.join(sorted(tasks - recorded))}; run `{command}`"
     if recorded - tasks:
         extra = ", ".join(sorted(recorded - tasks))
-        yield f"the record holds {extra}, which no task is called; run `make parity`"
+        yield f"the record holds {extra}, which no task is called; run `{command}`"
+
+
+def _lines(lines: Iterable[str], command: str) -> list[str]:
+    """Return what is generated from a record.
+
+    Raises:
+        ResultsError: If the record lacks something that it shows.
+    """
+    try:
+        return list(lines)
+    except (KeyError, TypeError, ValueError) as error:
+        raise ResultsError(f"the record is not complete: {error!r}; run `{command}`") from error
 
 
 def _row(*cells: str) -> str:

@@ -1,1 +1,17 @@
-"""Many episodes: experts that solve tasks, playing them, recording them."""
+"""Many episodes: experts that solve tasks, playing them, recording them, judging policies."""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rollouts.evaluation import Evaluation, Score, evaluate
+
+__all__ = ["Evaluation", "Score", "evaluate"]
+
+
+def __getattr__(name: str) -> Any:
+    """Load what is asked for, once; it needs torch and sapien."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module("rollouts.evaluation"), name)
+    return value

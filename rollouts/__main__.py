@@ -1,4 +1,4 @@
-"""`python -m rollouts COMMAND`: let experts play tasks, record them, and play recordings again."""
+"""`python -m rollouts COMMAND`: let experts play tasks, record and replay that, judge policies."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from robots import RobotLayoutsError, UnknownNameError
-from rollouts import record_command, replay_command, view_command
+from rollouts import evaluate_command, record_command, replay_command, view_command
+from rollouts.bench import command as bench_command
 from rollouts.export import command as export_command
 
 
@@ -50,9 +51,11 @@ def _parser() -> argparse.ArgumentParser:
     demo.set_defaults(run=_demo)
     for name, module in (
         ("record", record_command),
+        ("evaluate", evaluate_command),
         ("replay", replay_command),
         ("export", export_command),
         ("view", view_command),
+        ("bench", bench_command),
     ):
         command = commands.add_parser(name, help=module.DESCRIPTION, description=module.DESCRIPTION)
         module.add_arguments(command)

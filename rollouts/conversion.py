@@ -1,13 +1,34 @@
-"""The same episode in another control mode: what the arms were told, as joint positions."""
+"""Experts' plans in any control mode: what the arms were told, as joint positions."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from robots import TaskError
+from robots import CONTROL_MODES, TaskError
 from rollouts.episode import REBUILT
+from rollouts.experts.registry import Expert
 from tasks import MultiRobotTask
+
+DELTAS = CONTROL_MODES[0]  # which all experts speak
+
+
+class Planner:
+    """What an expert does in the episodes of a task, in the task's control mode."""
+
+    def __init__(self, task: MultiRobotTask, expert: Expert) -> None:
+        """Make a task in deltas for the expert to plan for, if this one is in another mode."""
+        self._task, self._expert = task, expert
+        self._converts = task.made_from.control_mode != DELTAS
+        if self._converts:
+            self._task = type(task)(replace(task.made_from, control_mode=DELTAS))
+
+    def __call__(self, seed: int) -> NDArray[np.float32]:
+        """Return the actions (T, A) of the episode that ``seed`` begins."""
+        actions = self._expert(self._task, seed)
+        return as_positions(self._task, seed, actions) if self._converts else actions
 
 
 def as_positions(
@@ -29,10 +50,9 @@ def as_positions(
     Raises:
         TaskError: If the task is in another control mode.
     """
-    if task.made_from.control_mode != "pd_joint_delta_pos":
+    if task.made_from.control_mode != DELTAS:
         raise TaskError(
-            f"actions of pd_joint_delta_pos are converted; the task has"
-            f" {task.made_from.control_mode}"
+            f"actions of {DELTAS} are converted; the task has {task.made_from.control_mode}"
         )
     positions = np.array(actions, np.float32)
     task.reset(seed, options=REBUILT)

@@ -8,9 +8,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from robots import TaskError
 from tasks import MultiRobotTask
@@ -80,19 +78,19 @@ def play(
     task.reset(seed, options=REBUILT)
     if start is not None:
         task.set_state_dict(start)
-    tape, outcomes, seconds = task.begin_tape(), list[tuple[Tensor, ...]](), 0.0
+    tape, seconds = task.begin_tape(), 0.0
+    rewards = np.empty(len(actions), np.float32)
+    success, terminated, truncated = np.empty((3, len(actions)), np.bool_)
     task.write_tape(tape)
     watch()
-    for action in actions:
+    for i, action in enumerate(actions):
         began = perf_counter()
-        _, reward, terminated, truncated, info = task.step(action)
+        _, reward, ended, cut_off, info = task.step(action)
         seconds += perf_counter() - began
-        outcomes.append((reward, info["success"], terminated, truncated))
+        rewards[i], success[i] = reward.item(), info["success"].item()
+        terminated[i], truncated[i] = ended.item(), cut_off.item()
         task.write_tape(tape)
         watch()
-    rewards, success, terminated, truncated = (
-        torch.cat(column).numpy() for column in zip(*outcomes, strict=True)
-    )
     return Episode(
         seed=seed,
         actions=np.asarray(actions, np.float32),

@@ -1,41 +1,51 @@
-"""Finished episodes as one small h5 file each, and how they are joined into one."""
+"""Finished episodes, each in a small file of its own until the recording ends.
+
+A part is a line that says what it is, two lines of json, the bytes of its arrays, and a checksum of
+all that. It is written
+while episodes are played, where an h5 file of as many arrays would cost fifteen times as much.
+"""
 
 from __future__ import annotations
 
 import json
+import math
 import os
-import re
-from collections.abc import Generator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import h5py
+import numpy as np
+from numpy.typing import NDArray
 
 from robots import RecordingError
+from rollouts.disk import replaced
 from rollouts.episode import REBUILT, Episode
 
-PARTIAL = ".partial"
-
-_PART = "traj_0"  # the only episode of a part, which is nearly in ManiSkill's format itself
-_HEADER = "header"  # attribute of a part; in a recording each of its entries is an attribute
-_FORMAT = "v108"  # HDF5 1.8, the first in which attributes may be larger than 64 kB
+_SUFFIX = ".part"
+_EARLIER = ".h5"
+_OPENING = b"robot-layouts episode 1\n"
+_CHECKSUM = 4  # bytes
 
 
 @dataclass(frozen=True)
 class Stored:
-    """Where an episode is stored.
+    """What is stored of an episode.
 
     Attributes:
-        path: The h5 file.
-        group: Its group there.
-        about: Its entry in the json, without ``episode_id``.
+        attributes: Attributes of its group in the h5 file; ``episode`` is its entry in the json,
+            without ``episode_id``.
+        arrays: The arrays of that group by their names there, as ``env_states/actors/cube``.
     """
 
-    path: Path
-    group: str
-    about: Mapping[str, Any]
+    attributes: Mapping[str, str]
+    arrays: Mapping[str, NDArray[Any]]
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """Its entry in the json, without ``episode_id``."""
+        return json.loads(self.attributes["episode"])
 
 
 @dataclass(frozen=True)
@@ -51,13 +61,13 @@ class PartWriter:
     folder: Path
     header: Mapping[str, Any]
     control_mode: str | dict[str, str]
-    _text: str = field(init=False, repr=False)
+    _text: bytes = field(init=False, repr=False)
     _split: str = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Write as text once what all parts say."""
         split = {name: robot["action"] for name, robot in self.header["layout"].items()}
-        object.__setattr__(self, "_text", json.dumps(self.header))
+        object.__setattr__(self, "_text", json.dumps(self.header).encode())
         object.__setattr__(self, "_split", json.dumps(split))
 
     def write(self, episode: Episode) -> None:
@@ -66,34 +76,28 @@ class PartWriter:
         Raises:
             RecordingError: If it cannot be written.
         """
-        path = part_path(self.folder, episode.seed)
-        partial = path.with_name(f"{path.name}.{os.getpid()}{PARTIAL}")
-        with disk_errors(path):
-            try:
-                partial.write_bytes(self._encode(episode))
-                os.replace(partial, path)
-            except OSError:
-                with suppress(OSError):
-                    partial.unlink()
-                raise
+        self.store(episode.seed, self.encode(episode))
 
-    def _encode(self, episode: Episode) -> bytes:
-        # In memory, because HDF5 does not recover from a disk that is full.
-        with h5py.File(
-            "part", "w", driver="core", backing_store=False, libver=(_FORMAT, "latest")
-        ) as file:
-            file.attrs[_HEADER] = self._text
-            group = file.create_group(_PART)
-            group.attrs["action_split"] = self._split
-            group.attrs["episode"] = json.dumps(self._about(episode))
-            group.create_dataset("actions", data=episode.actions)
-            for kind, entries in episode.states.items():
-                for name, rows in entries.items():
-                    group.create_dataset(f"env_states/{kind}/{name}", data=rows)
-            for name in ("rewards", "success", "terminated", "truncated"):
-                group.create_dataset(name, data=getattr(episode, name))
-            file.flush()
-            return file.id.get_file_image()
+    def store(self, seed: int, part: bytes) -> None:
+        """Write an episode that was encoded, perhaps on another machine; else as `write`."""
+        with replaced(part_path(self.folder, seed), f".{os.getpid()}") as partial:
+            partial.write_bytes(part)
+
+    def encode(self, episode: Episode) -> bytes:
+        """Return what `write` writes."""
+        arrays = _arrays(episode)
+        about = {
+            "attributes": {
+                "action_split": self._split,
+                "episode": json.dumps(self._about(episode)),
+            },
+            "arrays": [(name, rows.dtype.str, rows.shape) for name, rows in arrays.items()],
+        }
+        numbers = [rows.tobytes() for rows in arrays.values()]
+        content = b"".join(
+            [_OPENING, self._text, b"\n", json.dumps(about).encode(), b"\n", *numbers]
+        )
+        return content + _checksum(content)
 
     def _about(self, episode: Episode) -> dict[str, Any]:
         return {
@@ -107,7 +111,7 @@ class PartWriter:
 
 def part_path(folder: Path, seed: int) -> Path:
     """Return the part of a seed; names sort as seeds do."""
-    return folder / f"seed-{seed:010d}.h5"
+    return folder / f"seed-{seed:010d}{_SUFFIX}"
 
 
 def seed_of(part: Path) -> int:
@@ -117,104 +121,44 @@ def seed_of(part: Path) -> int:
 
 def list_parts(folder: Path) -> list[Path]:
     """Return the parts in a folder, sorted by seed; none if there is no folder."""
-    return sorted(folder.glob("seed-*.h5"))
+    return sorted(folder.glob(f"seed-*{_SUFFIX}"))
 
 
-def read_stored(path: Path) -> tuple[dict[str, Any], list[Stored]]:
-    """Return the header of a file that was written here, and its episodes.
-
-    Raises:
-        RecordingError: If it was not written here, or is damaged.
-    """
-    try:
-        with h5py.File(path, "r") as file:
-            header = {name: json.loads(text) for name, text in file.attrs.items()}
-            header = header.get(_HEADER, header)
-            stored = [
-                Stored(path, name, json.loads(group.attrs["episode"]))
-                for name, group in file.items()
-            ]
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
-        raise RecordingError(
-            f"{path} is no recording of this library, or it is damaged: {error}"
-        ) from error
-    return header, stored
+def list_earlier_parts(folder: Path) -> list[Path]:
+    """Return the parts that an earlier version left in a folder, which are not read any more."""
+    return sorted(folder.glob(f"seed-*{_EARLIER}"))
 
 
-def join(path: Path, header: Mapping[str, Any], episodes: Sequence[Stored]) -> None:
-    """Write episodes into one h5 file, numbered in the order given, in place of what is there.
-
-    Args:
-        path: The file; it is replaced in one step, when the new one is complete and on the disk.
-        header: What the episodes have in common.
-        episodes: What to join; some may be in the present file, the others are parts.
+def read_part(path: Path) -> tuple[bytes, Stored]:
+    """Return the header of a part, as json, and its episode.
 
     Raises:
-        RecordingError: If it cannot be written, or an episode not be read; nothing is changed.
+        RecordingError: If it is damaged.
+        OSError: If it cannot be read.
     """
-    partial = path.with_name(path.name + PARTIAL)
-    with disk_errors(path):
-        try:
-            with ExitStack() as stack:
-                file = stack.enter_context(h5py.File(partial, "w", libver=(_FORMAT, "latest")))
-                for name, value in header.items():
-                    file.attrs[name] = json.dumps(value)
-                present = stack.enter_context(h5py.File(path, "r")) if path.exists() else None
-                for number, stored in enumerate(episodes):
-                    if present is not None and stored.path == path:
-                        present.copy(stored.group, file, f"traj_{number}")
-                    else:
-                        with h5py.File(stored.path, "r") as part:
-                            part.copy(stored.group, file, f"traj_{number}")
-            _sync(partial)
-            os.replace(partial, path)
-        except BaseException:
-            with suppress(OSError):
-                partial.unlink()
-            raise
+    content = path.read_bytes()
+    whole, checksum = content[:-_CHECKSUM], content[-_CHECKSUM:]
+    if not whole.startswith(_OPENING) or checksum != _checksum(whole):
+        raise RecordingError(f"{path} is damaged, or not an episode of this library")
+    header, about, numbers = whole.removeprefix(_OPENING).split(b"\n", 2)
+    said = json.loads(about)
+    arrays: dict[str, NDArray[Any]] = {}
+    start = 0
+    for name, kind, shape in said["arrays"]:
+        rows = np.frombuffer(numbers, kind, math.prod(shape), start)
+        arrays[name] = rows.reshape(shape).copy()  # which also aligns it
+        start += rows.nbytes
+    return header, Stored(said["attributes"], arrays)
 
 
-def json_text(summary: Mapping[str, Any]) -> str:
-    """Return a json file's text."""
-    return json.dumps(summary, indent=1) + "\n"
+def _arrays(episode: Episode) -> dict[str, NDArray[Any]]:
+    arrays: dict[str, NDArray[Any]] = {"actions": episode.actions}
+    for kind, entries in episode.states.items():
+        arrays.update({f"env_states/{kind}/{name}": rows for name, rows in entries.items()})
+    for name in ("rewards", "success", "terminated", "truncated"):
+        arrays[name] = getattr(episode, name)
+    return arrays
 
 
-def write_json(path: Path, summary: Mapping[str, Any]) -> None:
-    """Replace a json file in one step.
-
-    Raises:
-        RecordingError: If it cannot be written.
-    """
-    partial = path.with_name(path.name + PARTIAL)
-    with disk_errors(path):
-        try:
-            partial.write_text(json_text(summary))
-            os.replace(partial, path)
-        except OSError:
-            with suppress(OSError):
-                partial.unlink()
-            raise
-
-
-@contextmanager
-def disk_errors(path: Path) -> Generator[None]:
-    """Turn what the disk refuses into one of our errors; h5py says it in several ways."""
-    try:
-        yield
-    except RecordingError:
-        raise
-    except (OSError, RuntimeError, ValueError) as error:
-        raise RecordingError(f"cannot write {path}: {_reason(error)}") from error
-
-
-def _reason(error: Exception) -> str:
-    """Return what the operating system said, out of the page that HDF5 makes of it."""
-    number = re.search(r"errno = (\d+)", str(error))
-    if number is not None:
-        return os.strerror(int(number[1]))
-    return (error.strerror if isinstance(error, OSError) else None) or str(error)
-
-
-def _sync(path: Path) -> None:
-    with path.open("rb") as stream:
-        os.fsync(stream.fileno())
+def _checksum(content: bytes) -> bytes:
+    return zlib.crc32(content).to_bytes(_CHECKSUM, "little")

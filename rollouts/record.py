@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 
 import tasks
 from robots import CONTROL_MODES, RecordingError
-from rollouts.conversion import as_positions
+from rollouts.conversion import Planner
 from rollouts.episode import play
-from rollouts.executor import Event, Executor
+from rollouts.executor import Event, Executor, WorkersDied
 from rollouts.experts import find_expert
 from rollouts.experts.registry import Expert
 from rollouts.parts import PartWriter
+from rollouts.provenance import describe_layout, differences, listing
 from rollouts.recorder import Recorder
 from tasks import MultiRobotTask, Scenario
 
 FILE = "trajectory.h5"
-DELTAS = CONTROL_MODES[0]
 
 
 @dataclass(frozen=True)
@@ -42,44 +39,43 @@ class Played:
 
 @dataclass(frozen=True)
 class EpisodeJob:
-    """Everything but the seed that decides an episode, and where it goes; can be pickled.
+    """Everything but the seed that decides an episode; can be pickled.
 
     Attributes:
         task: Class of the task.
         scenario: How to make it.
         expert: Who plays.
-        writer: Where finished episodes go.
-        parent: Process that gathers them; a worker that outlives it writes nothing.
+        writer: What encodes finished episodes.
     """
 
     task: type[MultiRobotTask]
     scenario: Scenario
     expert: Expert
     writer: PartWriter
-    parent: int
 
-    def __call__(self) -> Callable[[int], Played]:
-        """Make the task in a worker, and return what plays and records the episode of a seed."""
+    def __call__(self) -> Callable[[int], tuple[Played, bytes]]:
+        """Make the task in a worker, and return what plays and encodes the episode of a seed.
+
+        Raises:
+            RecordingError: If the robot files of this machine are not those of the recording.
+        """
         torch.set_num_threads(1)  # the tensors are small, and other workers want the cores
-        env = planned = self.task(self.scenario)
-        if self.scenario.control_mode != DELTAS:
-            planned = self.task(replace(self.scenario, control_mode=DELTAS))
+        env = self.task(self.scenario)
+        self._expect_same_robots(env)
+        plan = Planner(env, self.expert)
 
-        def record(seed: int) -> Played:
-            episode = play(env, seed, self._plan(planned, seed))
-            if os.getppid() != self.parent:
-                raise RecordingError("the process that gathers the episodes is gone")
-            self.writer.write(episode)
-            return Played(episode.solved, len(episode.actions))
+        def record(seed: int) -> tuple[Played, bytes]:
+            episode = play(env, seed, plan(seed))
+            return Played(episode.solved, len(episode.actions)), self.writer.encode(episode)
 
         return record
 
-    def _plan(self, planned: MultiRobotTask, seed: int) -> NDArray[np.float32]:
-        """Let the expert plan in deltas, which all experts speak, and convert if need be."""
-        actions = self.expert(planned, seed)
-        if self.scenario.control_mode == DELTAS:
-            return actions
-        return as_positions(planned, seed, actions)
+    def _expect_same_robots(self, env: MultiRobotTask) -> None:
+        found = differences(self.writer.header["layout"], describe_layout(env.layout))
+        if found:
+            raise RecordingError(
+                f"a worker would record something else than this recording is of ({listing(found)})"
+            )
 
 
 @dataclass
@@ -92,6 +88,7 @@ class Summary:
         played: Episodes played this time, by seed.
         failed: Why an episode could not be played, by seed.
         deaths: Workers that died, in words.
+        workers: Who played, in words.
     """
 
     recorded: int = 0
@@ -99,6 +96,7 @@ class Summary:
     played: dict[int, Played] = field(default_factory=dict[int, Played])
     failed: dict[int, Exception] = field(default_factory=dict[int, Exception])
     deaths: list[str] = field(default_factory=list[str])
+    workers: set[str] = field(default_factory=set[str])
 
 
 def record(
@@ -107,7 +105,7 @@ def record(
     folder: Path,
     executor: Executor,
     *,
-    control_mode: str = DELTAS,
+    control_mode: str = CONTROL_MODES[0],
     on_event: Callable[[Summary, Event | None], None] = lambda summary, event: None,
 ) -> Summary:
     """Record the episodes of some seeds; those that are in the folder already are kept.
@@ -140,13 +138,13 @@ def record(
         missing = [seed for seed in seeds if seed not in there]
         summary.already, summary.recorded = len(seeds) - len(missing), len(there)
         on_event(summary, None)
-        job = EpisodeJob(cls, scenario, expert, recorder.writer, os.getpid())
+        job = EpisodeJob(cls, scenario, expert, recorder.writer)
         try:
             with closing(executor.run(job, missing)) as events:
                 for event in events:
-                    _note(summary, event)
+                    _note(summary, event, recorder.writer)
                     on_event(summary, event)
-        finally:  # workers may have written more than they came to tell
+        finally:  # an interrupt may come between writing and counting
             summary.recorded = len(recorder)
     return summary
 
@@ -158,13 +156,16 @@ def where_died(event: Event) -> str:
     )
 
 
-def _note(summary: Summary, event: Event) -> None:
-    if isinstance(event.error, RecordingError):
+def _note(summary: Summary, event: Event, writer: PartWriter) -> None:
+    if isinstance(event.error, WorkersDied):
         raise event.error
-    if event.died is not None or event.seed is None:
+    if event.died is not None:
         summary.deaths.append(where_died(event))
-    elif event.error is not None:
+    elif event.error is not None and event.seed is not None:
         summary.failed[event.seed] = event.error
-    else:
-        summary.played[event.seed] = event.result
+    elif event.result is not None and event.seed is not None:
+        played, part = event.result
+        writer.store(event.seed, part)
+        summary.played[event.seed] = played
         summary.recorded += 1
+        summary.workers.add(event.worker)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
-from collections.abc import Generator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 from robots import CONTROL_MODES, RecordingError
+from rollouts import workers
+from rollouts.workers import INTERRUPTED, one_or_more, stop_signals, zero_or_more
 
 if TYPE_CHECKING:
     from rollouts.executor import Event
@@ -22,7 +21,6 @@ EPILOG = (
     "The same command goes on where it was stopped or killed. Exit code: 0 if every episode was"
     " recorded, 1 if not, 2 for bad usage, 130 if interrupted."
 )
-INTERRUPTED = 130  # as shells have it
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,9 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = EPILOG
     add = parser.add_argument
     add("--task", required=True, help="task id")
-    add("--episodes", type=_one_or_more, required=True, metavar="N", help="how many episodes")
-    add("--workers", type=_one_or_more, default=1, metavar="W", help="how many processes (1)")
-    add("--seed", type=_zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
+    add("--episodes", type=one_or_more, required=True, metavar="N", help="how many episodes")
+    workers.add_arguments(parser)
+    add("--seed", type=zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
     add("--out", type=Path, required=True, metavar="DIR", help="folder of trajectory.h5 and .json")
     add("--control-mode", choices=CONTROL_MODES, default=CONTROL_MODES[0], help="(%(default)s)")
 
@@ -43,20 +41,20 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         RobotLayoutsError: If it makes no sense, or cannot go on; finished episodes are kept.
     """
-    from rollouts.executor import ProcessExecutor, WorkerError
+    from rollouts.executor import WorkerError
     from rollouts.progress import LiveLine
     from rollouts.record import FILE, record
 
     seeds = range(options.seed, options.seed + options.episodes)
-    line = LiveLine(len(seeds), "episodes")
+    executor, line = workers.chosen_executor(options), LiveLine(len(seeds), "episodes")
     status = _Status(line)
     try:
-        with _stop_signals(), line:
+        with stop_signals(), line:
             summary = record(
                 options.task,
                 seeds,
                 options.out,
-                ProcessExecutor(options.workers),
+                executor,
                 control_mode=options.control_mode,
                 on_event=status.show,
             )
@@ -88,13 +86,16 @@ class _Status:
         if event is None and summary.already:
             total = self._line.total
             self._line.say(f"{summary.already} of {total} episodes were recorded before")
+        if event is not None and event.said is not None:
+            self._line.say(event.said)
         if event is not None and event.died is not None:
             self._line.say(f"{summary.deaths[-1]}; another takes its place")
         if event is not None and event.error is not None:
             self._line.say(f"seed {event.seed} is not recorded: {event.error}")
         solved = sum(played.success for played in summary.played.values())
         done = summary.already + len(summary.played)
-        self._line.update(done, f"{solved} of {len(summary.played)} succeeded")
+        who = f", {len(summary.workers)} workers" if len(summary.workers) > 1 else ""
+        self._line.update(done, f"{solved} of {len(summary.played)} succeeded{who}")
 
 
 def _report(summary: Summary, path: Path) -> None:
@@ -104,36 +105,9 @@ def _report(summary: Summary, path: Path) -> None:
         count = len(summary.played)
         steps = sum(played.steps for played in summary.played.values()) / count
         print(f"recorded now {count}, {solved} with success, {steps:.1f} steps on average")
+        if len(summary.workers) > 1:
+            print(f"played by {len(summary.workers)} workers")
     for death in summary.deaths:
         print(f"made good: {death}")
     if summary.failed:
         print(f"not recorded: seeds {', '.join(map(str, sorted(summary.failed)))}")
-
-
-@contextmanager
-def _stop_signals() -> Generator[None]:
-    """Let a request to end, as schedulers send it, stop like Ctrl-C."""
-
-    def stop(*_: object) -> NoReturn:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, stop)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-def _one_or_more(text: str) -> int:
-    return _at_least(1, text)
-
-
-def _zero_or_more(text: str) -> int:
-    return _at_least(0, text)
-
-
-def _at_least(least: int, text: str) -> int:
-    number = int(text)
-    if number < least:
-        raise argparse.ArgumentTypeError(f"{number} is too few; it must be {least} or more")
-    return number

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import glob
+import json
 import os
 import shutil
 import weakref
@@ -11,22 +12,19 @@ from collections.abc import Container, Mapping
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, NamedTuple
 
 from robots import RecordingError
+from rollouts.disk import PARTIAL, disk_errors, write_text
 from rollouts.episode import Episode
+from rollouts.joined import join, read_joined
 from rollouts.parts import (
-    PARTIAL,
     PartWriter,
-    Stored,
-    disk_errors,
-    join,
-    json_text,
+    list_earlier_parts,
     list_parts,
     part_path,
-    read_stored,
+    read_part,
     seed_of,
-    write_json,
 )
 from rollouts.provenance import describe_layout, describe_simulation, differences, listing
 from tasks import MultiRobotTask
@@ -35,6 +33,13 @@ from tasks.native_format import observation_keys
 __all__ = ["Recorder", "describe_layout"]
 
 SOURCE = ("source_type", "source_desc")  # may change from one resumption to the next
+
+
+class _Entry(NamedTuple):
+    """An episode of the h5 file: its group there, and its json."""
+
+    group: str
+    about: dict[str, Any]
 
 
 class Recorder:
@@ -153,9 +158,10 @@ class Recorder:
         finally:
             self._release()
 
-    def _begin(self, *, overwrite: bool, resume: bool) -> dict[int, Stored]:
+    def _begin(self, *, overwrite: bool, resume: bool) -> dict[int, _Entry]:
         """Check and tidy what is there; returns the episodes of the h5 file by seed."""
-        there = [path for path in (self.path, *list_parts(self.parts)) if path.exists()]
+        earlier = list_earlier_parts(self.parts)
+        there = [p for p in (self.path, *list_parts(self.parts), *earlier) if p.exists()]
         if there and not (overwrite or resume):
             raise RecordingError(
                 f"{there[0]} is there already; choose another name, or pass overwrite=True to"
@@ -166,6 +172,12 @@ class Recorder:
         if overwrite:
             for path in (self.json_path, *there):
                 path.unlink(missing_ok=True)
+        elif earlier:
+            raise RecordingError(
+                f"{earlier[0]} is one of {len(earlier)} episodes that an earlier version of this"
+                " library left when it was interrupted; go on with that version until it ends, or"
+                " choose another folder, or delete them to have them recorded again"
+            )
         joined = self._read_joined()
         for part in list_parts(self.parts):
             self._check_part(part, joined)
@@ -175,21 +187,22 @@ class Recorder:
     def _partials(self) -> str:
         return f"{glob.escape(self.path.stem)}.*{PARTIAL}"
 
-    def _read_joined(self) -> dict[int, Stored]:
+    def _read_joined(self) -> dict[int, _Entry]:
         if not self.path.exists():
             return {}
-        header, stored = read_stored(self.path)
+        header, groups = read_joined(self.path)
         self._expect_same(self.path, header)
-        return {e.about["episode_seed"]: e for e in sorted(stored, key=_seed)}
+        entries = {about["episode_seed"]: _Entry(name, about) for name, about in groups.items()}
+        return {seed: entries[seed] for seed in sorted(entries)}
 
     def _check_part(self, part: Path, joined: Container[int]) -> None:
         """Refuse a part of another recording; remove one that is damaged or already joined."""
         try:
-            header, _ = read_stored(part)
+            header, _ = read_part(part)
         except RecordingError:  # by a power cut, say: its episode is recorded again
             part.unlink()
             return
-        self._expect_same(part, header)
+        self._expect_same(part, json.loads(header))
         if seed_of(part) in joined:
             part.unlink()
 
@@ -206,21 +219,20 @@ class Recorder:
             )
 
     def _join(self) -> None:
-        parts = list_parts(self.parts)
+        parts = {seed_of(part): part for part in list_parts(self.parts)}
         if parts or not self.path.exists():
-            stored = dict(self._joined)
-            for part in parts:
-                stored[seed_of(part)] = read_stored(part)[1][0]
-            self._joined = {seed: stored[seed] for seed in sorted(stored)}
-            join(self.path, self._header, list(self._joined.values()))
-        summary = {**self._header, "episodes": self._entries()}
-        if not self._json_says(json_text(summary)):
-            write_json(self.json_path, summary)
+            places = {**{seed: entry.group for seed, entry in self._joined.items()}, **parts}
+            seeds = sorted(places)
+            joined = join(self.path, self._header, [places[seed] for seed in seeds])
+            self._joined = {
+                seed: _Entry(*entry) for seed, entry in zip(seeds, joined.items(), strict=True)
+            }
+        abouts = enumerate(entry.about for entry in self._joined.values())
+        episodes = [{"episode_id": number, **about} for number, about in abouts]
+        text = json.dumps({**self._header, "episodes": episodes}, indent=1) + "\n"
+        if not self._json_says(text):
+            write_text(self.json_path, text)
         shutil.rmtree(self.parts, ignore_errors=True)  # the next Recorder removes what is left
-
-    def _entries(self) -> list[dict[str, Any]]:
-        stored = enumerate(self._joined.values())
-        return [{"episode_id": number, **episode.about} for number, episode in stored]
 
     def _json_says(self, text: str) -> bool:
         try:
@@ -247,10 +259,6 @@ def _header(task: MultiRobotTask, source: str, source_desc: str | None) -> dict[
         "layout": describe_layout(task.layout),
         "simulation": describe_simulation(task),
     }
-
-
-def _seed(stored: Stored) -> int:
-    return stored.about["episode_seed"]
 
 
 def _control_mode(task: MultiRobotTask) -> str | dict[str, str]:

@@ -86,19 +86,25 @@ class Simulation:
                 step()
         self.stamp += 1
 
-    def timed_step(self, action: NDArray[np.float32]) -> float:
+    def timed_step(
+        self, action: NDArray[np.float32], clock: Callable[[], float] = perf_counter
+    ) -> float:
         """Advance like `step` and return the time that physics alone took (s).
 
         The floor that any task's step is measured against.
+
+        Args:
+            action: Shape (N, A), finite.
+            clock: Tells the time (s).
         """
         targets = self._controller.targets(action, self.read().joint_positions)
         seconds = 0.0
         for i, world in enumerate(self.worlds):
             self._controller.drive(targets, i)
-            start = perf_counter()
+            start = clock()
             for _ in range(self.substeps):
                 world.system.step()
-            seconds += perf_counter() - start
+            seconds += clock() - start
         self.stamp += 1
         return seconds
 

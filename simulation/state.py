@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robots import SimulationError
 from simulation.arrays import Flags, Floats, norm
@@ -93,7 +94,7 @@ class State:
             poses[frame, :, :3] = sum(poses[point, :, :3] for point in points) / len(points)
             poses[frame, :, 3:] = poses[orientation, :, 3:]
 
-    def poses(self, frames: Sequence[int]) -> Floats:
+    def poses(self, frames: NDArray[np.intp]) -> Floats:
         """Return a copy of the poses of some frames of `ReadoutIndex`, shape (K, N, 7)."""
         return self._poses.take(frames, 0)
 

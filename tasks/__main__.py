@@ -1,4 +1,4 @@
-"""``python -m tasks``: what there is to achieve, what it looks like, what a step costs."""
+"""``python -m tasks``: what there is to achieve, and what it looks like."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from rich.console import Console
 
 from layouts.view_command import add_page_options, page_words, show
-from robots import RobotLayoutsError, TaskError, UnknownNameError
+from robots import RobotLayoutsError, UnknownNameError
 from tasks.description import TaskFacts, describe, facts, list_table, parity_verdicts
 from tasks.registry import list_tasks, make
 from tasks.view import task_cell
@@ -35,8 +35,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if options.command == "list":
             _list()
-        elif options.command == "bench":
-            _bench(options)
         elif options.command == "describe":
             _describe(options.task)
         else:
@@ -73,18 +71,6 @@ def _describe(name: str) -> None:
     env.close()
 
 
-def _bench(options: argparse.Namespace) -> None:
-    from tasks.bench import MOST_ROBOTS, cost_table, measure
-
-    counts = options.robots or range(1, MOST_ROBOTS + 1)
-    for count in counts:
-        if not 1 <= count <= MOST_ROBOTS:
-            raise TaskError(f"--robots {count}: it takes numbers from 1 to {MOST_ROBOTS}")
-    if options.blocks < 1:
-        raise TaskError(f"--blocks is {options.blocks}; it must be 1 or more")
-    _console().print(cost_table(measure(counts, options.kinds, options.blocks)))
-
-
 def _view(options: argparse.Namespace) -> int:
     """Show a task as it is reset, or hand a recording over to the room that reads recordings."""
     if options.demo is not None:
@@ -111,11 +97,6 @@ def _parser() -> argparse.ArgumentParser:
     commands.add_parser("list", help="print every task as a row of a table")
     one = commands.add_parser("describe", help="print everything about a task")
     one.add_argument("task", metavar="TASK", help="task id or another of its names")
-    bench = commands.add_parser("bench", help="time a step with one robot, two, and so on")
-    add = bench.add_argument
-    add("--robots", type=int, nargs="+", metavar="N", help="numbers of robots (1 to 8)")
-    add("--kinds", nargs="+", default=["panda"], metavar="ROBOT", help="robots, in turn (panda)")
-    add("--blocks", type=int, default=20, help="timed blocks of 50 steps (20)")
     view = commands.add_parser(
         "view",
         help="look at a task, or at a demonstration of it, in a browser",

@@ -38,4 +38,4 @@ def refuse_collisions(layout: Layout) -> None:
 def _collisions(layout: Layout) -> str:
     findings = layout.validate(workspaces=False).findings
     kinds = ("collision", "self-collision", "table")
-    return "\n".join(str(finding) for finding in findings if finding.kind in kinds)
+    return "\n".join(str(found) for found in findings if found.serious and found.kind in kinds)

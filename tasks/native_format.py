@@ -17,6 +17,8 @@ from simulation.arrays import Floats
 
 StateDict = dict[str, dict[str, Tensor]]
 
+_MOMENTS = 128  # that a tape has room for at first: most episodes end before
+
 
 def observation_keys(layout: Layout) -> dict[str, str | None]:
     """Return native's key of each robot's proprioception; None where native has one robot."""
@@ -66,53 +68,74 @@ def _root_rows(simulation: Simulation, state: State, robot: str) -> list[Floats]
 class StateTape:
     """What `read_state_dict` returns, for many moments: cheap to write, put together at the end.
 
-    A tape is for one episode, as it keeps hold of the worlds' bodies: begin it after a reset.
+    A tape is for one episode, as it keeps hold of the worlds' bodies: begin it after a reset, or
+    after states were set. A moment is one row of numbers, so that nothing is left over for Python
+    to collect: poses, qpos, qvel, velocities of the bodies, velocities of the robots' roots.
     """
 
     def __init__(self, simulation: Simulation) -> None:
         """Find what has to be read."""
-        world = simulation.worlds[0]
+        world, index = simulation.worlds[0], simulation.index
         moving = [name for name, body in world.bodies.items() if body.kind != "static"]
-        dynamic = [name for name in moving if world.bodies[name].kind == "dynamic"]
-        keys = articulation_keys(simulation.layout)
-        self._bodies = {name: place for place, name in enumerate(moving)}
-        self._robots = {keys[name]: (len(moving) + i, name) for i, name in enumerate(world.robots)}
-        self._joints = simulation.index.joints
-        self._frames = [simulation.index.bodies[name] for name in moving]
-        self._frames += [simulation.index.bases[name] for name in world.robots]
-        self._with_velocity = [self._bodies[name] for name in dynamic]
-        self._with_velocity += [place for place, _ in self._robots.values()]
+        frames = [index.bodies[name] for name in moving]
+        frames += [index.bases[name] for name in world.robots]
+        self._frames = np.array(frames, np.intp)
+        self._bodies = moving
+        self._dynamic = [name for name in moving if world.bodies[name].kind == "dynamic"]
+        self._joints = {
+            key: index.joints[name] for name, key in articulation_keys(simulation.layout).items()
+        }
         self._components: list[Any] = [
-            component
-            for world in simulation.worlds
-            for component in (
-                *(world.bodies[name].component for name in dynamic),
-                *(robot.articulation.links[0] for robot in world.robots.values()),
-            )
+            world.bodies[name].component for world in simulation.worlds for name in self._dynamic
         ]
-        self._rows: list[tuple[Any, ...]] = []
+        self._roots: list[Any] = [
+            robot.articulation.links[0]
+            for world in simulation.worlds
+            for robot in world.robots.values()
+        ]
+        self._count = count = len(simulation.worlds)
+        poses, joints, velocities = 7 * count * len(frames), count * index.dof, 6 * count
+        widths = poses, joints, joints, velocities * len(self._dynamic)
+        self._ends: list[int] = np.cumsum(widths).tolist()
+        width = self._ends[-1] + velocities * len(self._joints)
+        self._rows: Floats = np.zeros((_MOMENTS, width), np.float32)
+        self._length = 0
 
     def write(self, state: State) -> None:
         """Add the present moment; ``state`` must be the read-out of it."""
-        velocities = [(part.linear_velocity, part.angular_velocity) for part in self._components]
-        self._rows.append(
-            (state.poses(self._frames), velocities, state.joint_positions, state.joint_velocities)
-        )
+        if self._length == len(self._rows):
+            self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
+        row = self._rows[self._length]
+        parts = [state.poses(self._frames), state.joint_positions, state.joint_velocities]
+        for body in self._components:
+            parts += (body.linear_velocity, body.angular_velocity)
+        np.concatenate(parts, axis=None, out=row[: self._ends[-1]])
+        if not self._length:  # roots are fixed: after a step they have no velocity
+            velocities = [(root.linear_velocity, root.angular_velocity) for root in self._roots]
+            row[self._ends[-1] :] = np.ravel(velocities)
+        self._length += 1
 
     def read(self) -> dict[str, dict[str, NDArray[np.float32]]]:
         """Return every entry of the state dict with all moments, each (moments, N, k)."""
-        poses, velocities, qpos, qvel = (np.stack(rows) for rows in zip(*self._rows, strict=True))
-        moments, frames, count, _ = poses.shape
-        roots = np.zeros((moments, count, frames, 13), np.float32)
-        roots[..., :7] = poses.swapaxes(1, 2)
-        roots[:, :, self._with_velocity, 7:] = velocities.reshape(moments, count, -1, 6)
+        moments, count = self._length, self._count
+        poses, qpos, qvel, velocities, roots = np.split(self._rows[:moments], self._ends, 1)
+        frames = poses.reshape(moments, -1, count, 7).swapaxes(0, 1)
+        moved, fixed = (
+            rows.reshape(moments, count, -1, 6).transpose(2, 0, 1, 3)
+            for rows in (velocities, roots)
+        )
+        qpos, qvel = (rows.reshape(moments, count, -1) for rows in (qpos, qvel))
+        velocity = dict(zip(self._dynamic, moved, strict=True))
+        still = np.zeros((moments, count, 6), np.float32)
+        bases = zip(self._joints.items(), frames[len(self._bodies) :], fixed, strict=True)
         return {
-            "actors": {name: roots[:, :, place].copy() for name, place in self._bodies.items()},
+            "actors": {
+                name: np.concatenate([pose, velocity.get(name, still)], 2)
+                for name, pose in zip(self._bodies, frames, strict=False)
+            },
             "articulations": {
-                key: np.concatenate(
-                    [roots[:, :, place], *(q[:, :, self._joints[name]] for q in (qpos, qvel))], 2
-                )
-                for key, (place, name) in self._robots.items()
+                key: np.concatenate([pose, root, qpos[..., joints], qvel[..., joints]], 2)
+                for (key, joints), pose, root in bases
             },
         }
 

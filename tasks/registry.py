@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from layouts import Layout, Placement
-from layouts.layout import RobotLike, load_robot
+from layouts.placement import RobotLike, load_robot
 from robots import TaskError, UnknownNameError
 
 if TYPE_CHECKING:

@@ -173,7 +173,8 @@ def find_zones(layout: Layout) -> tuple[tuple[float, float], ...]:
                 f"the robots {names[i]!r} and {names[j]!r} stand {apart:.2f} m apart and reach"
                 f" {first} m and {second} m; they can pass something on from"
                 f" {WORKING_REACH * abs(first - second):.2f} m to"
-                f" {FARTHEST_REACH * (first + second):.2f} m. Move them, or change the radius"
+                f" {FARTHEST_REACH * (first + second):.2f} m. Move them, or leave it to"
+                " layouts.ring(…, radius='auto')"
             )
         along = (apart**2 + near**2 - far**2) / (2 * apart)
         aside = sqrt(max(near**2 - along**2, 0.0))

@@ -8,7 +8,7 @@ from math import hypot
 import numpy as np
 
 from layouts import Layout, Placement
-from layouts.layout import load_robot
+from layouts.placement import load_robot
 from simulation import Camera, PhysicsSettings, Sphere, State, World, add_table
 from simulation.arrays import Array, Floats, constants, norm, tanh
 from tasks.props import FACE_UP, TARGET_HEIGHT, add_target

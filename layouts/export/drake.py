@@ -21,7 +21,8 @@ from robots import LayoutError, RobotDescriptor
 from robots.urdf_xml import parse_urdf, resolve
 
 if TYPE_CHECKING:
-    from layouts.layout import Layout, Placement
+    from layouts.layout import Layout
+    from layouts.placement import Placement
 
 ENDING = ".dmd.yaml"  # by which Drake's parser knows directives
 COPIED = ("material", "link", "joint")  # elements of a robot that are taken over

@@ -17,7 +17,8 @@ from robots.urdf_model import read_model
 from robots.urdf_xml import parse_urdf, resolve
 
 if TYPE_CHECKING:
-    from layouts.layout import Layout, Placement
+    from layouts.layout import Layout
+    from layouts.placement import Placement
 
 WORLD = "world"
 COPIED = ("material", "link", "joint")  # elements of a robot that are taken over

@@ -11,13 +11,21 @@ from itertools import combinations
 import numpy as np
 
 from layouts.frames import table_outlines
-from layouts.layout import Layout, Placement
+from layouts.layout import Layout
+from layouts.placement import Placement
+from layouts.validation.advice import (
+    NARROW,
+    to_be_reached,
+    to_leave_the_table,
+    to_stand_apart,
+    to_start_elsewhere,
+    to_touch_itself_no_more,
+)
 from layouts.validation.bodies import RobotModel, load_model, slab_hull
 from layouts.validation.collisions import (
     Approach,
     Postures,
     fixed,
-    nearer_than,
     nearest,
     stand,
     touching,
@@ -34,6 +42,7 @@ from layouts.validation.report import (
     TargetReach,
     length_text,
     links_text,
+    reach_text,
 )
 from robots import LayoutError
 
@@ -41,10 +50,8 @@ Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)
 Targets = Mapping[str, Sequence[float]] | Sequence[Sequence[float]]
 
 TABLE_DEPTH = 0.9  # m; tables are solid, from their tops down
-NARROW = 0.02  # m; less clearance than this is worth a warning
+SHALLOW = 0.005  # m; a folded arm's hulls overlap by less where its links do not
 LIMIT_TOLERANCE = 1e-4  # rad or m; limits and keyframes are written with four digits
-FARTHEST_MOVE = 3.0  # m; of the search for a distance that is clear
-MOVE_STEP = 0.01  # m
 PATIENCE = 2.0  # s; longer checks tell how far they are
 
 
@@ -141,8 +148,7 @@ class _Check:
                         f"keyframe {placement.start_keyframe!r} of {name} puts {joint} at"
                         f" {value:g} {unit}, {excess:.3g} {unit} beyond its limits"
                         f" {low:g} … {high:g}",
-                        f"keep {joint} within its limits, or start from another keyframe:"
-                        f" {_others(placement)}",
+                        f"put {joint} within its limits, or {to_start_elsewhere(placement)}",
                     )
 
     @staticmethod
@@ -158,16 +164,17 @@ class _Check:
             overlaps = touching(robot, robot, self._models[name].self_pairs)
             if overlaps:
                 pairs = _worst(overlaps)
+                still = any(overlap.posture == 0 for overlap in overlaps)
                 yield Finding(
                     "self-collision",
-                    True,
+                    still or pairs[0].depth > SHALLOW,
                     (name,),
                     pairs,
                     pairs[0].depth,
                     "m",
                     f"{name} touches itself {self._when(overlaps)}:"
                     f" {links_text(pairs, (name, name))}",
-                    self._keyframe_advice(name, overlaps),
+                    to_touch_itself_no_more(self._layout[name], overlaps),
                 )
 
     def _neighbours(
@@ -210,7 +217,9 @@ class _Check:
             "m",
             f"{one.name} and {other.name} collide {self._when(overlaps)}:"
             f" {links_text(pairs, between, table=at_table)}",
-            self._table_advice(one, overlaps) if at_table else self._distance_advice(one, other),
+            to_leave_the_table(one.name, self._layout[one.name], overlaps[0])
+            if at_table
+            else to_stand_apart(self._layout, one, other),
         )
 
     def _narrow(self, one: Postures, other: Postures, near: Approach) -> Finding:
@@ -224,7 +233,7 @@ class _Check:
             "m",
             f"{one.name}.{first} comes within {length_text(near.distance)} of"
             f" {other.name}.{second}",
-            self._distance_advice(one, other),
+            to_stand_apart(self._layout, one, other),
         )
 
     def _when(self, overlaps: list[Approach]) -> str:
@@ -233,42 +242,6 @@ class _Check:
             return "at the keyframes"
         noisy = len({overlap.posture for overlap in overlaps})
         return f"with joint noise ({noisy} of {self._draws} draws)"
-
-    # -- what to change ----------------------------------------------------------------------
-
-    def _distance_advice(self, one: Postures, other: Postures) -> str:
-        """Say how far apart two robots are clear of each other, found by trying."""
-        places = [np.array(self._layout[r.name].base_position) for r in (one, other)]
-        between = places[1] - places[0]
-        between[2] = 0.0
-        now = float(np.linalg.norm(between))
-        way = between / now if now > 1e-6 else np.array([0.0, 1.0, 0.0])
-        move = _clear_move(one, other, way)
-        if move is None:
-            return f"even {FARTHEST_MOVE:g} m farther apart they collide; use another keyframe"
-        return (
-            f"stand {one.name} and {other.name} {move:.3f} m farther apart"
-            f" ({now + move:.3f} m between their bases instead of {now:.3f} m), which leaves"
-            f" {length_text(NARROW)} or more"
-        )
-
-    def _keyframe_advice(self, name: str, overlaps: list[Approach]) -> str:
-        placement = self._layout[name]
-        noise = ""
-        if all(overlap.posture > 0 for overlap in overlaps):
-            noise = f"; or less joint noise than qpos_noise={placement.qpos_noise:g} rad"
-        return (
-            f"give {name} another keyframe than {placement.start_keyframe!r}:"
-            f" {_others(placement)}{noise}"
-        )
-
-    def _table_advice(self, robot: Postures, overlaps: list[Approach]) -> str:
-        lift = MOVE_STEP - overlaps[0].distance
-        placement = self._layout[robot.name]
-        return (
-            f"raise the base of {robot.name} by {lift:.3f} m, or give it another keyframe than"
-            f" {placement.start_keyframe!r}: {_others(placement)}"
-        )
 
     # -- reach -------------------------------------------------------------------------------
 
@@ -286,46 +259,56 @@ class _Check:
                 self._progress.tell(f"{name} to {target}")
                 quaternion = np.array(numbers[3:]) if len(numbers) == 7 else None
                 solutions = arm.solve(np.array(numbers[:3]), quaternion)
-                free = next((s for s in solutions if s.solved and self._free(name, s)), None)
+                solved = [s for s in solutions if s.solved]
+                free = next((s for s in solved if not any(self._obstacles(name, s))), None)
                 best = free or solutions[0]
                 yield TargetReach(
                     target,
                     name,
                     free is not None,
                     best.missing,
-                    free is None and best.solved,
+                    best.turn_missing,
+                    tuple(self._obstacles(name, best)) if solved and free is None else (),
                     best.qpos,
                 )
 
-    def _free(self, name: str, solution: Solution) -> bool:
-        """Tell whether a robot touches nothing there, with the others at their keyframes."""
+    def _obstacles(self, name: str, solution: Solution) -> Iterator[str]:
+        """Yield what a robot touches there, itself included, with the others at their keyframes."""
         model, first = self._models[name], slice(0, 1)
         robot = stand(name, self._layout[name], model, np.array([solution.qpos]))
-        others = [r.only(first) for n, r in self._robots.items() if n != name]
-        if touching(robot, robot, model.self_pairs) or any(touching(robot, o) for o in others):
-            return False
-        surfaces = [surface.only(first) for surface in self._surfaces.values()]
-        return not any(touching(robot, s, _moving_hulls(model)) for s in surfaces)
+        around = {**self._robots, **self._surfaces}
+        for obstacle, body in around.items():
+            if obstacle == name:
+                touches = touching(robot, robot, model.self_pairs)
+            else:
+                pairs = _moving_hulls(model) if obstacle in self._surfaces else None
+                touches = touching(robot, body.only(first), pairs)
+            if touches:
+                yield obstacle
 
     def _missed(self, reaches: Sequence[TargetReach]) -> Iterator[Finding]:
-        for target in self._targets:
+        for target, numbers in self._targets.items():
             told = [reach for reach in reaches if reach.target == target]
             if any(reach.reached for reach in told):
                 continue
             best = min(told, key=lambda reach: (not reach.blocked, reach.missing))
-            if best.blocked:
-                what, advice = (
-                    f"no robot reaches {target} without a collision",
-                    f"give {best.robot} more room, or move {target}",
-                )
-            else:
-                what, advice = (
-                    f"no robot reaches {target}; {best.robot} stays"
-                    f" {length_text(best.missing)} away",
-                    f"move {best.robot} or {target} by as much towards each other, or choose"
-                    " another orientation of it",
-                )
-            yield Finding("target", True, (best.robot,), (), best.missing, "m", what, advice)
+            turned = len(numbers) == 7 and not best.blocked and self._gets_to(best.robot, numbers)
+            what = f"no robot reaches {target}{' without a collision' * best.blocked}"
+            yield Finding(
+                "target",
+                True,
+                (best.robot,),
+                (),
+                best.missing,
+                "m",
+                f"{what}; {reach_text(best)}",
+                to_be_reached(target, best, otherwise_turned=turned),
+            )
+
+    def _gets_to(self, name: str, target: tuple[float, ...]) -> bool:
+        """Tell whether a robot reaches the place of a target, however turned."""
+        arm = Reach(self._layout[name], self._models[name])
+        return arm.solve(np.array(target[:3]), None)[0].solved
 
 
 class _Progress:
@@ -408,21 +391,6 @@ def _worst(overlaps: Sequence[Approach]) -> tuple[LinkPair, ...]:
     return tuple(pairs.values())
 
 
-def _clear_move(one: Postures, other: Postures, way: Floats) -> float | None:
-    """Return by how much ``other`` has to move along ``way`` (m), rounded up, or None."""
-    steps = round(FARTHEST_MOVE / MOVE_STEP)
-    low, high = 0, 1
-    while nearer_than(one, other.moved(high * MOVE_STEP * way), NARROW):
-        low, high = high, high * 2
-        if high > steps:
-            return None
-    while high - low > 1:
-        middle = (low + high) // 2
-        near = nearer_than(one, other.moved(middle * MOVE_STEP * way), NARROW)
-        low, high = (middle, high) if near else (low, middle)
-    return high * MOVE_STEP
-
-
 def _shared(spaces: Mapping[str, Workspace]) -> Iterator[SharedWorkspace]:
     for (one, space), (other, other_space) in combinations(spaces.items(), 2):
         volume = space.shared_with(other_space)
@@ -436,8 +404,3 @@ def _outline(robot: Postures) -> tuple[tuple[Point, ...], ...]:
         tuple(map(tuple, (hull.corners @ pose[:3, :3].T + pose[:3, 3]).tolist()))
         for hull, pose in zip(robot.hulls, robot.poses[0], strict=True)
     )
-
-
-def _others(placement: Placement) -> str:
-    others = [name for name in placement.robot.keyframes if name != placement.start_keyframe]
-    return ", ".join(others) if others else f"{placement.robot.name} has no other"

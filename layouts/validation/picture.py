@@ -24,7 +24,7 @@ GOOD, BAD, NARROW = "#1B7837", "#B2182B", "#B35806"
 WIDTH, HEIGHT = 10.0, 8.5  # inches; 1500 × 1275 pixels
 DOTS_PER_INCH = 150
 MARGIN = 0.08  # free space around the robots, in shares of the plan's larger side
-NAME_GAP = 0.05  # m, between a robot and its name
+GAP = 10  # points, between what is drawn and its name
 SHOWN_FINDINGS = 3
 
 
@@ -61,8 +61,9 @@ def draw(report: Report) -> Figure:
     _draw_tables(plan, report)
     for index, name in enumerate(report.layout):
         _draw_robot(plan, report, index, name)
+    centre = np.mean([p.base_position[:2] for p in report.layout.values()], axis=0)
     for clearance in _nearest_neighbours(report):
-        _draw_clearance(plan, clearance)
+        _draw_clearance(plan, clearance, centre)
     _draw_overlaps(plan, report)
     for name, position in report.targets.items():
         _draw_target(plan, report, name, position)
@@ -91,19 +92,18 @@ def _draw_robot(plan: Axes, report: Report, index: int, name: str) -> None:
         plan.add_patch(Polygon(outline, fill=False, edgecolor=colour, linewidth=0.9, zorder=3))
     x, y, _ = report.layout[name].base_position
     plan.plot(x, y, "o", color="white", markeredgecolor=colour, markersize=8, zorder=4)
-    (x, y), behind = _behind(report, name)
-    side = "right" if behind[0] < -0.5 else "left" if behind[0] > 0.5 else "center"
-    _write(plan, x, y, name, colour, size=11, weight="bold", side=side)
+    place, behind = _behind(report, name)
+    _write(plan, place, behind, name, colour, size=11, weight="bold")
 
 
 def _behind(report: Report, name: str) -> tuple[Floats, Floats]:
-    """Return a place behind a robot's back (m), and the direction from its base to there."""
+    """Return the end of a robot's back (m), and the direction from its base to there."""
     base = np.array(report.layout[name].base_position[:2])
     corners = np.array([c[:2] for hull in report.outlines[name] for c in hull]) - base
     ahead = corners.mean(axis=0)
     length = float(np.linalg.norm(ahead))
     behind = -ahead / length if length > 0.02 else np.array([0.0, -1.0])
-    return base + behind * (float((corners @ behind).max()) + NAME_GAP), behind
+    return base + behind * float((corners @ behind).max()), behind
 
 
 def _nearest_neighbours(report: Report) -> list[Clearance]:
@@ -117,26 +117,29 @@ def _nearest_neighbours(report: Report) -> list[Clearance]:
     return chosen
 
 
-def _draw_clearance(plan: Axes, clearance: Clearance) -> None:
-    """Join the nearest points of two robots."""
+def _draw_clearance(plan: Axes, clearance: Clearance, centre: Floats) -> None:
+    """Join the nearest points of two robots, and write their distance on the outer side."""
     (x, y, _), (to_x, to_y, _) = clearance.points
     colour = NARROW if clearance.noisy_distance < 0.02 else INK
     plan.plot([x, to_x], [y, to_y], "-", color=colour, linewidth=1.4, zorder=6)
     plan.plot([x, to_x], [y, to_y], "o", color=colour, markersize=3, zorder=6)
-    text = length_text(clearance.distance)
-    _write(plan, (x + to_x) / 2, (y + to_y) / 2, f"  {text}", colour, size=9, side="left")
+    along, middle = np.array([to_x - x, to_y - y]), np.array([x + to_x, y + to_y]) / 2
+    beside = np.array([-along[1], along[0]]) / max(float(np.linalg.norm(along)), 1e-9)
+    outwards = round(float(beside @ (middle - centre)), 3)
+    beside *= 1 if (outwards, *beside[::-1]) > (0, 0, 0) else -1
+    _write(plan, middle, beside, length_text(clearance.distance), colour, size=9)
 
 
 def _draw_overlaps(plan: Axes, report: Report) -> None:
     for finding in report.findings:
         for number, pair in enumerate(finding.links):
             x, y, _ = pair.point
-            deepest = number == 0
+            deepest = number == 0 and finding.serious
             plan.plot(
                 x,
                 y,
                 "X",
-                color=BAD,
+                color=BAD if finding.serious else NARROW,
                 markeredgecolor="white",
                 markersize=13 if deepest else 6,
                 alpha=1.0 if deepest else 0.6,
@@ -149,7 +152,7 @@ def _draw_target(plan: Axes, report: Report, name: str, position: tuple[float, .
     reached = any(reach.reached for reach in told)
     colour = GOOD if reached else BAD
     plan.plot(*position[:2], "*", color=colour, markeredgecolor="white", markersize=15, zorder=8)
-    _write(plan, position[0], position[1] + NAME_GAP, name, colour, size=9)
+    _write(plan, np.array(position[:2]), np.array([0.0, 1.0]), name, colour, size=9)
     for reach in told:
         if reach.reached:
             x, y, _ = report.layout[reach.robot].base_position
@@ -158,26 +161,28 @@ def _draw_target(plan: Axes, report: Report, name: str, position: tuple[float, .
 
 def _write(
     plan: Axes,
-    x: float,
-    y: float,
+    place: Floats,
+    way: Floats,
     text: str,
     colour: str,
     *,
     size: float,
     weight: str = "normal",
-    side: str = "center",
 ) -> None:
+    """Write beside a place (m), on the side that a unit vector points to."""
     from matplotlib.patheffects import withStroke
 
-    plan.text(
-        x,
-        y,
+    x, y = way.tolist()
+    plan.annotate(
         text,
+        xy=(float(place[0]), float(place[1])),
+        xytext=(GAP * x, GAP * y),
+        textcoords="offset points",
         color=colour,
         fontsize=size,
         fontweight=weight,
-        ha=side,
-        va="center",
+        ha="right" if x < -0.5 else "left" if x > 0.5 else "center",
+        va="top" if y < -0.5 else "bottom" if y > 0.5 else "center",
         path_effects=[withStroke(linewidth=3, foreground="white", alpha=0.85)],
         zorder=9,
     )

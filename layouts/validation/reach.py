@@ -137,19 +137,9 @@ class Reach:
 
 def rotation_vectors(rotations: Floats) -> Floats:
     """Return axis times angle (rad) of rotation matrices: (n, 3, 3) to (n, 3)."""
-    twice_sine = np.stack(
-        [
-            rotations[:, 2, 1] - rotations[:, 1, 2],
-            rotations[:, 0, 2] - rotations[:, 2, 0],
-            rotations[:, 1, 0] - rotations[:, 0, 1],
-        ],
-        axis=1,
-    )
-    cosine = (np.trace(rotations, axis1=1, axis2=2) - 1) / 2
-    sine = np.linalg.norm(twice_sine, axis=1) / 2
-    angle = np.arctan2(sine, cosine)
-    scale = np.where(sine > 1e-9, angle / np.maximum(2 * sine, 1e-12), 0.5)
-    return twice_sine * scale[:, None]
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_matrix(rotations).as_rotvec()
 
 
 def tcp_links(robot: RobotDescriptor, model: RobotModel) -> list[int]:

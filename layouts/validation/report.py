@@ -113,7 +113,9 @@ class TargetReach:
         reached: Whether it does, without touching itself, the table or the others at their
             keyframes.
         missing: How far its tool centre point stays from the target (m).
-        blocked: Whether it would reach it, were it not for a collision.
+        turn_missing: How far its orientation stays from the target's (rad); 0 if none was asked.
+        obstacles: What it would touch there, where it would reach it but for that: names of
+            robots, itself among them, and of tables.
         qpos: Joint positions that come nearest, in the descriptor's order (rad, m).
     """
 
@@ -121,8 +123,14 @@ class TargetReach:
     robot: str
     reached: bool
     missing: float
-    blocked: bool
+    turn_missing: float
+    obstacles: tuple[str, ...]
     qpos: tuple[float, ...]
+
+    @property
+    def blocked(self) -> bool:
+        """Whether it would reach the target, were it not for a collision."""
+        return bool(self.obstacles)
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,6 +207,17 @@ def links_text(pairs: Sequence[LinkPair], between: tuple[str, str], *, table: bo
     return ", ".join(spoken) + (f" and {rest} more pairs of links" if rest else "")
 
 
+def reach_text(reach: TargetReach) -> str:
+    """Say whether a robot reaches a target, or what keeps it from that."""
+    if reach.reached:
+        return f"{reach.robot} reaches it"
+    if reach.blocked:
+        touched = ["itself" if name == reach.robot else name for name in reach.obstacles]
+        return f"{reach.robot} would touch {' and '.join(touched)} there"
+    turn = f" and {reach.turn_missing:.2f} rad" if reach.turn_missing >= 0.005 else ""
+    return f"{reach.robot} stays {length_text(reach.missing)}{turn} away"
+
+
 def _lines(report: Report) -> Iterator[str]:
     serious = sum(finding.serious for finding in report.findings)
     warnings = len(report.findings) - serious
@@ -264,13 +283,5 @@ def _spaces(report: Report) -> Iterator[str]:
 
 def _targets(report: Report) -> Iterator[str]:
     for name, position in report.targets.items():
-        told = [_reach_text(reach) for reach in report.reaches if reach.target == name]
+        told = [reach_text(reach) for reach in report.reaches if reach.target == name]
         yield f"{name} ({', '.join(decimal(x) for x in position)}): {', '.join(told)}"
-
-
-def _reach_text(reach: TargetReach) -> str:
-    if reach.reached:
-        return f"{reach.robot} reaches it"
-    if reach.blocked:
-        return f"{reach.robot} would collide there"
-    return f"{reach.robot} stays {length_text(reach.missing)} away"

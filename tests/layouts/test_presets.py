@@ -17,9 +17,10 @@ from layouts import (
     single,
     yaw_quaternion,
 )
+from layouts.distances import HAND_OVER, ROUND_CORNERS
 from layouts.frames import EDGES, table_outlines
 from layouts.orientation import forward, multiplied, rotated, upward, yaw_degrees
-from layouts.presets import HAND_OVER, PRESETS
+from layouts.presets import PRESETS
 from robots import LayoutError, RobotRegistry, UnknownNameError
 
 spacings = st.floats(min_value=1e-3, max_value=100.0)
@@ -228,18 +229,18 @@ class TestAutomaticDistances:
         names = list(layout)
         pairs = [*zip(names[::2], names[1::2], strict=False), *zip(names, names[2:], strict=False)]
         if pairs:
-            least = min(apart(layout, *pair) for pair in pairs)
-            farthest = max(reach for pair in pairs for reach in reaches(layout, *pair))
+            most = max(apart(layout, *pair) for pair in pairs)
             lengths = [distance(layout, *pair) for pair in pairs]
-            assert lengths == pytest.approx([max(least, farthest)] * len(pairs))
+            assert lengths == pytest.approx([most] * len(pairs))
 
     @given(sized)
     def test_across_a_table_every_pair_can_hand_over(self, robots):
         names = list(robots)[:4]
         layout = around_table({name: robots[name] for name in names})
+        share = HAND_OVER if len(names) < 3 else ROUND_CORNERS
         for pair in (names[:2], names[2:]):
             if len(pair) == 2:
-                length = HAND_OVER * sum(reaches(layout, *pair))
+                length = share * sum(reaches(layout, *pair))
                 assert distance(layout, *pair) == pytest.approx(length)
 
     @given(sized)

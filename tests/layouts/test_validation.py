@@ -150,6 +150,13 @@ class TestDistances:
         assert between.links == ("base", "base")
         assert between.distance == pytest.approx(0.115, abs=1e-9)
 
+    def test_one_above_the_other_is_moved_the_shorter_way(self, tmp_path):
+        """Their boxes are 10 cm wide, and 10 cm and 40 cm high; they overlap by 5 cm in height."""
+        arm = turntable(tmp_path)
+        layout = Layout({"one": Placement(arm), "other": Placement(arm, (0.01, 0.0, 0.35))})
+        (finding,) = layout.validate(samples=0, workspaces=False).findings
+        assert "0.070 m farther apart vertically (0.420 m between" in finding.advice
+
     def test_turned_boxes_are_moved_no_farther_than_they_need(self, tmp_path):
         """Their sides face each other, though not along the world's axes."""
         arm, half = turntable(tmp_path), 0.5**0.5
@@ -258,6 +265,14 @@ class TestSelfCollisions:
         assert "with joint noise (" in finding.what
         assert "less joint noise than qpos_noise=0.3 rad" in finding.advice
 
+    def test_a_graze_of_a_folded_arm_that_noise_alone_causes_is_a_warning(self):
+        layout = Layout({"arm": Placement("koch", keyframe="rest")})
+        report = layout.validate(samples=300, workspaces=False)
+        (finding,) = report.findings
+        assert report.ok
+        assert (finding.kind, finding.serious) == ("self-collision", False)
+        assert 0 < finding.amount < 0.005
+
     def test_neighbours_may_touch(self, tmp_path):
         text = FOLDING.replace('<origin xyz="0.2 0 0"/>', '<origin xyz="0.09 0 0"/>')
         arm = robot(tmp_path, text, ["shoulder", "elbow"], tcp="lower")
@@ -350,6 +365,27 @@ class TestTargets:
         left = next(reach for reach in report.reaches if reach.robot == "left")
         assert not left.reached
         assert left.blocked
+        assert left.obstacles == ("right",)
+
+    @pytest.mark.parametrize(
+        ("target", "advice"),
+        [
+            ((0.0, 0.0, 0.05, 1, 0, 0, 0), "another orientation of cube; its place is in reach"),
+            ((3.0, 0.0, 0.05, 1, 0, 0, 0), "move arm or cube by as much towards each other"),
+        ],
+    )
+    def test_what_to_change_depends_on_what_is_missing(self, target, advice):
+        report = Layout({"arm": Placement("panda")}).validate(targets={"cube": target})
+        (finding,) = report.findings
+        assert advice in finding.advice
+
+    def test_a_turn_that_is_missing_is_told(self, tmp_path):
+        """It turns about z only: the place is right, and half a turn about x is missing."""
+        layout = Layout({"arm": Placement(turntable(tmp_path))})
+        report = layout.validate(targets={"cube": (0, 0, 0.35, 0, 1, 0, 0)}, workspaces=False)
+        (reach,) = report.reaches
+        assert reach.turn_missing == pytest.approx(math.pi)
+        assert "arm stays 0.0 cm and 3.14 rad away" in str(report)
 
     def test_one_below_the_table_is_reached_only_without_it(self):
         layout = Layout({"arm": Placement("panda")})
@@ -358,7 +394,9 @@ class TestTargets:
         report = layout.validate(targets=below, table=TABLE, workspaces=False)
         assert free.ok
         assert not report.ok
-        assert "would collide there" in str(report)
+        (finding,) = report.findings
+        assert "without a collision; arm would touch table there" in finding.what
+        assert "move below away from table" in finding.advice
 
     @pytest.mark.parametrize(
         ("target", "message"),

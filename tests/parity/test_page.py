@@ -14,9 +14,10 @@ import pytest
 import tasks
 from parity.__main__ import COMMANDS, main
 from parity.embedding import ClipError, fit, poster, share, size
-from parity.page import COLUMNS, RECORDED_COLUMNS, UNKNOWN, cells, grouped, is_verified, tiles
+from parity.report.figures import COLUMNS, RECORDED_COLUMNS, UNKNOWN, cells, is_verified, tiles
+from parity.report.gaps import grouped
 from parity.results import RESULTS, read
-from parity.sweep import SUMMARY, blank, write_summary
+from parity.sweep.entries import SUMMARY, blank, write_summary
 
 FLAGS = (
     "--no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking"

@@ -4,18 +4,23 @@ import copy
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from parity.__main__ import main
-from parity.readme import BEGIN, END, with_table
+from parity.readme import BENCH_TABLES, PARITY_TABLE, begin, end, with_lines
 from parity.results import ResultsError, read
 from parity.snapshot import QUANTITIES
+from rollouts.bench.measurement import Measurement
+from rollouts.bench.report import Report
 from tasks.registry import CATALOGUE
 
 ROOT = Path(__file__).parents[2]
-MARKERS = f"# Title\n\n{BEGIN}\n{END}\n\nThe end.\n"
+BEGIN, END = begin(PARITY_TABLE), end(PARITY_TABLE)
+BENCHES = f"{begin(BENCH_TABLES)}\n{end(BENCH_TABLES)}\n"
+MARKERS = f"# Title\n\n{BEGIN}\n{END}\n\n{BENCHES}\nThe end.\n"
 
 ENTRY = {
     "robots": "2 × panda",
@@ -42,19 +47,53 @@ def a_record(*task_ids: str) -> dict:
     }
 
 
+def some_benchmarks(*task_ids: str) -> Report:
+    """What is in the README's tables: native three times as slow, ours twice the physics."""
+
+    def on(values, name, unit, ratios=(), **series) -> Measurement:
+        samples = {key.replace("_", " "): [[x]] * len(values) for key, x in series.items()}
+        floors = tuple(key for key in samples if key == "physics alone")
+        return Measurement(
+            name, f"About {name}", unit, "task", tuple(values), samples, floors, ratios
+        )
+
+    beside, floor = ("native", "here"), ("here", "physics alone")
+    times = {"here": 2.0, "native": 6.0}
+    return Report(
+        (
+            on(task_ids, "step", "µs per step", (beside, floor), **times, physics_alone=1.0),
+            on(task_ids, "reset", "ms per reset", (beside,), **times),
+            on(["A-v1"], "vector", "steps per second", (("here", "native"),), here=70.0, native=10),
+            on([1, 64], "start", "s", start=4.5),
+            on(["A-v1"], "memory", "MB", memory=1.5),
+            on(["A-v1"], "recording", "ms", (("recorded", "stepped"),), stepped=10.0, recorded=11),
+            on([4], "validation", "ms", check=66.5),
+        ),
+        {"cpu": "A processor", "cores": 2, "system": "Linux", "versions": {"python": "3.11.7"}},
+        "time that went by",
+        (0.5, 1.5),
+    )
+
+
 class Files:
-    """A README and a record in a folder of their own."""
+    """A README and two records in a folder of their own."""
 
     def __init__(self, folder: Path, record: dict) -> None:
         self.readme, self.results = folder / "README.md", folder / "results.json"
+        self.bench = folder / "bench.json"
         self.readme.write_text(MARKERS, encoding="utf-8")
         self.write(record)
+        self.write_bench(some_benchmarks(*CATALOGUE))
+
+    def write_bench(self, report: Report) -> None:
+        self.bench.write_text(report.as_json(), encoding="utf-8")
 
     def write(self, record: dict) -> None:
         self.results.write_text(json.dumps(record))
 
     def run(self, *options: str) -> int:
         paths = ("--readme", str(self.readme), "--results", str(self.results))
+        paths += ("--bench", str(self.bench))
         return main(["readme", *paths, *options])
 
 
@@ -69,7 +108,8 @@ def test_a_row_says_everything(files):
     text = files.readme.read_text(encoding="utf-8")
     assert text.startswith("# Title\n\n")
     assert text.endswith("\n\nThe end.\n")
-    heading, rule, *rows = (line for line in text.splitlines() if line.startswith("|"))
+    shown, _, _ = text.partition(END)
+    heading, rule, *rows = (line for line in shown.splitlines() if line.startswith("|"))
     assert heading.count("|") == rule.count("|") == rows[0].count("|")
     names, cells = ([c.strip() for c in line.strip("|").split("|")] for line in (heading, rows[0]))
     assert dict(zip(names, cells, strict=True)) == {
@@ -92,6 +132,22 @@ def test_a_row_says_everything(files):
     }
     assert len(rows) == len(CATALOGUE)
     assert "Measured on x86_64 with python 3.11.7, mani_skill 3.0.1." in text
+
+
+def test_benchmarks_are_shown(files):
+    files.run()
+    text = files.readme.read_text(encoding="utf-8")
+    _, _, shown = text.partition(begin(BENCH_TABLES))
+    lines = shown.splitlines()
+    heading = "| task | step, here (µs) | step, native (µs) | step, physics alone (µs) |"
+    heading += " native / here | here / physics alone |"
+    assert f"{heading} reset, here (ms) | reset, native (ms) | native / here |" in lines
+    row = "`PushT-v1` | 2.00 | 6.00 | 1.00 | 3.00 | 2.00 | 2.00 | 6.00 | 3.00"
+    assert f"| {row} |" in lines
+    assert "| A-v1 | 70.0 | 10.0 | 7.00 |" in lines
+    assert "| About start | 64 task | 4.50 s |" in lines
+    assert "| About recording | `A-v1` | 11.0 ms, recorded / stepped 1.10 |" in lines
+    assert "A processor (Linux), 2 cores, load average 0.5 to 1.5; time that went by" in shown
 
 
 def test_a_fresh_table_passes_and_stays(files, capsys):
@@ -150,6 +206,22 @@ class TestStale:
         missing = min(CATALOGUE)
         self.expect(files, capsys, f"the record lacks {missing}; run `make parity`")
 
+    def test_newer_benchmarks(self, files, capsys):
+        files.run()
+        report = some_benchmarks(*CATALOGUE)
+        step = report.find("step")
+        faster = {**step.samples, "here": [[1.9]] * len(step.values)}
+        others = tuple(one for one in report.measurements if one.name != "step")
+        files.write_bench(replace(report, measurements=(replace(step, samples=faster), *others)))
+        self.expect(files, capsys, "README.md is stale")
+
+    def test_a_task_that_was_never_timed(self, files, capsys):
+        files.write_bench(some_benchmarks(*sorted(CATALOGUE)[1:]))
+        assert files.run() == 0
+        capsys.readouterr()
+        lacks = f"the record lacks {min(CATALOGUE)}; run `make bench ARGS=--record`"
+        self.expect(files, capsys, lacks)
+
     def test_a_task_that_is_gone(self, files, capsys):
         files.write(a_record(*CATALOGUE, "Gone-v1"))
         files.run()
@@ -167,7 +239,8 @@ class TestStale:
 )
 def test_markers_must_be_there_once_and_in_order(text, complaint, files, capsys):
     with pytest.raises(ResultsError, match=complaint):
-        with_table(text, a_record("PushT-v1"))
+        with_lines(text, PARITY_TABLE, [])
+    text += BENCHES
     files.readme.write_text(text)
     for options in ([], ["--check"]):
         assert files.run(*options) == 2
@@ -190,6 +263,18 @@ def test_a_record_that_lacks_a_figure(files, capsys):
     files.write(record)
     assert files.run("--check") == 2
     assert "the record is not complete: KeyError('steps')" in capsys.readouterr().err
+
+
+def test_benchmarks_that_lack_something(files, capsys):
+    report = some_benchmarks(*CATALOGUE)
+    files.write_bench(replace(report, measurements=report.measurements[:-1]))
+    assert files.run("--check") == 2
+    assert "nothing was measured of 'validation'" in capsys.readouterr().err
+    files.bench.unlink()
+    assert files.run("--check") == 2
+    told = capsys.readouterr().err
+    assert f"cannot read {files.bench}" in told
+    assert "`make bench ARGS=--record` writes it" in told
 
 
 def test_missing_files_are_named(files, capsys):

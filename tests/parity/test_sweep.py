@@ -19,21 +19,15 @@ from parity.episodes import Episode
 from parity.results import ResultsError
 from parity.rollout import load
 from parity.runs import Run
-from parity.sweep import (
-    LOG,
+from parity.sweep.entries import SUMMARY, blank, is_done, read_summary, write_summary
+from parity.sweep.plan import Plan, plan
+from parity.sweep.processes import LOG, sweep
+from parity.sweep.stages import (
     NO_DEMONSTRATION,
     NO_VIDEO,
-    SUMMARY,
-    Plan,
     _episodes,
     _shortest_success,
     agreement,
-    blank,
-    is_done,
-    plan,
-    read_summary,
-    sweep,
-    write_summary,
 )
 from robots import TaskError, UnknownNameError
 from rollouts.episode import play
@@ -80,7 +74,7 @@ class TestPlan:
 
     def test_the_expert_comes_first_if_asked_for(self, tmp_path, monkeypatch):
         path = record(tmp_path, TASK)
-        monkeypatch.setattr("parity.sweep.list_experts", lambda: (TASK,))
+        monkeypatch.setattr("parity.sweep.plan.list_experts", lambda: (TASK,))
         options = {"tasks": [TASK], "demos": tmp_path}
         assert planned(tmp_path, **options)[0].demos == (str(path),)
         assert planned(tmp_path, **options, experts=True)[0].demos == ()
@@ -109,7 +103,7 @@ class TestEpisodes:
         }
 
     def test_the_expert(self, tmp_path, monkeypatch):
-        monkeypatch.setattr("parity.sweep.list_experts", lambda: [TASK])
+        monkeypatch.setattr("parity.sweep.stages.list_experts", lambda: [TASK])
         monkeypatch.setattr(
             "parity.rollout.find_expert",
             lambda task_id: lambda task, seed: np.full((2 + seed, 8), seed, np.float32),
@@ -119,7 +113,7 @@ class TestEpisodes:
         assert [(e.seed, e.actions.shape) for e in run.episodes] == [(0, (2, 8)), (1, (3, 8))]
 
     def test_chance(self, tmp_path, monkeypatch):
-        monkeypatch.setattr("parity.sweep.list_experts", list)
+        monkeypatch.setattr("parity.sweep.stages.list_experts", list)
         (run,), source = _episodes(Plan(TASK, (), 2, tmp_path, False))
         assert source == "random"
         assert [e.actions.shape for e in run.episodes] == [(50, 8), (50, 8)]

@@ -1,20 +1,16 @@
-"""The hand-over's plans, made once per process for all tests."""
-
-import functools
+"""The hand-over's plans; see `expert_plays`."""
 
 import numpy as np
 
 import tasks
-from rollouts.experts import find_expert
+from tests.rollouts import expert_plays
 
 TASK = "TwoRobotPickCube-v1"
 
 
-@functools.cache
 def task() -> tasks.MultiRobotTask:
-    return tasks.make(TASK)
+    return expert_plays.task(TASK)
 
 
-@functools.cache
 def plan(seed: int) -> np.ndarray:
-    return find_expert(TASK)(task(), seed)
+    return expert_plays.plan(TASK, seed)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from robots import TaskError
+from rollouts.executor import Event, report
 
 TASK = "PushT-v1"
 NO_PLAN = 1007  # a seed that the expert cannot plan
@@ -32,12 +33,15 @@ class Play:
     fails_at: int = -1
     breaks_at: int = -1
     lasts: float = 0.0  # s
+    says: str = ""
 
     def __call__(self):
         return self.play
 
     def play(self, seed: int):
         time.sleep(self.lasts)
+        if self.says:
+            report(self.says)
         if seed == self.dies_at and (self.always or not (self.folder / "died").exists()):
             (self.folder / "died").touch()
             os.kill(os.getpid(), signal.SIGKILL)
@@ -68,3 +72,19 @@ def cannot_prepare():
 
 def dies_before_it_is_ready():
     os._exit(7)
+
+
+class Here:
+    """Executor that plays in this very process, in another order than asked for."""
+
+    def run(self, prepare, seeds):
+        play = prepare()
+        for seed in reversed(seeds):
+            yield Event(seed, result=play(seed))
+
+
+def blocked_signals():
+    """Return which signals this process holds back, as the kernel writes it."""
+    status = Path("/proc/self/status").read_text()
+    (mask,) = (line.split()[1] for line in status.splitlines() if line.startswith("SigBlk"))
+    return lambda seed: mask

@@ -3,12 +3,20 @@
 import multiprocessing
 import os
 import pickle
+import re
+import signal
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
 
 import pytest
 
 from robots import TaskError
-from rollouts.executor import Event, ProcessExecutor, WorkerError
+from rollouts.executor import Event, ProcessExecutor, WorkerError, WorkersDied
 from tests.rollouts.plays import DiesOnce, Play, cannot_prepare, dies_before_it_is_ready
+
+ROOT = Path(__file__).parents[2]
 
 
 def run(prepare, seeds, workers=2):
@@ -48,17 +56,52 @@ def test_a_worker_that_dies_is_told_and_its_episode_played_again(tmp_path):
 
 
 def test_an_episode_that_kills_every_worker_is_given_up(tmp_path):
-    events = []
-    with pytest.raises(WorkerError, match="seed 1 ended 3 worker processes; .*SIGKILL"):  # noqa: PT012
-        for event in ProcessExecutor(2).run(Play(tmp_path, dies_at=1, always=True), range(9)):
-            events.append(event)
+    events = run(Play(tmp_path, dies_at=1, always=True), range(9))
     assert [event.seed for event in events if event.died] == [1, 1, 1]
+    (given_up,) = [event for event in events if event.error]
+    assert given_up.seed == 1
+    assert isinstance(given_up.error, WorkersDied)
+    assert re.search("seed 1 ended 3 worker processes; .*SIGKILL", str(given_up.error))
+    assert sorted(squares(events)) == [0, *range(2, 9)]
+
+
+def test_one_attempt(tmp_path):
+    executor = ProcessExecutor(1, attempts=1)
+    events = list(executor.run(Play(tmp_path, dies_at=1, always=True), range(3)))
+    assert [event.seed for event in events if event.died] == [1]
+    assert "seed 1 ended 1 worker process; " in str(events[-2].error)
+    assert sorted(squares(events)) == [0, 2]
+
+
+def test_a_fresh_process_for_every_episode():
+    events = list(ProcessExecutor(2, fresh=True).run(Play(), range(4)))
+    assert len({event.result[0] for event in events}) == 4
+
+
+def test_what_an_episode_says_of_itself():
+    events = list(ProcessExecutor(1).run(Play(says="halfway"), range(2)))
+    said = [(event.seed, event.said or event.result[1]) for event in events]
+    assert said == [(0, "halfway"), (0, 0), (1, "halfway"), (1, 1)]
+
+
+def test_ctrl_c_reaches_no_worker():
+    """Not even the first one, whose start begins with that of a helper."""
+    program = """
+        from rollouts.executor import ProcessExecutor
+        from tests.rollouts.plays import blocked_signals
+
+        if __name__ == "__main__":
+            print(*[event.result for event in ProcessExecutor().run(blocked_signals, [0])])
+    """
+    words = [sys.executable, "-c", textwrap.dedent(program)]
+    said = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert int(said, 16) >> (signal.SIGINT - 1) & 1
 
 
 def test_an_episode_that_cannot_be_played(tmp_path):
     events = {event.seed: event for event in run(Play(fails_at=1, breaks_at=2), range(4))}
     assert sorted(squares(events.values())) == [0, 3]
-    assert events[1] == Event(1, error=events[1].error)
+    assert events[1] == Event(1, error=events[1].error, worker=events[1].worker)
     assert isinstance(events[1].error, TaskError)
     assert str(events[1].error) == "no plan for 1"
     assert isinstance(events[2].error, WorkerError)
@@ -81,7 +124,7 @@ def test_a_worker_that_dies_before_it_is_ready_is_replaced(tmp_path):
 
 
 def test_what_cannot_be_sent_is_said():
-    with pytest.raises(WorkerError, match="cannot be sent to them: .*lambda.*; a task or an exp"):
+    with pytest.raises(WorkerError, match="cannot be sent to them: .*lambda.*; a task, an ex"):
         run(lambda: None, range(2))
 
 

@@ -1,14 +1,10 @@
-"""The experts that pick, place and stack solve their tasks, here and in native."""
-
-import functools
+"""The experts that pick, place and stack: how they grip, and what they refuse."""
 
 import numpy as np
 import pytest
-import torch
 
 import tasks
 from layouts import Layout, Placement
-from parity.native import make_native, native_action
 from robots import RobotRegistry, TaskError
 from rollouts.episode import play
 from rollouts.experts import find_expert
@@ -16,80 +12,7 @@ from rollouts.experts.geometry import rotate
 from rollouts.experts.grasps import cube_grips, held_at, is_near
 from rollouts.experts.rehearsal import Rehearsal, first_success
 from rollouts.experts.script import Scene, Waypoint
-
-TASKS = (
-    "PickCube-v1",
-    "PickCubeSO100-v1",
-    "PlaceSphere-v1",
-    "StackCube-v1",
-    "StackPyramid-v1",
-    "TwoRobotStackCube-v1",
-)
-SEEDS = (0, 1)
-
-
-@functools.cache
-def task(task_id: str) -> tasks.MultiRobotTask:
-    return tasks.make(task_id)
-
-
-@functools.cache
-def plan(task_id: str, seed: int) -> np.ndarray:
-    return find_expert(task_id)(task(task_id), seed)
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.parametrize("task_id", TASKS)
-def test_the_task_is_solved_in_a_fresh_environment(task_id, seed):
-    actions = plan(task_id, seed)
-    env = tasks.make(task_id)
-    assert actions.dtype == np.float32
-    assert actions.shape[1:] == env.single_action_space.shape
-    assert len(actions) <= env.max_episode_steps
-    assert np.abs(actions).max() <= 1
-    success = play(env, seed, actions).success
-    assert success[-1]
-    assert not success[:-1].any()
-
-
-@pytest.mark.parametrize("task_id", TASKS)
-def test_a_plan_is_the_same_to_the_last_bit(task_id):
-    np.testing.assert_array_equal(find_expert(task_id)(tasks.make(task_id), 1), plan(task_id, 1))
-
-
-@pytest.mark.parametrize("task_id", TASKS)
-def test_the_task_is_left_alone(task_id):
-    env = tasks.make(task_id)
-    env.reset(seed=11)
-    env.step(torch.zeros(1, env.layout.action_dim))
-    before = env.get_state_dict()
-    find_expert(task_id)(env, 0)
-    after = env.get_state_dict()
-    for group, entries in before.items():
-        for name, row in entries.items():
-            assert torch.equal(after[group][name], row), name
-
-
-@pytest.mark.long
-@pytest.mark.native
-@pytest.mark.filterwarnings("ignore:__array_wrap__:DeprecationWarning")  # mani_skill's own
-@pytest.mark.parametrize("task_id", TASKS)
-def test_native_is_solved_by_the_same_actions(task_id):
-    native = make_native(task_id)
-    failed: list[int] = []
-    for seed in range(10):
-        native.reset(seed=seed, options={"reconfigure": True})
-        outcomes = [
-            bool(native.step(native_action(native, action))[-1]["success"][0])
-            for action in plan(task_id, seed)
-        ]
-        ours = play(task(task_id), seed, plan(task_id, seed)).success
-        assert outcomes == ours.tolist(), f"seed {seed}"
-        if not outcomes[-1]:
-            failed.append(seed)
-    native.close()
-    allowed = 2 if task_id == "PickCubeSO100-v1" else 0
-    assert len(failed) <= allowed, f"failed: {failed}"
+from tests.rollouts.expert_plays import plan, task
 
 
 @pytest.mark.parametrize(

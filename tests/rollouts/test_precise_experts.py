@@ -1,120 +1,37 @@
 """The experts that draw, insert, plug in and push do so by the means their tasks intend."""
 
-import functools
-
 import numpy as np
 import pytest
-import torch
 
 import tasks
 from layouts import Layout, Placement
-from parity.native import make_native, native_action
 from robots import TaskError
-from rollouts.episode import Episode, play
+from rollouts.episode import play
 from rollouts.experts import find_expert
 from rollouts.experts import push_t as push_t_module
 from rollouts.experts.geometry import rotate
+from tests.rollouts.expert_plays import episode, plan, seeds, task
 
-# Task -> how many of 50 seeds at least, and those that are played in every run.
-TASKS = {
-    "DrawTriangle-v1": (48, (0,)),
-    "PegInsertionSide-v1": (45, (0, 1)),
-    "PlugCharger-v1": (45, (0, 3)),  # 3 takes the second style
-    "PushT-v1": (45, (13, 15)),
-}
-EPISODES = [(name, seed) for name, (_, seeds) in TASKS.items() for seed in seeds]
 HELD = {"PegInsertionSide-v1": "peg", "PlugCharger-v1": "charger"}
-REBUILT = {"reconfigure": True}
 
 
-@functools.cache
-def task(name: str) -> tasks.MultiRobotTask:
-    return tasks.make(name)
-
-
-@functools.cache
-def plan(name: str, seed: int) -> np.ndarray:
-    return find_expert(name)(task(name), seed)
-
-
-@functools.cache
-def episode(name: str, seed: int) -> Episode:
-    return play(tasks.make(name), seed, plan(name, seed))
-
-
-@pytest.mark.parametrize(("name", "seed"), EPISODES)
-def test_an_expert_solves_its_task_in_time(name, seed):
-    actions = plan(name, seed)
-    assert actions.dtype == np.float32
-    assert actions.shape[1:] == task(name).single_action_space.shape
-    assert len(actions) <= task(name).max_episode_steps
-    assert np.abs(actions).max() <= 1
-    success = episode(name, seed).success
-    assert success[-1]
-    assert not success[:-1].any()
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", TASKS)
-def test_an_expert_solves_most_of_50_seeds(name):
-    failed = [seed for seed in range(50) if not episode(name, seed).solved]
-    assert len(failed) <= 50 - TASKS[name][0], f"failed: {failed}"
-
-
-@pytest.mark.long
-@pytest.mark.native
-# mani_skill's own
-@pytest.mark.filterwarnings("ignore:__array_wrap__:DeprecationWarning")
-@pytest.mark.filterwarnings("ignore:The 'warn' method:DeprecationWarning")
-@pytest.mark.parametrize("name", TASKS)
-def test_the_same_actions_succeed_in_native(name):
-    native = make_native(name)
-    for seed in range(10):
-        native.reset(seed=seed, options=REBUILT)
-        for action in plan(name, seed):
-            *_, info = native.step(native_action(native, action))
-        assert bool(info["success"][0]) == episode(name, seed).solved, f"seed {seed}"
-        assert bool(info["success"][0]), f"seed {seed}"
-    native.close()
-
-
-@pytest.mark.parametrize("name", TASKS)
-def test_an_expert_repeats_itself(name):
-    seed = TASKS[name][1][-1]
-    np.testing.assert_array_equal(find_expert(name)(tasks.make(name), seed), plan(name, seed))
-
-
-@pytest.mark.parametrize("name", TASKS)
-def test_an_expert_leaves_the_task_alone(name):
-    env = tasks.make(name)
-    env.reset(seed=11)
-    env.step(torch.zeros(1, *env.single_action_space.shape))
-    before = env.get_state_dict()
-    find_expert(name)(env, TASKS[name][1][-1])
-    after = env.get_state_dict()
-    for group, entries in before.items():
-        for body, row in entries.items():
-            assert torch.equal(after[group][body], row), body
-
-
-@pytest.mark.parametrize("seed", TASKS["DrawTriangle-v1"][1])
-def test_the_triangle_is_drawn_in_one_go(seed):
+def test_the_triangle_is_drawn_in_one_go():
     """From the first dot on every step leaves one: the stick is not lifted in between."""
-    actors = episode("DrawTriangle-v1", seed).states["actors"]
-    count = len(plan("DrawTriangle-v1", seed))
+    actors = episode("DrawTriangle-v1", 0).states["actors"]
+    count = len(plan("DrawTriangle-v1", 0))
     drawn = [actors[f"dot_{i}"][-1, 2] > 0 for i in range(count)]
     assert sum(drawn) > 30
     assert all(drawn[drawn.index(True) :])
 
 
-@pytest.mark.parametrize(("name", "seed"), [key for key in EPISODES if key[0] in HELD])
+@pytest.mark.parametrize(("name", "seed"), [(name, s) for name in HELD for s in seeds(name)])
 def test_what_is_put_in_is_held_to_the_end(name, seed):
     env = tasks.make(name)
     play(env, seed, plan(name, seed))
     assert bool(env.simulation.read().is_grasping("arm", HELD[name])[0])
 
 
-@pytest.mark.parametrize("seed", TASKS["PegInsertionSide-v1"][1])
+@pytest.mark.parametrize("seed", [0, 1])
 def test_the_peg_goes_in_straight(seed):
     actors = episode("PegInsertionSide-v1", seed).states["actors"]
     axes = [
@@ -124,7 +41,7 @@ def test_the_peg_goes_in_straight(seed):
     assert axes[0] @ axes[1] > np.cos(0.06)  # 6 mm of play over 10 cm
 
 
-@pytest.mark.parametrize("seed", TASKS["PushT-v1"][1])
+@pytest.mark.parametrize("seed", seeds("PushT-v1"))
 def test_the_t_is_pushed_over_the_table(seed):
     """The stick's friction lifts its near side a little, never off the table."""
     rows = episode("PushT-v1", seed).states["actors"]["Tee"]

@@ -1,18 +1,15 @@
 """The experts that push, pull, poke, stand up and roll do so by the means their tasks intend."""
 
-import functools
-
 import numpy as np
 import pytest
-import torch
 
 import tasks
 from layouts import Layout, Placement
-from parity.native import make_native, native_action
 from robots import TaskError
-from rollouts.episode import Episode, play
+from rollouts.episode import play
 from rollouts.experts import find_expert
 from rollouts.experts.geometry import rotate
+from tests.rollouts.expert_plays import REBUILT, episode, path, plan
 
 TASKS = (
     "LiftPegUpright-v1",
@@ -24,81 +21,6 @@ TASKS = (
 )
 HELD = {"PokeCube-v1": "peg", "PullCubeTool-v1": "l_shape_tool"}
 X_AXIS = np.array([1.0, 0.0, 0.0])
-REBUILT = {"reconfigure": True}
-
-
-@functools.cache
-def task(name: str) -> tasks.MultiRobotTask:
-    return tasks.make(name)
-
-
-@functools.cache
-def plan(name: str, seed: int) -> np.ndarray:
-    return find_expert(name)(task(name), seed)
-
-
-@functools.cache
-def episode(name: str, seed: int) -> Episode:
-    return play(task(name), seed, plan(name, seed))
-
-
-def path(name: str, seed: int, body: str) -> np.ndarray:
-    """Return where a body was before and after every step, (T + 1, 3) (m)."""
-    return episode(name, seed).states["actors"][body][:, :3]
-
-
-@pytest.mark.parametrize("name", TASKS)
-@pytest.mark.parametrize("seed", [0, 1])
-def test_an_expert_solves_its_task_in_time(name, seed):
-    actions = plan(name, seed)
-    assert actions.dtype == np.float32
-    assert actions.shape[1:] == (8,)
-    assert len(actions) <= task(name).max_episode_steps
-    assert np.abs(actions).max() <= 1
-    success = play(tasks.make(name), seed, actions).success
-    assert success[-1]
-    assert not success[:-1].any()
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", TASKS)
-def test_an_expert_solves_48_of_50_seeds(name):
-    failed = [seed for seed in range(50) if not play(task(name), seed, plan(name, seed)).solved]
-    assert len(failed) <= 2, f"failed: {failed}"
-
-
-@pytest.mark.long
-@pytest.mark.native
-# mani_skill's own
-@pytest.mark.filterwarnings("ignore:__array_wrap__:DeprecationWarning")
-@pytest.mark.filterwarnings("ignore:The 'warn' method:DeprecationWarning")
-@pytest.mark.parametrize("name", TASKS)
-def test_the_same_actions_succeed_in_native(name):
-    native = make_native(name)
-    for seed in range(10):
-        native.reset(seed=seed, options=REBUILT)
-        for action in plan(name, seed):
-            *_, info = native.step(native_action(native, action))
-        assert bool(info["success"][0]), f"seed {seed}"
-    native.close()
-
-
-@pytest.mark.parametrize("name", TASKS)
-def test_an_expert_repeats_itself(name):
-    np.testing.assert_array_equal(find_expert(name)(tasks.make(name), 1), plan(name, 1))
-
-
-@pytest.mark.parametrize("name", TASKS)
-def test_an_expert_leaves_the_task_alone(name):
-    env = tasks.make(name)
-    env.reset(seed=11)
-    env.step(torch.zeros(1, 8))
-    before = env.get_state_dict()
-    find_expert(name)(env, 1)
-    after = env.get_state_dict()
-    for group, entries in before.items():
-        for body, row in entries.items():
-            assert torch.equal(after[group][body], row), body
 
 
 @pytest.mark.parametrize("name", ["PushCube-v1", "PullCube-v1"])
@@ -141,7 +63,9 @@ def test_the_ball_rolls_by_itself(seed):
     rolling = path("RollBall-v1", seed, "ball")
     speeds = np.linalg.norm(np.diff(rolling[-10:], axis=0), axis=1)
     assert speeds.max() - speeds.min() < 0.01 * speeds.max()
-    state = task("RollBall-v1").simulation.read()
+    env = tasks.make("RollBall-v1")
+    play(env, seed, plan("RollBall-v1", seed))
+    state = env.simulation.read()
     assert np.linalg.norm(state.tcp_offset("arm", "ball")) > 0.5
 
 

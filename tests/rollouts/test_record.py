@@ -48,7 +48,7 @@ def start(*words: str) -> subprocess.Popen[str]:
 
 def wait_for_parts(out: Path, count: int) -> None:
     deadline = time.monotonic() + 180
-    while len(list(out.glob("trajectory.parts/*.h5"))) < count:
+    while len(list(out.glob("trajectory.parts/*.part"))) < count:
         assert time.monotonic() < deadline, "nothing is recorded"
         time.sleep(0.005)
 
@@ -210,14 +210,14 @@ def expect_killed_and_resumed(
     """Kill a recording some time after it has begun to write, and go on until it is whole."""
     out, undisturbed = tmp_path / "killed", tmp_path / "undisturbed" / FILE
     for patience in kills:
-        before = len(list(out.glob("trajectory.parts/*.h5")))
+        before = len(list(out.glob("trajectory.parts/*.part")))
         process = start(*arguments(out, episodes, workers))
         wait_for_parts(out, before + 1)
         time.sleep(patience)
         process.kill()
         process.communicate()
         wait_until_nobody_is_left(process)
-    left = len(list(out.glob("trajectory.parts/*.h5")))
+    left = len(list(out.glob("trajectory.parts/*.part")))
     assert 0 < left < episodes, "it was killed too late"
     last = start(*arguments(out, episodes, workers))
     printed, said = last.communicate(timeout=600)
@@ -254,7 +254,7 @@ def test_a_full_disk_ends_it_with_what_is_finished(tmp_path):
         kept, error = said.splitlines()[-2:]
         assert error.startswith(f"error: cannot write {disk}/trajectory.parts/seed-")
         assert error.endswith("No space left on device")
-        parts = len(list(disk.glob("trajectory.parts/*.h5")))
+        parts = len(list(disk.glob("trajectory.parts/*.part")))
         assert parts > 3
         assert kept == f"stopped; {parts} episodes are recorded"
         wait_until_nobody_is_left(process)

@@ -18,6 +18,7 @@ import pytest
 import tasks
 from robots import ActionError, RecordingError, TaskError
 from rollouts.episode import Episode, play
+from rollouts.parts import part_path, read_part
 from rollouts.recorder import Recorder
 from rollouts.trajectory import TrajectoryFile
 from tests.rollouts.hand_overs import TASK, plan, task
@@ -189,10 +190,12 @@ def test_a_part_says_what_it_is(tmp_path, push_t):
     with Recorder(tmp_path / "open.h5", env) as recorder:
         recorder.add(episodes[3])
         (part,) = recorder.parts.iterdir()
-        with h5py.File(part) as file:
-            np.testing.assert_array_equal(file["traj_0/actions"], episodes[3].actions)
-            header = json.loads(file.attrs["header"])
-            assert header["layout"]["arm"]["robot"] == "panda_stick"
+        header, stored = read_part(part)
+        assert json.loads(header)["layout"]["arm"]["robot"] == "panda_stick"
+        assert stored.about["episode_seed"] == 3
+        np.testing.assert_array_equal(stored.arrays["actions"], episodes[3].actions)
+        tee = stored.arrays["env_states/actors/Tee"]
+        np.testing.assert_array_equal(tee, episodes[3].states["actors"]["Tee"])
         assert len(recorder) == 1
 
 
@@ -250,8 +253,8 @@ def test_what_a_kill_leaves_half_done_is_tidied(tmp_path, push_t):
     path = write(tmp_path / "tidy.h5", env, episodes[:2])
     parts = path.with_suffix(".parts")
     parts.mkdir()
-    (parts / "seed-0000000007.h5.123.partial").write_bytes(b"half")
-    (parts / "seed-0000000008.h5").write_bytes(b"damaged")
+    (parts / "seed-0000000007.part.123.partial").write_bytes(b"half")
+    (parts / "seed-0000000008.part").write_bytes(b"damaged")
     path.with_name("tidy.h5.partial").write_bytes(b"half")
     path.with_name("tidy.json.partial").write_text("{")
     path.with_name("untidy.h5.partial").write_text("another's")
@@ -259,6 +262,50 @@ def test_what_a_kill_leaves_half_done_is_tidied(tmp_path, push_t):
         assert recorder.seeds == {0, 1}
     names = sorted(p.name for p in tmp_path.iterdir())
     assert names == ["tidy.h5", "tidy.json", "untidy.h5.partial"]
+
+
+def damaged(content: bytes) -> dict[str, bytes]:
+    middle = len(content) // 2
+    return {
+        "nothing": b"",
+        "zeros": bytes(len(content)),
+        "a short piece": content[:40],
+        "half": content[:middle],
+        "all but a byte": content[:-1],
+        "more": content + b"\0",
+        "another bit": content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :],
+    }
+
+
+@pytest.mark.parametrize("damage", damaged(b"of any length"))
+def test_a_part_that_is_torn_or_changed_is_recorded_again(tmp_path, push_t, damage):
+    env, episodes = push_t
+    path = tmp_path / "torn.h5"
+    recorder = Recorder(path, env)
+    for episode in episodes[:2]:
+        recorder.add(episode)
+    torn = part_path(recorder.parts, 1)
+    torn.write_bytes(damaged(torn.read_bytes())[damage])
+    del recorder
+    with Recorder(path, env, resume=True) as again:
+        assert again.seeds == {0}
+        again.add(episodes[1])
+    assert same_files(path, write(tmp_path / "whole.h5", env, episodes[:2]))
+
+
+def test_parts_of_an_earlier_version_are_refused_not_lost(tmp_path, push_t):
+    env, episodes = push_t
+    path = write(tmp_path / "old.h5", env, episodes[:1])
+    parts = path.with_suffix(".parts")
+    parts.mkdir()
+    old = parts / "seed-0000000007.h5"
+    with h5py.File(old, "w") as file:
+        file["traj_0/actions"] = episodes[1].actions
+    with pytest.raises(RecordingError, match=r"seed-0000000007\.h5 is one of 1 episodes that an e"):
+        Recorder(path, env, resume=True)
+    assert old.exists()
+    write(path, env, episodes[:2], overwrite=True)
+    assert not parts.exists()
 
 
 def test_one_episode_per_seed(tmp_path, push_t):

@@ -35,6 +35,12 @@ def test_a_layout_that_is_clear_is_built():
     tasks.make(TWO, layout=face_to_face(PANDAS, spacing=1.4)).close()
 
 
+def test_a_folded_arm_that_grazes_itself_with_joint_noise_is_built():
+    layout = side_by_side({f"arm_{i}": "koch" for i in range(6)}, spacing="auto")
+    assert layout.validate(workspaces=False).findings
+    refuse_collisions(layout)
+
+
 def test_other_robots_at_the_same_places_are_checked_too():
     with pytest.raises(LayoutError, match="collide"):
         tasks.make(TWO, layout=crowded(), robots={"right": "panda_stick"})

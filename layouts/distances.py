@@ -1,0 +1,114 @@
+"""Distances that presets choose, from how far their robots reach.
+
+Neighbours stand `HAND_OVER` of the sum of their reaches apart: the last eighth of that sum is where
+both can work, so one can hand an object to the other. They never stand so near that one can reach
+the other's base. Robots of the catalogue, however mixed, keep clear of each other so.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import accumulate, pairwise
+
+from robots import RobotDescriptor
+
+# Share of the sum of two reaches. ManiSkill's two-robot tasks stand their Pandas 1.5 m apart,
+# which is 0.877 of twice 0.855 m (mani_skill 3.0.1, scene_builder/table).
+HAND_OVER = 7 / 8
+# The same where robots also stand round a corner of a table: at 7/8 their hands would meet over its
+# middle. Pandas need 0.93 to start 5 cm apart there, with joint noise.
+ROUND_CORNERS = 15 / 16
+OPPOSITE = (("north", "south"), ("east", "west"))  # edges of a table
+
+Rows = Mapping[str, Sequence[RobotDescriptor]]  # the robots of each edge of a table, in order
+
+
+def apart(one: RobotDescriptor, other: RobotDescriptor) -> float:
+    """Return the hand-over distance (m) of two bases, from which neither reaches the other one."""
+    return max(HAND_OVER * (one.reach + other.reach), one.reach, other.reach)
+
+
+def gaps(row: Iterable[RobotDescriptor]) -> list[float]:
+    """Return the hand-over distances (m) of neighbours in a row."""
+    return [apart(*pair) for pair in pairwise(row)]
+
+
+def centred(gaps: Sequence[float]) -> list[float]:
+    """Return the places of a row with these gaps, from smallest to largest, about 0 (m)."""
+    return list(accumulate(gaps, initial=-sum(gaps) / 2))
+
+
+def ring_of(robots: Sequence[RobotDescriptor]) -> tuple[float, list[float]]:
+    """Return the radius (m) and the angles (rad) that put neighbours at hand-over distance.
+
+    The neighbours' distances are the sides of a polygon whose corners lie on the circle.
+    """
+    count = len(robots)
+    if count == 1:
+        return HAND_OVER * robots[0].reach, [0.0]
+    sides = gaps([*robots, robots[0]])
+    longest = max(range(count), key=lambda i: sides[i])
+    if sides[longest] - min(sides) < 1e-12:
+        radius = sides[0] / (2 * math.sin(math.pi / count))
+        return radius, [2 * math.pi * i / count for i in range(count)]
+    radius = _circumradius(sides)
+    arcs = [2 * math.asin(min(side / (2 * radius), 1.0)) for side in sides]
+    arcs[longest] = 2 * math.pi - (sum(arcs) - arcs[longest])
+    return radius, list(accumulate(arcs[:-1], initial=0.0))
+
+
+def share_at_table(rows: Rows) -> float:
+    """Return at which share of its reach a robot at an edge is from the middle of a table."""
+    along_x, along_y = (any(rows[edge] for edge in pair) for pair in OPPOSITE)
+    return ROUND_CORNERS if along_x and along_y else HAND_OVER
+
+
+def table_for(rows: Rows, inset: float) -> tuple[float, float]:
+    """Return width and depth (m) of a table with robots at its edges.
+
+    One robot at an edge works in the middle. Of several, the outer ones stand as far from the
+    corner as any robot round it reaches.
+
+    Args:
+        rows: The robots of each edge.
+        inset: Of their bases from the edge (m).
+    """
+    farthest = max(robot.reach for row in rows.values() for robot in row)
+    alone = share_at_table(rows) * farthest
+
+    def length(edge: str) -> float:
+        span = sum(gaps(rows[edge]))
+        return span + 2 * (farthest if span > 0 else alone)
+
+    width, depth = (max(map(length, pair)) + 2 * inset for pair in OPPOSITE)
+    return width, depth
+
+
+def _circumradius(sides: Sequence[float]) -> float:
+    """Return the radius of the circle through the corners of a polygon with these sides (m).
+
+    Each side is shorter than the others together. Found by bisection: the smallest circle that
+    the longest side fits into is half of it.
+    """
+    longest = max(sides)
+
+    def angle(radius: float) -> float:  # half of what all sides but the longest span
+        return sum(math.asin(min(s / (2 * radius), 1.0)) for s in sides) - math.asin(
+            min(longest / (2 * radius), 1.0)
+        )
+
+    # The longest side spans the rest of the circle; more than half of it if the others span less.
+    centre_inside = angle(longest / 2) >= math.pi / 2
+
+    def too_small(radius: float) -> bool:
+        rest = math.asin(longest / (2 * radius))
+        return angle(radius) > math.pi - rest if centre_inside else angle(radius) < rest
+
+    low, high = longest / 2, longest
+    while too_small(high):
+        low, high = high, 2 * high
+    for _ in range(100):
+        middle = (low + high) / 2
+        low, high = (middle, high) if too_small(middle) else (low, middle)
+    return high

@@ -1,0 +1,102 @@
+"""``python -m parity report``: what a sweep found, as one HTML page that needs nothing else."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from parity import embedding
+from parity.report.content import page_content
+from parity.report.html import render
+from parity.results import RESULTS, ResultsError, read
+from parity.sweep.entries import SUMMARY, read_summary
+from robots import RecordingError, RobotLayoutsError, TaskError
+
+LIMIT = 25.0  # MB
+MARGIN = 20_000  # bytes kept free when clips are made to fit
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Returns:
+        0 if the page was written, 2 if not.
+    """
+    parser = argparse.ArgumentParser(
+        prog="python -m parity report",
+        description="Make one self-contained HTML page of what `python -m parity sweep` and the"
+        " recorded comparison found, clips included.",
+    )
+    add = parser.add_argument
+    add("--runs", type=Path, default=Path("runs"), metavar="DIR", help="the sweep's (%(default)s)")
+    add("--out", type=Path, default=Path("report.html"), metavar="FILE", help="%(default)s")
+    add("--results", type=Path, default=RESULTS, help="the record (this project's)")
+    add("--limit", type=float, default=LIMIT, metavar="MB", help="largest page (%(default)g MB)")
+    args = parser.parse_args(argv)
+    try:
+        page = make(args.runs, args.results, args.limit)
+        _write(args.out, page)
+    except RobotLayoutsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    print(f"{args.out}: {len(page.encode()) / 1e6:.1f} MB")
+    return 0
+
+
+def make(runs: Path, results: Path = RESULTS, limit: float = LIMIT) -> str:
+    """Return the page.
+
+    Args:
+        runs: Folder of a sweep.
+        results: The recorded comparison.
+        limit: Largest size (MB); clips are encoded anew where they have to be.
+
+    Raises:
+        ResultsError: If there is no sweep or no record, or one cannot be read.
+        TaskError: If the page cannot be made as small as that.
+    """
+    if not (runs / SUMMARY).is_file():
+        raise ResultsError(f"there is no {runs / SUMMARY}; `python -m parity sweep` writes it")
+    swept, recorded = read_summary(runs / SUMMARY), read(results)
+    paths = {
+        task_id: runs / task_id / entry["clip"]["clip"]
+        for task_id, entry in swept["tasks"].items()
+        if entry["clip"]
+    }
+    if lost := [str(path) for path in paths.values() if not path.is_file()]:
+        raise ResultsError(f"{', '.join(lost)} is gone; `python -m parity sweep --again` makes it")
+    posters = {path: embedding.poster(path) for path in paths.values()}
+    context = page_content(runs, swept, recorded)
+    bare = len(render(context, {}).encode()) + sum(_encoded(len(p)) for p in posters.values())
+    room = int((limit * 1e6 - bare - MARGIN) * 3 / 4)
+    try:
+        fitted = embedding.take(list(paths.values()), room, posters) if paths else {}
+    except embedding.ClipError as error:
+        raise TaskError(_too_large(limit, str(error))) from error
+    page = render(context, {task_id: fitted[path] for task_id, path in paths.items()})
+    if len(page.encode()) > limit * 1e6:
+        raise TaskError(_too_large(limit, f"it takes {len(page.encode()) / 1e6:.2f} MB"))
+    return page
+
+
+def _too_large(limit: float, why: str) -> str:
+    return f"the page does not fit into {limit:g} MB ({why}); give a larger --limit, or fewer tasks"
+
+
+def _encoded(count: int) -> int:
+    return -(-count // 3) * 4 + 100  # base64, and the words around it
+
+
+def _write(path: Path, page: str) -> None:
+    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
+    try:
+        path.absolute().parent.mkdir(parents=True, exist_ok=True)
+        partial.write_text(page, encoding="utf-8")
+        os.replace(partial, path)
+    except OSError as error:
+        raise RecordingError(f"cannot write {path}: {error}") from error
+    finally:
+        partial.unlink(missing_ok=True)

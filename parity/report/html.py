@@ -1,0 +1,74 @@
+"""How a report is written: a template, a style and a script, and clips inside the page."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Mapping
+from importlib.resources import files
+from typing import Any
+
+from parity.embedding import Embedded
+from robots import MissingPackageError
+
+
+def render(context: Mapping[str, Any], fitted: Mapping[str, Embedded]) -> str:
+    """Return the page.
+
+    Args:
+        context: What it says.
+        fitted: Clip of a task by its id.
+
+    Raises:
+        MissingPackageError: If jinja2 is not installed.
+    """
+    try:
+        import jinja2
+    except ImportError:
+        raise MissingPackageError("a page needs jinja2: pip install jinja2") from None
+    folder = files("parity") / "templates"
+    parts = {
+        name: (folder / f"report.{suffix}").read_text(encoding="utf-8")
+        for name, suffix in (("page", "html.jinja"), ("style", "css"), ("script", "js"))
+    }
+    environment = jinja2.Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    shown = [{**task, "clip": _clip(task, fitted.get(task["id"]))} for task in context["tasks"]]
+    return environment.from_string(parts["page"]).render(
+        {
+            **context,
+            "tasks": shown,
+            "style": parts["style"],
+            "script": parts["script"],
+            "policy": _policy(parts["style"], parts["script"]),
+        }
+    )
+
+
+def _clip(task: Mapping[str, Any], clip: Embedded | None) -> dict[str, Any] | None:
+    if clip is None:
+        return None
+    label = f"{task['id']}: native ManiSkill, the clone and their difference, side by side"
+    return {
+        "label": label,
+        "caption": task["caption"],
+        "source": _data_address("video/mp4", clip.video),
+        "poster": _data_address("image/jpeg", clip.poster),
+        "width": clip.width,
+        "height": clip.height,
+    }
+
+
+def _data_address(kind: str, content: bytes) -> str:
+    return f"data:{kind};base64,{base64.b64encode(content).decode()}"
+
+
+def _policy(style: str, script: str) -> str:
+    """Return a policy under which a browser loads nothing but what the page itself carries."""
+    allowed = {
+        name: base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+        for name, text in (("style-src", style), ("script-src", script))
+    }
+    own = "; ".join(f"{name} 'sha256-{digest}'" for name, digest in allowed.items())
+    return f"default-src 'none'; img-src data:; media-src data: blob:; {own}; form-action 'none'"

@@ -1,0 +1,1 @@
+"""The sweep: every task beside native, with rollouts, agreement and clips."""

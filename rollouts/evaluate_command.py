@@ -1,0 +1,102 @@
+"""``python -m rollouts evaluate``: how well a policy or an expert does."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from robots import CONTROL_MODES, TaskError
+from rollouts import workers
+from rollouts.workers import INTERRUPTED, one_or_more, stop_signals, zero_or_more
+
+if TYPE_CHECKING:
+    from rollouts.executor import Event
+    from rollouts.progress import LiveLine
+
+DESCRIPTION = "let a policy play episodes in worker processes, and tell how well it does"
+EPILOG = (
+    "A policy maps an observation to an action; see rollouts.evaluate. Exit code: 0 if all was"
+    " played, 1 if not, 2 for bad usage, 130 if interrupted."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.epilog = EPILOG
+    add = parser.add_argument
+    add("--task", required=True, help="task id")
+    add(
+        "--policy",
+        default="expert",
+        metavar="MODULE:NAME",
+        help="a policy that can be imported; by default the task's expert",
+    )
+    add("--episodes", type=one_or_more, default=100, metavar="N", help="how many (%(default)s)")
+    workers.add_arguments(parser)
+    add("--seed", type=zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
+    add("--control-mode", choices=CONTROL_MODES, default=CONTROL_MODES[0], help="(%(default)s)")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command; returns its exit code.
+
+    Raises:
+        RobotLayoutsError: If it makes no sense, or the policy fails.
+    """
+    from rollouts.evaluation import evaluate
+    from rollouts.progress import LiveLine
+
+    module, named, _ = options.policy.partition(":")
+    executor = workers.chosen_executor(options, [module] if named else [])
+    line = LiveLine(options.episodes, "episodes")
+    try:
+        with stop_signals(), line:
+            found = evaluate(
+                find_policy(options.policy),
+                options.task,
+                range(options.seed, options.seed + options.episodes),
+                executor=executor,
+                on_event=_Status(line).show,
+                control_mode=options.control_mode,
+            )
+    except KeyboardInterrupt:
+        print("stopped", file=sys.stderr)
+        return INTERRUPTED
+    print(found)
+    return 0
+
+
+def find_policy(name: str) -> Any:
+    """Return what ``MODULE:NAME`` names, or the word ``"expert"`` as it is.
+
+    Raises:
+        TaskError: If it cannot be imported.
+    """
+    if ":" not in name:
+        return name
+    module, _, attribute = name.partition(":")
+    try:
+        return getattr(import_module(module), attribute)
+    except (ImportError, AttributeError) as error:
+        raise TaskError(f"no policy {name!r}: {error}") from error
+
+
+class _Status:
+    """How far the evaluation is."""
+
+    def __init__(self, line: LiveLine) -> None:
+        self._line = line
+        self._solved = self._played = 0
+
+    def show(self, event: Event) -> None:
+        """Tell what has come of the episodes so far."""
+        if event.seed is None and event.said is not None:
+            self._line.say(event.said)
+        if event.died is not None:
+            self._line.say(f"{event.died}; another takes its place")
+        if event.result is not None:
+            self._played += 1
+            self._solved += event.result.success
+        self._line.update(self._played, f"{self._solved} of {self._played} succeeded")

@@ -1,0 +1,149 @@
+"""The h5 file that finished episodes are joined into, in ManiSkill's own trajectory format.
+
+Groups and datasets are made by h5py's low-level interface, at a third of what its own
+`create_dataset` costs, with the properties that `create_dataset` would give them.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from robots import RecordingError
+from rollouts.disk import replaced
+from rollouts.parts import Stored, read_part
+
+_FORMAT = "v108"  # HDF5 1.8, the first in which attributes may be larger than 64 kB
+_TEXT = h5py.string_dtype()
+_HDF5: Any = h5py  # whose low-level modules pyright cannot look into
+
+
+def read_joined(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    """Return the header of a recording that was written here, and its episodes' json by group.
+
+    Raises:
+        RecordingError: If it was not written here, or is damaged.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            header = {name: json.loads(text) for name, text in file.attrs.items()}
+            about = {name: json.loads(group.attrs["episode"]) for name, group in file.items()}
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
+        raise RecordingError(
+            f"{path} is no recording of this library, or it is damaged: {error}"
+        ) from error
+    return header, about
+
+
+def join(
+    path: Path, header: Mapping[str, Any], episodes: Sequence[Path | str]
+) -> dict[str, dict[str, Any]]:
+    """Write episodes into one h5 file, numbered in the order given, in place of what is there.
+
+    Args:
+        path: The file; it is replaced in one step, when the new one is complete and on the disk.
+        header: What the episodes have in common.
+        episodes: What to join: parts, and names of groups in the present file.
+
+    Returns:
+        The episodes' json by group, as `read_joined` does.
+
+    Raises:
+        RecordingError: If it cannot be written, or an episode not be read; nothing is changed.
+    """
+    about: dict[str, dict[str, Any]] = {}
+    with replaced(path) as partial:
+        with ExitStack() as stack:
+            file = stack.enter_context(h5py.File(partial, "w", libver=(_FORMAT, "latest")))
+            present = stack.enter_context(h5py.File(path, "r")) if path.exists() else file
+            for name, value in header.items():
+                file.attrs[name] = json.dumps(value)
+            writer = _GroupWriter(file)
+            for number, episode in enumerate(episodes):
+                if isinstance(episode, Path):
+                    stored = read_part(episode)[1]
+                else:
+                    stored = _read_group(present, episode)
+                writer.write(f"traj_{number}", stored)
+                about[f"traj_{number}"] = stored.about
+        _sync(partial)
+    return about
+
+
+class _GroupWriter:
+    """Writes episodes as groups of a file.
+
+    Names are written in sorted order, and nothing has a time stamp: the bytes of a file depend on
+    its episodes only, not on whether they come from parts or from another file.
+    """
+
+    def __init__(self, file: h5py.File) -> None:
+        self._file = file.id
+        self._group_properties = _HDF5.h5p.create(_HDF5.h5p.GROUP_CREATE)
+        self._group_properties.set_obj_track_times(False)
+        self._properties = _HDF5.h5p.create(_HDF5.h5p.DATASET_CREATE)
+        self._properties.set_obj_track_times(False)
+        self._properties.set_fill_time(_HDF5.h5d.FILL_TIME_IFSET)
+        self._text = _HDF5.h5t.py_create(_TEXT, logical=True)
+        self._one = _HDF5.h5s.create(_HDF5.h5s.SCALAR)
+        self._types: dict[Any, Any] = {}
+        self._spaces: dict[tuple[int, ...], Any] = {}
+
+    def write(self, name: str, stored: Stored) -> None:
+        groups = {"": self._create_group(self._file, name)}
+        for key, text in sorted(stored.attributes.items()):
+            attribute = _HDF5.h5a.create(groups[""], key.encode(), self._text, self._one)
+            attribute.write(np.array(text, _TEXT))
+        for key, rows in sorted(stored.arrays.items()):
+            above, _, last = key.rpartition("/")
+            self._write_array(self._find_group(groups, above), last, rows)
+
+    def _find_group(self, groups: dict[str, Any], name: str) -> Any:
+        if name not in groups:
+            above, _, last = name.rpartition("/")
+            groups[name] = self._create_group(self._find_group(groups, above), last)
+        return groups[name]
+
+    def _create_group(self, above: Any, name: str) -> Any:
+        return _HDF5.h5g.create(above, name.encode(), None, self._group_properties)
+
+    def _write_array(self, group: Any, name: str, rows: NDArray[Any]) -> None:
+        kind = self._types.get(rows.dtype)
+        if kind is None:
+            kind = self._types[rows.dtype] = _HDF5.h5t.py_create(rows.dtype, logical=True)
+        space = self._spaces.get(rows.shape)
+        if space is None:
+            space = self._spaces[rows.shape] = _HDF5.h5s.create_simple(rows.shape)
+        dataset = _HDF5.h5d.create(group, name.encode(), kind, space, self._properties)
+        dataset.write(_HDF5.h5s.ALL, _HDF5.h5s.ALL, rows, kind)
+
+
+def _read_group(file: h5py.File, name: str) -> Stored:
+    group = file[name]
+    attributes = {key: str(text) for key, text in group.attrs.items()}
+    return Stored(attributes, dict(_read_arrays(group.id, "")))
+
+
+def _read_arrays(group: Any, prefix: str) -> Iterator[tuple[str, NDArray[Any]]]:
+    for name in group:
+        found = _HDF5.h5o.open(group, name)
+        key = prefix + name.decode()
+        if isinstance(found, _HDF5.h5g.GroupID):
+            yield from _read_arrays(found, f"{key}/")
+        else:
+            rows = np.empty(found.shape, found.dtype)
+            found.read(_HDF5.h5s.ALL, _HDF5.h5s.ALL, rows)
+            yield key, rows
+
+
+def _sync(path: Path) -> None:
+    with path.open("rb") as stream:
+        os.fsync(stream.fileno())

@@ -1,0 +1,315 @@
+"""Plays whole episodes on a Ray cluster, in actors, and survives actors and nodes that die."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import shutil
+import signal
+import threading
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from robots import MissingPackageError, UnknownNameError
+from robots.manifest import load_manifest
+from rollouts.executor import (
+    UNSENDABLE,
+    Event,
+    Play,
+    Shift,
+    Worker,
+    WorkerError,
+    portable,
+    unsendable,
+)
+
+ROOMS = ("robots", "layouts", "simulation", "tasks", "rollouts")
+PACKAGES = ("sapien", "torch", "numpy")  # which decide the bits of an episode
+
+_SILENCE = 30.0  # s without any worker at play, until that is told
+
+
+class RayExecutor:
+    """Actors on the machines of a Ray cluster; none is left when `run` ends, whatever ends it.
+
+    The cluster gets the code of this library from here. What that needs (``sapien``, ``torch``
+    and so on) must be installed on every node, in the versions of this machine; each node finds
+    robot files as it would without Ray. If Ray is in use already, that connection stays as it is,
+    and its own ``runtime_env`` says which code the nodes have.
+    """
+
+    def __init__(
+        self, address: str = "auto", workers: int | None = None, *, modules: Sequence[str] = ()
+    ) -> None:
+        """Choose a cluster that this machine has joined.
+
+        Args:
+            address: ``"HOST:PORT"`` of its head, or ``"auto"``.
+            workers: How many actors, each on one CPU; None: one for each CPU of the cluster.
+            modules: Packages or modules of yours that the nodes get as well, such as those that
+                define your tasks, experts and policies.
+
+        Raises:
+            MissingPackageError: If Ray is not installed.
+        """
+        self._ray = import_ray()
+        self._address, self._workers, self._modules = address, workers, tuple(modules)
+
+    def run(self, prepare: Callable[[], Play], seeds: Iterable[int]) -> Generator[Event]:
+        """Play the episode of every seed; see `rollouts.executor.Executor`."""
+        seeds = list(seeds)
+        if not seeds:
+            return
+        with _joined(self._ray, self._address, self._modules):
+            crew = _Actors(self._ray, prepare)
+            yield from Shift(crew, seeds, self._workers or crew.cpus).events()
+
+
+def import_ray() -> Any:
+    """Return the ray package.
+
+    Raises:
+        MissingPackageError: If it is not installed.
+    """
+    try:
+        import ray
+    except ImportError as error:
+        raise MissingPackageError(
+            "playing on many machines needs ray: pip install 'robot-layouts[ray]'"
+        ) from error
+    return ray
+
+
+@contextmanager
+def _joined(ray: Any, address: str, modules: Sequence[str]) -> Generator[None]:
+    """Be part of a cluster, whose workers have the code of this process.
+
+    Raises:
+        WorkerError: If that is impossible.
+    """
+    if ray.is_initialized():
+        yield
+        return
+    with TemporaryDirectory() as folder:
+        gather_code(Path(folder), modules)
+        with _own_stop_signal():
+            try:
+                ray.init(
+                    address=address,
+                    runtime_env={"working_dir": folder},
+                    log_to_driver=False,
+                    logging_level="ERROR",
+                )
+            except (OSError, RuntimeError, ValueError) as error:
+                raise WorkerError(
+                    f"the Ray cluster at {address!r} cannot be joined: {error}"
+                ) from error
+    try:
+        yield
+    finally:
+        ray.shutdown()
+
+
+def gather_code(folder: Path, modules: Sequence[str] = ()) -> None:
+    """Copy the rooms, and other packages or modules, into an empty folder.
+
+    Raises:
+        UnknownNameError: If there is no such module.
+    """
+    for name in dict.fromkeys([*ROOMS, *(module.partition(".")[0] for module in modules)]):
+        spec = find_spec(name)
+        if spec is None:
+            raise UnknownNameError("module", name, (), "It must be importable here.")
+        for path in spec.submodule_search_locations or ():
+            shutil.copytree(
+                path,
+                folder / name,
+                ignore=shutil.ignore_patterns("__pycache__"),
+                dirs_exist_ok=True,
+            )
+        if not spec.submodule_search_locations and spec.origin is not None:
+            shutil.copy(spec.origin, folder)
+    (folder / "robots" / "manifest.json").write_text(load_manifest().to_json(), encoding="utf-8")
+
+
+@contextmanager
+def _own_stop_signal() -> Generator[None]:
+    """Keep what SIGTERM does here; Ray makes it an exit when it starts."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        yield
+    except SystemExit as stop:
+        raise KeyboardInterrupt from stop
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+class _Actors:
+    """Actors of a cluster."""
+
+    def __init__(self, ray: Any, prepare: Callable[[], Play]) -> None:
+        self._ray = ray
+        try:
+            self._prepare: bytes = ray.cloudpickle.dumps(prepare)
+        except UNSENDABLE as error:
+            raise unsendable(error) from error
+        self._class = ray.remote(_Player).options(
+            num_cpus=1, max_restarts=0, max_task_retries=0, scheduling_strategy="SPREAD"
+        )
+
+    @property
+    def cpus(self) -> int:
+        """How many CPUs the cluster has."""
+        cpus = int(self._ray.cluster_resources().get("CPU", 0))
+        if not cpus:
+            raise WorkerError("no node of the Ray cluster offers a CPU; add one with `ray start`")
+        return cpus
+
+    def hire(self) -> _Actor:
+        """Ask for an actor, which begins when a node has room for it."""
+        return _Actor(self._ray, self._class.remote(), self._prepare)
+
+    def wait(self, workers: Sequence[Worker]) -> list[Worker] | str:
+        """Return the actors whose answers are there; if none can begin for long, why."""
+        waiting = {worker.answer: worker for worker in workers if isinstance(worker, _Actor)}
+        patience = None if any(worker.seed is not None for worker in workers) else _SILENCE
+        if not self._ray.wait(list(waiting), timeout=patience)[0]:
+            free = self._ray.available_resources().get("CPU", 0)
+            return (
+                f"no worker could begin for {_SILENCE:.0f} s: {free:.0f} CPUs of the Ray cluster"
+                " are free; still waiting"
+            )
+        ready = self._ray.wait(list(waiting), num_returns=len(waiting), timeout=0)[0]
+        return [waiting[answer] for answer in ready]
+
+
+@dataclass(frozen=True)
+class _Home:
+    """Where an actor lives.
+
+    Attributes:
+        node: Id of the node.
+        address: Its IP address.
+        process: Its process number there.
+        packages: Version of each package that counts.
+    """
+
+    node: str
+    address: str
+    process: int
+    packages: dict[str, str]
+
+
+class _Actor:
+    """One actor, as seen from here; it plays one seed at a time.
+
+    Attributes:
+        answer: What it has been asked for last.
+    """
+
+    def __init__(self, ray: Any, actor: Any, prepare: bytes) -> None:
+        self.seed: int | None = None
+        self.name = "actor"
+        self._ray, self._actor = ray, actor
+        self._home: _Home | None = None
+        self.answer: Any = actor.begin.remote(prepare)
+
+    def send(self, seed: int) -> None:
+        """Let it play a seed."""
+        self.seed = seed
+        self.answer = self._actor.play.remote(seed)
+
+    def receive(self) -> Event | None:
+        """Return what it says; None if it has just become ready.
+
+        Raises:
+            RobotLayoutsError: What it could not begin for.
+        """
+        try:
+            result, error = self._ray.get(self.answer)
+        except self._ray.exceptions.RayError as death:
+            return self._died(death)
+        if self._home is None:
+            self._settle(result, error)
+            return None
+        seed, self.seed = self.seed, None
+        return Event(seed, result=result, error=error, worker=self.name)
+
+    def dismiss(self) -> None:
+        """Let it go; it has nothing to do."""
+        self.kill()
+
+    def kill(self) -> None:
+        """End it at once."""
+        with suppress(self._ray.exceptions.RayError, ValueError):
+            self._ray.kill(self._actor, no_restart=True)
+
+    def _settle(self, home: _Home, error: Exception | None) -> None:
+        self._home, self.name = home, f"process {home.process} on node {home.address}"
+        if error is not None:
+            error.args = (f"{error} (on node {home.address})", *error.args[1:])
+            raise error
+        here = _versions()
+        if home.packages != here:
+            raise WorkerError(
+                f"node {home.address} has {_listing(home.packages)}, this machine {_listing(here)};"
+                " equal episodes need equal versions"
+            )
+
+    def _died(self, error: Exception) -> Event:
+        self.kill()  # it may only be out of reach
+        how = " ".join(str(error).split())
+        return Event(
+            self.seed,
+            died=f"worker {self.name} died: {how}",
+            excused=self._home is not None and not self._node_lives(self._home.node),
+            worker=self.name,
+        )
+
+    def _node_lives(self, node: str) -> bool:
+        return any(about["NodeID"] == node and about["Alive"] for about in self._ray.nodes())
+
+
+class _Player:
+    """What runs on the cluster: one process, which plays one seed at a time."""
+
+    _play: Play
+
+    def begin(self, prepare: bytes) -> tuple[_Home, Exception | None]:
+        """Make what plays; returns where that is, and what went wrong."""
+        ray, error = import_ray(), None
+        try:
+            self._play = pickle.loads(prepare)()
+        except Exception as found:
+            error = portable(found)
+        node = ray.get_runtime_context().get_node_id()
+        home = _Home(node, ray.util.get_node_ip_address(), os.getpid(), _versions())
+        return home, error
+
+    def play(self, seed: int) -> tuple[Any, Exception | None]:
+        """Play an episode; returns its result, and what went wrong."""
+        try:
+            return self._play(seed), None
+        except Exception as error:
+            return None, portable(error)
+
+
+def _versions() -> dict[str, str]:
+    found: dict[str, str] = {}
+    for package in PACKAGES:
+        with suppress(PackageNotFoundError):
+            found[package] = version(package)
+    return found
+
+
+def _listing(packages: dict[str, str]) -> str:
+    return ", ".join(f"{name} {found}" for name, found in packages.items()) or "none of them"

@@ -1,0 +1,67 @@
+"""What PushCube and PullCube share: a cube, and a round target on one side of it."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from layouts import single
+from simulation import PhysicsSettings, State, World, add_table
+from simulation.arrays import Array, Floats, constants, norm
+from tasks.props import DARK_BLUE, FACE_UP, TARGET_HEIGHT, add_cube, add_target
+from tasks.randomness import EpisodeRandom
+from tasks.task import Info, MultiRobotTask
+
+# mani_skill 3.0.1, envs/tasks/tabletop/push_cube.py and pull_cube.py (m)
+CUBE_HALF_SIZE = 0.02
+GOAL_RADIUS = 0.1
+GOAL_DISTANCE = 0.1 + GOAL_RADIUS  # of the target from the cube, along x
+SPAWN_HALF_SIZE = 0.1
+TOUCH_RADIUS = 0.01  # around where the TCP should move the cube from
+
+
+class MovedCube(MultiRobotTask):
+    """Move a cube along x onto a round target.
+
+    Attributes:
+        direction: 1 if the target lies farther along x than the cube, -1 if it lies before it.
+        touch_offset: From the cube to where the TCP should move it from, (3,) (m).
+    """
+
+    layout = single({"arm": "panda"})
+    physics = PhysicsSettings()
+    max_episode_steps = 50
+    direction: ClassVar[int]
+    touch_offset: ClassVar[Floats]
+
+    def build(self, world: World) -> None:
+        """Add the table, the cube and the target."""
+        add_table(world)
+        add_cube(world, "cube", CUBE_HALF_SIZE, (0.0, 0.0, CUBE_HALF_SIZE), DARK_BLUE)
+        add_target(world, GOAL_RADIUS)
+
+    def sample(self, world: World, rng: EpisodeRandom) -> None:
+        """Lay the cube on the table and the target behind it or before it."""
+        xy = (rng.uniform(1, 2) * (SPAWN_HALF_SIZE * 2) - SPAWN_HALF_SIZE)[0]
+        x, y = xy.tolist()
+        goal_x = (xy[0] + self.direction * GOAL_DISTANCE).item()
+        world.set_pose("cube", (x, y, CUBE_HALF_SIZE))
+        world.set_pose("goal_region", (goal_x, y, TARGET_HEIGHT), FACE_UP)
+
+    def over_target(self, state: State) -> Array:
+        """Tell whether the cube is within the target's radius, seen from above; (N,) bool."""
+        return state.planar_distance("cube", "goal_region") < _GOAL_RADIUS
+
+    def touch_distance(self, state: State) -> Floats:
+        """Return how far the TCP is from where it should move the cube from, (N,) (m)."""
+        return norm(state.position("cube") + self.touch_offset - state.tcp_position("arm"))
+
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
+        """TCP, target and cube."""
+        return {
+            "tcp_pose": state.tcp_pose("arm"),
+            "goal_pos": state.position("goal_region"),
+            "obj_pose": state.pose("cube"),
+        }
+
+
+_GOAL_RADIUS, TOUCHED = constants(GOAL_RADIUS, TOUCH_RADIUS)

@@ -1,0 +1,95 @@
+"""`rollouts.evaluate`: the same whoever plays, and what one can read off it."""
+
+import re
+
+import numpy as np
+import pytest
+import torch
+
+import tasks
+from robots import TaskError, UnknownNameError
+from rollouts import Evaluation, Score, evaluate
+from rollouts.__main__ import main
+from rollouts.episode import REBUILT, play
+from rollouts.executor import ProcessExecutor, WorkerError
+from rollouts.experts import find_expert, registry
+from tests.rollouts.plays import NO_PLAN, Here, at_random
+from tests.rollouts.policies import TASK, Wanders, fails, still
+
+
+def test_who_plays_makes_no_difference():
+    here = evaluate(Wanders(0.5), TASK, range(4), executor=Here())
+    assert evaluate(Wanders(0.5), TASK, [3, 1, 0, 2], workers=2).scores == here.scores
+    assert len(set(here.returns.values())) == 4
+    other = evaluate(Wanders(0.6), TASK, [2], executor=Here())
+    assert other.returns[2] != here.returns[2]
+
+
+def test_it_is_what_one_sees_by_hand():
+    robots = {"arm": "panda_stick"}
+    found = evaluate(still, TASK, [3], executor=Here(), reward_mode="sparse", robots=robots)
+    env = tasks.make(TASK, reward_mode="sparse")
+    env.reset(3, options=REBUILT)
+    total, steps, over = 0.0, 0, False
+    while not over:
+        _, reward, terminated, truncated, _ = env.step(torch.zeros(1, 7))
+        total, steps = total + float(reward), steps + 1
+        over = bool(terminated | truncated)
+    assert found.scores == {3: Score(False, total, steps)}
+    assert steps == env.max_episode_steps
+
+
+def test_an_expert_plays_its_plan(monkeypatch):
+    monkeypatch.setitem(registry._registered, TASK, at_random)
+    found = evaluate("expert", TASK, [4, NO_PLAN], executor=Here())
+    episode = play(env := tasks.make(TASK), 4, at_random(env, 4))
+    assert found.lengths == {4: 24, NO_PLAN: 0}
+    assert found.returns == {4: pytest.approx(float(np.sum(episode.rewards))), NO_PLAN: 0}
+    positions = evaluate("expert", TASK, [4], executor=Here(), control_mode="pd_joint_pos")
+    assert positions.lengths == {4: 24}
+
+
+def test_success_ends_an_episode():
+    found = evaluate("expert", "PushCube-v1", [0], executor=Here())
+    plan = find_expert("PushCube-v1")(tasks.make("PushCube-v1"), 0)
+    assert found.successes == {0: True}
+    assert 0 < found.lengths[0] <= len(plan)
+
+
+def test_how_it_reads():
+    scores = {seed: Score(seed % 3 > 0, seed / 2, 10 * seed) for seed in range(1, 5)}
+    found = Evaluation("PickCube-v1", "MyPolicy", scores)
+    assert found.success_rate == 0.75
+    assert str(found).splitlines() == [
+        "PickCube-v1, MyPolicy: 3 of 4 episodes with success (75.0%)",
+        "on average: return 1.25 (0.5 to 2), 25.0 steps (10 to 40)",
+        "no success: seeds 3",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("policy", "task", "seeds", "making", "error", "complaint"),
+    [
+        (still, "PushX-v1", [0], {}, UnknownNameError, "Did you mean 'PushT-v1'?"),
+        (still, TASK, [0], {"obs_mod": "x"}, UnknownNameError, "Did you mean 'obs_mode'?"),
+        (still, TASK, [0], {"num_envs": 2}, TaskError, "num_envs is 2; an evaluation plays 1"),
+        (still, TASK, [], {}, TaskError, "0 seeds were given; each .* at least one"),
+        (still, TASK, [1, 2, 1], {}, TaskError, "3 seeds were given; each must be there once"),
+        ("exprt", TASK, [0], {}, TaskError, "policy is 'exprt'; it must be callable, obs → acti"),
+        (fails, TASK, [7], {}, WorkerError, "seed 7: KeyError: 'no such key' .*policies.py:"),
+        (lambda obs: obs, TASK, [7], {}, WorkerError, "cannot be sent .*a policy must be defined"),
+    ],
+)
+def test_what_cannot_be_evaluated(policy, task, seeds, making, error, complaint):
+    with pytest.raises(error, match=complaint):
+        evaluate(policy, task, seeds, executor=ProcessExecutor(1), **making)
+
+
+def test_the_command(capsys):
+    words = ["evaluate", f"--task={TASK}", "--episodes=2", "--seed=3"]
+    assert main([*words, "--policy=tests.rollouts.policies:still"]) == 0
+    printed = capsys.readouterr().out
+    assert printed == f"{evaluate(still, TASK, [3, 4], executor=Here())}\n"
+    assert re.match(r"PushT-v1, still: 0 of 2 episodes with success \(0.0%\)\non av", printed)
+    assert main([*words, "--policy=tests.rollouts.policies:stil"]) == 1
+    assert "no policy 'tests.rollouts.policies:stil': module" in capsys.readouterr().err
