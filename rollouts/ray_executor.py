@@ -38,6 +38,7 @@ PACKAGES = ("sapien", "torch", "numpy")  # which decide the bits of an episode
 
 _PATIENCE = 10.0  # s that the head of a cluster may take to answer
 _THIS_MACHINE = ("localhost", "127.0.0.1", "[::1]")  # for which Ray takes an address of its own
+_NODE_DIED = "its node has died"  # in Ray's words
 _CACHES = shutil.ignore_patterns("__pycache__")
 _SILENCE = 30.0  # s without any worker at play, until that is told
 
@@ -304,11 +305,11 @@ class _Actor:
 
     def _died(self, error: Exception) -> Event:
         self.kill()  # it may only be out of reach
+        how = _reason(error)
         lost = isinstance(error, self._ray.exceptions.ActorUnavailableError) or (
-            self._home is not None and not self._node_lives(self._home.node)
+            not self._node_lives(self._home.node) if self._home is not None else how == _NODE_DIED
         )
-        how = "out of reach" if lost else _reason(error)
-        died = f"worker {self.name} was lost: {how}"
+        died = f"worker {self.name} was lost: {'out of reach' if lost else how}"
         return Event(self.seed, died=died, excused=lost, worker=self.name)
 
     def _node_lives(self, node: str) -> bool:

@@ -99,11 +99,13 @@ def test_nodes_and_actors_that_are_killed_change_nothing(nodes, tmp_path):
     summary = record(TASK, range(24), tmp_path, RayExecutor(nodes.address), on_event=disturb)
     shutil.rmtree(nodes.barrier)
     assert sorted(disturb.arrived) == list(range(24))
-    lost = sorted(death.partition(" was lost: ")[2] for death in summary.deaths)
-    assert [words.partition(" at seed ")[0] for words in lost] == [
+    lost = [death.partition(" was lost: ")[2] for death in summary.deaths]
+    assert sorted(words.partition(" at seed ")[0] for words in lost if " at seed " in words) == [
         "its worker process has died",
         "out of reach",
     ]
+    late = "out of reach before it could play anything"  # sent to a node not yet known to be dead
+    assert {words for words in lost if " at seed " not in words} <= {late}
     assert same_files(tmp_path / FILE, recorded_directly(tmp_path / "direct" / FILE, range(24)))
 
 
