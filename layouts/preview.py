@@ -147,14 +147,14 @@ def _draw_plan(plan: Axes, layout: Layout, bounds: Rectangle, table: Rectangle |
         plan.add_patch(Polygon(outline, facecolor=TABLE, edgecolor="#C9B99B", zorder=0.5))
     if _draw_overlap(plan, layout, bounds):
         plan.set_title("grey: within reach of two or more", loc="right", color=FAINT, fontsize=10)
+    plan.set_xlim(bounds[0], bounds[2])
+    plan.set_ylim(bounds[1], bounds[3])
     arrow = HEADING * max(bounds[2] - bounds[0], bounds[3] - bounds[1])
     for index, (name, placement) in enumerate(layout.items()):
         _draw_robot(plan, index, name, placement, arrow)
     plan.set_title(headline(layout), loc="left", color=INK, fontsize=13, fontweight="bold")
     plan.set_xlabel("x (m)", color=INK)
     plan.set_ylabel("y (m)", color=INK)
-    plan.set_xlim(bounds[0], bounds[2])
-    plan.set_ylim(bounds[1], bounds[3])
     plan.set_aspect("equal")
     plan.grid(color="#DDDDDD", linewidth=0.6)
     plan.set_axisbelow(True)
@@ -240,11 +240,15 @@ def _draw_base(axes: Axes, x: float, y: float, index: int) -> None:
 def _write_name(
     plan: Axes, base: tuple[float, float], behind: tuple[float, float], name: str
 ) -> None:
-    """Write a robot's name behind its back, where its arm is least."""
+    """Write a robot's name behind its back, where its arm is least, or below if it fits only so."""
     from matplotlib.patheffects import withStroke
 
     length = math.hypot(*behind)
     x, y = (0.0, -1.0) if length <= 0.1 else (behind[0] / length, behind[1] / length)
+    low, high = plan.get_xlim()
+    room = (base[0] - low if x < 0 else high - base[0]) / (high - low)  # shares of the plan
+    if abs(x) > 0.5 and room < (14 + 8.5 * len(name)) / (72 * (WIDTH - LEFT - RIGHT)):
+        x, y = 0.0, -1.0
     plan.annotate(
         name,
         xy=base,

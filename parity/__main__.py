@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from robots import unknown_name_message
+from robots import RobotLayoutsError, unknown_name_message
 
 # Command -> the module whose ``main(argv)`` runs it, and what it does.
 COMMANDS = {
@@ -29,7 +29,7 @@ COMMANDS = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command; returns its exit code, 2 if there is no such command."""
+    """Run a command; returns its exit code, 2 if there is no such command or it makes no sense."""
     command, *rest = list(sys.argv[1:] if argv is None else argv) or ["--help"]
     if command in ("-h", "--help"):
         print(f"usage: python -m parity {{{','.join(COMMANDS)}}} ...\n")
@@ -39,7 +39,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     if command not in COMMANDS:
         print(f"error: {unknown_name_message('command', command, COMMANDS)}", file=sys.stderr)
         return 2
-    return import_module(COMMANDS[command][0]).main(rest)
+    try:
+        return import_module(COMMANDS[command][0]).main(rest)
+    except RobotLayoutsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
 
 
 if __name__ == "__main__":

@@ -6,7 +6,8 @@ import argparse
 import gc
 import logging
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing, contextmanager
 from functools import partial
 from typing import Any
 
@@ -90,12 +91,12 @@ def reset(task_ids: Sequence[str], settings: Settings) -> Measurement:
 
 def vectors(settings: Settings) -> Measurement:
     """Measure the rate of a vector beside Gymnasium's own vector over native, on as many cores."""
-    share, clock, steps = settings.worker_envs, settings.clock, settings.steps
+    share, clock, steps = settings.worker_envs, settings.clock, settings.batch_steps
     task_ids = settings.tasks[:FRONT_TASKS]
     samples: dict[tuple[str, str], list[float]] = {}
     for task_id in task_ids:
-        native = _native_vector(task_id)
         with (
+            _native_vector(task_id) as native,
             PhysicsProcesses(task_id, PROCESSES, share) as floor,
             vector(task_id, PROCESSES * share, PROCESSES) as ours,
         ):
@@ -105,8 +106,6 @@ def vectors(settings: Settings) -> Measurement:
                 variants[NATIVE, task_id] = TimedVector(native, clock, steps).rate
             variants[PHYSICS, task_id] = lambda number, here=here: floor.rate(here, number)
             samples.update(settings.interleave(variants, part=1 / len(task_ids)))
-        if native is not None:
-            native.close()
     return Measurement(
         name="vector",
         title=f"Rate of {PROCESSES} × {share} environments; native: AsyncVectorEnv of {PROCESSES}",
@@ -147,11 +146,15 @@ def _native_steps(native: Any, played: Played, number: int, settings: Settings) 
     return (settings.clock.now() - start) / len(actions) * 1e6
 
 
-def _native_vector(task_id: str) -> AsyncVectorEnv | None:
-    """Return Gymnasium's vector over native; native's wrapper cannot run several robots: None."""
+@contextmanager
+def _native_vector(task_id: str) -> Generator[AsyncVectorEnv | None]:
+    """Give Gymnasium's vector over native; native's wrapper cannot run several robots: None."""
     if len(get_task_class(task_id).layout) > 1:
-        return None
-    return AsyncVectorEnv([partial(_native_front, task_id)] * PROCESSES, context="spawn")
+        yield None
+        return
+    make = [partial(_native_front, task_id)] * PROCESSES
+    with closing(AsyncVectorEnv(make, context="spawn")) as env:
+        yield env
 
 
 def _native_front(task_id: str) -> gymnasium.Env[Any, Any]:

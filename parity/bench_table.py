@@ -7,12 +7,12 @@ from pathlib import Path
 
 from parity.results import ResultsError
 from rollouts.bench import report
-from rollouts.bench.measurement import BenchmarkError, Measurement, number_text
+from rollouts.bench.measurement import BenchmarkError, Measurement, Value, number_text
 from rollouts.bench.report import Report, markdown_table
 
 RECORD = Path(__file__).with_name("bench.json")
 COMMAND = "make bench ARGS=--record"
-SMALL = ("start", "memory", "recording", "validation")  # go into one table, a row per value
+SMALL = ("start", "memory", "recording", "validation")  # go into one table, a row each
 
 
 def read(path: Path = RECORD) -> Report:
@@ -45,7 +45,7 @@ def markdown(recorded: Report) -> Iterator[str]:
     yield ""
     yield from markdown_table(vector.headings(), vector.rows())
     yield ""
-    yield from markdown_table(["what", "", "measured"], _small(recorded))
+    yield from markdown_table(["besides", "median"], _small(recorded))
     yield ""
     yield recorded.told()
 
@@ -57,13 +57,18 @@ def _headings(measurement: Measurement, what: str) -> list[str]:
 
 
 def _small(recorded: Report) -> Iterator[list[str]]:
-    """Yield a row for each value; the last series is what counts, or its ratio if it has one."""
+    """Yield a row for each: the last series by value, and its ratios."""
     for name in SMALL:
         measurement = recorded.find(name)
-        for value in measurement.values:
-            told = f"{number_text(measurement.median([*measurement.samples][-1], value))}"
-            told += f" {measurement.unit}"
-            for pair in measurement.ratios:
-                told += f", {' / '.join(pair)} {measurement.ratio(*pair, value):.2f}"
-            at = f"{value} {measurement.variable}" if isinstance(value, int) else f"`{value}`"
-            yield [measurement.title, at, told]
+        told = "; ".join(_told(measurement, value) for value in measurement.values)
+        yield [f"{measurement.title} ({measurement.unit})", told]
+
+
+def _told(measurement: Measurement, value: Value) -> str:
+    last = [*measurement.samples][-1]
+    at = f"{value} {measurement.variable}" if isinstance(value, int) else f"`{value}`"
+    ratios = [
+        f" ({' / '.join(pair)} {measurement.ratio(*pair, value):.2f})"
+        for pair in measurement.ratios
+    ]
+    return f"{at}: {number_text(measurement.median(last, value))}{''.join(ratios)}"

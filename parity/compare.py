@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
@@ -83,14 +82,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
     Returns:
-        0 if everything is equal, 1 if not, 2 if it could not be compared.
+        0 if everything is equal, 1 if not.
+
+    Raises:
+        RobotLayoutsError: If it could not be compared.
     """
-    args = parser().parse_args(argv)
-    try:
-        return _compare(args)
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+    return _compare(parser().parse_args(argv))
 
 
 def _compare(args: argparse.Namespace) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from rich.table import Table
 
 from parity.native import native_tasks
 from parity.results import RESULTS, read
-from robots import MissingPackageError, RobotLayoutsError, RobotRegistry
+from robots import MissingPackageError, RobotRegistry
 from rollouts.experts import list_experts
 from rollouts.trajectory import TrajectoryError, recorded_task
 from tasks import get_task_class, list_clones, list_tasks
@@ -98,7 +97,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
     Returns:
-        0 if all went well, 2 if something that it needs cannot be read.
+        0.
+
+    Raises:
+        RobotLayoutsError: If something that it needs cannot be read.
     """
     parser = argparse.ArgumentParser(
         prog="python -m parity inventory",
@@ -109,12 +111,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     add("--demos", type=Path, metavar="DIR", help="look for demonstrations below DIR")
     add("--results", type=Path, default=RESULTS, help="the record (this project's)")
     add("--json", action="store_true", help="print json instead of tables")
-    args = parser.parse_args(argv)
-    try:
-        _run(args)
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+    _run(parser.parse_args(argv))
     return 0
 
 

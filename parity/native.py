@@ -26,14 +26,16 @@ def make_native(
     control_mode: str = CONTROL_MODES[0],
     *,
     picture_size: int | None = None,
+    obs_mode: str = "state",
 ) -> Any:
-    """Make the native environment of a task: one environment, state observations, CPU physics.
+    """Make the native environment of a task: one environment, CPU physics.
 
     Args:
         task_id: ManiSkill's id, for example ``"PickCube-v1"``.
         reward_mode: One of the task's reward modes; None takes native's default.
         control_mode: One of `robots.CONTROL_MODES`.
         picture_size: Width and height of its ``render_rgb_array`` (pixels); None takes native's.
+        obs_mode: What it observes, in native's words.
 
     Raises:
         MissingPackageError: If mani_skill, or a package that it needs, is not installed.
@@ -49,7 +51,7 @@ def make_native(
         try:
             return gym.make(
                 task_id,
-                obs_mode="state",
+                obs_mode=obs_mode,
                 control_mode=control_mode,
                 sim_backend="physx_cpu",
                 render_backend="cpu",

@@ -23,8 +23,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
     Returns:
-        0 if README.md shows the records, 1 if a check finds that it does not or that a record
-        does not hold exactly the tasks there are, 2 if a file cannot be read.
+        0 if README.md shows the records, 1 if a check finds that it does not or that the record
+        of parity does not hold exactly the tasks there are, 2 if a file cannot be read.
     """
     parser = argparse.ArgumentParser(
         prog="python -m parity readme",
@@ -49,8 +49,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"error: {error}", file=sys.stderr)
         return 2
     complaints = list(missing_and_extra(record["tasks"], list_clones()))
-    timed = map(str, measured.find("step").values)
-    complaints += missing_and_extra(timed, list_clones(), bench_table.COMMAND)
     if args.check and fresh != text:
         complaints.append(f"{args.readme.name} is stale; run `python -m parity readme`")
     for complaint in complaints:
@@ -109,22 +107,14 @@ def markdown(record: Mapping[str, Any]) -> Iterator[str]:
     yield f"Measured on {record['machine']} with {versions}."
 
 
-def missing_and_extra(
-    recorded: Iterable[str], tasks: Iterable[str], command: str = "make parity"
-) -> Iterator[str]:
-    """Yield a complaint if tasks are not in a record, and one if it holds what is no task.
-
-    Args:
-        recorded: Tasks in the record.
-        tasks: Tasks that there are.
-        command: What writes the record.
-    """
+def missing_and_extra(recorded: Iterable[str], tasks: Iterable[str]) -> Iterator[str]:
+    """Yield a complaint if tasks are not in the record, and one if it holds what is no task."""
     recorded, tasks = set(recorded), set(tasks)
     if tasks - recorded:
-        yield f"the record lacks {', '.join(sorted(tasks - recorded))}; run `{command}`"
+        yield f"the record lacks {', '.join(sorted(tasks - recorded))}; run `make parity`"
     if recorded - tasks:
         extra = ", ".join(sorted(recorded - tasks))
-        yield f"the record holds {extra}, which no task is called; run `{command}`"
+        yield f"the record holds {extra}, which no task is called; run `make parity`"
 
 
 def _lines(lines: Iterable[str], command: str) -> list[str]:

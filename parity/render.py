@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import gc
-import sys
 from collections.abc import Sequence
 from contextlib import closing
 from functools import partial
@@ -17,7 +16,7 @@ import tasks
 from parity.clip import Candidate, Clip, ClipOptions, SideBySide, choose
 from parity.episodes import Episode, load_episodes, recorded_control_mode
 from parity.sides import NativeSide, OurSide
-from robots import CONTROL_MODES, MissingPackageError, RecordingError, RobotLayoutsError, TaskError
+from robots import CONTROL_MODES, MissingPackageError, RecordingError, TaskError
 from rollouts.experts import find_expert
 from rollouts.progress import LiveLine
 from rollouts.video import package_problem
@@ -73,14 +72,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
     Returns:
-        0 if both sides succeed and nothing differs, 1 if not, 2 if it could not be shown.
+        0 if both sides succeed and nothing differs, 1 if not.
+
+    Raises:
+        RobotLayoutsError: If it could not be shown.
     """
-    args = parser().parse_args(argv)
-    try:
-        return _render(args)
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+    return _render(parser().parse_args(argv))
 
 
 def _render(args: argparse.Namespace) -> int:

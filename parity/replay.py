@@ -16,7 +16,7 @@ import tasks
 from parity.comparison import EpisodeResult
 from parity.episodes import load_episodes, recorded_control_mode
 from parity.runs import Run, RunResult, play
-from robots import CONTROL_MODES, RobotLayoutsError, TaskError
+from robots import CONTROL_MODES, TaskError
 from rollouts.executor import ProcessExecutor
 from rollouts.progress import LiveLine
 from rollouts.record import FILE, record
@@ -51,14 +51,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
     Returns:
-        0 if everything is equal, 1 if not, 2 if it could not be compared.
+        0 if everything is equal, 1 if not.
+
+    Raises:
+        RobotLayoutsError: If it could not be compared.
     """
-    args = parser().parse_args(argv)
-    try:
-        return _replay(args)
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+    return _replay(parser().parse_args(argv))
 
 
 def _replay(args: argparse.Namespace) -> int:

@@ -6,7 +6,6 @@ import argparse
 import json
 import os
 import platform
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -96,7 +95,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
     Returns:
-        0 if both sides are equal, 1 if not, 2 if they could not be played.
+        0 if both sides are equal, 1 if not.
+
+    Raises:
+        RobotLayoutsError: If they could not be played.
     """
     parser = argparse.ArgumentParser(
         prog="python -m parity rollout",
@@ -115,12 +117,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     add("--out", type=Path, default=Path("runs"), metavar="DIR", help="default %(default)s")
     add("--no-video", action="store_true", help="make no film of native")
-    args = parser.parse_args(argv)
-    try:
-        return _run(args)
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+    return _run(parser.parse_args(argv))
 
 
 def _run(args: argparse.Namespace) -> int:

@@ -40,6 +40,19 @@ def locate(package: str, urdf: str, *, pictures: bool) -> Path:
     return store.root / package / urdf
 
 
+def locate_file(package: str, path: str) -> Path:
+    """Return one file of the local copy, fetching its package if something of that is not there.
+
+    Raises:
+        UnknownNameError: If the manifest has no such package or file.
+        AssetError: If it could not be had from any source.
+    """
+    about = load_manifest().package(package)
+    file, store = about.file(path), AssetStore(default_root())
+    ensure(about.files, store, default_sources())
+    return store.path(file)
+
+
 def default_sources(*, offline: bool = False, revision: str | None = None) -> list[AssetSource]:
     """Return the sources after the local copy, in the order in which they are tried.
 

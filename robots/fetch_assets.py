@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from robots import scenery
 from robots.asset_sources import AssetSource, InstalledManiSkill, LocalCopy, ManiSkillWheel
 from robots.asset_store import AssetStore, FileState, default_root
 from robots.assets import default_sources, ensure
@@ -33,6 +34,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"--source {options.source} needs the network, which --offline rules out")
     try:
         needs = robot_files(options.robots, pictures=not options.physics_only)
+        if not (options.robots or options.physics_only):
+            needs["scenery"] = load_manifest().package(scenery.PACKAGE).files
         store = AssetStore((options.dest or default_root()).expanduser().absolute())
         if not options.check:
             ensure(_union(needs), store, _sources(options, store), trust=options.trust_source)

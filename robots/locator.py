@@ -37,6 +37,30 @@ class UrdfLocator:
 
 
 @dataclass(frozen=True)
+class FileLocator:
+    """A file of the manifest that belongs to no robot; making one touches nothing.
+
+    Attributes:
+        package: Package of the manifest.
+        file: Path of the file inside the package.
+    """
+
+    package: str
+    file: str
+
+    def locate(self) -> Path:
+        """Return the path of the file, fetched and checked.
+
+        Raises:
+            UnknownNameError: If the manifest has no such package or file.
+            AssetError: If it could not be had from any source; says why of each.
+        """
+        from robots.assets import locate_file
+
+        return locate_file(self.package, self.file)
+
+
+@dataclass(frozen=True)
 class LocalUrdf:
     """A URDF that the user keeps on disk; making one touches nothing.
 

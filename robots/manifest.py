@@ -101,6 +101,19 @@ class AssetPackage:
             if urdf in file.physics or (pictures and urdf in file.pictures)
         )
 
+    def file(self, path: str) -> AssetFile:
+        """Return one file.
+
+        Raises:
+            UnknownNameError: If the package has no such file.
+        """
+        for file in self.files:
+            if file.path == path:
+                return file
+        raise UnknownNameError(
+            f"file of {self.origin.name}", path, [file.path for file in self.files]
+        )
+
 
 @dataclass(frozen=True)
 class Manifest:

@@ -10,6 +10,7 @@ import sys
 from importlib import metadata
 from pathlib import Path
 
+from robots import scenery
 from robots.asset_sources import find_mani_skill
 from robots.errors import AssetError, RobotLayoutsError
 from robots.locator import UrdfLocator
@@ -45,7 +46,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def build_manifest(mani_skill: Path) -> Manifest:
-    """Return the manifest of everything that the catalogue's URDFs need.
+    """Return the manifest of everything that the catalogue's URDFs need, and of the scenery.
 
     Args:
         mani_skill: Folder of an installed mani_skill package.
@@ -58,7 +59,23 @@ def build_manifest(mani_skill: Path) -> Manifest:
         locator = RobotRegistry.load(name).urdf
         if isinstance(locator, UrdfLocator):
             urdfs.setdefault(locator.package, set()).add(locator.file)
-    return Manifest({name: build_package(name, mani_skill, urdfs[name]) for name in urdfs})
+    packages = {name: build_package(name, mani_skill, urdfs[name]) for name in urdfs}
+    return Manifest({**packages, scenery.PACKAGE: build_scenery(mani_skill)})
+
+
+def build_scenery(mani_skill: Path) -> AssetPackage:
+    """Return the package of what stands around robots in pictures.
+
+    Args:
+        mani_skill: Folder of an installed mani_skill package.
+
+    Raises:
+        AssetError: If mani_skill lacks one of its files.
+    """
+    folder = mani_skill / scenery.MANI_SKILL_FOLDER
+    origin = _origin(scenery.PACKAGE, folder, scenery.MANI_SKILL_FOLDER, "scenes")
+    paths = sorted(locator.file for locator in scenery.FILES)
+    return AssetPackage(origin, tuple(_asset_file(origin, folder, p, set(), set()) for p in paths))
 
 
 def build_package(name: str, mani_skill: Path, urdfs: set[str]) -> AssetPackage:
@@ -76,17 +93,7 @@ def build_package(name: str, mani_skill: Path, urdfs: set[str]) -> AssetPackage:
     folder = mani_skill / relative
     if not (name.startswith(PREFIX) and folder.is_dir()):
         raise AssetError(f"package {name!r} has no folder {folder}; call it {PREFIX}<folder>")
-    version = metadata.version("mani_skill")
-    licence, terms = _licence(folder)
-    origin = PackageOrigin(
-        name=name,
-        mani_skill=relative,
-        hub_dataset=HUB_DATASET,
-        hub_folder=f"robots/{name}",
-        wheel=f"mani_skill=={version}",
-        licence=licence,
-        licence_note=f"robot files of mani_skill {version}, {terms}",
-    )
+    origin = _origin(name, folder, relative, "robots")
     physics: dict[str, set[str]] = {}
     pictures: dict[str, set[str]] = {}
     drawable = [_add_needs(folder, urdf, physics, pictures) for urdf in sorted(urdfs)]
@@ -96,6 +103,21 @@ def build_package(name: str, mani_skill: Path, urdfs: set[str]) -> AssetPackage:
         for path in sorted({*physics, *pictures})
     )
     return AssetPackage(origin, tuple(files), tuple(undrawable))
+
+
+def _origin(name: str, folder: Path, relative: str, kind: str) -> PackageOrigin:
+    """Return where the files of a package come from; ``kind`` is their folder on the Hub."""
+    version = metadata.version("mani_skill")
+    licence, terms = _licence(folder)
+    return PackageOrigin(
+        name=name,
+        mani_skill=relative,
+        hub_dataset=HUB_DATASET,
+        hub_folder=f"{kind}/{name}",
+        wheel=f"mani_skill=={version}",
+        licence=licence,
+        licence_note=f"{kind.removesuffix('s')} files of mani_skill {version}, {terms}",
+    )
 
 
 def _licence(folder: Path) -> tuple[str, str]:
@@ -146,7 +168,7 @@ def _asset_file(
     origin: PackageOrigin, folder: Path, path: str, physics: set[str], pictures: set[str]
 ) -> AssetFile:
     if path.startswith("../") or not (folder / path).is_file():
-        urdfs = ", ".join(sorted(physics | pictures))
+        urdfs = ", ".join(sorted(physics | pictures)) or origin.name
         raise AssetError(f"{urdfs} refers to {path}, which is not a file inside {folder}")
     data = (folder / path).read_bytes()
     return AssetFile(

@@ -8,7 +8,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from robots import RobotLayoutsError, UnknownNameError
-from rollouts import evaluate_command, record_command, replay_command, view_command
+from rollouts import (
+    evaluate_command,
+    record_command,
+    replay_command,
+    soak_command,
+    view_command,
+)
 from rollouts.bench import command as bench_command
 from rollouts.export import command as export_command
 
@@ -56,6 +62,7 @@ def _parser() -> argparse.ArgumentParser:
         ("export", export_command),
         ("view", view_command),
         ("bench", bench_command),
+        ("soak", soak_command),
     ):
         command = commands.add_parser(name, help=module.DESCRIPTION, description=module.DESCRIPTION)
         module.add_arguments(command)

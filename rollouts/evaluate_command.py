@@ -48,9 +48,7 @@ def run(options: argparse.Namespace) -> int:
     from rollouts.evaluation import evaluate
     from rollouts.progress import LiveLine
 
-    module, named, _ = options.policy.partition(":")
-    executor = workers.chosen_executor(options, [module] if named else [])
-    line = LiveLine(options.episodes, "episodes")
+    executor, line = workers.chosen_executor(options), LiveLine(options.episodes, "episodes")
     try:
         with stop_signals(), line:
             found = evaluate(

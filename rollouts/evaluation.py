@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from robots import TaskError
 from rollouts.conversion import Planner
 from rollouts.episode import REBUILT
-from rollouts.executor import Event, Executor, ProcessExecutor
+from rollouts.executor import Event, Executor, ProcessExecutor, modules_of
 from rollouts.experts import find_expert
 from rollouts.experts.registry import Expert
 from tasks import MultiRobotTask, Scenario, get_task_class
@@ -169,6 +169,11 @@ class EvaluationJob:
     scenario: Scenario
     policy: Any = None
     expert: Expert | None = None
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """What other machines may need to play it."""
+        return modules_of(self.task, self.policy, self.expert)
 
     def __call__(self) -> Callable[[int], Score]:
         """Make the task in a worker, and return what plays the episode of a seed."""

@@ -47,7 +47,7 @@ class Event:
         result: What was returned when it was played to the end, else None.
         error: Why it could not be played, else None; `WorkersDied` if workers died of it.
         died: How its worker died, in words, else None; the episode will be played again.
-        excused: Whether the worker died because its machine did.
+        excused: Whether it is out of reach, with its machine perhaps: not the episode's fault.
         said: What was told meanwhile: by `report` if there is a seed, else by the executor, in
             words.
         worker: Who played it, in words.
@@ -72,7 +72,8 @@ class Executor(Protocol):
         """Play the episode of every seed, in any order.
 
         Args:
-            prepare: Called once in every worker; makes what plays there. It can be pickled.
+            prepare: Called once in every worker; makes what plays there. It can be pickled. If it
+                has ``modules``, other machines may need these.
             seeds: Which episodes.
 
         Yields:
@@ -251,6 +252,12 @@ class Shift:
             yield Event(seed, error=WorkersDied(what))
         elif seed is not None:
             self._waiting.appendleft(seed)
+
+
+def modules_of(*things: Any) -> tuple[str, ...]:
+    """Return the modules that define classes, functions, or the classes of other things."""
+    known = (thing if hasattr(thing, "__module__") else type(thing) for thing in things)
+    return tuple(dict.fromkeys(str(thing.__module__) for thing in known))
 
 
 def portable(error: Exception) -> Exception:

@@ -21,7 +21,9 @@ from robots import RecordingError
 from rollouts.disk import replaced
 from rollouts.parts import Stored, read_part
 
-_FORMAT = "v108"  # HDF5 1.8, the first in which attributes may be larger than 64 kB
+# From HDF5 1.8, the first in which attributes may be larger than 64 kB.
+_VERSIONS = "v108", "latest"
+_OVERHEAD = 16_384  # bytes of an episode besides its numbers: four times those of ten arrays
 _TEXT = h5py.string_dtype()
 _HDF5: Any = h5py  # whose low-level modules pyright cannot look into
 
@@ -61,8 +63,9 @@ def join(
     """
     about: dict[str, dict[str, Any]] = {}
     with replaced(path) as partial:
+        _reserve(partial, _room(path, episodes))
         with ExitStack() as stack:
-            file = stack.enter_context(h5py.File(partial, "w", libver=(_FORMAT, "latest")))
+            file = stack.enter_context(h5py.File(partial, "r+", libver=_VERSIONS))
             present = stack.enter_context(h5py.File(path, "r")) if path.exists() else file
             for name, value in header.items():
                 file.attrs[name] = json.dumps(value)
@@ -76,6 +79,25 @@ def join(
                 about[f"traj_{number}"] = stored.about
         _sync(partial)
     return about
+
+
+def _room(path: Path, episodes: Sequence[Path | str]) -> int:
+    """Return more bytes than the joined episodes take."""
+    files = [path] if path.exists() else []
+    files += [episode for episode in episodes if isinstance(episode, Path)]
+    return sum(file.stat().st_size for file in files) + _OVERHEAD * (len(episodes) + 1)
+
+
+def _reserve(path: Path, room: int) -> None:
+    """Make an empty h5 file that has its room on the disk: HDF5 crashes on one that is full.
+
+    HDF5 gives back what it does not use when it closes the file.
+    """
+    with h5py.File("new", "w", driver="core", backing_store=False, libver=_VERSIONS) as file:
+        file.flush()
+        path.write_bytes(file.id.get_file_image())
+    with path.open("r+b") as stream:
+        os.posix_fallocate(stream.fileno(), 0, room)
 
 
 class _GroupWriter:

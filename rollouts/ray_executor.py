@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import os
 import pickle
+import re
 import shutil
 import signal
+import socket
+import sysconfig
 import threading
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager, suppress
@@ -19,6 +22,7 @@ from typing import Any
 from robots import MissingPackageError, UnknownNameError
 from robots.manifest import load_manifest
 from rollouts.executor import (
+    DEATHS_ALLOWED,
     UNSENDABLE,
     Event,
     Play,
@@ -32,43 +36,60 @@ from rollouts.executor import (
 ROOMS = ("robots", "layouts", "simulation", "tasks", "rollouts")
 PACKAGES = ("sapien", "torch", "numpy")  # which decide the bits of an episode
 
+_PATIENCE = 10.0  # s that the head of a cluster may take to answer
+_THIS_MACHINE = ("localhost", "127.0.0.1", "[::1]")  # for which Ray takes an address of its own
+_CACHES = shutil.ignore_patterns("__pycache__")
 _SILENCE = 30.0  # s without any worker at play, until that is told
 
 
 class RayExecutor:
     """Actors on the machines of a Ray cluster; none is left when `run` ends, whatever ends it.
 
-    The cluster gets the code of this library from here. What that needs (``sapien``, ``torch``
-    and so on) must be installed on every node, in the versions of this machine; each node finds
-    robot files as it would without Ray. If Ray is in use already, that connection stays as it is,
-    and its own ``runtime_env`` says which code the nodes have.
+    The cluster gets the code of this library from here, and modules of yours that define the task,
+    expert or policy. What they need (``sapien``, ``torch`` and so on) must be installed on every
+    node, in the versions of this machine; each node finds robot files as it would without Ray. If
+    Ray is in use already, that connection stays as it is, and its own ``runtime_env`` says which
+    code the nodes have.
     """
 
     def __init__(
-        self, address: str = "auto", workers: int | None = None, *, modules: Sequence[str] = ()
+        self,
+        address: str = "auto",
+        workers: int | None = None,
+        *,
+        modules: Sequence[str] = (),
+        attempts: int = DEATHS_ALLOWED,
+        fresh: bool = False,
     ) -> None:
         """Choose a cluster that this machine has joined.
 
         Args:
             address: ``"HOST:PORT"`` of its head, or ``"auto"``.
             workers: How many actors, each on one CPU; None: one for each CPU of the cluster.
-            modules: Packages or modules of yours that the nodes get as well, such as those that
-                define your tasks, experts and policies.
+            modules: More packages or modules of yours that the nodes get, such as those that your
+                tasks, experts and policies import.
+            attempts: How many workers may die of one episode before it is given up; those that are
+                out of reach do not count.
+            fresh: Whether every episode gets a process of its own.
 
         Raises:
             MissingPackageError: If Ray is not installed.
         """
         self._ray = import_ray()
         self._address, self._workers, self._modules = address, workers, tuple(modules)
+        self._attempts, self._fresh = attempts, fresh
 
     def run(self, prepare: Callable[[], Play], seeds: Iterable[int]) -> Generator[Event]:
         """Play the episode of every seed; see `rollouts.executor.Executor`."""
         seeds = list(seeds)
         if not seeds:
             return
-        with _joined(self._ray, self._address, self._modules):
+        modules = [*self._modules, *filter(_is_own, getattr(prepare, "modules", ()))]
+        with _joined(self._ray, self._address, modules):
             crew = _Actors(self._ray, prepare)
-            yield from Shift(crew, seeds, self._workers or crew.cpus).events()
+            count = self._workers or crew.cpus
+            shift = Shift(crew, seeds, count, attempts=self._attempts, fresh=self._fresh)
+            yield from shift.events()
 
 
 def import_ray() -> Any:
@@ -100,6 +121,7 @@ def _joined(ray: Any, address: str, modules: Sequence[str]) -> Generator[None]:
         gather_code(Path(folder), modules)
         with _own_stop_signal():
             try:
+                _expect_somebody(address)
                 ray.init(
                     address=address,
                     runtime_env={"working_dir": folder},
@@ -116,8 +138,15 @@ def _joined(ray: Any, address: str, modules: Sequence[str]) -> Generator[None]:
         ray.shutdown()
 
 
-def gather_code(folder: Path, modules: Sequence[str] = ()) -> None:
-    """Copy the rooms, and other packages or modules, into an empty folder.
+def _expect_somebody(address: str) -> None:
+    """Raise OSError if nobody listens at an address; Ray itself would try for minutes."""
+    host, _, port = address.rpartition(":")
+    if port.isdigit() and "/" not in host and host not in _THIS_MACHINE:
+        socket.create_connection((host.strip("[]"), int(port)), _PATIENCE).close()
+
+
+def gather_code(folder: Path, modules: Iterable[str] = ()) -> None:
+    """Copy the rooms, and the packages of other modules, into an empty folder.
 
     Raises:
         UnknownNameError: If there is no such module.
@@ -127,15 +156,22 @@ def gather_code(folder: Path, modules: Sequence[str] = ()) -> None:
         if spec is None:
             raise UnknownNameError("module", name, (), "It must be importable here.")
         for path in spec.submodule_search_locations or ():
-            shutil.copytree(
-                path,
-                folder / name,
-                ignore=shutil.ignore_patterns("__pycache__"),
-                dirs_exist_ok=True,
-            )
+            shutil.copytree(path, folder / name, ignore=_CACHES, dirs_exist_ok=True)
         if not spec.submodule_search_locations and spec.origin is not None:
             shutil.copy(spec.origin, folder)
     (folder / "robots" / "manifest.json").write_text(load_manifest().to_json(), encoding="utf-8")
+
+
+def _is_own(module: str) -> bool:
+    """Tell whether a module is not installed, but the user's own; ``__main__`` is pickled."""
+    name = module.partition(".")[0]
+    spec = None if name == "__main__" else find_spec(name)
+    places = [] if spec is None else [*(spec.submodule_search_locations or [spec.origin or ""])]
+    return any(Path(place).is_absolute() and not _is_installed(Path(place)) for place in places)
+
+
+def _is_installed(path: Path) -> bool:
+    return any(path.is_relative_to(sysconfig.get_path(kind)) for kind in ("stdlib", "platlib"))
 
 
 @contextmanager
@@ -169,7 +205,8 @@ class _Actors:
     @property
     def cpus(self) -> int:
         """How many CPUs the cluster has."""
-        cpus = int(self._ray.cluster_resources().get("CPU", 0))
+        alive = [about["Resources"] for about in self._ray.nodes() if about["Alive"]]
+        cpus = sum(int(resources.get("CPU", 0)) for resources in alive)
         if not cpus:
             raise WorkerError("no node of the Ray cluster offers a CPU; add one with `ray start`")
         return cpus
@@ -267,13 +304,12 @@ class _Actor:
 
     def _died(self, error: Exception) -> Event:
         self.kill()  # it may only be out of reach
-        how = " ".join(str(error).split())
-        return Event(
-            self.seed,
-            died=f"worker {self.name} died: {how}",
-            excused=self._home is not None and not self._node_lives(self._home.node),
-            worker=self.name,
+        lost = isinstance(error, self._ray.exceptions.ActorUnavailableError) or (
+            self._home is not None and not self._node_lives(self._home.node)
         )
+        how = "out of reach" if lost else _reason(error)
+        died = f"worker {self.name} was lost: {how}"
+        return Event(self.seed, died=died, excused=lost, worker=self.name)
 
     def _node_lives(self, node: str) -> bool:
         return any(about["NodeID"] == node and about["Alive"] for about in self._ray.nodes())
@@ -301,6 +337,13 @@ class _Player:
             return self._play(seed), None
         except Exception as error:
             return None, portable(error)
+
+
+def _reason(error: Exception) -> str:
+    """Return what Ray says of a death, out of the page that it makes of it."""
+    text = " ".join(str(error).split())
+    because = re.search(r" because (.+?)\.(?: |$)", text)
+    return because[1] if because else text.partition(". ")[0]
 
 
 def _versions() -> dict[str, str]:

@@ -13,7 +13,7 @@ import tasks
 from robots import CONTROL_MODES, RecordingError
 from rollouts.conversion import Planner
 from rollouts.episode import play
-from rollouts.executor import Event, Executor, WorkersDied
+from rollouts.executor import Event, Executor, WorkersDied, modules_of
 from rollouts.experts import find_expert
 from rollouts.experts.registry import Expert
 from rollouts.parts import PartWriter
@@ -52,6 +52,11 @@ class EpisodeJob:
     scenario: Scenario
     expert: Expert
     writer: PartWriter
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """What other machines may need to play it."""
+        return modules_of(self.task, self.expert)
 
     def __call__(self) -> Callable[[int], tuple[Played, bytes]]:
         """Make the task in a worker, and return what plays and encodes the episode of a seed.

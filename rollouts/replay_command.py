@@ -24,14 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.epilog = EPILOG
     add = parser.add_argument
-    add(
-        "file",
-        type=Path,
-        nargs="?",
-        metavar="FILE",
-        help="the h5 file, or the folder of a recording",
-    )
-    add("--task", help="its task; without FILE, find its official one in $MS_ASSET_DIR/demos")
+    add_recording(parser)
     add("--episodes", type=int, metavar="N", help="play the first N episodes (all)")
     add(
         "--from",
@@ -40,6 +33,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="seed",
         help="begin by a reset with the recorded seed, or, not exactly, from the recorded state",
     )
+
+
+def add_recording(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments that say which recording; see `rollouts.replay.open_recording`."""
+    add = parser.add_argument
+    add(
+        "file",
+        type=Path,
+        nargs="?",
+        metavar="FILE",
+        help="the h5 file, or the folder of a recording",
+    )
+    add("--task", help="its task; without FILE, find its official one in $MS_ASSET_DIR/demos")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from layouts.view_command import add_page_options, show
 from layouts.viewer import Cell, Motion
+from rollouts.replay_command import add_recording
 
 if TYPE_CHECKING:
     from rollouts.trajectory import Trajectory, TrajectoryFile
@@ -22,15 +22,9 @@ EPILOG = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
+    parser.epilog = EPILOG
     add = parser.add_argument
-    add(
-        "file",
-        type=Path,
-        nargs="?",
-        metavar="FILE",
-        help="the h5 file, or the folder of a recording",
-    )
-    add("--task", help="its task; without FILE, find its official one in $MS_ASSET_DIR/demos")
+    add_recording(parser)
     add("--episode", type=int, default=0, metavar="N", help="the Nth in the file, from 0 (0)")
     add_page_options(parser)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import signal
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn
 
@@ -30,12 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def chosen_executor(options: argparse.Namespace, modules: Sequence[str] = ()) -> Executor:
+def chosen_executor(options: argparse.Namespace) -> Executor:
     """Return who plays.
-
-    Args:
-        options: What was chosen.
-        modules: Modules that other machines need besides this library.
 
     Raises:
         MissingPackageError: If Ray is asked for and not installed.
@@ -43,7 +39,7 @@ def chosen_executor(options: argparse.Namespace, modules: Sequence[str] = ()) ->
     if options.ray is not None:
         from rollouts.ray_executor import RayExecutor
 
-        return RayExecutor(options.ray, options.workers, modules=modules)
+        return RayExecutor(options.ray, options.workers)
     from rollouts.executor import ProcessExecutor
 
     return ProcessExecutor(options.workers or 1)

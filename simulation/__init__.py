@@ -3,6 +3,7 @@
 The only room that imports sapien.
 """
 
+from simulation.cameras import Camera
 from simulation.physics import SAPIEN_DEFAULTS, Friction, PhysicsSettings
 from simulation.scene import build_scene
 from simulation.shapes import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
@@ -14,6 +15,7 @@ from simulation.world import World
 __all__ = [
     "SAPIEN_DEFAULTS",
     "Box",
+    "Camera",
     "Capsule",
     "Cylinder",
     "Friction",

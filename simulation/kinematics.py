@@ -10,6 +10,7 @@ import sapien
 from numpy.typing import NDArray
 
 from robots import SimulationError
+from simulation.arm_model import ArmModel
 from simulation.world import World
 
 Floats = NDArray[np.float64]
@@ -41,23 +42,16 @@ class InverseKinematics:
             UnknownNameError: If the layout has no such robot, or the robot no such TCP link.
             SimulationError: If the robot's TCP is not a link but a mean of several.
         """
-        placement = world.layout[robot]
-        simulated, descriptor = world.robots[robot], placement.robot
+        descriptor, simulated = world.layout[robot].robot, world.robots[robot]
         if descriptor.tcp_position_links:
             raise SimulationError(
                 f"inverse kinematics needs a TCP that is a link; that of {descriptor.name} is the"
                 f" mean of {', '.join(descriptor.tcp_position_links)}"
             )
-        self.joints = descriptor.arm_joints
-        self._base = simulated.base_pose
-        self._model: Any = simulated.articulation.create_pinocchio_model()
-        self._tcp = simulated.articulation.links.index(simulated.link(descriptor.tcp_link))
-        names = [joint.name for joint in simulated.joints]
-        self._arm = np.array([names.index(joint) for joint in self.joints])
-        self._mask = np.isin(np.arange(len(names)), self._arm).astype(np.int32)
-        limits = np.concatenate([joint.limits for joint in simulated.joints])
-        self._low, self._high = limits[self._arm].astype(float).T
-        keyframes = np.zeros((len(descriptor.keyframes), len(names)))
+        self._arm = arm = ArmModel(world, robot)
+        self.joints = arm.joints
+        self._mask = np.isin(np.arange(arm.dof), arm.index).astype(np.int32)
+        keyframes = np.zeros((len(descriptor.keyframes), arm.dof))
         keyframes[:, simulated.active_index] = list(descriptor.keyframes.values())
         self._keyframes = keyframes
 
@@ -77,12 +71,12 @@ class InverseKinematics:
         Returns:
             Positions in the order of ``joints``, shape (arm joints,) (rad).
         """
-        target = self._base.inv() * sapien.Pose(list(position), list(quaternion))
+        target = self._arm.base.inv() * sapien.Pose(list(position), list(quaternion))
         all_joints = np.asarray(start_qpos, float)
         found: list[Floats] = []
         for start in self._starts(all_joints):
-            qpos, converged, _ = self._model.compute_inverse_kinematics(
-                self._tcp,
+            qpos, converged, _ = self._arm.model.compute_inverse_kinematics(
+                self._arm.tcp,
                 target,
                 initial_qpos=start,
                 active_qmask=self._mask,
@@ -91,10 +85,10 @@ class InverseKinematics:
                 dt=_STEP,
                 damp=_DAMPING,
             )
-            arm = self._within_limits(qpos[self._arm])
+            arm = self._within_limits(qpos[self._arm.index])
             if converged and arm is not None:
                 found.append(arm)
-        now = all_joints[self._arm]
+        now = all_joints[self._arm.index]
         return min(found, key=lambda arm: np.abs(arm - now).max(), default=None)
 
     def forward(self, arm_qpos: Numbers) -> tuple[Floats, Floats]:
@@ -103,11 +97,7 @@ class InverseKinematics:
         Args:
             arm_qpos: Positions in the order of ``joints``, shape (arm joints,) (rad).
         """
-        qpos = np.zeros(len(self._mask))
-        qpos[self._arm] = arm_qpos
-        self._model.compute_forward_kinematics(qpos)
-        pose = self._base * self._model.get_link_pose(self._tcp)
-        return np.array(pose.p, float), np.array(pose.q, float)
+        return self._arm.forward(arm_qpos)
 
     def _starts(self, qpos: Floats) -> Iterator[Floats]:
         yield qpos
@@ -115,11 +105,12 @@ class InverseKinematics:
         random = np.random.default_rng(_SEED)
         for _ in range(_NEARBY_STARTS):
             start = qpos.copy()
-            start[self._arm] += random.normal(0, _SPREAD, len(self._arm))
+            start[self._arm.index] += random.normal(0, _SPREAD, len(self.joints))
             yield start
 
     def _within_limits(self, arm: Floats) -> Floats | None:
         """Turn joints by whole turns into their limits, or return None."""
-        turns = np.ceil((self._low - arm) / (2 * np.pi))
-        arm = np.where((arm < self._low) | (arm > self._high), arm + turns * 2 * np.pi, arm)
-        return arm if ((arm >= self._low) & (arm <= self._high)).all() else None
+        low, high = self._arm.low, self._arm.high
+        turns = np.ceil((low - arm) / (2 * np.pi))
+        arm = np.where((arm < low) | (arm > high), arm + turns * 2 * np.pi, arm)
+        return arm if ((arm >= low) & (arm <= high)).all() else None

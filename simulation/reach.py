@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots import UnknownNameError
+from simulation.arm_model import ArmModel
 from simulation.world import World
 
 Floats = NDArray[np.float64]
@@ -37,20 +37,12 @@ class PointReach:
         Raises:
             UnknownNameError: If the layout has no such robot, or the robot no such TCP link.
         """
-        descriptor, simulated = world.layout[robot].robot, world.robots[robot]
-        self.joints = descriptor.arm_joints
-        self._base = simulated.base_pose
-        self._model: Any = simulated.articulation.create_pinocchio_model()
-        self._link = simulated.articulation.links.index(simulated.link(descriptor.tcp_link))
-        names = [joint.name for joint in simulated.joints]
-        self._arm = np.array([names.index(joint) for joint in self.joints])
-        self._size = len(names)
-        limits = np.concatenate([joint.limits for joint in simulated.joints])
-        self._low, self._high = limits[self._arm].astype(float).T
+        self._model = ArmModel(world, robot)
+        self.joints = self._model.joints
 
     def arm(self, qpos: Floats) -> Floats:
         """Pick the arm's joints, in the order of ``joints``, out of all in SAPIEN's order."""
-        return qpos[self._arm]
+        return qpos[self._model.index]
 
     def forward(self, arm: Floats) -> tuple[Floats, Floats]:
         """Return where arm joints bring the TCP link: position (3,) (m), quaternion (4,) wxyz.
@@ -58,8 +50,7 @@ class PointReach:
         Args:
             arm: Positions in the order of ``joints``, shape (arm joints,) (rad).
         """
-        pose = self._link_pose(arm)
-        return np.array(pose.p, float), np.array(pose.q, float)
+        return self._model.forward(arm)
 
     def place_of(self, point: Floats, arm: Floats) -> Floats:
         """Return where arm joints bring a point, (3,) (m), world.
@@ -68,14 +59,8 @@ class PointReach:
             point: In the frame of the TCP link, (3,) (m).
             arm: Positions in the order of ``joints``, shape (arm joints,) (rad).
         """
-        matrix = np.array(self._link_pose(arm).to_transformation_matrix(), float)
+        matrix = np.array(self._model.tcp_pose(arm).to_transformation_matrix(), float)
         return matrix[:3, :3] @ point + matrix[:3, 3]
-
-    def _link_pose(self, arm: Floats) -> Any:
-        qpos = np.zeros(self._size)
-        qpos[self._arm] = arm
-        self._model.compute_forward_kinematics(qpos)
-        return self._base * self._model.get_link_pose(self._link)
 
     def solve(
         self, point: Floats, place: Floats, start: Floats, fixed: Sequence[str] = ()
@@ -115,6 +100,6 @@ class PointReach:
             arm[free] += np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
             if np.abs(step).max() < _DIFFERENCE:
                 break
-        arm = np.clip(arm, self._low, self._high)
+        arm = np.clip(arm, self._model.low, self._model.high)
         away = np.linalg.norm(self.place_of(point, arm) - place)
         return arm if away < _CONVERGED else None

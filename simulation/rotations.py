@@ -49,3 +49,33 @@ def last_euler_angle(matrix: Floats) -> Floats:
         Angle in (-π, π], shape (N,) (rad).
     """
     return arctan2(-matrix[:, 0, 1], matrix[:, 0, 0])
+
+
+def quaternion(matrix: torch.Tensor) -> torch.Tensor:
+    """Return the quaternion of one rotation matrix, wxyz, float32, (4,), w ≥ 0.
+
+    Of the four ways to read it off, the one that divides by the largest number.
+
+    Args:
+        matrix: Shape (3, 3), float32.
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix
+    doubled = torch.stack(
+        [
+            1.0 + xx + yy + zz,
+            1.0 + xx - yy - zz,
+            1.0 - xx + yy - zz,
+            1.0 - xx - yy + zz,
+        ]
+    )
+    root = doubled.clamp(min=0.0).sqrt()
+    squared = root**2
+    rows = (
+        (squared[0], zy - yz, xz - zx, yx - xy),
+        (zy - yz, squared[1], yx + xy, xz + zx),
+        (xz - zx, yx + xy, squared[2], zy + yz),
+        (yx - xy, zx + xz, zy + yz, squared[3]),
+    )
+    largest = int(root.argmax())
+    found = torch.stack(rows[largest]) / (2.0 * root[largest].clamp(min=0.1))
+    return -found if found[0] < 0 else found

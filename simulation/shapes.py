@@ -1,8 +1,8 @@
-"""Shapes that bodies are made of: data, and the one place that turns it into SAPIEN records."""
+"""Shapes that bodies are made of: data, and the one place that turns it into collision shapes."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,31 @@ Color = tuple[float, float, float, float]  # red, green, blue, alpha in 0 … 1
 GREY: Color = (0.7, 0.7, 0.7, 1.0)
 
 
+@dataclass(frozen=True)
+class Finish:
+    """How a surface throws light back, each from 0 to 1.
+
+    Attributes:
+        metallic: 0 for paint, 1 for metal.
+        roughness: 0 for a mirror, 1 for chalk.
+        specular: Strength of highlights.
+    """
+
+    metallic: float = 0.0
+    roughness: float = 1.0
+    specular: float = 0.0
+
+
+MATT = Finish()
+POLISHED = Finish(metallic=1.0, roughness=0.0, specular=1.0)
+
+
+def linear(code: str) -> Color:
+    """Return the colour of a code like ``"#FFD289"``, which is of light as screens encode it."""
+    red, green, blue = ((int(code[i : i + 2], 16) / 255) ** 2.2 for i in (1, 3, 5))
+    return red, green, blue, 1.0
+
+
 @dataclass(frozen=True, kw_only=True)
 class Shape:
     """What all shapes share.
@@ -27,6 +52,7 @@ class Shape:
         friction: Contact material; None takes the world's.
         density: Density (kg/m³).
         color: Colour when drawn.
+        finish: Surface when drawn.
         collides: Whether it takes part in contacts.
         visible: Whether it is drawn.
     """
@@ -36,6 +62,7 @@ class Shape:
     friction: Friction | None = None
     density: float = 1000.0
     color: Color = GREY
+    finish: Finish = MATT
     collides: bool = True
     visible: bool = True
 
@@ -100,22 +127,35 @@ class Mesh(Shape):
     Attributes:
         file: Mesh file.
         scale: Scale along x, y, z.
+        textured: Whether it is drawn as its file says; else in ``color``, with the file's finish.
     """
 
     file: Path
     scale: Vector3 = (1.0, 1.0, 1.0)
+    textured: bool = False
 
 
-def add_shape(builder: Any, shape: Shape, *, visuals: bool) -> None:
-    """Add a shape to a SAPIEN actor builder, for contacts and (if asked) for pictures."""
+@dataclass(frozen=True)
+class Floor(Shape):
+    """A square of the plane z = 0 that is drawn with a texture, and touches nothing.
+
+    Attributes:
+        texture: Image file.
+        size: Length of its sides (m), a whole number.
+        tile: Length of the texture's sides (m).
+    """
+
+    texture: Path
+    size: int = 100
+    tile: float = 4.0
+    collides: bool = field(default=False, kw_only=True)
+
+
+def add_collision(builder: Any, shape: Shape) -> None:
+    """Add a shape to a SAPIEN actor builder, if it takes part in contacts."""
+    if not shape.collides:
+        return
     pose = sapien.Pose(list(shape.position), list(shape.quaternion))
-    if shape.collides:
-        _add_collision(builder, shape, pose)
-    if visuals and shape.visible:
-        _add_visual(builder, shape, pose)
-
-
-def _add_collision(builder: Any, shape: Shape, pose: sapien.Pose) -> None:
     material = (
         None
         if shape.friction is None
@@ -144,29 +184,6 @@ def _add_collision(builder: Any, shape: Shape, pose: sapien.Pose) -> None:
         case _:
             raise TypeError(f"no collision for {type(shape).__name__}")
     add(density=shape.density, **common, **sizes)
-
-
-def _add_visual(builder: Any, shape: Shape, pose: sapien.Pose) -> None:
-    from sapien.render import RenderMaterial
-
-    material = RenderMaterial(base_color=list(shape.color))
-    match shape:
-        case Plane():
-            builder.add_plane_visual(pose=pose, scale=[50.0, 50.0, 50.0], material=material)
-        case Box():
-            builder.add_box_visual(pose=pose, half_size=list(shape.half_size), material=material)
-        case Sphere():
-            builder.add_sphere_visual(pose=pose, radius=shape.radius, material=material)
-        case Cylinder():
-            builder.add_cylinder_visual(pose=pose, material=material, **_round_sizes(shape))
-        case Capsule():
-            builder.add_capsule_visual(pose=pose, material=material, **_round_sizes(shape))
-        case Mesh():
-            builder.add_visual_from_file(
-                filename=str(shape.file), pose=pose, scale=list(shape.scale), material=material
-            )
-        case _:
-            raise TypeError(f"no picture for {type(shape).__name__}")
 
 
 def _round_sizes(shape: Cylinder | Capsule) -> dict[str, float]:

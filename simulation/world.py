@@ -13,7 +13,7 @@ from robots import SimulationError, UnknownNameError
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, apply
 from simulation.robot import SimulatedRobot
-from simulation.shapes import Shape, add_shape
+from simulation.shapes import Shape, add_collision
 
 BodyKind = Literal["dynamic", "kinematic", "static"]
 
@@ -30,6 +30,7 @@ class SimulatedBody:
         start_pose: Pose it was built at.
         anchored: Whether every reset puts it back to ``start_pose``.
         shapes: What it is made of.
+        marker: Whether cameras that observe do not see it.
     """
 
     name: str
@@ -39,6 +40,7 @@ class SimulatedBody:
     start_pose: sapien.Pose
     anchored: bool
     shapes: tuple[Shape, ...] = ()
+    marker: bool = False
 
 
 class World:
@@ -98,6 +100,7 @@ class World:
         position: Vector3 = (0.0, 0.0, 0.0),
         quaternion: Quaternion = IDENTITY,
         anchored: bool = False,
+        marker: bool = False,
     ) -> SimulatedBody:
         """Add a body made of shapes.
 
@@ -108,6 +111,7 @@ class World:
             position: Where it is built (m, world).
             quaternion: How it is turned, wxyz.
             anchored: Whether every reset puts it back there.
+            marker: Whether it is there for people only: cameras that observe do not see it.
 
         Raises:
             SimulationError: If the name is taken.
@@ -116,17 +120,19 @@ class World:
             raise SimulationError(f"this world already has a body called {name!r}")
         builder = self.scene.create_actor_builder()
         for shape in shapes:
-            add_shape(builder, shape, visuals=self.visuals)
+            add_collision(builder, shape)
         builder.set_physx_body_type(kind)
         pose = sapien.Pose(list(position), list(quaternion))
         builder.set_initial_pose(pose)
         entity = builder.build(name)
+        if self.visuals:
+            _draw(entity, shapes)
         component = entity.find_component_by_type(
             physx.PhysxRigidStaticComponent
             if kind == "static"
             else physx.PhysxRigidDynamicComponent
         )
-        body = SimulatedBody(name, entity, component, kind, pose, anchored, shapes)
+        body = SimulatedBody(name, entity, component, kind, pose, anchored, shapes, marker)
         self.bodies[name] = body
         return body
 
@@ -178,6 +184,14 @@ def _floats(values: Any) -> list[float]:
     return values.tolist() if hasattr(values, "tolist") else [float(x) for x in values]
 
 
+def _draw(entity: sapien.Entity, shapes: tuple[Shape, ...]) -> None:
+    from simulation.visuals import visual_component
+
+    component = visual_component(shapes)
+    if component is not None:
+        entity.add_component(component)
+
+
 def _render_system() -> Any:
     from sapien.render import RenderSystem
 
@@ -186,5 +200,5 @@ def _render_system() -> Any:
     except RuntimeError as error:
         raise SimulationError(
             f"pictures need a Vulkan driver, and none works here ({error}); without pictures"
-            " (render_mode=None) everything else works"
+            " (render_mode=None, obs_mode='state') everything else works"
         ) from error

@@ -5,8 +5,9 @@ from __future__ import annotations
 import inspect
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import degrees
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,9 @@ from rich.table import Table
 
 from layouts import Layout
 from robots import TaskError
+from simulation import Camera
+from simulation.cameras import RobotCamera
+from tasks.observation import cameras_of
 from tasks.registry import get_task_class, make, other_names
 from tasks.task import MultiRobotTask
 
@@ -77,7 +81,7 @@ def facts(task_id: str) -> TaskFacts:
             cls.task_id,
             robots_text(cls.layout),
             cls.layout.action_dim,
-            env.single_observation_space.shape[0],
+            observation_size(env),
             cls.max_episode_steps,
             cls.reward_modes,
         )
@@ -170,8 +174,15 @@ def describe(env: MultiRobotTask) -> Iterator[RenderableType]:
     yield f"\nLayout: {env.layout}\n"
     yield action_sentence(env.layout)
     yield action_table(env.layout)
-    yield f"Observation, {env.single_observation_space.shape[0]} numbers"
-    yield observation_table(env.observation_slices)
+    yield f"Observation, {observation_size(env)} numbers"
+    yield observation_table(env.observation_slices, env.observer.senses)
+    yield "Cameras, with obs_mode='rgb' or 'rgbd'; beside images only what is sensed is told"
+    yield camera_table(cameras_of(env.layout, cls.cameras))
+
+
+def observation_size(env: MultiRobotTask) -> int:
+    """Return how many numbers the flat observation of a task has."""
+    return max((part.stop for part in env.observation_slices.values()), default=0)
 
 
 def action_sentence(layout: Layout) -> str:
@@ -199,12 +210,35 @@ def action_table(layout: Layout) -> Table:
     return rows
 
 
-def observation_table(slices: dict[str, slice]) -> Table:
-    """Return one row per named entry of the flat observation."""
-    rows = _table("entry", "slice", "size", numbers=(1, 2))
+def observation_table(slices: dict[str, slice], senses: Callable[[str], bool]) -> Table:
+    """Return one row per named entry of the flat observation.
+
+    Args:
+        slices: Where each entry stands.
+        senses: Tells of an entry whether real robots know it, so that it is told beside images.
+    """
+    rows = _table("entry", "slice", "size", "sensed", numbers=(1, 2))
     for name, part in slices.items():
-        rows.add_row(name, f"{part.start}:{part.stop}", str(part.stop - part.start))
+        size, joints = str(part.stop - part.start), name.endswith((".qpos", ".qvel"))
+        told = "yes" if joints or senses(name) else "no"
+        rows.add_row(name, f"{part.start}:{part.stop}", size, told)
     return rows
+
+
+def camera_table(cameras: Mapping[str, Camera | RobotCamera]) -> Table:
+    """Return one row per camera: where it is, and how large and wide its images are."""
+    rows = _table("camera", "place", "pixels", "view", numbers=(2, 3))
+    for name, camera in cameras.items():
+        if isinstance(camera, RobotCamera):
+            lens, place = camera.mount, f"on {camera.robot}, link {camera.mount.link}"
+        else:
+            lens, place = camera, f"at {_point(camera.eye)}, towards {_point(camera.target)} m"
+        rows.add_row(name, place, f"{lens.width} × {lens.height}", f"{degrees(lens.fov):.0f}°")
+    return rows
+
+
+def _point(place: Sequence[float]) -> str:
+    return f"({', '.join(f'{x:g}' for x in place)})"
 
 
 def _table(*columns: str, numbers: Sequence[int]) -> Table:

@@ -13,7 +13,7 @@ from torch import Tensor
 from layouts import Layout, Placement
 from robots import RobotRegistry, SimulationError
 from robots.descriptor import Quaternion
-from simulation import Box, Cylinder, PhysicsSettings, State, World, add_table
+from simulation import Box, Camera, Cylinder, PhysicsSettings, State, World, add_table
 from simulation.arrays import Array, Floats
 from simulation.shapes import Color
 from tasks.props import WHITE
@@ -114,6 +114,7 @@ class DrawTriangle(MultiRobotTask):
     max_episode_steps = MAX_DOTS
     reward_modes = ("sparse",)
     viewpoint = ((0.3, 0.0, 0.8), (0.0, 0.0, 0.1))
+    cameras = (Camera((0.3, 0.0, 0.8), (0.0, 0.0, 0.1), width=320, height=240, fov=1.2),)
 
     def build(self, world: World) -> None:
         """Add the table, the canvas, the dots and the triangle."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from layouts import around_table
 from robots.descriptor import Vector3
-from simulation import PhysicsSettings, State, World
+from simulation import Camera, PhysicsSettings, State, World
 from simulation.arrays import Array, Flags, Floats, constants, norm
 from simulation.shapes import Color
 from tasks.props import (
@@ -56,6 +56,7 @@ class FourRobotStack(MultiRobotTask):
     max_episode_steps = 300
     max_reward = 5
     viewpoint = ((1.3, 1.0, 1.0), (0.0, 0.0, 0.1))
+    cameras = (Camera((0.6, 0.6, 0.8), (0.0, 0.0, 0.1)),)
 
     def build(self, world: World) -> None:
         """Add the table, the cubes and the target."""

@@ -9,9 +9,9 @@ from math import pi
 import numpy as np
 
 from layouts import single
-from simulation import Box, PhysicsSettings, State, World, add_table
+from simulation import Box, Camera, PhysicsSettings, State, World, add_table
 from simulation.arrays import Array, Floats, constants, norm, tanh
-from simulation.shapes import Color
+from simulation.shapes import Finish, linear
 from tasks.poses import compose, inverse, transform
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -30,9 +30,8 @@ ALIGNED = 0.01  # peg from the hole's axis
 GRASP_X = -0.06  # where to grasp, behind the peg's middle
 MAX_GRASP_ANGLE = 20.0  # degrees; stricter than the robot's own
 
-ORANGE: Color = (236 / 255, 115 / 255, 87 / 255, 1.0)
-CREAM: Color = (237 / 255, 246 / 255, 249 / 255, 1.0)
-WOOD: Color = (1.0, 210 / 255, 137 / 255, 1.0)
+ORANGE, CREAM, WOOD = linear("#EC7357"), linear("#EDF6F9"), linear("#FFD289")
+SATIN = Finish(roughness=0.5, specular=0.5)
 
 
 @dataclass(frozen=True)
@@ -63,6 +62,7 @@ class PegDesign:
                 half_size=(half / 2, radius, radius),
                 position=(x, 0.0, 0.0),
                 color=color,
+                finish=SATIN,
                 collides=False,
             )
             for x, color in ((half / 2, ORANGE), (-half / 2, CREAM))
@@ -81,7 +81,10 @@ class PegDesign:
             ((depth, width, wall - z), (0.0, 0.0, offset + z)),
             ((depth, width, wall + z), (0.0, 0.0, -offset + z)),
         )
-        return [Box(half_size=size, position=position, color=WOOD) for size, position in walls]
+        return [
+            Box(half_size=size, position=position, color=WOOD, finish=SATIN)
+            for size, position in walls
+        ]
 
 
 @register_task("PegInsertionSide-v1", "maniskill.peg_insertion_side_native")
@@ -106,6 +109,8 @@ class PegInsertionSide(MultiRobotTask):
         half_length, radius = rng.numpy.uniform(*HALF_LENGTH), rng.numpy.uniform(*RADIUS)
         y, z = 0.5 * (half_length - radius) * rng.numpy.uniform(-1, 1, size=2)
         return PegDesign(half_length, radius, (y, z))
+
+    cameras = (Camera((0.0, -0.3, 0.2), (0.0, 0.0, 0.1)),)
 
     def build(self, world: World) -> None:
         """Add the table, the peg and the box."""

@@ -40,6 +40,7 @@ class PickCube(MultiRobotTask):
     physics = PhysicsSettings()
     max_episode_steps = 50
     max_reward = 5
+    sensed = ("is_grasped", "tcp_pose", "goal_pos")
 
     # mani_skill 3.0.1, envs/tasks/tabletop/pick_cube_cfgs.py, "panda"
     cube_half_size: ClassVar[float] = 0.02

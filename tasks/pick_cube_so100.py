@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from layouts import single
+from simulation import Camera
 from tasks.pick_cube import PickCube
 from tasks.registry import register_task
 
@@ -18,6 +19,7 @@ class PickCubeSO100(PickCube):
     source = "mani_skill 3.0.1, envs/tasks/tabletop/pick_cube.py"
     layout = single({"arm": "so100"})
     viewpoint = ((-0.1, 0.3, 0.4), (-0.46, 0.0, 0.1))
+    cameras = (Camera((-0.27, 0.0, 0.4), (-0.56, 0.0, -0.25)),)
 
     # mani_skill 3.0.1, envs/tasks/tabletop/pick_cube_cfgs.py, "so100" (m)
     cube_half_size = 0.0125

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from layouts import single
-from simulation import Box, PhysicsSettings, Sphere, State, World, add_table
+from simulation import Box, Camera, PhysicsSettings, Sphere, State, World, add_table
 from simulation.arrays import Array, Floats, constants
-from tasks.props import DARK_BLUE
+from tasks.props import DARK_BLUE, WHITE
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness, letting_go, stillness
@@ -36,6 +36,8 @@ class PlaceSphere(MultiRobotTask):
     max_episode_steps = 50
     max_reward = 13
     viewpoint = ((0.6, -0.2, 0.2), (0.0, 0.0, 0.2))
+    cameras = (Camera((0.3, 0.0, 0.2), (-0.1, 0.0, 0.0)),)
+    sensed = ("is_grasped", "tcp_pose", "bin_pos")
 
     def build(self, world: World) -> None:
         """Add the table, the ball and the bin."""
@@ -92,15 +94,15 @@ class PlaceSphere(MultiRobotTask):
 def _bin() -> list[Box]:
     """The floor of the bin and its walls at -x, +x, -y, +y, with the floor's centre as origin."""
     across, height = BIN_HALF_SIZE - WALL, 2 * WALL + WALL
-    floor = Box(half_size=(BIN_HALF_SIZE, BIN_HALF_SIZE, WALL))
+    floor = Box(half_size=(BIN_HALF_SIZE, BIN_HALF_SIZE, WALL), color=WHITE)
     return [
         floor,
         *(
-            Box(half_size=(WALL, BIN_HALF_SIZE, 2 * WALL), position=(x, 0.0, height))
+            Box(half_size=(WALL, BIN_HALF_SIZE, 2 * WALL), position=(x, 0.0, height), color=WHITE)
             for x in (-across, across)
         ),
         *(
-            Box(half_size=(BIN_HALF_SIZE, WALL, 2 * WALL), position=(0.0, y, height))
+            Box(half_size=(BIN_HALF_SIZE, WALL, 2 * WALL), position=(0.0, y, height), color=WHITE)
             for y in (-across, across)
         ),
     ]

@@ -11,7 +11,7 @@ from layouts import single
 from robots.descriptor import Vector3
 from simulation import Box, PhysicsSettings, State, World, add_table
 from simulation.arrays import Array, constants, norm
-from simulation.shapes import Color
+from simulation.shapes import POLISHED, Finish, linear
 from tasks.poses import angle_between, compose
 from tasks.props import WHITE
 from tasks.randomness import EpisodeRandom
@@ -32,16 +32,27 @@ RECEPTACLE_YAW = (pi - pi / 8, pi + pi / 8)
 PLUGGED_DISTANCE = 5e-3
 PLUGGED_ANGLE = 0.2
 
-BRASS: Color = (219 / 255, 181 / 255, 57 / 255, 1.0)
+BRASS = linear("#DBB539")
+GLOSSY = Finish(roughness=0.1)
 
 
 def charger() -> list[Box]:
     """Return the two prongs and the body; the origin is where the prongs leave the body."""
     prongs = [
-        Box(half_size=PRONG_HALF_SIZE, position=(PRONG_HALF_SIZE[0], y, 0.0), color=BRASS)
+        Box(
+            half_size=PRONG_HALF_SIZE,
+            position=(PRONG_HALF_SIZE[0], y, 0.0),
+            color=WHITE,
+            finish=POLISHED,
+        )
         for y in (PRONG_OFFSET, -PRONG_OFFSET)
     ]
-    body = Box(half_size=BODY_HALF_SIZE, position=(-BODY_HALF_SIZE[0], 0.0, 0.0), color=WHITE)
+    body = Box(
+        half_size=BODY_HALF_SIZE,
+        position=(-BODY_HALF_SIZE[0], 0.0, 0.0),
+        color=WHITE,
+        finish=GLOSSY,
+    )
     return [*prongs, body]
 
 
@@ -59,6 +70,7 @@ def receptacle() -> list[Box]:
             half_size=half_size,
             position=(-depth, y, z),
             color=BRASS if brass else WHITE,
+            finish=POLISHED if brass else GLOSSY,
             collides=not brass,
         )
 

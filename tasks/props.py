@@ -47,14 +47,15 @@ def add_cube(
 
 
 def add_goal(world: World, radius: float, name: str = "goal_site") -> None:
-    """Add a green ball that marks a place and touches nothing.
+    """Add a green ball that marks a place, touches nothing and is hidden from observing cameras.
 
     Args:
         world: The world.
         radius: Its radius (m).
         name: Its name.
     """
-    world.add(name, Sphere(radius=radius, color=GREEN, collides=False), kind="kinematic")
+    ball = Sphere(radius=radius, color=GREEN, collides=False)
+    world.add(name, ball, kind="kinematic", marker=True)
 
 
 def add_peg(

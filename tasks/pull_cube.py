@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from simulation import State
+from simulation import Camera, State
 from simulation.arrays import Array, Floats, constants
 from tasks.moved_cube import CUBE_HALF_SIZE, TOUCHED, MovedCube
 from tasks.registry import register_task
@@ -28,6 +28,8 @@ class PullCube(MovedCube):
     max_reward = 3
     direction = -1
     touch_offset = np.array([PULL_OFFSET, 0.0, 0.0], np.float32)
+    cameras = (Camera((-0.5, 0.0, 0.25), (0.2, 0.0, -0.5)),)
+    sensed = ("tcp_pose", "goal_pos")
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: over the target."""

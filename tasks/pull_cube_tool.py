@@ -7,8 +7,9 @@ from math import pi
 import numpy as np
 
 from layouts import single
-from simulation import Box, PhysicsSettings, State, World, add_table
+from simulation import Box, Camera, PhysicsSettings, State, World, add_table
 from simulation.arrays import Array, Flags, Floats, constants, norm, tanh
+from simulation.shapes import POLISHED
 from tasks.props import DARK_BLUE, RED, add_cube
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -42,6 +43,7 @@ class PullCubeTool(MultiRobotTask):
     physics = PhysicsSettings()
     max_episode_steps = 100
     max_reward = 5
+    cameras = (Camera((0.3, 0.0, 0.5), (-0.1, 0.0, 0.1)),)
 
     def build(self, world: World) -> None:
         """Add the table, the cube and the tool."""
@@ -53,11 +55,13 @@ class PullCubeTool(MultiRobotTask):
             position=(HANDLE_LENGTH / 2, 0.0, 0.0),
             density=HANDLE_DENSITY,
             color=RED,
+            finish=POLISHED,
         )
         hook = Box(
             half_size=(HOOK_LENGTH / 2, WIDTH, HEIGHT / 2),
             position=(HANDLE_LENGTH - HOOK_LENGTH / 2, WIDTH, 0.0),
             color=RED,
+            finish=POLISHED,
         )
         world.add("l_shape_tool", handle, hook)
 

@@ -76,7 +76,7 @@ class PushT(MultiRobotTask):
 
     def build(self, world: World) -> None:
         """Add the table, the T, its outline and the marker where the stick starts."""
-        add_table(world)
+        add_table(world, textured=False)
         red, grey = (194 / 255, 19 / 255, 22 / 255, 1.0), (128 / 255, 128 / 255, 128 / 255, 1.0)
         above = (0.0, 0.0, 0.1)
         world.add("Tee", *tee(thickness=HALF_THICKNESS, color=red, collides=True), position=above)

@@ -143,7 +143,8 @@ def make(
             with one place. A robot that lacks its place's keyframe starts from its home's.
         layout: Another layout with the task's places, in any order; for a task over any number of
             robots, with places of any names.
-        obs_mode: ``"state"``, ``"state_dict"`` or ``"none"``.
+        obs_mode: ``"state"``, ``"state_dict"``, ``"none"``, or what cameras see: ``"rgb"``,
+            ``"rgbd"`` and others; see `tasks.Scenario`.
         reward_mode: One of the task's reward modes; None takes native's default.
         fields: Other fields of `tasks.Scenario`.
 

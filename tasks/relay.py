@@ -10,7 +10,7 @@ import numpy as np
 
 from layouts import Layout, ring
 from robots import TaskError
-from simulation import Box, PhysicsSettings, State, World
+from simulation import Box, Camera, PhysicsSettings, State, World
 from simulation.arrays import Array, Floats, constants, norm
 from tasks.props import DARK_BLUE, FACE_UP, TARGET_HEIGHT, add_goal, add_target, add_wide_table
 from tasks.randomness import EpisodeRandom
@@ -50,6 +50,8 @@ class Relay(MultiRobotTask):
     physics = PhysicsSettings()
     max_episode_steps = 800
     viewpoint = ((1.5, 1.5, 1.5), (0.0, 0.0, 0.0))
+    cameras = (Camera((1.2, 0.0, 1.2), (0.0, 0.0, 0.0)),)
+    sensed = ("beacon_pos", "share_visited", "*_tcp_pose")
 
     def build(self, world: World) -> None:
         """Add the table, the baton, the zones and the beacon."""

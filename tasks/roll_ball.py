@@ -9,7 +9,7 @@ import numpy as np
 
 from layouts import Layout, Placement
 from layouts.placement import load_robot
-from simulation import PhysicsSettings, Sphere, State, World, add_table
+from simulation import Camera, PhysicsSettings, Sphere, State, World, add_table
 from simulation.arrays import Array, Floats, constants, norm, tanh
 from tasks.props import FACE_UP, TARGET_HEIGHT, add_target
 from tasks.randomness import EpisodeRandom
@@ -45,6 +45,7 @@ class RollBall(MultiRobotTask):
     max_episode_steps = 80
     max_reward = 30
     viewpoint = ((-0.6, 1.3, 0.8), (0.0, 0.13, 0.0))
+    cameras = (Camera((-0.1, 0.9, 0.3), (0.0, 0.0, 0.0)),)
 
     def build(self, world: World) -> None:
         """Add the table, the ball and the target."""

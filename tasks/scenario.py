@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any
 
 from layouts import Layout
 from robots import CONTROL_MODES, TaskError, UnknownNameError
-from simulation import PhysicsSettings
+from simulation import Camera, PhysicsSettings
+from tasks.observation import read_mode
 
 SIMULATORS = ("sapien3",)
-OBS_MODES = ("state", "state_dict", "none")
 RENDER_MODES = (None, "rgb_array")
 
 
@@ -23,14 +22,18 @@ class Scenario:
         layout: Which robots stand where.
         num_envs: Number of environments in this process.
         physics: Solver settings; None keeps SAPIEN's own defaults.
-        obs_mode: ``"state"`` (flat), ``"state_dict"`` (named parts) or ``"none"``.
+        obs_mode: ``"state"`` (flat), ``"state_dict"`` (named parts), ``"none"``, or what cameras
+            see (needs a Vulkan driver): ``"rgb"``, ``"rgbd"``, or any of ``rgb``, ``depth``,
+            ``segmentation`` and ``position`` joined by ``+``, and to them ``state`` or
+            ``state_dict``, without which only what a real robot senses is told beside images.
         reward_mode: One of the task's modes; None takes its first.
         control_mode: ``"pd_joint_delta_pos"``, or ``"pd_joint_pos"`` for actions that are joint
             positions.
         control_frequency: Control steps per second (Hz).
         render_mode: ``"rgb_array"`` to draw pictures (needs a Vulkan driver), or None.
         headless: No window is opened; the only choice.
-        cameras: Cameras to observe with; none are offered yet.
+        cameras: Cameras to observe with, in the place of the task's own; empty takes those. Those
+            of the robots come after.
         simulator: ``"sapien3"``.
         check_layout: Whether to refuse a layout whose robots collide; the task's own layout is
             never checked.
@@ -45,7 +48,7 @@ class Scenario:
     control_frequency: float = 20.0
     render_mode: str | None = None
     headless: bool = True
-    cameras: Sequence[Any] = field(default_factory=list[Any])
+    cameras: Sequence[Camera] = field(default_factory=list[Camera])
     simulator: str = "sapien3"
     check_layout: bool = True
 
@@ -55,6 +58,11 @@ class Scenario:
         if name not in known:
             raise UnknownScenarioField("scenario field", name, known)
         object.__setattr__(self, name, value)
+
+    @property
+    def draws(self) -> bool:
+        """Whether anything is drawn: for people, or for cameras that observe."""
+        return self.render_mode is not None or bool(read_mode(self.obs_mode).textures)
 
     def check(self, reward_modes: Sequence[str]) -> None:
         """Refuse values that no task can be made with.
@@ -76,7 +84,6 @@ class Scenario:
         for name, choices in (
             ("simulator", SIMULATORS),
             ("control_mode", CONTROL_MODES),
-            ("obs_mode", OBS_MODES),
             ("render_mode", RENDER_MODES),
             ("reward_mode", (None, *reward_modes)),
         ):
@@ -84,12 +91,16 @@ class Scenario:
             if value not in choices:
                 offered = ", ".join(map(repr, choices))
                 raise TaskError(f"{name} {value!r} is not offered; choices: {offered}")
+        read_mode(self.obs_mode)
         if not isinstance(self.check_layout, bool):
             raise TaskError(f"check_layout is {self.check_layout!r}; it must be True or False")
         if not self.headless:
             raise TaskError("headless=False is not offered: no window is opened; use render_mode")
-        if self.cameras:
-            raise TaskError("cameras are not offered yet; leave the list empty")
+        for camera in self.cameras:
+            if not isinstance(camera, Camera):
+                raise TaskError(
+                    f"cameras has a {type(camera).__name__}; simulation.Camera is needed"
+                )
 
 
 class UnknownScenarioField(UnknownNameError, AttributeError):

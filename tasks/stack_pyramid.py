@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from layouts import single
-from simulation import PhysicsSettings, State, World, add_table
+from simulation import Camera, PhysicsSettings, State, World, add_table
 from simulation.arrays import Array, Flags, constants
 from tasks.props import BLUE, GREEN, RED, add_cube
 from tasks.randomness import EpisodeRandom
@@ -35,6 +35,7 @@ class StackPyramid(MultiRobotTask):
     physics = PhysicsSettings()
     max_episode_steps = 250
     reward_modes = ("none", "sparse")
+    cameras = (Camera((0.3, 0.0, 0.4), (-0.05, 0.0, 0.1)),)
 
     def build(self, world: World) -> None:
         """Add the table and the cubes."""

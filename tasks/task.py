@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 import torch
 from gymnasium.spaces import Box
+from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 from torch import Tensor
 
 from layouts import Layout
-from robots import SimulationError, TaskError, unknown_name_message
-from simulation import PhysicsSettings, Simulation, State, World
+from robots import SimulationError, TaskError
+from simulation import Camera, PhysicsSettings, Simulation, State, World
 from simulation.arrays import Array, Floats
 from tasks.actions import ActionReader
+from tasks.arguments import check_places, checked_ids, checked_seeds, wants_rebuild
 from tasks.layout_check import refuse_collisions
-from tasks.native_format import (
-    StateDict,
-    StateTape,
-    observation_keys,
-    read_state_dict,
-    write_state_dict,
-)
+from tasks.native_format import StateDict, StateTape, read_state_dict, write_state_dict
+from tasks.observation import Observer, read_mode, space_of
 from tasks.randomness import EpisodeRandom
 from tasks.scenario import Scenario
 
@@ -65,12 +61,17 @@ class MultiRobotTask:
         joint_noise_draws: How often joint noise is drawn at a reset; the last draw counts.
         rebuilds: Whether every reset builds the worlds anew, with a new `design`.
         viewpoint: Camera position and target of `render` (m, world).
+        cameras: Cameras that observe, where images are asked for; those of the robots come after.
+        sensed: Which parts of `observe` a real robot knows, so that they are observed beside
+            images; the others are privileged. ``*`` stands for any letters.
         num_envs: Number of environments N.
         single_action_space: Action of one environment, (A,); joint limits (rad) where the control
             mode asks for positions, else [-1, 1].
         action_space: Actions of all environments, (N, A).
         action_split: Robot name → slice of the flat action, in declared order.
         moving: Which environments the present step advances.
+        observer: What puts its observations together, and its cameras.
+        observation_slices: Where each named part stands in the flat observation.
         start: Observation and info of the first reset, when it was made.
         made_from: The scenario it was made from.
     """
@@ -92,6 +93,9 @@ class MultiRobotTask:
         (0.6, 0.7, 0.6),
         (0.0, 0.0, 0.35),
     )
+
+    cameras: ClassVar[tuple[Camera, ...]] = (Camera((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1)),)
+    sensed: ClassVar[tuple[str, ...]] = ("*tcp_pose",)
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         """Offer dense modes exactly if the subclass computes a dense reward."""
@@ -171,8 +175,9 @@ class MultiRobotTask:
             AssetError: If robot files cannot be found.
         """
         scenario.check(self.reward_modes)
-        self._check_places(scenario.layout)
-        if scenario.check_layout and scenario.layout != type(self).layout:
+        own = type(self)
+        check_places(own.__name__, scenario.layout, own.layout, self.robot_counts)
+        if scenario.check_layout and scenario.layout != own.layout:
             refuse_collisions(scenario.layout)
         self.made_from = scenario
         self.layout = scenario.layout.in_control_mode(scenario.control_mode)
@@ -185,8 +190,9 @@ class MultiRobotTask:
         self.single_action_space = Box(low, high, dtype=np.float32)
         self.action_space = Box(np.tile(low, rows), np.tile(high, rows), dtype=np.float32)
         self._reader = ActionReader(self.layout, self.num_envs)
-        self._observation_keys = observation_keys(self.layout)
-        self._robots = tuple(self.layout)
+        mode = read_mode(scenario.obs_mode)
+        cameras = scenario.cameras or self.cameras if mode.textures else ()
+        self.observer = Observer(self.layout, mode, cameras, self.sensed)
         self._rngs = [EpisodeRandom(first_seed + i) for i in range(self.num_envs)]
         self._max_reward = np.array(self.max_reward, np.float32)
         self._elapsed = np.zeros(self.num_envs, np.int32)
@@ -198,17 +204,12 @@ class MultiRobotTask:
             self.num_envs,
             scenario.physics,
             control_frequency=scenario.control_frequency,
-            visuals=scenario.render_mode is not None,
+            visuals=scenario.draws,
         )
         self._camera: Any = None
         self._responds = type(self).respond is not MultiRobotTask.respond
         self.start = self._begin(list(range(self.num_envs)), reconfigured=True)
-        obs = self.start[0]
-        self.observation_slices = self._slices() if self.obs_mode == "state" else {}
-        if isinstance(obs, Tensor):
-            shape = (obs.shape[1],)
-            self.single_observation_space = Box(-np.inf, np.inf, shape, np.float32)
-            self.observation_space = Box(-np.inf, np.inf, (self.num_envs, *shape), np.float32)
+        self._describe_observation()
 
     @property
     def simulation(self) -> Simulation:
@@ -225,6 +226,7 @@ class MultiRobotTask:
         """Let the worlds go; closing twice is allowed."""
         self._simulation = None
         self._camera = None
+        self.observer.close()
 
     # -- episodes ----------------------------------------------------------------------------
 
@@ -249,9 +251,9 @@ class MultiRobotTask:
         Raises:
             TaskError: If an argument makes no sense; nothing is reset then.
         """
-        ids = self._checked_ids(env_ids)
-        seeds = self._checked_seeds(seed, ids)
-        reconfigure = self._checked_options(options) or self.rebuilds
+        ids = checked_ids(env_ids, self.num_envs)
+        seeds = checked_seeds(seed, ids)
+        reconfigure = wants_rebuild(options) or self.rebuilds
         self.simulation.touched()
         for i, own_seed in zip(ids, seeds, strict=True):
             if own_seed is not None:
@@ -284,7 +286,7 @@ class MultiRobotTask:
             ActionError: If the action has a wrong shape, type or number; nothing moves then.
         """
         flat = self._reader.read(action)
-        self.moving = self._everywhere if env_ids is None else self._checked_ids(env_ids)
+        self.moving = self._everywhere if env_ids is None else checked_ids(env_ids, self.num_envs)
         self.simulation.step(flat, self._state.joint_positions, self.moving)
         self._elapsed[slice(None) if env_ids is None else self.moving] += 1
         state = self.simulation.read()
@@ -294,6 +296,7 @@ class MultiRobotTask:
             state = self.simulation.read()
         self._state = state
         info = self._info(state)
+        self.observer.changed(self.moving)
         obs = self._observation(state, info)
         reward = _tensor(self._reward(state, flat, info))
         terminated = _tensor(info["success"].copy())
@@ -324,7 +327,9 @@ class MultiRobotTask:
         Raises:
             TaskError: If a key or a shape is wrong; nothing is changed then.
         """
-        write_state_dict(self.simulation, state, self._checked_ids(env_ids))
+        ids = checked_ids(env_ids, self.num_envs)
+        write_state_dict(self.simulation, state, ids)
+        self.observer.changed(ids)
         self._state = self.simulation.read()
 
     def render(self) -> np.ndarray:
@@ -342,21 +347,6 @@ class MultiRobotTask:
         return self._camera.take()
 
     # -- inside ------------------------------------------------------------------------------
-
-    @classmethod
-    def _check_places(cls, layout: Layout) -> None:
-        """Refuse a layout whose places are not the task's; their order is the layout's own."""
-        if cls.robot_counts is not None:
-            if len(layout) not in cls.robot_counts:
-                raise TaskError(
-                    f"{cls.__name__} takes {cls.robot_counts[0]} to {cls.robot_counts[-1]} robots;"
-                    f" the layout has {len(layout)}: {list(layout)}"
-                )
-        elif set(layout) != set(cls.layout):
-            raise TaskError(
-                f"{cls.__name__} has the places {list(cls.layout)}; the layout has {list(layout)}."
-                " Give the layout's robots the names of the places"
-            )
 
     def _joint_noise(self, layout: Layout, rng: EpisodeRandom) -> dict[str, NDArray[np.float64]]:
         if not self.shared_joint_noise:
@@ -383,33 +373,26 @@ class MultiRobotTask:
         state = self._state = self.simulation.read()
         self.begin_episodes(state, ids)
         info = self._info(state)
+        self.observer.changed(ids)
         obs = self._observation(state, info)
         return obs, {**_tensors(info), "reconfigure": reconfigured}
+
+    def _describe_observation(self) -> None:
+        """Read spaces and slices off the first observation."""
+        state, mode = self._state, self.observer.mode
+        parts = self.observe(state, self._info(state)) if mode.flat else {}
+        self.observation_slices = self.observer.slices(state, parts)
+        if not mode.nothing:
+            self.single_observation_space = space_of(self.start[0], batched=True)
+            self.observation_space = batch_space(self.single_observation_space, self.num_envs)
 
     def _info(self, state: State) -> Info:
         told = {key: np.asarray(value) for key, value in self.evaluate(state).items()}
         return {"elapsed_steps": self._elapsed.copy(), **told}
 
     def _observation(self, state: State, info: Info) -> Any:
-        if self.obs_mode == "none":
-            return {}
-        extra = self.observe(state, info)
-        if self.obs_mode == "state_dict":
-            own = {key: _tensor(x.copy()) for key, x in extra.items()}
-            return {"agent": self._proprioception(state), "extra": own}
-        parts = [part for name in self._robots for part in (state.qpos(name), state.qvel(name))]
-        parts.extend(part if part.ndim == 2 else part[:, None] for part in extra.values())
-        return _tensor(np.concatenate(parts, 1, dtype=np.float32))
-
-    def _proprioception(self, state: State) -> dict[str, Any]:
-        parts: dict[str, Any] = {}
-        for name, key in self._observation_keys.items():
-            own = {
-                "qpos": _tensor(state.qpos(name).copy()),
-                "qvel": _tensor(state.qvel(name).copy()),
-            }
-            parts.update(own if key is None else {key: own})
-        return parts
+        parts = {} if self.observer.mode.nothing else self.observe(state, info)
+        return self.observer.observe(self.simulation, state, parts)
 
     def _reward(self, state: State, action: Floats, info: Info) -> Floats:
         match self.reward_mode:
@@ -424,54 +407,6 @@ class MultiRobotTask:
 
     def _dense(self, state: State, action: Floats, info: Info) -> Floats:
         return np.asarray(self.dense_reward(state, action, info), np.float32)
-
-    def _slices(self) -> dict[str, slice]:
-        state, sizes = self._state, dict[str, int]()
-        for name in self.layout:
-            sizes[f"{name}.qpos"] = sizes[f"{name}.qvel"] = state.qpos(name).shape[1]
-        extra = self.observe(state, self._info(state))
-        sizes.update({key: x.shape[1] if x.ndim == 2 else 1 for key, x in extra.items()})
-        slices, start = dict[str, slice](), 0
-        for name, size in sizes.items():
-            slices[name] = slice(start, start + size)
-            start += size
-        return slices
-
-    def _checked_ids(self, env_ids: Sequence[int] | None) -> list[int]:
-        if env_ids is None:
-            return list(range(self.num_envs))
-        try:
-            ids = [operator.index(i) for i in env_ids]
-        except TypeError:
-            raise TaskError(f"env_ids is {env_ids!r}; it takes a sequence of integers") from None
-        wrong = [i for i in ids if not 0 <= i < self.num_envs]
-        if wrong or len(set(ids)) != len(ids):
-            raise TaskError(
-                f"env_ids {ids} must be different numbers from 0 to {self.num_envs - 1}"
-            )
-        return ids
-
-    def _checked_seeds(self, seed: int | Sequence[int] | None, ids: list[int]) -> list[int | None]:
-        if seed is None:
-            return [None] * len(ids)
-        try:
-            if isinstance(seed, Sequence | np.ndarray | Tensor) and np.ndim(seed) == 1:
-                seeds = [operator.index(s) for s in seed]
-            else:
-                seeds = [operator.index(seed) + i for i in ids]  # type: ignore[arg-type]
-        except TypeError:
-            raise TaskError(f"seed is {seed!r}; it takes an integer or a list of them") from None
-        if len(seeds) != len(ids):
-            raise TaskError(f"{len(seeds)} seeds for {len(ids)} environments")
-        if not all(0 <= s < 2**32 for s in seeds):
-            raise TaskError(f"seeds {seeds} must lie from 0 to 2**32 - 1")
-        return list(seeds)
-
-    def _checked_options(self, options: Mapping[str, Any] | None) -> bool:
-        for key in options or {}:
-            if key != "reconfigure":
-                raise TaskError(unknown_name_message("reset option", key, ("reconfigure",)))
-        return bool((options or {}).get("reconfigure", False))
 
 
 _tensor = torch.from_numpy

@@ -7,7 +7,7 @@ from math import cos, pi, radians
 import numpy as np
 
 from layouts import face_to_face
-from simulation import Box, PhysicsSettings, State, World, add_table
+from simulation import Box, Camera, PhysicsSettings, State, World, add_table
 from simulation.arrays import Array, Flags, Floats, arccos, constants, norm
 from tasks.poses import transform
 from tasks.props import DARK_BLUE, RED
@@ -47,6 +47,8 @@ class TwoRobotLiftBar(MultiRobotTask):
     max_episode_steps = 100
     max_reward = 7
     viewpoint = ((1.4, 0.4, 0.75), (0.0, 0.0, 0.15))
+    cameras = (Camera((1.0, 0.0, 0.75), (0.0, 0.0, 0.1)),)
+    sensed = ("*_tcp_pose", "is_left_grasping", "is_right_grasping")
 
     def build(self, world: World) -> None:
         """Add the table and the bar."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from layouts import face_to_face
-from simulation import PhysicsSettings, State, World, add_table
+from simulation import Camera, PhysicsSettings, State, World, add_table
 from simulation.arrays import Array, Floats, constants, norm, tanh
 from tasks.props import add_cube, add_goal
 from tasks.randomness import EpisodeRandom
@@ -36,6 +36,8 @@ class TwoRobotPickCube(MultiRobotTask):
     max_reward = 21
     shared_joint_noise = True  # native gives both arms one draw
     viewpoint = ((1.4, 0.8, 0.75), (0.0, 0.1, 0.1))
+    cameras = (Camera((1.0, 0.0, 0.75), (0.0, 0.0, 0.25)),)
+    sensed = ("left_arm_tcp", "right_arm_tcp")
 
     def build(self, world: World) -> None:
         """Add the table, the cube and the goal."""

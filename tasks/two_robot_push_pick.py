@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 
 from layouts import face_to_face
-from simulation import Box, Friction, PhysicsSettings, State, World, add_table
+from simulation import Box, Camera, Friction, PhysicsSettings, State, World, add_table
 from simulation.arrays import Array, Floats, constants, norm
 from tasks.props import DARK_RED, add_goal
 from tasks.randomness import EpisodeRandom
@@ -42,6 +42,8 @@ class TwoRobotPushPick(MultiRobotTask):
     max_episode_steps = 150
     max_reward = 8
     viewpoint = ((1.4, 0.4, 0.75), (0.0, 0.0, 0.1))
+    cameras = (Camera((1.0, 0.0, 0.75), (0.0, 0.0, 0.1)),)
+    sensed = ("*_tcp_pose", "goal_pos", "is_cube_grasped")
 
     def build(self, world: World) -> None:
         """Add the table, the cube and the goal."""

@@ -39,6 +39,7 @@ class TwoRobotStackCube(MultiRobotTask):
     max_reward = 10
     shared_joint_noise = True  # native gives both arms one draw
     viewpoint = ((0.6, 0.2, 0.4), (-0.1, 0.0, 0.1))
+    sensed = ("left_arm_tcp", "right_arm_tcp")
 
     def build(self, world: World) -> None:
         """Add the table, both cubes and the target."""

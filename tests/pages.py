@@ -25,6 +25,11 @@ SIZE = {"width": 900, "height": 560}
 PLAN = 580  # pixels from the left that no panel covers
 
 
+def _heed_ctrl_c() -> None:
+    """Undo what a shell does to processes in the background: they would never see Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 class Served:
     """A ``view`` command that runs.
 
@@ -40,6 +45,7 @@ class Served:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
+            preexec_fn=_heed_ctrl_c,
         )
         assert self.process.stdout is not None
         self.lines: list[str] = []

@@ -100,6 +100,7 @@ class TestDependencies:
             "export",
             "parity",
             "pettingzoo",
+            "ray",
             "sb3",
         ):
             declared |= names_of(PROJECT["optional-dependencies"][extra])

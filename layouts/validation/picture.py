@@ -10,7 +10,7 @@ import numpy as np
 
 from layouts.description import decimal, headline
 from layouts.files import written_whole
-from layouts.preview import COLOURS, FAINT, INK, SUPPORTED, TABLE
+from layouts.preview import COLOURS, FAINT, INK, LONGEST_NAME, SUPPORTED, TABLE
 from layouts.validation.kinematics import Floats
 from layouts.validation.report import Clearance, Report, length_text
 from robots import LayoutError, MissingPackageError
@@ -93,7 +93,7 @@ def _draw_robot(plan: Axes, report: Report, index: int, name: str) -> None:
     x, y, _ = report.layout[name].base_position
     plan.plot(x, y, "o", color="white", markeredgecolor=colour, markersize=8, zorder=4)
     place, behind = _behind(report, name)
-    _write(plan, place, behind, name, colour, size=11, weight="bold")
+    _write(plan, place, behind, _shortened(name, LONGEST_NAME), colour, size=11, weight="bold")
 
 
 def _behind(report: Report, name: str) -> tuple[Floats, Floats]:

@@ -269,6 +269,6 @@ def _aim(server: Any, cell: Cell) -> None:
     middle = (places.min(0) + places.max(0)) / 2 + (0.0, 0.0, 0.2)
     span = float(np.linalg.norm(np.ptp(places, axis=0)))
     reach = max(placement.robot.reach for placement in cell.layout.values())
-    distance = 0.75 * span + 1.35 * reach
+    distance = 0.55 * span + 1.35 * reach
     server.initial_camera.look_at = tuple(middle)
     server.initial_camera.position = tuple(middle + distance * np.array([0.9, -0.55, 0.6]))

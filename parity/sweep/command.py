@@ -16,14 +16,17 @@ from parity.sweep.entries import SUMMARY, Entry, is_done, line, read_summary, wr
 from parity.sweep.plan import Plan, plan
 from parity.sweep.processes import Progressed, sweep
 from parity.sweep.stages import STAGES
-from robots import RobotLayoutsError
+from rollouts.executor import Executor
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
     Returns:
-        0 if every task was swept and is equal, 1 if not, 2 for bad usage, 130 if interrupted.
+        0 if every task was swept and is equal, 1 if not, 130 if interrupted.
+
+    Raises:
+        RobotLayoutsError: If the arguments make no sense.
     """
     parser = argparse.ArgumentParser(
         prog="python -m parity sweep",
@@ -39,20 +42,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     add("--episodes", type=int, default=3, metavar="N", help="episodes of each task (3)")
     add("--out", type=Path, default=Path("runs"), metavar="DIR", help="default %(default)s")
     add("--workers", type=int, default=1, metavar="W", help="tasks at a time (1)")
+    add("--ray", metavar="ADDRESS", help="sweep on a Ray cluster whose machines share all DIRs")
     add("--again", action="store_true", help="sweep tasks again that are done")
     add("--no-video", action="store_true", help="no film of native and no clip")
     args = parser.parse_args(argv)
     try:
         return _run(args)
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
     except KeyboardInterrupt:
         print("stopped; the same command goes on from here", file=sys.stderr)
         return 130
 
 
 def _run(args: argparse.Namespace) -> int:
+    if args.ray is not None:  # whose workers are in folders of their own
+        args.out, args.demos = args.out.absolute(), args.demos and args.demos.absolute()
     plans = plan(args)
     path = args.out / SUMMARY
     known = {} if args.again and args.tasks is None else read_summary(path)["tasks"]
@@ -61,7 +64,7 @@ def _run(args: argparse.Namespace) -> int:
     for done in [p for p in plans if p not in waiting]:
         print(f"{line(found[done.task_id])}  (done before)")
     with _bars(waiting) as (show, hide):
-        for entry in sweep(waiting, args.workers, show):
+        for entry in sweep(waiting, args.workers, show, executor=_cluster(args)):
             found[entry["task"]] = entry
             write_summary(path, found)
             hide(entry["task"])
@@ -74,6 +77,14 @@ def _run(args: argparse.Namespace) -> int:
         f" both succeed and no pixel differs. Written to {path}"
     )
     return 0 if good == len(entries) else 1
+
+
+def _cluster(args: argparse.Namespace) -> Executor | None:
+    if args.ray is None:
+        return None
+    from rollouts.ray_executor import RayExecutor
+
+    return RayExecutor(args.ray, args.workers, attempts=1, fresh=True)
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import torch
 
-from robots import MissingPackageError, UnknownNameError
+from robots import MissingPackageError, SimulationError, UnknownNameError
 from rollouts.bench import episodes, processes, steps
 from rollouts.bench.measurement import BenchmarkError, Measurement
 from rollouts.bench.report import Report, machine
@@ -58,7 +58,7 @@ def measure(
         progress = _Progress(line, number, name)
         try:
             found.append(catalogue[name].measure(replace(settings, tick=progress.tick)))
-        except (BenchmarkError, MissingPackageError) as error:
+        except (BenchmarkError, MissingPackageError, SimulationError) as error:
             left_out[name] = str(error)
             line.say(f"{name} is left out: {error}")
     load.append(os.getloadavg()[0])

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robots import MissingPackageError
+from rollouts.workers import INTERRUPTED, one_or_more, stop_signals, zero_or_more
 
 if TYPE_CHECKING:
     from rollouts.bench.report import Report
@@ -28,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--only", nargs="+", metavar="NAME", help="these benchmarks; all if left out")
     add("--out", type=Path, metavar="DIR", help="write bench.json, bench.md and bench.png there")
     add("--task", nargs="+", metavar="TASK", help="task ids; what takes one takes the first")
-    add("--rounds", type=_one_or_more, metavar="N", help="samples of each (12)")
+    add("--rounds", type=one_or_more, metavar="N", help="samples of each (12)")
     add("--processor-time", action="store_true", help="for a machine that does other things too")
     for name, values, about in (
         ("environments", "1 4 16 64", "numbers of environments in one process"),
@@ -37,12 +39,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("cubes", "0 8 16 32 64", "numbers of cubes that touch"),
     ):
         help_text = f"{about} ({values})"
-        add(f"--{name}", type=_zero_or_more, nargs="+", metavar="N", help=help_text)
+        add(f"--{name}", type=zero_or_more, nargs="+", metavar="N", help=help_text)
     add("--kinds", nargs="+", metavar="ROBOT", help="robots, in turn (panda so100 panda_stick)")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; returns its exit code, 1 if nothing could be measured.
+    """Run the command; returns its exit code, 1 if nothing could be measured, 130 if interrupted.
 
     Raises:
         RobotLayoutsError: If it makes no sense.
@@ -71,8 +73,12 @@ def run_benchmarks(
 
     names = list(dict.fromkeys(options.only or catalogue))
     expect_known(names, catalogue)
-    with LiveLine(len(names), "benchmarks") as line:
-        report = measure(names, catalogue, settings, line)
+    try:
+        with stop_signals(), LiveLine(len(names), "benchmarks") as line:
+            report = measure(names, catalogue, settings, line)
+    except KeyboardInterrupt:
+        print("stopped; nothing is kept", file=sys.stderr)
+        return INTERRUPTED, None
     if not report.measurements:
         return 1, None
     console = Console(markup=False, highlight=False)
@@ -118,18 +124,3 @@ def settings_of(options: argparse.Namespace) -> Settings:
     }
     settings = Settings(clock=Clock(options.processor_time))
     return replace(settings, **{name: value for name, value in given.items() if value})
-
-
-def _one_or_more(text: str) -> int:
-    return _at_least(1, text)
-
-
-def _zero_or_more(text: str) -> int:
-    return _at_least(0, text)
-
-
-def _at_least(least: int, text: str) -> int:
-    number = int(text)
-    if number < least:
-        raise argparse.ArgumentTypeError(f"{number} is too few; it must be {least} or more")
-    return number

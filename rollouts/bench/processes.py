@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import signal
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing, contextmanager, suppress
 from multiprocessing.connection import Connection
@@ -30,7 +31,7 @@ def workers(settings: Settings) -> Measurement:
     with PhysicsProcesses(task_id, max(1, *settings.workers), share) as floor:
         for count in settings.workers:
             with vector(task_id, max(1, count) * share, count) as env:
-                timed = TimedVector(env, settings.clock, settings.steps)
+                timed = TimedVector(env, settings.clock, settings.batch_steps)
                 variants = {
                     (VECTOR, count): timed.rate,
                     (PHYSICS, count): lambda number, timed=timed: floor.rate(timed, number),
@@ -174,6 +175,7 @@ def _work(connection: Connection, task_id: str, num_envs: int) -> None:
 
     import tasks
 
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C: the process that started this one acts
     torch.set_num_threads(1)
     env = tasks.make(task_id, num_envs=num_envs)
     connection.send(0.0)

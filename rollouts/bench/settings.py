@@ -62,7 +62,8 @@ class Settings:
         rounds: Samples of each.
         tick: Called with the share of a benchmark that was just done.
         tasks: Task ids; benchmarks that take one task alone take the first.
-        steps: Control steps of a sample.
+        steps: Control steps of a sample of one environment.
+        batch_steps: Control steps of a sample of many.
         environments: Numbers of environments in one process.
         workers: Numbers of worker processes; 0 is this process.
         worker_envs: Environments of each worker.
@@ -78,7 +79,8 @@ class Settings:
     rounds: int = 12
     tick: Callable[[float], None] = lambda share: None
     tasks: tuple[str, ...] = ("PickCube-v1", "TwoRobotPickCube-v1", "PushT-v1")
-    steps: int = 25
+    steps: int = 50
+    batch_steps: int = 25
     environments: tuple[int, ...] = (1, 4, 16, 64)
     workers: tuple[int, ...] = (0, *(2**k for k in range(3) if 2**k <= CORES))
     worker_envs: int = 32

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -69,7 +70,7 @@ def step(settings: Settings) -> Measurement:
 
 def environments(settings: Settings) -> Measurement:
     """Time a step with one environment, with some, and with many in this process."""
-    task_id = settings.tasks[0]
+    task_id, settings = settings.tasks[0], replace(settings, steps=settings.batch_steps)
     envs = {count: tasks.make(task_id, num_envs=count) for count in settings.environments}
     title = f"One step per environment of one process, {task_id}"
     return _beside_physics(settings, "environments", title, "environments", {STEP: envs})

@@ -10,15 +10,8 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from rollouts.experts.geometry import (
-    Floats,
-    backed_off,
-    gripper_facing,
-    heading,
-    nearest_quarter_turn,
-    yaw_of,
-)
-from rollouts.experts.grasps import held_at, need_fingers, pick
+from rollouts.experts.geometry import Floats, backed_off
+from rollouts.experts.grasps import YAWS, cube_grip_from, held_at, need_fingers, pick
 from rollouts.experts.rehearsal import first_success
 from rollouts.experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
 from tasks import MultiRobotTask
@@ -41,9 +34,6 @@ class Style:
     waiting: float = 0.12
     clearance: float = 0.05
 
-
-# How a gripper may turn about the vertical on its way to the middle; the quickest is taken (rad).
-YAWS = tuple(0.3 * i for i in range(-4, 5))
 
 STYLES = (
     Style(),
@@ -84,10 +74,7 @@ def _stack(
     goal = np.array([0.0, 0.0, (2 * level + 1) * CUBE_HALF_SIZE])
 
     def grips(scene: Scene) -> list[Pose]:
-        place, quaternion = scene.body(cube)
-        forward = heading(base, place)
-        direction = forward + nearest_quarter_turn(yaw_of(quaternion) - forward)
-        return [(place, gripper_facing(direction, style.tilt))]
+        return [cube_grip_from(scene.body(cube), base, style.tilt)]
 
     def lift(scene: Scene) -> list[Pose]:
         x, y, _ = scene.body(cube)[0]

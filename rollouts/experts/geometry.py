@@ -67,6 +67,11 @@ def nearest_quarter_turn(angle: float) -> float:
     return angle - round(angle / (pi / 2)) * (pi / 2)
 
 
+def squared(direction: float, yaw: float) -> float:
+    """Return the heading of a cube's side nearest a direction, for a cube of that yaw (rad)."""
+    return direction + nearest_quarter_turn(yaw - direction)
+
+
 def gripper_facing(direction: float, tilt: float) -> Floats:
     """Return the orientation of a gripper that reaches down and forward, (4,).
 

@@ -13,9 +13,11 @@ from rollouts.experts.geometry import (
     Floats,
     backed_off,
     gripper_facing,
+    heading,
     inverse,
     multiply,
     rotate,
+    squared,
     turn,
     yaw_of,
 )
@@ -25,6 +27,9 @@ from tasks import MultiRobotTask
 Numbers = Sequence[float] | Floats
 
 QUARTERS = (0, 1, 2, 3)
+
+# How a gripper may turn about the vertical on its way to a place; the quickest is taken (rad).
+YAWS = tuple(0.3 * i for i in range(-4, 5))
 
 
 def need_fingers(task: MultiRobotTask, plan: str, *robots: str) -> None:
@@ -58,6 +63,19 @@ def cube_grips(cube: Pose, turns: Sequence[int] = QUARTERS, tilt: float = 0.0) -
     position, quaternion = cube
     yaw = yaw_of(quaternion)
     return [(position, gripper_facing(yaw + turn * pi / 2, tilt)) for turn in turns]
+
+
+def cube_grip_from(cube: Pose, base: Floats, tilt: float) -> Pose:
+    """Return the grip of a cube by the side faces that look most along the way from a base.
+
+    Args:
+        cube: Where it is.
+        base: Where the arm stands, (3,) (m, world).
+        tilt: Angle of the gripper from straight down, forward (rad).
+    """
+    position, quaternion = cube
+    direction = squared(heading(base, position), yaw_of(quaternion))
+    return position, gripper_facing(direction, tilt)
 
 
 def pick(

@@ -10,7 +10,15 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from rollouts.experts.grasps import QUARTERS, cube_grips, held_at, is_near, need_fingers, pick
+from rollouts.experts.grasps import (
+    QUARTERS,
+    YAWS,
+    cube_grips,
+    held_at,
+    is_near,
+    need_fingers,
+    pick,
+)
 from rollouts.experts.rehearsal import first_success
 from rollouts.experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
 from tasks import MultiRobotTask
@@ -39,9 +47,6 @@ class Style:
     ready: float = 0.1
     clearance: float = 0.06
 
-
-# How the gripper may turn about the vertical on its way to the green cube; the quickest is taken.
-YAWS = tuple(0.3 * i for i in range(-4, 5))  # rad
 
 # Tried in this order. The first solves 99 of 100 seeds.
 STYLES = (

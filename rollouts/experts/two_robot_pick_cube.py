@@ -15,7 +15,7 @@ from rollouts.experts.geometry import (
     gripper_facing,
     heading,
     multiply,
-    nearest_quarter_turn,
+    squared,
     turn,
     yaw_of,
 )
@@ -115,7 +115,7 @@ class _HandOver:
 
     def pick(self, scene: Scene, back: float) -> list[Pose]:
         position, quaternion = scene.body(CUBE)
-        direction = self.forward + nearest_quarter_turn(yaw_of(quaternion) - self.forward)
+        direction = squared(self.forward, yaw_of(quaternion))
         return [self._grip(position, direction, self.style.pick_tilt, back)]
 
     def present(self, scene: Scene) -> list[Pose]:

@@ -10,15 +10,16 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from rollouts.experts.geometry import (
-    Floats,
-    backed_off,
-    gripper_facing,
-    heading,
-    nearest_quarter_turn,
-    yaw_of,
+from rollouts.experts.geometry import Floats, backed_off
+from rollouts.experts.grasps import (
+    YAWS,
+    cube_grip_from,
+    cube_grips,
+    held_at,
+    is_near,
+    need_fingers,
+    pick,
 )
-from rollouts.experts.grasps import cube_grips, held_at, is_near, need_fingers, pick
 from rollouts.experts.rehearsal import first_success
 from rollouts.experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
 from tasks import MultiRobotTask
@@ -47,9 +48,6 @@ class Style:
     short: float = 0.05
     clearance: float = 0.02
 
-
-# How a gripper may turn about the vertical on its way to a place; the quickest is taken (rad).
-YAWS = tuple(0.3 * i for i in range(-4, 5))
 
 # Tried in this order. The first solves each of the seeds 0 … 99.
 STYLES = (
@@ -84,10 +82,7 @@ def _lay(style: Style, base: Floats) -> tuple[Waypoint, ...]:
     """The right arm brings the green cube and makes room."""
 
     def grips(scene: Scene) -> list[Pose]:
-        cube, quaternion = scene.body(BASE)
-        forward = heading(base, cube)
-        direction = forward + nearest_quarter_turn(yaw_of(quaternion) - forward)
-        return [(cube, gripper_facing(direction, style.tilt))]
+        return [cube_grip_from(scene.body(BASE), base, style.tilt)]
 
     def place(scene: Scene, up: float, yaws: Sequence[float] = (0.0,)) -> list[Pose]:
         target, _ = scene.body(TARGET)

@@ -6,7 +6,6 @@ import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from rollouts.export.statistics import (
     describe_numbers,
     flatten,
 )
+from rollouts.export.writer import DatasetWriter
 
 VERSION = "v3.0"
 CAMERA = "observation.images.overview"
@@ -64,7 +64,7 @@ class Place:
         )
 
 
-class LeRobotWriter:
+class LeRobotWriter(DatasetWriter):
     """Writes episodes one after the other; the dataset is complete when it is closed."""
 
     def __init__(
@@ -101,26 +101,6 @@ class LeRobotWriter:
         self._video_place = Place()
         self._origins: list[dict[str, Any]] = []
         self._frames = 0
-
-    def __enter__(self) -> LeRobotWriter:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        """Complete the dataset, or let go of its files after an error."""
-        try:
-            if error is None:
-                self._complete()
-        finally:
-            self._data.close()
-            self._episodes.close()
-            if self._video is not None:
-                self._video.close()
 
     def add(
         self,
@@ -230,6 +210,12 @@ class LeRobotWriter:
             row |= _keys("meta/episodes", self._episodes.place)
         self._episodes.write(pa.Table.from_pylist(self._rows))
         self._rows.clear()
+
+    def _let_go(self) -> None:
+        self._data.close()
+        self._episodes.close()
+        if self._video is not None:
+            self._video.close()
 
     def _complete(self) -> None:
         if self._rows:

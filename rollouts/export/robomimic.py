@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import h5py
@@ -13,13 +12,14 @@ import numpy as np
 
 from rollouts.episode import States
 from rollouts.export.columns import POSE, ColumnReader, Columns, Floats
+from rollouts.export.writer import DatasetWriter
 
 FILE_NAME = "low_dim.hdf5"  # what robomimic calls observations without pictures
 GYM = 2  # robomimic's number for environments made by gym
 VALIDATION_EVERY = 10  # the last of each ten demonstrations is for validation
 
 
-class RobomimicWriter:
+class RobomimicWriter(DatasetWriter):
     """Writes episodes one after the other; the file is complete when it is closed."""
 
     def __init__(self, folder: Path, reader: ColumnReader, *, origin: Mapping[str, Any]) -> None:
@@ -34,23 +34,6 @@ class RobomimicWriter:
         self._file = h5py.File(folder / FILE_NAME, "w")
         self._data = self._file.create_group("data")
         self._total, self._solved = 0, list[str]()
-
-    def __enter__(self) -> RobomimicWriter:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        """Complete the file, or let go of it after an error."""
-        try:
-            if error is None:
-                self._complete()
-        finally:
-            self._file.close()
 
     def add(self, columns: Columns) -> None:
         """Write one episode."""
@@ -86,6 +69,9 @@ class RobomimicWriter:
         if self._reader.bodies:
             parts["object"] = columns.bodies
         return parts
+
+    def _let_go(self) -> None:
+        self._file.close()
 
     def _complete(self) -> None:
         self._data.attrs["total"] = self._total

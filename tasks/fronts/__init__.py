@@ -51,7 +51,7 @@ def parallel_env(
         robot_reward: What each robot earns; None gives every robot the task's reward. Called as
             ``robot_reward(robot, observation, reward, info)`` with its place, what it observes
             now, the task's reward and the info of the step.
-        fields: Other arguments of `tasks.make`; ``num_envs`` and ``obs_mode`` are not offered.
+        fields: Other arguments of `tasks.make`; ``num_envs`` is not offered.
 
     Raises:
         MissingPackageError: If pettingzoo is not installed.

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from robots import TaskError
 from tasks.fronts.board import Arrays, Shapes
+from tasks.observation import told_dtype
 from tasks.scenario import Scenario
 from tasks.task import FIRST_SEED, MultiRobotTask
 
@@ -183,4 +184,4 @@ def _leaves(name: str, tree: Any) -> Iterator[tuple[str, NDArray[Any]]]:
             yield from _leaves(f"{name}/{key}", part)
     else:
         array: NDArray[Any] = tree.numpy()
-        yield name, array.astype(np.float32, copy=False)
+        yield name, array.astype(told_dtype(array), copy=False)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots import TaskError
-from tasks.fronts.numbers import info_row, observation_space, row
+from tasks.fronts.numbers import info_row, row
+from tasks.observation import space_of
 from tasks.registry import make
 
 RENDER_MODES = ["rgb_array"]
@@ -48,7 +49,7 @@ class GymnasiumTask(gymnasium.Env[Any, NDArray[np.float32]]):
         frames = round(self.task.made_from.control_frequency)
         self.metadata = {**self.metadata, "render_fps": frames}  # type: ignore[misc]
         self.action_space = self.task.single_action_space
-        self.observation_space = observation_space(row(self.task.start[0]))
+        self.observation_space = space_of(row(self.task.start[0]))
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -11,29 +11,32 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from robots import TaskError, UnknownNameError
-from tasks.fronts.numbers import info_row
+from tasks.fronts.numbers import info_row, row
+from tasks.native_format import observation_keys
+from tasks.observation import space_of
 from tasks.registry import make
 
-Observation = NDArray[np.float32]
+Observation = Any
+"""An array, or with images a mapping of them."""
 RobotReward = Callable[[str, Observation, float, dict[str, Any]], float]
 """Robot, its observation, the task's reward, info → what the robot earns."""
 
 _Space = TypeVar("_Space", bound=Space[Any])
-_NOT_OFFERED = ("num_envs", "obs_mode")
 
 
 class ParallelTask(ParallelEnv[str, Observation, NDArray[np.float32]]):
     """What `tasks.parallel_env` gives: every robot observes and acts for itself.
 
     A robot observes its own joint positions and velocities, then all that the task observes
-    besides joints (TCP poses, objects, goals). Its action is its own slice of the task's. All
+    besides joints (TCP poses, objects, goals), and where images are asked for, what the task's
+    cameras and its own see. Its action is its own slice of the task's. All
     robots end together: when the task succeeds or is truncated, ``agents`` is emptied.
 
     Attributes:
         task: The task, with one environment.
         possible_agents: The robots' places, in declared order.
         agents: The same during an episode, else nothing.
-        observed: Robot → the numbers of the task's observation that it observes.
+        observed: Robot → the numbers of the task's flat observation that it observes.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -51,9 +54,10 @@ class ParallelTask(ParallelEnv[str, Observation, NDArray[np.float32]]):
         **fields: Any,
     ) -> None:
         """Make the task; see `tasks.parallel_env`."""
-        for name in _NOT_OFFERED:
-            if name in fields:
-                raise TaskError(f"parallel_env takes no {name}: it is one environment of states")
+        if "num_envs" in fields:
+            raise TaskError("parallel_env takes no num_envs: it is one environment")
+        if fields.get("obs_mode") == "none":
+            raise TaskError("parallel_env takes no obs_mode='none'; choices: 'state', 'rgb', …")
         self.task = make(task_id, render_mode=render_mode, **fields)
         self.render_mode = render_mode
         frames = round(self.task.made_from.control_frequency)
@@ -61,16 +65,14 @@ class ParallelTask(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self._robot_reward = robot_reward
         self.possible_agents = list(self.task.layout)
         self.agents: list[str] = []
-        self.observed = self._observed()
+        self.observed = self._observed() if self.task.observation_slices else {}
         bounds = self.task.single_action_space
         self._action_spaces = {
             name: Box(bounds.low[part], bounds.high[part], dtype=np.float32)
             for name, part in self.task.action_split.items()
         }
-        self._observation_spaces = {
-            name: Box(-np.inf, np.inf, (len(numbers),), np.float32)
-            for name, numbers in self.observed.items()
-        }
+        start = self._observations(self.task.start[0])
+        self._observation_spaces = {name: space_of(own) for name, own in start.items()}
 
     def observation_space(self, agent: str) -> Space[Observation]:
         """Return what a robot observes; always the same object."""
@@ -160,8 +162,24 @@ class ParallelTask(ParallelEnv[str, Observation, NDArray[np.float32]]):
         }
 
     def _observations(self, obs: Any) -> dict[str, Observation]:
-        flat = obs[0].numpy()
-        return {name: flat[numbers] for name, numbers in self.observed.items()}
+        told = row(obs)
+        return {name: self._own(name, told) for name in self.possible_agents}
+
+    def _own(self, robot: str, told: Any) -> Any:
+        """Return what one robot observes of all that is observed."""
+        if not isinstance(told, Mapping):
+            return told[self.observed[robot]]
+        own = dict(told)
+        if "state" in told:
+            own["state"] = told["state"][self.observed[robot]]
+        if "agent" in told:
+            key = observation_keys(self.task.layout)[robot]
+            own["agent"] = told["agent"] if key is None else told["agent"][key]
+        cameras = self.task.observer.seen_by(robot)
+        for kind in ("sensor_param", "sensor_data"):
+            if kind in told:
+                own[kind] = {name: told[kind][name] for name in cameras}
+        return own
 
     def _infos(self, info: dict[str, Any]) -> dict[str, dict[str, Any]]:
         return {name: dict(info) for name in self.possible_agents}

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
-from gymnasium.spaces import Box, Dict, Space
+from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from tasks.actions import ActionReader
 from tasks.fronts.batch import FINAL, INFO, OBSERVATION, Beginning, Part
 from tasks.fronts.gymnasium import RENDER_MODES
 from tasks.fronts.workers import Failure, InProcess, WorkerError, Workers, WorkersFailed
+from tasks.observation import space_of
 from tasks.registry import get_task_class, make_scenario
 from tasks.task import FIRST_SEED
 
@@ -98,8 +99,8 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             Part(cls, scenario, start, stop, mode, ignore_terminations)
             for start, stop in zip(bounds, bounds[1:], strict=False)
         ]
-        for placement in layout.values():
-            placement.robot.urdf.locate()  # fetched here, not by all workers at once
+        for placement in layout.values():  # fetched here, not by all workers at once
+            placement.robot.urdf.locate(pictures=scenario.draws)
         try:
             self._crew = Workers(parts, timeout) if workers else InProcess(parts[0])
         except WorkersFailed as failed:
@@ -108,7 +109,7 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         low, high = np.array(layout.action_bounds, np.float32).T
         self.single_action_space = Box(low, high, dtype=np.float32)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self.single_observation_space = _space(self._observation())
+        self.single_observation_space = space_of(self._observation(), batched=True)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
 
     def reset(
@@ -372,12 +373,6 @@ def _checked_workers(num_workers: int | None, num_envs: int) -> int:
             f" environments, {num_envs}"
         )
     return num_workers
-
-
-def _space(batch: Any) -> Space[Any]:
-    if isinstance(batch, Mapping):
-        return Dict({key: _space(part) for key, part in batch.items()})
-    return Box(-np.inf, np.inf, batch.shape[1:], np.float32)
 
 
 def _row(batch: Any, env: int) -> Any:

@@ -1,5 +1,11 @@
 """A cell with a robot that stands askew, one on a wall, one under a ceiling, and two of a kind."""
 
+import io
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
 import numpy as np
 import yourdfpy
 
@@ -19,12 +25,28 @@ def mixed_cell() -> Layout:
     )
 
 
+def hung(robot: str) -> Layout:
+    """One robot upside down under a ceiling, turned."""
+    return Layout(
+        {"arm": Placement(robot, (0.1, -0.2, 0.0), on="ceiling", rpy=(0.0, 0.0, 1.0))},
+        {"ceiling": ceiling(1.5, position=(0.4, -0.3))},
+    )
+
+
+def skeleton(file: Path) -> yourdfpy.URDF:
+    """Return links and joints of a URDF, without shapes: yourdfpy knows no capsules."""
+    root = ElementTree.parse(file).getroot()
+    for link in root.iterfind("link"):
+        for shape in [*link.findall("visual"), *link.findall("collision")]:
+            link.remove(shape)
+    return yourdfpy.URDF.load(io.BytesIO(ElementTree.tostring(root)))
+
+
 def random_positions(placement: Placement, random: np.random.Generator) -> dict[str, float]:
-    """Return positions of a robot's joints within their limits, its own mimicry respected."""
-    urdf = yourdfpy.URDF.load(str(placement.robot.urdf.locate()), load_meshes=False)
+    """Return positions of joints within their limits and a half-turn, mimicry respected."""
+    urdf = skeleton(placement.robot.urdf.locate())
     positions = {
-        joint.name: float(random.uniform(joint.limit.lower, joint.limit.upper))
-        for joint in urdf.actuated_joints
+        joint.name: float(random.uniform(*_range(joint))) for joint in urdf.actuated_joints
     }
     for joint in urdf.robot.joints:
         if joint.mimic is not None:
@@ -34,7 +56,24 @@ def random_positions(placement: Placement, random: np.random.Generator) -> dict[
 
 def link_poses(placement: Placement, positions: dict[str, float]) -> dict[str, np.ndarray]:
     """Return the world pose of each link, by yourdfpy from the robot's own URDF."""
-    urdf = yourdfpy.URDF.load(str(placement.robot.urdf.locate()), load_meshes=False)
+    urdf = skeleton(placement.robot.urdf.locate())
     urdf.update_cfg({joint.name: positions[joint.name] for joint in urdf.actuated_joints})
     base = pose_matrix(placement.base_position, placement.base_quaternion)
     return {link: base @ urdf.get_transform(link) for link in urdf.link_map}
+
+
+def _range(joint: yourdfpy.Joint) -> tuple[float, float]:
+    """Return what a joint may be at (rad or m); single precision forbids slides of 20 m."""
+    if joint.limit is None or joint.limit.lower is None:
+        return -np.pi, np.pi
+    return max(joint.limit.lower, -np.pi), min(joint.limit.upper, np.pi)
+
+
+def overlapping(texts: list[Any]) -> list[tuple[str, str]]:
+    """Return pairs of matplotlib texts of one figure whose letters cover each other."""
+    boxes = [(text.get_text().strip(), text.get_window_extent()) for text in texts]
+    return [
+        (one, other)
+        for (one, first), (other, second) in combinations(boxes, 2)
+        if one and other and first.overlaps(second)
+    ]

@@ -11,8 +11,8 @@ import yourdfpy
 from scipy.spatial.transform import Rotation
 
 from layouts import single
-from robots import LayoutError
-from tests.layouts.cells import link_poses, mixed_cell, random_positions
+from robots import LayoutError, RobotRegistry
+from tests.layouts.cells import hung, link_poses, mixed_cell, random_positions, skeleton
 
 DRAWS = 5
 READABLE = (".obj", ".vtk", ".gltf")  # by Drake
@@ -76,6 +76,21 @@ def test_links_are_where_the_robots_own_urdfs_put_them(cell, exported):
                 np.testing.assert_allclose(found, pose, rtol=0, atol=1e-9)
                 compared += 1
     assert compared == DRAWS * 50
+
+
+@pytest.mark.parametrize("robot", RobotRegistry.names())
+def test_links_of_any_robot_that_hangs_are_there(robot, tmp_path):
+    layout = hung(robot)
+    models, welds = read(layout.to_drake(tmp_path / "cell.dmd.yaml", visuals=False))
+    urdf = skeleton(urdf_of(models["arm"]))
+    welded, base = welds["arm"]
+    random = np.random.default_rng(1)
+    for _ in range(DRAWS):
+        positions = random_positions(layout["arm"], random)
+        urdf.update_cfg({j.name: positions[j.name] for j in urdf.actuated_joints})
+        for link, pose in link_poses(layout["arm"], positions).items():
+            found = base @ urdf.get_transform(link, welded)
+            np.testing.assert_allclose(found, pose, rtol=0, atol=1e-9)
 
 
 def test_robots_start_at_their_keyframes(cell, exported):

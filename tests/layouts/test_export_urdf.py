@@ -16,7 +16,7 @@ from layouts.orientation import normalised, rpy_quaternion
 from layouts.validation.kinematics import pose_matrix
 from robots import AssetError, LayoutError, LocalUrdf, RobotRegistry
 from robots.urdf_xml import read_references
-from tests.layouts.cells import link_poses, mixed_cell, random_positions
+from tests.layouts.cells import hung, link_poses, mixed_cell, random_positions, skeleton
 
 DRAWS = 5
 
@@ -63,6 +63,19 @@ def test_links_are_where_the_robots_own_urdfs_put_them(cell, merged):
                 np.testing.assert_allclose(found, pose, rtol=0, atol=1e-9)
                 compared += 1
     assert compared == DRAWS * 50
+
+
+@pytest.mark.parametrize("robot", RobotRegistry.names())
+def test_links_of_any_robot_that_hangs_are_there(robot, tmp_path):
+    layout = hung(robot)
+    urdf = skeleton(layout.to_urdf(tmp_path / "cell.urdf", visuals=False))
+    random = np.random.default_rng(1)
+    for _ in range(DRAWS):
+        positions = random_positions(layout["arm"], random)
+        urdf.update_cfg({j.name: positions[j.name.partition("/")[2]] for j in urdf.actuated_joints})
+        for link, pose in link_poses(layout["arm"], positions).items():
+            found = urdf.get_transform(f"arm/{link}", "world")
+            np.testing.assert_allclose(found, pose, rtol=0, atol=1e-9)
 
 
 def test_there_is_one_tree_whose_names_are_distinct(cell, merged):

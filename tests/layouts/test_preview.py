@@ -20,6 +20,7 @@ from layouts import (
 )
 from layouts.preview import DOTS_PER_INCH, SUPPORTED, WIDTH, draw
 from robots import LayoutError, MissingPackageError
+from tests.layouts.cells import overlapping
 
 
 def mixed(count):
@@ -87,6 +88,16 @@ def test_names_robots_and_action_numbers_are_written(name):
         assert place in written
         assert placement.robot.name in written
         assert f"{part.start}:{part.stop}" in written
+
+
+def test_long_names_fit_into_the_list_and_the_plan():
+    robots = {"robot_of_a_very_long_name": "floating_panda_gripper", "b": "mobile_panda"}
+    figure = draw(grid(robots, spacing=8.765, columns=1).moved((-111.1, -22.2, 0.0)))
+    plan, listing = figure.axes
+    assert overlapping(listing.texts) == []
+    assert max(text.get_window_extent().x1 for text in listing.texts) < figure.bbox.x1
+    for text in plan.texts:
+        assert plan.bbox.x0 < text.get_window_extent().x0
 
 
 @pytest.mark.parametrize("name", LAYOUTS)

@@ -20,6 +20,7 @@ from layouts import (
 from layouts.validation.bodies import load_model
 from layouts.validation.collisions import nearest, stand, touching
 from robots import AssetError, DescriptorError, LayoutError, MissingPackageError, RobotRegistry
+from tests.layouts.cells import overlapping
 from tests.layouts.small_robots import (
     FOLDING,
     TURNTABLE,
@@ -500,6 +501,14 @@ class TestPicture:
         written = [text.get_text().strip() for text in plan.texts]
         assert {"left", "right", "cube", "4.1 cm"} <= set(written)
         assert plan.get_title(loc="right") == "ok"
+
+    def test_no_word_covers_another_where_four_hands_meet(self):
+        from layouts.validation.picture import draw
+
+        layout = around_table({name: "panda" for name in "abcd"})
+        figure = draw(layout.validate(workspaces=False))
+        assert len(figure.axes[0].texts) >= 4 + 3
+        assert overlapping(figure.axes[0].texts) == []
 
     def test_an_unsupported_ending_names_the_supported_ones(self, tmp_path):
         report = Layout({"arm": Placement("panda")}).validate(workspaces=False)

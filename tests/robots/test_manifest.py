@@ -49,7 +49,13 @@ def test_every_package_says_its_origin_and_licence():
     for package in packages.values():
         assert DUTIES[package.origin.licence] in package.origin.licence_note
         assert package.origin.wheel == "mani_skill==3.0.1"
-    for name in ("maniskill_fetch", "maniskill_panda", "maniskill_xarm7", *APACHE):
+    for name in (
+        "maniskill_fetch",
+        "maniskill_panda",
+        "maniskill_tabletop",
+        "maniskill_xarm7",
+        *APACHE,
+    ):
         licence = "Apache-2.0" if name in APACHE else "CC BY-NC 4.0"
         assert packages[name].origin.licence == licence
 

@@ -12,15 +12,27 @@ from robots import TaskError
 from rollouts.executor import Event, report
 
 TASK = "PushT-v1"
+BARRIER = "TEST_BARRIER"  # environment variable: a folder where `at_random` waits, if it exists
 NO_PLAN = 1007  # a seed that the expert cannot plan
 
 
 def at_random(task, seed):
     """An expert that costs nothing: it moves at random for a while."""
+    wait_for_others()
     if seed == NO_PLAN:
         raise TaskError(f"no plan for seed {seed}")
     rng = np.random.default_rng(seed)
     return rng.uniform(-1, 1, (20 + seed % 5, task.layout.action_dim)).astype(np.float32)
+
+
+def wait_for_others(workers=3):
+    """Wait until so many workers have come here, and then a moment, so that they all play on."""
+    folder = Path(os.environ.get(BARRIER, "/nowhere"))
+    if folder.exists():
+        (folder / str(os.getpid())).touch()
+        while folder.exists() and len(list(folder.iterdir())) < workers:
+            time.sleep(0.01)
+        time.sleep(0.1)
 
 
 @dataclass(frozen=True)
@@ -88,3 +100,14 @@ def blocked_signals():
     status = Path("/proc/self/status").read_text()
     (mask,) = (line.split()[1] for line in status.splitlines() if line.startswith("SigBlk"))
     return lambda seed: mask
+
+
+class CodeFolder:
+    """Plays that tell where the code of the library lies, in a module that travels along."""
+
+    modules = (__name__,)
+
+    def __call__(self):
+        import rollouts
+
+        return lambda seed: str(Path(rollouts.__file__).parent)

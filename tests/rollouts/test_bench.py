@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import tasks
-from robots import MissingPackageError
+from robots import MissingPackageError, SimulationError
 from rollouts.__main__ import main
 from rollouts.bench import command, processes
 from rollouts.bench.catalogue import BENCHMARKS, measure
@@ -29,6 +29,7 @@ TINY = Settings(
     rounds=2,
     tasks=("PickCube-v1",),
     steps=2,
+    batch_steps=2,
     environments=(1, 2),
     workers=(0, 1),
     worker_envs=2,
@@ -125,13 +126,15 @@ class TestWhatIsTimed:
         played.step(4)
         assert not np.array_equal(played.env.simulation.read().joint_positions, ends[0])
 
-    def test_cubes_of_a_pile_touch_and_stay_awake(self):
-        env = make_pile(64)
+    @pytest.mark.parametrize(("cubes", "pairs"), [(0, 1), (8, 25), (64, 400)])
+    def test_cubes_of_a_pile_touch_and_stay_awake(self, cubes, pairs):
+        env = make_pile(cubes)
         for _ in range(40):
             env.step(np.zeros((1, 8), np.float32))
-        bodies = [env.simulation.worlds[0].body(f"pile{i}").component for i in range(64)]
-        assert not any(body.is_sleeping for body in bodies)
-        assert env.touching() > 200
+        world = env.simulation.worlds[0]
+        bodies = [world.body(name) for name in ("cube", *(f"pile{i}" for i in range(cubes)))]
+        assert not any(body.component.is_sleeping for body in bodies)
+        assert env.touching() >= pairs
 
     def test_kinds_of_a_crowd_take_turns(self):
         layout = crowd(3, ("panda", "so100"))
@@ -229,9 +232,10 @@ class TestCommand:
         assert command.EPILOG.startswith(f"Benchmarks: {', '.join(BENCHMARKS)}.")
 
 
-def test_what_cannot_be_measured_is_left_out(capsys):
+@pytest.mark.parametrize("error", [MissingPackageError, SimulationError, BenchmarkError])
+def test_what_cannot_be_measured_is_left_out(error, capsys):
     def fail(settings):
-        raise MissingPackageError("pip install something")
+        raise error("pip install something")
 
     catalogue = {"broken": Benchmark("nothing", fail), "names": Benchmark("", lambda _: NAMES)}
     with LiveLine(2) as line:

@@ -392,7 +392,7 @@ env = tasks.make("PushT-v1")
 try:
     with Recorder(sys.argv[1], env) as recorder:
         for seed in range(10**4):
-            recorder.add(play(env, seed, np.zeros((3, 7), np.float32)))
+            recorder.add(play(env, seed, np.zeros((22, 7), np.float32)))
             print(seed, flush=True)
 except RecordingError as error:
     sys.exit(f"error: {error}")

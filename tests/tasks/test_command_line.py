@@ -80,11 +80,11 @@ def test_describe_accounts_for_every_number(task_id, capsys):
     assert [line[0] for line in actions] == [str(i) for i in range(about.action_size)]
     assert all(line[-1] in ("rad", "m", "step") for line in actions)
     start = 0
-    for entry in lines[lines.index(["entry", "slice", "size"]) + 2 :]:
-        if entry:
-            _, part, size = entry
-            assert part == f"{start}:{start + int(size)}"
-            start += int(size)
+    entries = lines[lines.index(["entry", "slice", "size", "sensed"]) + 2 :]
+    for name, part, size, sensed in entries[: entries.index([])]:
+        assert part == f"{start}:{start + int(size)}"
+        assert sensed == "yes" if name.endswith((".qpos", "tcp_pose")) else sensed in ("yes", "no")
+        start += int(size)
     assert start == about.observation_size
 
 
@@ -102,9 +102,16 @@ def test_describe_takes_any_name_and_says_the_rest(capsys):
         "0 arm arm.panda_joint1 -0.1 +0.1 rad per step",
         "7 arm gripper -0.01 0.04 m",
         "Observation, 42 numbers",
-        "is_grasped 18:19 1",
+        "is_grasped 18:19 1 yes",
+        "obj_pose 29:36 7 no",
+        "base_camera at (0.3, 0, 0.6), towards (-0.1, 0, 0.1) m 128 × 128 90°",
     ):
         assert text in printed
+
+
+def test_describe_tells_of_the_cameras_that_ride_on_robots(capsys):
+    printed = " ".join(run(capsys, "describe", "TwoRobotPickCube-v1").split())
+    assert "panda_wristcam-1-hand_camera on right, link camera_link 128 × 128 90°" in printed
 
 
 def test_brackets_are_not_markup(capsys):
