@@ -13,7 +13,7 @@ pytest.importorskip("matplotlib")
 
 ROOT = Path(__file__).parent.parent.parent
 EXAMPLE = ROOT / "examples" / "ppo_push_cube.py"
-FILES = ["learning_curve.json", "learning_curve.png", "policy.zip"]
+FILES = ["learning_curve.json", "learning_curve.png", "normalization.pkl", "policy.zip"]
 
 
 @pytest.fixture(scope="module")
