@@ -74,8 +74,8 @@ def sb3_vec_env(
 ) -> SB3Task:
     """Make a Stable-Baselines3 ``VecEnv`` of a task, with the environments of its vector.
 
-    Its policies learn from a flat state, ``"MlpPolicy"``, or from named parts of one,
-    ``"MultiInputPolicy"`` with ``obs_mode="state_dict"``.
+    Policies learn from a flat state, ``"MlpPolicy"``, or from named parts of one and from images,
+    ``"MultiInputPolicy"`` with ``obs_mode="state_dict"`` or ``"rgb"``.
 
     Args:
         task_id: The task's id or another of its names.

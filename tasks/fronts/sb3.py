@@ -30,8 +30,9 @@ class SB3Task(VecEnv):
     An environment whose episode ends begins the next one in the same step. What it said then is
     in its info: ``terminal_observation``, ``TimeLimit.truncated`` (its time was up, and it had not
     terminated), and ``is_success``, from which Stable-Baselines3 takes its success rates. Parts of
-    a ``state_dict`` observation are called by their way, ``extra/tcp_pose``: nested spaces are
-    unknown to Stable-Baselines3. ``VecMonitor`` adds the returns and lengths of episodes.
+    an observation are called by their way, ``extra/tcp_pose`` or ``sensor_data/base_camera/rgb``:
+    nested spaces are unknown to Stable-Baselines3. ``VecMonitor`` adds the returns and lengths of
+    episodes.
 
     Attributes:
         vector: The Gymnasium vector behind it; ``vector.restart`` replaces workers that are gone.

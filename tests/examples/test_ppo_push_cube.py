@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -49,7 +50,9 @@ def test_what_it_cannot_do_is_said(example, tmp_path, capsys):
 @pytest.mark.long
 def test_it_learns(tmp_path):
     words = ["--steps", "40000", "--tests", "20", "--workers", "2", "--out", str(tmp_path)]
-    subprocess.run([sys.executable, str(EXAMPLE), *words], cwd=ROOT, check=False)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, str(EXAMPLE), *words], env=environment, check=False)
+    assert done.returncode in (0, 1)  # 1: it has not learned enough yet
     curve = json.loads((tmp_path / "learning_curve.json").read_text())["curve"]
     assert curve[-1]["reward"] > 2 * curve[0]["reward"]
 

@@ -18,6 +18,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.torch_layers import NatureCNN
 from stable_baselines3.common.vec_env import (
     DummyVecEnv,
     VecCheckNan,
@@ -262,9 +263,20 @@ def test_their_own_checks_of_single_environments(task_id):
 
 
 @pytest.mark.long
+def test_images_are_learned_from():
+    if problem := vulkan_problem():
+        pytest.skip(problem)
+    env = make(num_envs=2, obs_mode="rgb", timeout=None)
+    assert env.reset()["sensor_data/base_camera/rgb"].dtype == np.uint8
+    model = PPO("MultiInputPolicy", env, n_steps=2, batch_size=4, n_epochs=1, device="cpu")
+    extractors = model.learn(4).policy.features_extractor.extractors
+    assert isinstance(extractors["sensor_data/base_camera/rgb"], NatureCNN)
+
+
+@pytest.mark.long
 def test_pictures():
     if problem := vulkan_problem():
         pytest.skip(problem)
     with closing(make(num_envs=2, render_mode="rgb_array", timeout=None)) as env:
         env.reset()
-        assert env.render("rgb_array").shape == (512, 1024, 3)
+        assert env.render("rgb_array").shape == (1024, 512, 3)
