@@ -14,6 +14,9 @@ from layouts import Placement
 from robots import DescriptorError, RobotDescriptor, UnknownNameError
 from robots.urdf_xml import resolve
 
+Blueprint = Any
+"""SAPIEN's builder of an articulation; it builds as often as it is asked to."""
+
 
 class _Loader(URDFLoader):
     """A URDF loader that finds every mesh that a locator found.
@@ -50,18 +53,23 @@ class SimulatedRobot:
     """
 
     def __init__(
-        self, scene: sapien.Scene, name: str, placement: Placement, *, visuals: bool
+        self, scene: sapien.Scene, name: str, placement: Placement, blueprint: Blueprint
     ) -> None:
-        """Load the URDF into ``scene``, stand it at its placement and set its drives.
+        """Build it in ``scene``, stand it at its placement and set its drives.
+
+        Args:
+            scene: SAPIEN's scene.
+            name: Its name in the layout.
+            placement: What it is and where it stands.
+            blueprint: What `read_blueprint` made of it.
 
         Raises:
-            AssetError: If its files cannot be found.
             DescriptorError: If the descriptor names joints or links that the URDF lacks.
         """
         descriptor = placement.robot
         self.name, self.descriptor = name, descriptor
         self.base_pose = sapien.Pose(list(placement.base_position), list(placement.base_quaternion))
-        self.articulation: Any = _load(scene, descriptor, self.base_pose, visuals=visuals)
+        self.articulation: Any = _build(scene, blueprint, self.base_pose)
         self.links = {link.name: link for link in self.articulation.links}
         self.joints: list[Any] = list(self.articulation.active_joints)
         self.active_index = _active_index(descriptor, [joint.name for joint in self.joints])
@@ -126,11 +134,18 @@ class SimulatedRobot:
                 joint.set_friction(group.friction)
 
 
-def _load(
-    scene: sapien.Scene, descriptor: RobotDescriptor, pose: sapien.Pose, *, visuals: bool
-) -> Any:
+def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
+    """Read a robot's URDF, once for any number of worlds with the same physics settings.
+
+    Args:
+        descriptor: The robot.
+        visuals: Whether to read what pictures need.
+
+    Raises:
+        AssetError: If its files cannot be found.
+    """
     loader: Any = _Loader(visuals=visuals)
-    loader.set_scene(scene)
+    loader.set_scene(sapien.Scene([]))  # which hands out empty builders and is not built in
     loader.fix_root_link = True
     if material := descriptor.gripper_material:
         friction = material.static_friction, material.dynamic_friction, material.restitution
@@ -139,9 +154,14 @@ def _load(
             loader.set_link_patch_radius(link, material.patch_radius)
             loader.set_link_min_patch_radius(link, material.patch_radius)
     urdf = descriptor.urdf.locate(pictures=visuals)
-    builder = loader.load_file_as_articulation_builder(str(urdf))
-    builder.set_initial_pose(pose)
-    articulation = builder.build()
+    return loader.load_file_as_articulation_builder(str(urdf))
+
+
+def _build(scene: sapien.Scene, blueprint: Blueprint, pose: sapien.Pose) -> Any:
+    blueprint.set_scene(scene)
+    blueprint.set_initial_pose(pose)
+    articulation = blueprint.build()
+    blueprint.set_scene(None)  # else it would keep the scene alive
     articulation.set_root_pose(pose)
     return articulation
 

@@ -13,6 +13,7 @@ from robots import RobotDescriptor
 from simulation.controller import JointPositionController
 from simulation.physics import PhysicsSettings
 from simulation.readout import ReadoutIndex
+from simulation.robot import Blueprint
 from simulation.state import State
 from simulation.world import World
 
@@ -50,6 +51,7 @@ class Simulation:
         """
         self.layout = layout
         self._build, self._physics, self._visuals = build, physics, visuals
+        self._blueprints: dict[str, Blueprint] = {}
         self.stamp = 0
         self.worlds = [self._build_world(i) for i in range(num_envs)]
         self.substeps = round(1 / (self.worlds[0].physics.timestep * control_frequency))
@@ -117,7 +119,9 @@ class Simulation:
         self.stamp += 1
 
     def _build_world(self, index: int) -> World:
-        world = World(self.layout, self._physics, visuals=self._visuals)
+        world = World(
+            self.layout, self._physics, visuals=self._visuals, blueprints=self._blueprints
+        )
         self._build(world, index)
         world.settle()
         return world

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -12,7 +13,7 @@ from layouts import Layout
 from robots import SimulationError, UnknownNameError
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, apply
-from simulation.robot import SimulatedRobot
+from simulation.robot import Blueprint, SimulatedRobot, read_blueprint
 from simulation.shapes import Shape, add_collision
 
 BodyKind = Literal["dynamic", "kinematic", "static"]
@@ -61,7 +62,12 @@ class World:
     """
 
     def __init__(
-        self, layout: Layout, physics: PhysicsSettings | None = None, *, visuals: bool = False
+        self,
+        layout: Layout,
+        physics: PhysicsSettings | None = None,
+        *,
+        visuals: bool = False,
+        blueprints: dict[str, Blueprint] | None = None,
     ) -> None:
         """Build the robots of a layout.
 
@@ -69,6 +75,8 @@ class World:
             layout: Which robots stand where.
             physics: Solver settings; None keeps SAPIEN's own defaults.
             visuals: Whether to build what pictures need (a Vulkan driver must be present).
+            blueprints: What was read of the robots for an earlier world that is like this one,
+                by name; what is missing is read and added.
 
         Raises:
             AssetError: If a robot's files cannot be found.
@@ -84,10 +92,12 @@ class World:
             systems.append(_render_system())
         self.scene = sapien.Scene(systems)
         self.system.timestep = self.physics.timestep
-        self.robots = {
-            name: SimulatedRobot(self.scene, name, placement, visuals=visuals)
-            for name, placement in layout.items()
-        }
+        blueprints = {} if blueprints is None else blueprints
+        self.robots: dict[str, SimulatedRobot] = {}
+        for name, placement in layout.items():
+            if name not in blueprints:
+                blueprints[name] = read_blueprint(placement.robot, visuals=visuals)
+            self.robots[name] = SimulatedRobot(self.scene, name, placement, blueprints[name])
         self.articulations = [robot.articulation for robot in self.robots.values()]
         self.bodies: dict[str, SimulatedBody] = {}
         self.design: Any = None
@@ -177,7 +187,13 @@ class World:
             position: Three numbers (m, world).
             quaternion: Four numbers, wxyz.
         """
-        self.body(name).entity.set_pose(sapien.Pose(_floats(position), _floats(quaternion)))
+        self.set_poses((name,), position, quaternion)
+
+    def set_poses(self, names: Iterable[str], position: Any, quaternion: Any = IDENTITY) -> None:
+        """Move several bodies to the same pose; see `set_pose`."""
+        pose = sapien.Pose(_floats(position), _floats(quaternion))
+        for name in names:
+            self.body(name).entity.set_pose(pose)
 
 
 def _floats(values: Any) -> list[float]:

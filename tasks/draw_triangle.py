@@ -132,8 +132,7 @@ class DrawTriangle(MultiRobotTask):
         """Lay the triangle on the canvas and hide the dots."""
         x, y = (rng.uniform(1, 2) * SPAWN_SIZE + SPAWN_OFFSET)[0].tolist()
         world.set_pose("goal_tri", (x, y, BAR_HEIGHT), rng.yaw_quaternion())
-        for name in _DOTS:
-            world.set_pose(name, _HIDDEN, _FLAT)
+        world.set_poses(_DOTS, _HIDDEN, _FLAT)
 
     def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
         """Forget what was drawn and remember where the outline is.

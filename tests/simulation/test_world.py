@@ -1,14 +1,22 @@
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
 from layouts import Layout, Placement, face_to_face, side_by_side, single
-from robots import DescriptorError, RobotRegistry, SimulationError, UnknownNameError
+from robots import (
+    DescriptorError,
+    RobotDescriptor,
+    RobotRegistry,
+    SimulationError,
+    UnknownNameError,
+)
 from robots.descriptor import ActionSplit
 from simulation import Box, PhysicsSettings, Simulation, Sphere, World, add_table
 from simulation.controller import JointPositionController
+from simulation.robot import read_blueprint
 from simulation.shapes import Capsule, Cylinder
 
 HALF = 0.02
@@ -184,6 +192,38 @@ def test_a_rebuilt_world_has_no_past():
     simulation.rebuild([1])
     assert simulation.worlds[0] is kept
     assert not simulation.worlds[1].system.get_contacts()
+
+
+def test_a_rebuilt_world_is_the_same_to_the_last_bit():
+    layout = side_by_side({"left": "panda", "right": "panda_stick"}, spacing=1.0)
+    action = np.full((1, layout.action_dim), 0.5, np.float32)
+
+    def motion(rebuilt: bool) -> np.ndarray:
+        simulation = Simulation(layout, with_cube, 1, PhysicsSettings())
+        if rebuilt:
+            simulation.rebuild([0])
+        stand(simulation)
+        for _ in range(20):
+            simulation.step(action, simulation.read().joint_positions)
+        return simulation.read().joint_positions
+
+    assert np.array_equal(motion(rebuilt=True), motion(rebuilt=False))
+
+
+def test_a_urdf_is_read_once_for_all_worlds_and_keeps_none_of_them_alive(monkeypatch):
+    read: list[tuple[str, Any]] = []
+
+    def reading(descriptor: RobotDescriptor, *, visuals: bool) -> Any:
+        blueprint = read_blueprint(descriptor, visuals=visuals)
+        read.append((descriptor.name, blueprint))
+        return blueprint
+
+    monkeypatch.setattr("simulation.world.read_blueprint", reading)
+    layout = side_by_side({"left": "panda", "right": "panda_stick"}, spacing=1.0)
+    simulation = Simulation(layout, with_cube, 3)
+    simulation.rebuild([1, 2])
+    assert [name for name, _ in read] == ["panda", "panda_stick"]
+    assert [blueprint.scene for _, blueprint in read] == [None, None]
 
 
 def test_anchored_bodies_return_and_velocities_vanish():
