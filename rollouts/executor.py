@@ -6,7 +6,6 @@ import multiprocessing
 import os
 import pickle
 import signal
-import threading
 import traceback
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable, Sequence
@@ -17,6 +16,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any, Protocol
 
 from robots import RobotLayoutsError
+from tasks.fronts.work import end_with_parent
 
 Play = Callable[[int], Any]
 """Plays the episode of a seed and returns what is to be known of it (it can be pickled)."""
@@ -367,7 +367,7 @@ class _Report:
 def _work(connection: Connection, prepare: Callable[[], Play]) -> None:
     """Be a worker: say None when ready, then answer each seed with a result and an error."""
     global _tell
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     _tell = lambda said: connection.send(_Report(said))  # noqa: E731
     try:
         play = prepare()
@@ -395,14 +395,6 @@ def _tell_nobody(said: Any) -> None:
 
 
 _tell: Callable[[Any], None] = _tell_nobody
-
-
-def _end_with_parent() -> None:
-    """End this process when the one that started it is gone, even killed."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        wait([parent.sentinel])
-        os._exit(1)
 
 
 @contextmanager

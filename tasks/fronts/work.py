@@ -9,6 +9,7 @@ import threading
 import traceback
 from multiprocessing import reduction
 from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from typing import TYPE_CHECKING, Any
 
 from robots import RobotLayoutsError
@@ -23,7 +24,7 @@ def work(connection: Connection) -> None:
     Every answer is a result and an error. An error of ours while building is sent as it is.
     """
     os.environ["OMP_NUM_THREADS"] = "1"
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     try:
         _serve(connection, _build(connection))
     except (EOFError, OSError):
@@ -77,8 +78,13 @@ def _said(error: Exception) -> str:
     return f"failed with {type(error).__name__}: {error} ({last.filename}:{last.lineno})"
 
 
-def _end_with_parent() -> None:
+def end_with_parent() -> None:
+    """Let this process end when the one that started it is gone, even killed."""
     parent = multiprocessing.parent_process()
     if parent is not None:
-        parent.join()
-        os._exit(1)
+        threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
+
+
+def _end_after(parent: BaseProcess) -> None:
+    parent.join()
+    os._exit(1)
