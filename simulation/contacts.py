@@ -60,14 +60,15 @@ def grasped(fingers: Fingers, forces: Floats, poses: Sequence[Floats]) -> Flags:
     Returns:
         Shape (N,), bool.
     """
-    held = torch.ones(len(forces), dtype=torch.bool)
-    for i, (pose, sign) in enumerate(zip(poses, fingers.opening_signs, strict=True)):
-        force = torch.from_numpy(forces[:, i])
-        opening = torch.from_numpy(sign * rotation_matrix(pose[:, 3:])[:, :, 1])
-        angle = torch.rad2deg(_angle_between(opening, force))
-        strong = torch.linalg.vector_norm(force, dim=1) >= fingers.min_force
-        held &= strong & (angle <= fingers.max_angle)
-    return held.numpy()
+    count = len(poses)
+    signs = np.repeat(np.array(fingers.opening_signs, np.float32), len(forces))
+    turned = rotation_matrix(np.concatenate(poses)[:, 3:])  # one finger's worlds after the other's
+    opening = torch.from_numpy(signs[:, None] * turned[:, :, 1])
+    force = torch.from_numpy(forces.transpose(1, 0, 2).reshape(-1, 3))
+    strong = torch.linalg.vector_norm(force, dim=1) >= fingers.min_force
+    angle = torch.rad2deg(_angle_between(opening, force))
+    held = strong & (angle <= fingers.max_angle)
+    return held.reshape(count, -1).all(dim=0).numpy()
 
 
 def _angle_between(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:

@@ -81,8 +81,10 @@ class Simulation:
             env_ids: Which worlds; all if None. The others stand still.
         """
         targets = self._controller.targets(action, joint_positions)
-        for i in range(len(self.worlds)) if env_ids is None else env_ids:
+        moving = range(len(self.worlds)) if env_ids is None else list(env_ids)
+        for i in moving:  # all before any physics, which drives this code out of the caches
             self._controller.drive(targets, i)
+        for i in moving:
             step = self.worlds[i].system.step
             for _ in range(self.substeps):
                 step()

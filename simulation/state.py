@@ -78,18 +78,16 @@ class State:
         self.memo: dict[Any, Any] = {}
         self._offsets = _NOTHING
         self._distances = _NOTHING
-        self.num_envs = count = len(simulation.worlds)
+        worlds = simulation.worlds
+        self.num_envs = count = len(worlds)
+        packed = b"".join([world.scene.pack_poses() for world in worlds])
+        entities = np.frombuffer(packed, np.float32).reshape(count, -1, 7).transpose(1, 0, 2)
         self._poses = poses = np.empty((index.frames, count, 7), np.float32)
-        self.joint_positions = qpos = np.empty((count, index.dof), np.float32)
-        self.joint_velocities = qvel = np.empty((count, index.dof), np.float32)
-        entities = poses[: index.entities]
-        for i, world in enumerate(simulation.worlds):
-            packed = np.frombuffer(world.scene.pack_poses(), np.float32).reshape(-1, 7)
-            entities[:, i, :3] = packed[:, 4:]  # SAPIEN packs the quaternion first
-            entities[:, i, 3:] = packed[:, :4]
-            for articulation, part in zip(world.articulations, index.joints.values(), strict=True):
-                qpos[i, part] = articulation.qpos
-                qvel[i, part] = articulation.qvel
+        poses[: index.entities, :, :3] = entities[:, :, 4:]  # SAPIEN packs the quaternion first
+        poses[: index.entities, :, 3:] = entities[:, :, :4]
+        robots = [articulation for world in worlds for articulation in world.articulations]
+        self.joint_positions = _rows([robot.qpos for robot in robots], count)
+        self.joint_velocities = _rows([robot.qvel for robot in robots], count)
         for frame, orientation, points in index.mean_frames:
             poses[frame, :, :3] = sum(poses[point, :, :3] for point in points) / len(points)
             poses[frame, :, 3:] = poses[orientation, :, 3:]
@@ -310,3 +308,7 @@ class State:
                 "velocities and contacts were asked of a state that is no longer the present one;"
                 " read them before the next step or reset"
             )
+
+
+def _rows(parts: list[Floats], count: int) -> Floats:
+    return np.concatenate(parts).reshape(count, -1)
