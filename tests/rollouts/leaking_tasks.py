@@ -18,11 +18,3 @@ class LeavesFilesOpen(PushCube):
     def evaluate(self, state):
         _hoard.append(open(os.devnull))
         return super().evaluate(state)
-
-
-def let_go() -> None:
-    """Free what was hoarded in this process."""
-    while _hoard:
-        kept = _hoard.pop()
-        if not isinstance(kept, bytes):
-            kept.close()

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 import pytest
 
 from rollouts.levels import Level, grown, growth, read_level, worst
+from tests.fresh_process import in_fresh_process
 
 
 def level(memory: float = 0.0, descriptors: float = 0.0) -> Level:
@@ -52,6 +53,13 @@ def shared_memory():
     os.close(descriptor)
 
 
+def levels_around(held) -> tuple[Level, Level, Level]:
+    before = read_level()
+    with held():
+        during = read_level()
+    return before, during, read_level()
+
+
 @pytest.mark.parametrize(
     ("held", "expected"),
     [
@@ -63,10 +71,7 @@ def shared_memory():
     ],
 )
 def test_what_is_held_is_counted(held, expected):
-    before = read_level()
-    with held():
-        during = read_level()
-    after = read_level()
+    before, during, after = in_fresh_process(levels_around, held)
     for name in ("descriptors", "threads", "processes", "shared"):
         assert getattr(during, name) - getattr(before, name) == expected.get(name, 0)
         assert getattr(after, name) == getattr(before, name)

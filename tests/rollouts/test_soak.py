@@ -1,25 +1,38 @@
 """``python -m rollouts soak``: what is healthy passes, and what leaks is told."""
 
 import random
+from contextlib import redirect_stdout
+from io import StringIO
 
 import pytest
 
 from robots import TaskError
 from rollouts.__main__ import main
 from rollouts.soak import Soak, Soaked, between_laps, complaints, leaks, soak
-from tasks import list_tasks, register_task, registry
+from tasks import list_tasks, register_task
+from tests.fresh_process import in_fresh_process
 from tests.rollouts import leaking_tasks
 from tests.rollouts.test_levels import level
 
 SMALL = ["--envs", "2", "--workers", "1", "--steps", "1"]
 
 
-def test_a_healthy_task_passes(capsys):
-    assert main(["soak", "--tasks", "maniskill.push_cube_native", *SMALL]) == 0
-    printed = capsys.readouterr().out
-    assert "PushCube-v1" in printed
-    assert printed.splitlines()[-1].endswith("nothing grows.")
-    assert "MB, all else –." in printed
+def soaked(task_id: str, leaking: type | None = None) -> tuple[int, list[str]]:
+    """Return the exit code of the command and the lines that it prints."""
+    if leaking is not None:
+        register_task(task_id)(leaking)
+    printed = StringIO()
+    with redirect_stdout(printed):
+        code = main(["soak", "--tasks", task_id, *SMALL])
+    return code, printed.getvalue().splitlines()
+
+
+def test_a_healthy_task_passes():
+    code, printed = in_fresh_process(soaked, "maniskill.push_cube_native")
+    assert code == 0
+    assert any("PushCube-v1" in line for line in printed)
+    assert any("MB, all else –." in line for line in printed)
+    assert printed[-1].endswith("nothing grows.")
 
 
 @pytest.mark.parametrize(
@@ -29,15 +42,9 @@ def test_a_healthy_task_passes(capsys):
         (leaking_tasks.LeavesFilesOpen, "descriptors"),
     ],
 )
-def test_a_task_that_leaks_is_told(leaking, quantity, monkeypatch, capsys):
-    monkeypatch.setattr(registry, "_registered", dict(registry._registered))
-    monkeypatch.setattr(registry, "_listed", list(registry._listed))
-    register_task("Leaking-v1")(leaking)
-    try:
-        assert main(["soak", "--tasks", "Leaking-v1", *SMALL]) == 1
-    finally:
-        leaking_tasks.let_go()
-    printed = capsys.readouterr().out.splitlines()
+def test_a_task_that_leaks_is_told(leaking, quantity):
+    code, printed = in_fresh_process(soaked, "Leaking-v1", leaking)
+    assert code == 1
     assert [line for line in printed if line.startswith("GROWS")] == [
         f"GROWS: Leaking-v1: {quantity} in workers",
         f"GROWS: Leaking-v1: {quantity} in this process",
@@ -79,6 +86,6 @@ def test_numbers_that_make_no_sense(fields, message):
 
 @pytest.mark.long
 def test_nothing_grows_over_all_tasks():
-    found = soak(Soak(60_000, seed=random.randrange(1000)))
+    found = in_fresh_process(soak, Soak(60_000, seed=random.randrange(1000)))
     assert [task.task_id for task in found] == list(list_tasks())
     assert complaints(found) == []
