@@ -93,7 +93,7 @@ def _draw_lines(axes: Axes, measurement: Measurement) -> None:
             at, low, high = zip(*spread, strict=True)
             axes.fill_between(at, low, high, color=colour, alpha=0.15, linewidth=0)
     numbers = _numbers(measurement)
-    if max(numbers) >= 8 and all(number.bit_count() == 1 for number in numbers):  # 1, 2, 4 …
+    if max(numbers) >= 16 and all(number.bit_count() == 1 for number in numbers):  # 1, 2, 4 …
         axes.set_xscale("log", base=2)
     axes.set_xticks(numbers, [str(number) for number in numbers], minor=False)
     axes.minorticks_off()
