@@ -78,6 +78,28 @@ def preview(layout: Layout, path: str | os.PathLike[str], table: Rectangle | Non
     return target
 
 
+def blank_figure(
+    what: str, size: tuple[float, float], dots_per_inch: int = DOTS_PER_INCH
+) -> Figure:
+    """Return a white figure to draw on.
+
+    Args:
+        what: What it becomes, in words.
+        size: Width and height (inches).
+        dots_per_inch: Resolution.
+
+    Raises:
+        MissingPackageError: If matplotlib is not installed.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise MissingPackageError(
+            f"{what} needs matplotlib: pip install 'robot-layouts[preview]'"
+        ) from error
+    return Figure(figsize=size, dpi=dots_per_inch, facecolor="white")
+
+
 def draw(layout: Layout, table: Rectangle | None = None) -> Figure:
     """Return the figure that `preview` saves.
 
@@ -88,13 +110,6 @@ def draw(layout: Layout, table: Rectangle | None = None) -> Figure:
     Raises:
         MissingPackageError: If matplotlib is not installed.
     """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingPackageError(
-            "a preview needs matplotlib: pip install 'robot-layouts[preview]'"
-        ) from error
-
     bounds = _bounds(layout, table)
     plan_width = WIDTH - LEFT - RIGHT
     plan_height = plan_width * (bounds[3] - bounds[1]) / (bounds[2] - bounds[0])
@@ -102,7 +117,7 @@ def draw(layout: Layout, table: Rectangle | None = None) -> Figure:
     list_height = ROW_HEIGHT * (len(layout) + 1.5)
     height = ABOVE + plan_height + BELOW + list_height
 
-    figure = Figure(figsize=(WIDTH, height), dpi=DOTS_PER_INCH, facecolor="white")
+    figure = blank_figure("a preview", (WIDTH, height))
     bottom = (BELOW + list_height) / height
     plan = figure.add_axes((LEFT / WIDTH, bottom, plan_width / WIDTH, plan_height / height))
     _draw_plan(plan, layout, _stretched(bounds, plan_width / plan_height), table)

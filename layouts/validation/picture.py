@@ -10,10 +10,10 @@ import numpy as np
 
 from layouts.description import decimal, headline
 from layouts.files import written_whole
-from layouts.preview import COLOURS, FAINT, INK, LONGEST_NAME, SUPPORTED, TABLE
+from layouts.preview import COLOURS, FAINT, INK, LONGEST_NAME, SUPPORTED, TABLE, blank_figure
 from layouts.validation.kinematics import Floats
 from layouts.validation.report import Clearance, Report, length_text
-from robots import LayoutError, MissingPackageError
+from robots import LayoutError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 GOOD, BAD, NARROW = "#1B7837", "#B2182B", "#B35806"
 
 WIDTH, HEIGHT = 10.0, 8.5  # inches; 1500 × 1275 pixels
-DOTS_PER_INCH = 150
 MARGIN = 0.08  # free space around the robots, in shares of the plan's larger side
 GAP = 10  # points, between what is drawn and its name
 SHOWN_FINDINGS = 3
@@ -48,13 +47,7 @@ def draw(report: Report) -> Figure:
     Raises:
         MissingPackageError: If matplotlib is not installed.
     """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingPackageError(
-            "a picture needs matplotlib: pip install 'robot-layouts[preview]'"
-        ) from error
-    figure = Figure(figsize=(WIDTH, HEIGHT), dpi=DOTS_PER_INCH, facecolor="white")
+    figure = blank_figure("a picture", (WIDTH, HEIGHT))
     lines = _captions(report)
     below = 0.1 + 0.028 * len(lines)
     plan = figure.add_axes((0.08, below, 0.89, 0.93 - below))

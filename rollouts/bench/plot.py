@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from layouts.preview import COLOURS, FAINT, INK
-from robots import MissingPackageError
+from layouts.preview import COLOURS, FAINT, INK, blank_figure
 from rollouts.bench.measurement import Measurement, number_text
 
 if TYPE_CHECKING:
@@ -30,21 +29,12 @@ def draw(measurements: Sequence[Measurement], told: str) -> Figure:
     Raises:
         MissingPackageError: If matplotlib is not installed.
     """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingPackageError(
-            "a plot needs matplotlib: pip install 'robot-layouts[preview]'"
-        ) from error
     in_rows = [measurements[i : i + COLUMNS] for i in range(0, len(measurements), COLUMNS)]
     columns = min(COLUMNS, len(measurements))
     heights = [max(map(_height, row)) for row in in_rows]
-    figure = Figure(
-        figsize=(PANEL_WIDTH * columns, sum(heights) + FOOT),
-        dpi=DOTS_PER_INCH,
-        facecolor="white",
-        layout="constrained",
-    )
+    size = PANEL_WIDTH * columns, sum(heights) + FOOT
+    figure = blank_figure("a plot", size, DOTS_PER_INCH)
+    figure.set_layout_engine("constrained")
     grid = figure.add_gridspec(len(in_rows), columns, height_ratios=heights)
     for i, row in enumerate(in_rows):
         for j, measurement in enumerate(row):
