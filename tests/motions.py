@@ -168,11 +168,12 @@ def two_robot_pick_cube(puppeteer: Puppeteer) -> None:
     """The left arm lays the cube down in the middle, the right one takes it up."""
     grasp_and_shake(puppeteer, "left", pi / 2)
     hand = downwards(pi / 2)
-    puppeteer.move(24, CLOSED, {"left": ((0.0, 0.03, 0.1), hand)})
+    puppeteer.move(12, CLOSED, {"left": ((0.0, -0.1, 0.2), hand)})  # up, wherever it was shaken to
+    puppeteer.move(20, CLOSED, {"left": ((0.0, 0.03, 0.1), hand)})
     puppeteer.move(8, CLOSED, {"left": ((0.0, 0.03, 0.03), hand)})
     puppeteer.move(3, OPEN, {"left": ((0.0, 0.03, 0.03), hand)})
     puppeteer.move(12, OPEN, {"left": ((0.0, -0.2, 0.3), hand)})
-    grasp_and_shake(puppeteer, "right", -pi / 2, approach=20)
+    grasp_and_shake(puppeteer, "right", -pi / 2, approach=28)
 
 
 def push_t(puppeteer: Puppeteer) -> None:

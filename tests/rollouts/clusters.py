@@ -81,6 +81,8 @@ def running_cluster():
     temp_dir = tempfile.mkdtemp(prefix="ray-")  # short: it holds sockets
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+        patch.setenv("RAY_TMPDIR", temp_dir)  # where a cluster notes its address for `auto`
+        Path(temp_dir, "ray").mkdir()
         patch.setenv(BARRIER, f"{temp_dir}/barrier")
         nodes = Nodes(temp_dir)
         try:
