@@ -234,6 +234,12 @@ class RobotDescriptor:
         """Number of action numbers; a Panda has 8, as one number moves both fingers."""
         return self.action_split.size
 
+    @property
+    def size(self) -> str:
+        """Both numbers in words: ``9 joints, 8 action numbers``."""
+        counts = {"joint": self.dof, "action number": self.action_dim}
+        return ", ".join(f"{count} {what}{'s' * (count != 1)}" for what, count in counts.items())
+
     def keyframe(self, name: str) -> tuple[float, ...]:
         """Return the joint positions of a keyframe (rad, m), in the order of ``joints``.
 

@@ -40,8 +40,7 @@ class Guess:
 
     def __str__(self) -> str:
         """Return name and reasons, one a line."""
-        robot = self.descriptor
-        head = f"{robot.name}: {robot.dof} joints, {robot.action_dim} action numbers, all guessed"
+        head = f"{self.descriptor.name}: {self.descriptor.size}, all guessed"
         return "\n".join([head, *(f"  {reason}" for reason in self.reasons)])
 
     def module(self) -> str:

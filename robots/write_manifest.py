@@ -32,7 +32,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         text = build_manifest(find_mani_skill()).to_json()
     except RobotLayoutsError as error:
-        print(error, file=sys.stderr)
+        print(f"error: {error}", file=sys.stderr)
         return 1
     if check:
         fresh = path.is_file() and path.read_text(encoding="utf-8") == text

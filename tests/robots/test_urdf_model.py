@@ -168,6 +168,13 @@ def test_what_is_only_odd_is_accepted(tmp_path):
     assert read_model(robot(massless.replace('"0.1"', '"0"')).encode(), "toy").root == "base"
 
 
+def test_one_joint_is_a_robot(tmp_path, capsys):
+    path = tmp_path / "toy.urdf"
+    path.write_text(robot(LINKS + SHOULDER + ELBOW.replace("revolute", "fixed")))
+    assert RobotDescriptor.from_urdf(path).joints == ("shoulder",)
+    assert capsys.readouterr().err.startswith("toy: 1 joint, 1 action number, all guessed\n")
+
+
 def test_nothing_to_drive_is_an_error(tmp_path):
     path = tmp_path / "toy.urdf"
     path.write_text(
