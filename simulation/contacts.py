@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -14,15 +15,48 @@ from simulation.rotations import rotation_matrix
 from simulation.world import World
 
 
+class LinkTouch(NamedTuple):
+    """A link that touched something in the last step of physics.
+
+    Attributes:
+        robot: The link's robot, by name.
+        link: The link's name.
+        other: The component of what it touched.
+        sign: 1 if the contact's impulses act on the link, -1 if on the other.
+        contact: SAPIEN's contact, good until the next step.
+    """
+
+    robot: str
+    link: str
+    other: Any
+    sign: int
+    contact: Any
+
+
+def link_touches(world: World) -> list[LinkTouch]:
+    """Return what links touched in a world's last step of physics.
+
+    PhysX refreshes contacts only in a step: after a teleport they are still those of the last one.
+    """
+    links = world.links
+    touches: list[LinkTouch] = []
+    for contact in world.system.get_contacts():
+        first, second = contact.bodies  # an impulse acts on the first
+        if found := links.get(id(first)):
+            touches.append(LinkTouch(*found, second, 1, contact))
+        if found := links.get(id(second)):
+            touches.append(LinkTouch(*found, first, -1, contact))
+    return touches
+
+
 def pairwise_forces(
-    world: World, robot: str, links: Sequence[str], body: str
+    world: World, touches: Sequence[LinkTouch], robot: str, links: Sequence[str], body: str
 ) -> dict[str, NDArray[np.float32]]:
     """Return the contact force of a body on each link that it touches, summed over contacts.
 
-    PhysX refreshes contacts only in a step: after a teleport they are still those of the last one.
-
     Args:
         world: The world.
+        touches: What `link_touches` returned.
         robot: Robot name.
         links: Names of the links asked about.
         body: Body name.
@@ -30,23 +64,15 @@ def pairwise_forces(
     Returns:
         Force by link name, shape (3,) (N, world frame); links without contact are left out.
     """
-    other = world.body(body).component
+    component = world.body(body).component
     impulses: dict[str, NDArray[np.float64]] = {}
-    for contact in world.system.get_contacts():
-        first, second = contact.bodies
-        if first is other:
-            link, sign = second, -1
-        elif second is other:
-            link, sign = first, 1
-        else:
-            continue
-        name = link.name
-        if name in links and link is world.robots[robot].link(name):
-            # An impulse acts on the first body; native adds them up in float64.
-            total = np.sum([point.impulse for point in contact.points], axis=0) * sign
-            impulses[name] = impulses.get(name, np.zeros(3)) + total
+    for touch in touches:
+        if touch.other is component and touch.robot == robot and touch.link in links:
+            # Native adds them up in float64.
+            total = np.sum([point.impulse for point in touch.contact.points], axis=0) * touch.sign
+            impulses[touch.link] = impulses.get(touch.link, np.zeros(3)) + total
     timestep = np.array(world.physics.timestep, np.float32)
-    return {name: impulse.astype(np.float32) / timestep for name, impulse in impulses.items()}
+    return {link: impulse.astype(np.float32) / timestep for link, impulse in impulses.items()}
 
 
 def grasped(fingers: Fingers, forces: Floats, poses: Sequence[Floats]) -> Flags:

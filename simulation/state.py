@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from robots import SimulationError
 from simulation.arrays import Flags, Floats, norm
-from simulation.contacts import grasped, pairwise_forces
+from simulation.contacts import LinkTouch, grasped, link_touches, pairwise_forces
 from simulation.rotations import last_euler_angle, rotation_matrix
 
 if TYPE_CHECKING:
@@ -295,12 +295,19 @@ class State:
         """Forces of a body on some links, (N, L, 3), or None if nothing touches anywhere."""
         self._expect_current()
         forces: Floats | None = None
-        for i, world in enumerate(self._simulation.worlds):
-            for link, force in pairwise_forces(world, robot, links, body).items():
+        for i, touches in self._touches():
+            found = pairwise_forces(self._simulation.worlds[i], touches, robot, links, body)
+            for link, force in found.items():
                 if forces is None:
                     forces = np.zeros((self.num_envs, len(links), 3), np.float32)
                 forces[i, links.index(link)] = force
         return forces
+
+    @_remembered
+    def _touches(self) -> list[tuple[int, list[LinkTouch]]]:
+        """Number of each world in which links touch something, and what they touch."""
+        touches = [link_touches(world) for world in self._simulation.worlds]
+        return [(i, found) for i, found in enumerate(touches) if found]
 
     def _expect_current(self) -> None:
         if self._stamp != self._simulation.stamp:

@@ -57,6 +57,7 @@ class World:
         system: Its physics system.
         robots: Robot by name in the layout.
         articulations: The robots' articulations, in layout order.
+        links: Robot and link name of each link, by the identity of its component.
         bodies: Body by name.
         design: Geometry drawn for the coming episodes, if the task draws any.
     """
@@ -99,6 +100,11 @@ class World:
                 blueprints[name] = read_blueprint(placement.robot, visuals=visuals)
             self.robots[name] = SimulatedRobot(self.scene, name, placement, blueprints[name])
         self.articulations = [robot.articulation for robot in self.robots.values()]
+        self.links = {
+            id(link): (name, link_name)
+            for name, robot in self.robots.items()
+            for link_name, link in robot.links.items()
+        }
         self.bodies: dict[str, SimulatedBody] = {}
         self.design: Any = None
 
