@@ -29,7 +29,7 @@ def write_module(robot: RobotDescriptor, reasons: Sequence[str] = ()) -> str:
         _import(module, sorted({name for name in used if _home(name) == module}))
         for module in sorted({_home(name) for name in used})
     )
-    title = f'"""{robot.name}: {robot.size}."""'
+    title = f'"""{robot.name}: {robot.summary}."""'
     remarks = [
         textwrap.fill(reason, WIDTH, initial_indent="# ", subsequent_indent="#   ")
         for reason in reasons

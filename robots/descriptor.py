@@ -235,7 +235,7 @@ class RobotDescriptor:
         return self.action_split.size
 
     @property
-    def size(self) -> str:
+    def summary(self) -> str:
         """Both numbers in words: ``9 joints, 8 action numbers``."""
         counts = {"joint": self.dof, "action number": self.action_dim}
         return ", ".join(f"{count} {what}{'s' * (count != 1)}" for what, count in counts.items())

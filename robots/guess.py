@@ -40,7 +40,7 @@ class Guess:
 
     def __str__(self) -> str:
         """Return name and reasons, one a line."""
-        head = f"{self.descriptor.name}: {self.descriptor.size}, all guessed"
+        head = f"{self.descriptor.name}: {self.descriptor.summary}, all guessed"
         return "\n".join([head, *(f"  {reason}" for reason in self.reasons)])
 
     def module(self) -> str:

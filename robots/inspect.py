@@ -53,7 +53,7 @@ def report(robot: RobotDescriptor, store: AssetStore) -> str:
     """
     urdf, remark = find_urdf(robot, store)
     sections = {
-        f"{robot.name}: {robot.size}": [
+        f"{robot.name}: {robot.summary}": [
             f"numbers from  {robot.source}",
             f"reach         {robot.reach:g} m from the base axis",
             f"TCP link      {robot.tcp_link}",

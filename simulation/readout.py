@@ -24,6 +24,12 @@ class Places(dict[str, Place]):
         """Refuse an unknown name."""
         raise UnknownNameError(self.kind, name, self)
 
+    def expect(self, *names: str) -> None:
+        """Refuse unknown names."""
+        for name in names:
+            if name not in self:
+                self.__missing__(name)
+
 
 class ReadoutIndex:
     """Places of bodies, links, tool centre points and joints, the same in a batch's every world.

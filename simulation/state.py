@@ -294,6 +294,8 @@ class State:
     def _contact_forces(self, robot: str, links: tuple[str, ...], body: str) -> Floats | None:
         """Forces of a body on some links, (N, L, 3), or None if nothing touches anywhere."""
         self._expect_current()
+        self._index.links[robot].expect(*links)
+        self._index.bodies.expect(body)
         forces: Floats | None = None
         for i, touches in self._touches():
             found = pairwise_forces(self._simulation.worlds[i], touches, robot, links, body)

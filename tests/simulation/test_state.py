@@ -57,6 +57,16 @@ def test_a_remembered_answer_is_that_of_the_same_question(env: MultiRobotTask):
     assert state.is_static("left", threshold=100.0).all()
 
 
+def test_contacts_of_unknown_names_are_refused_where_nothing_touches(env: MultiRobotTask):
+    state = state_of(env)
+    with pytest.raises(UnknownNameError, match="Did you mean 'cube'"):
+        state.is_grasping("left", "cub")
+    with pytest.raises(UnknownNameError, match="Did you mean 'cube'"):
+        state.contact_force("left", "panda_leftfinger", "cub")
+    with pytest.raises(UnknownNameError, match="Did you mean 'panda_leftfinger'"):
+        state.contact_force("left", "panda_leftfingr", "cube")
+
+
 def test_a_grasp_may_be_told_by_a_narrower_angle():
     env = tasks.make("PullCubeTool-v1")
     env.reset(seed=0)
