@@ -14,9 +14,16 @@ import subprocess
 import sys
 from collections.abc import Iterator
 
+import hypothesis
 import pytest
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # read when torch is imported
+
+# However slow or busy the machine is, no example of a property takes too long.
+hypothesis.settings.register_profile(
+    "any machine", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
+)
+hypothesis.settings.load_profile("any machine")
 
 REQUIRED = os.environ.get("ROBOT_LAYOUTS_REQUIRE_NATIVE") == "1"
 

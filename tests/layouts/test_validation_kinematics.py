@@ -45,7 +45,7 @@ def drawn(robot, seed):
 
 
 @every_robot
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(seed=seeds)
 def test_every_link_is_where_the_engine_has_it(robot, seed):
     simulated, qpos = engine(robot), drawn(robot, seed)
@@ -69,7 +69,7 @@ def test_limits_are_the_engines(robot):
 
 
 @every_robot
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=4)
 @given(seed=seeds)
 def test_how_a_link_moves_is_the_slope_of_where_it_is(robot, seed):
     kinematics = load_model(RobotRegistry.load(robot)).kinematics
@@ -102,7 +102,7 @@ class TestReach:
         return Reach(placement(robot), model).solve(place, quaternion), model.kinematics.limits
 
     @every_robot
-    @settings(max_examples=4, deadline=None)
+    @settings(max_examples=4)
     @given(seed=seeds)
     def test_places_the_arm_can_be_at_are_reached(self, robot, seed):
         qpos = np.array(placement(robot).start_qpos)

