@@ -76,7 +76,7 @@ def pairwise_forces(
 
 
 def grasped(fingers: Fingers, forces: Floats, poses: Sequence[Floats]) -> Flags:
-    """Tell from contact forces whether two fingers hold a body.
+    """Tell from contact forces whether two fingers hold a body; only if both touch it.
 
     Args:
         fingers: Which way they open, and the thresholds.
@@ -86,6 +86,15 @@ def grasped(fingers: Fingers, forces: Floats, poses: Sequence[Floats]) -> Flags:
     Returns:
         Shape (N,), bool.
     """
+    held = np.logical_and.reduce(np.logical_or.reduce(forces != 0, 2), 1)
+    if touched := np.flatnonzero(held).tolist():  # angles cost much, and few worlds need them
+        held[touched] = _strong_and_straight(
+            fingers, forces[touched], [pose[touched] for pose in poses]
+        )
+    return held
+
+
+def _strong_and_straight(fingers: Fingers, forces: Floats, poses: Sequence[Floats]) -> Flags:
     count = len(poses)
     signs = np.repeat(np.array(fingers.opening_signs, np.float32), len(forces))
     turned = rotation_matrix(np.concatenate(poses)[:, 3:])  # one finger's worlds after the other's

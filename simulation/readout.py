@@ -52,6 +52,8 @@ class ReadoutIndex:
         mean_frames: For each frame that lies between links: itself, the frame that orients it,
             and the frames whose mean is its origin.
         pairs: Pairs of frames whose distance was asked for.
+        velocities: Bodies and which of their velocities was asked for, with their numbers: from
+            the second step on a state reads all at once.
     """
 
     def __init__(self, world: World) -> None:
@@ -69,6 +71,7 @@ class ReadoutIndex:
         self.bases: Places[int] = Places(_ROBOT)
         self.mean_frames: list[tuple[int, int, list[int]]] = []
         self.pairs = FramePairs()
+        self.velocities: dict[tuple[str, str], int] = {}
         self.bodies.update({name: place[body.entity] for name, body in world.bodies.items()})
         for name, robot in world.robots.items():
             descriptor = robot.descriptor
@@ -85,6 +88,11 @@ class ReadoutIndex:
             self.dof += len(robot.joints)
             self.fingers[name] = descriptor.fingers
             self.tcps[name] = self._tcp_frame(name, world)
+
+    def velocity(self, body: str, which: str) -> int:
+        """Return the number of a body's velocity, adding it if it is new."""
+        self.bodies.expect(body)
+        return self.velocities.setdefault((body, which), len(self.velocities))
 
     def _gripper(self, name: str, world: World) -> tuple[list[int], np.float32]:
         robot = world.robots[name]

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from simulation.simulation import Simulation
 
 _NOTHING = np.empty(0, np.float32)
+_STILL = np.zeros(3, np.float32)
 _Arguments = ParamSpec("_Arguments")
 _Value = TypeVar("_Value")
 
@@ -63,7 +64,9 @@ class State:
         "_offsets",
         "_poses",
         "_simulation",
+        "_speeds",
         "_stamp",
+        "_velocities",
         "joint_positions",
         "joint_velocities",
         "memo",
@@ -78,6 +81,8 @@ class State:
         self.memo: dict[Any, Any] = {}
         self._offsets = _NOTHING
         self._distances = _NOTHING
+        self._velocities = _NOTHING
+        self._speeds = _NOTHING
         worlds = simulation.worlds
         self.num_envs = count = len(worlds)
         packed = b"".join([world.scene.pack_poses() for world in worlds])
@@ -120,25 +125,21 @@ class State:
         """Angle about z of a body turned about its own x, then y, then z, shape (N,) (rad)."""
         return last_euler_angle(self.rotation(body))
 
-    @_remembered
     def linear_velocity(self, body: str) -> Floats:
         """Linear velocity of a body in the world frame, shape (N, 3) (m/s)."""
         return self._velocity(body, "linear_velocity")
 
-    @_remembered
     def angular_velocity(self, body: str) -> Floats:
         """Angular velocity of a body in the world frame, shape (N, 3) (rad/s)."""
         return self._velocity(body, "angular_velocity")
 
-    @_remembered
     def speed(self, body: str) -> Floats:
         """Euclidean norm of a body's linear velocity, shape (N,) (m/s)."""
-        return norm(self.linear_velocity(body))
+        return self._speed(body, "linear_velocity")
 
-    @_remembered
     def spin(self, body: str) -> Floats:
         """Euclidean norm of a body's angular velocity, shape (N,) (rad/s)."""
-        return norm(self.angular_velocity(body))
+        return self._speed(body, "angular_velocity")
 
     # -- robots ------------------------------------------------------------------------------
 
@@ -285,11 +286,27 @@ class State:
         return self._offsets
 
     def _velocity(self, body: str, which: str) -> Floats:
-        self._expect_current()
-        bodies = [world.body(body) for world in self._simulation.worlds]
-        if bodies[0].kind != "dynamic":
-            return np.zeros((self.num_envs, 3), np.float32)
-        return np.stack([getattr(found.component, which) for found in bodies])
+        place = self._index.velocity(body, which)
+        return self._all_velocities(place)[place]
+
+    def _speed(self, body: str, which: str) -> Floats:
+        place = self._index.velocity(body, which)
+        if place >= len(self._speeds):
+            self._speeds = norm(self._all_velocities(place))
+        return self._speeds[place]
+
+    def _all_velocities(self, place: int) -> Floats:
+        """Velocities that were ever asked for, (K, N, 3), at least up to ``place``."""
+        if place >= len(self._velocities):
+            self._expect_current()
+            worlds = self._simulation.worlds
+            rows: list[Floats] = []
+            for body, which in self._index.velocities:
+                bodies = [world.bodies[body] for world in worlds]
+                moves = bodies[0].kind == "dynamic"
+                rows += [getattr(b.component, which) if moves else _STILL for b in bodies]
+            self._velocities = np.concatenate(rows).reshape(-1, self.num_envs, 3)
+        return self._velocities
 
     def _contact_forces(self, robot: str, links: tuple[str, ...], body: str) -> Floats | None:
         """Forces of a body on some links, (N, L, 3), or None if nothing touches anywhere."""

@@ -103,15 +103,16 @@ class FourRobotStack(MultiRobotTask):
 
     def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """For each arm reach (0.2), grasp (0.3) and carry (0.9), 1 when placed; 5 on success."""
-        reward = np.zeros(self.num_envs, np.float32)
-        for level, place in enumerate(ORDER):
-            cube = f"cube_{place}"
-            reach, carry = closeness(
-                state.tcp_distance(place, cube), norm(_PLACES[level] - state.position(cube))
-            )
-            grasped = info[f"is_{place}_grasping"]
-            part = np.where(grasped, _GRASPED + _CARRIED * carry, _REACHED * reach)
-            reward = reward + np.where(info[f"is_{place}_placed"], _ONE, part)
+        cubes = {place: f"cube_{place}" for place in ORDER}
+        to_cube = [state.tcp_distance(place, cube) for place, cube in cubes.items()]
+        astray = norm(_PLACES[:, None] - [state.position(cube) for cube in cubes.values()])
+        near = np.array(closeness(*to_cube, *astray)).reshape(2, len(ORDER), -1)
+        grasped, placed = (
+            np.array([info[f"is_{place}_{what}"] for place in ORDER])
+            for what in ("grasping", "placed")
+        )
+        parts = np.where(grasped, _GRASPED + _CARRIED * near[1], _REACHED * near[0])
+        reward = np.add.reduce(np.where(placed, _ONE, parts))
         return np.where(info["success"], _DONE, reward)
 
 

@@ -3,7 +3,7 @@ import pytest
 import torch
 
 import tasks
-from robots import UnknownNameError
+from robots import SimulationError, UnknownNameError
 from simulation import State
 from tasks import MultiRobotTask
 
@@ -48,6 +48,32 @@ def test_speed_and_spin_are_norms(env: MultiRobotTask):
     state = state_of(env)
     np.testing.assert_allclose(state.speed("cube"), [0.5, 0.5], rtol=1e-6)
     np.testing.assert_allclose(state.spin("cube"), [2.0, 2.0], rtol=1e-6)
+
+
+def test_velocities_are_those_of_the_body_asked_for(env: MultiRobotTask):
+    for world in env.simulation.worlds:
+        world.body("cube").component.set_linear_velocity([0.0, 0.0, 4.0])
+        world.body("cube").component.set_angular_velocity([0.0, 2.0, 0.0])
+    env.simulation.touched()
+    for order in (["goal_site", "cube"], ["cube", "goal_site"], ["cube"]):
+        state = state_of(env)
+        spins = {body: state.spin(body).tolist() for body in order}
+        speeds = {body: state.speed(body).tolist() for body in order}
+        assert spins["cube"] == [2.0, 2.0]
+        assert speeds["cube"] == [4.0, 4.0]
+        assert spins.get("goal_site") == speeds.get("goal_site") in (None, [0.0, 0.0])
+    with pytest.raises(UnknownNameError, match="Did you mean 'cube'"):
+        state.speed("cub")
+    assert state_of(env).linear_velocity("cube").tolist() == [[0.0, 0.0, 4.0]] * 2
+
+
+def test_velocities_are_read_while_the_state_is_present(env: MultiRobotTask):
+    read, unread = state_of(env), state_of(env)
+    before = read.linear_velocity("cube").tolist()
+    env.step(torch.zeros(2, 15))
+    assert read.linear_velocity("cube").tolist() == before
+    with pytest.raises(SimulationError, match="no longer the present one"):
+        unread.linear_velocity("cube")
 
 
 def test_a_remembered_answer_is_that_of_the_same_question(env: MultiRobotTask):
