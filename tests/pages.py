@@ -14,11 +14,13 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-# WebGL by software, and no traffic of the browser's own.
-FLAGS = (
-    "--no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader"
-    " --ignore-gpu-blocklist --disable-quic --no-first-run --disable-background-networking"
+# No traffic of the browser's own.
+QUIET = (
+    "--no-sandbox --disable-quic --no-first-run --disable-background-networking"
     " --disable-component-update --disable-sync"
+).split()
+SOFTWARE_WEBGL = (
+    "--use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --ignore-gpu-blocklist"
 ).split()
 PATIENCE = 120.0  # s; browsers without a graphics card are slow
 SIZE = {"width": 900, "height": 560}
@@ -75,19 +77,27 @@ def served(*words: str) -> Iterator[Served]:
 
 
 @contextmanager
-def browser_page() -> Iterator[tuple[Any, list[str]]]:
-    """Yield an empty page of a browser, and the list of all addresses that it asks for."""
+def running_browser(*flags: str) -> Iterator[Any]:
+    """Run Debian's chromium, with some flags more."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
+        path = shutil.which("chromium")
+        browser = playwright.chromium.launch(executable_path=path, args=[*QUIET, *flags])
+        yield browser
+        browser.close()
+
+
+@contextmanager
+def browser_page() -> Iterator[tuple[Any, list[str]]]:
+    """Yield an empty page of a browser, and the list of all addresses that it asks for."""
+    with running_browser(*SOFTWARE_WEBGL) as browser:
         page = browser.new_page(viewport=SIZE)
         page.set_default_timeout(1000 * PATIENCE)
         asked: list[str] = []
         page.on("request", lambda request: asked.append(request.url))
         page.on("websocket", lambda socket: asked.append(socket.url))
         yield page, asked
-        browser.close()
 
 
 def picture(page: Any) -> np.ndarray:

@@ -3,7 +3,6 @@
 import copy
 import json
 import re
-import shutil
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,12 +18,8 @@ from parity.report.figures import COLUMNS, RECORDED_COLUMNS, UNKNOWN, cells, is_
 from parity.report.gaps import grouped
 from parity.results import RESULTS, read
 from parity.sweep.entries import SUMMARY, blank, write_summary
-from tests.pages import PATIENCE
+from tests.pages import PATIENCE, running_browser
 
-FLAGS = (
-    "--no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking"
-    " --disable-component-update --disable-sync"
-).split()
 DESKTOP, PHONE = (1280, 900), (390, 844)
 INJECTION = '</p><script>document.title = "taken over"</script><img src=x onerror=alert(1)>'
 VERIFIED, RANDOM, FAILED, DIFFERENT = "PickCube-v1", "PushT-v1", "RollBall-v1", "StackCube-v1"
@@ -140,12 +135,8 @@ def page_file(runs, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def browser():
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
+    with running_browser("--disable-gpu") as chromium:
         yield chromium
-        chromium.close()
 
 
 class Visit:
