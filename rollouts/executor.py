@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import pickle
 import signal
-import traceback
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any, Protocol
 
 from robots import RobotLayoutsError
-from tasks.fronts.work import end_with_parent
+from tasks import processes
 
 Play = Callable[[int], Any]
 """Plays the episode of a seed and returns what is to be known of it (it can be pickled)."""
@@ -26,8 +23,6 @@ DEATHS_ALLOWED = 3  # of workers at one seed
 UNSENDABLE = (pickle.PicklingError, AttributeError, TypeError)  # what pickling raises
 
 _PATIENCE = 10.0  # s that a worker may take to end by itself
-
-_context = multiprocessing.get_context("spawn")  # SAPIEN does not survive a fork
 
 
 class WorkerError(RobotLayoutsError, RuntimeError):
@@ -260,12 +255,9 @@ def modules_of(*things: Any) -> tuple[str, ...]:
     return tuple(dict.fromkeys(str(thing.__module__) for thing in known))
 
 
-def portable(error: Exception) -> Exception:
-    """Return an error that can be sent: ours as they are, others as text."""
-    if isinstance(error, RobotLayoutsError):
-        return error
-    last = traceback.extract_tb(error.__traceback__)[-1]
-    return WorkerError(f"{type(error).__name__}: {error} ({last.filename}:{last.lineno})")
+def portable(error: Exception) -> processes.Sendable:
+    """Return what arrives elsewhere as an error of ours, with its traceback as its cause."""
+    return processes.Sendable(error, WorkerError)
 
 
 def unsendable(error: Exception) -> WorkerError:
@@ -291,23 +283,22 @@ class _Processes:
 
     def wait(self, workers: Sequence[Worker]) -> list[Worker]:
         """Return the workers that have something to say."""
-        processes = [worker for worker in workers if isinstance(worker, _Process)]
-        ready = wait([worker.connection for worker in processes])
-        return [worker for worker in processes if worker.connection in ready]
+        here = [worker for worker in workers if isinstance(worker, _Process)]
+        ready = wait([worker.connection for worker in here])
+        return [worker for worker in here if worker.connection in ready]
 
 
 class _Process:
     """One process, which plays one seed at a time."""
 
     def __init__(self, prepare: Callable[[], Play]) -> None:
-        self.connection, theirs = _context.Pipe()
+        self.connection, theirs = processes.context.Pipe()
         self.seed: int | None = None
-        self._process = _context.Process(target=_work, args=(theirs, prepare), daemon=True)
-        with _no_interrupts():
-            try:
-                self._process.start()
-            except UNSENDABLE as error:
-                raise unsendable(error) from error
+        self._process = processes.context.Process(target=_work, args=(theirs, prepare), daemon=True)
+        try:
+            processes.start(self._process)
+        except UNSENDABLE as error:
+            raise unsendable(error) from error
         theirs.close()
         self.name = f"process {self._process.pid}"
 
@@ -367,7 +358,7 @@ class _Report:
 def _work(connection: Connection, prepare: Callable[[], Play]) -> None:
     """Be a worker: say None when ready, then answer each seed with a result and an error."""
     global _tell
-    end_with_parent()
+    processes.end_with_parent()
     _tell = lambda said: connection.send(_Report(said))  # noqa: E731
     try:
         play = prepare()
@@ -395,17 +386,3 @@ def _tell_nobody(said: Any) -> None:
 
 
 _tell: Callable[[Any], None] = _tell_nobody
-
-
-@contextmanager
-def _no_interrupts() -> Generator[None]:
-    """Hold back Ctrl-C here, and for good in processes that are started meanwhile.
-
-    A terminal sends it to all of them; only the main process is to act on it.
-    """
-    resource_tracker.ensure_running()  # its start would let Ctrl-C through again
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

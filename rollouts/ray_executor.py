@@ -32,6 +32,7 @@ from rollouts.executor import (
     portable,
     unsendable,
 )
+from tasks.processes import Sendable
 
 ROOMS = ("robots", "layouts", "simulation", "tasks", "rollouts")
 PACKAGES = ("sapien", "torch", "numpy")  # which decide the bits of an episode
@@ -321,7 +322,7 @@ class _Player:
 
     _play: Play
 
-    def begin(self, prepare: bytes) -> tuple[_Home, Exception | None]:
+    def begin(self, prepare: bytes) -> tuple[_Home, Sendable | None]:
         """Make what plays; returns where that is, and what went wrong."""
         ray, error = import_ray(), None
         try:
@@ -332,7 +333,7 @@ class _Player:
         home = _Home(node, ray.util.get_node_ip_address(), os.getpid(), _versions())
         return home, error
 
-    def play(self, seed: int) -> tuple[Any, Exception | None]:
+    def play(self, seed: int) -> tuple[Any, Sendable | None]:
         """Play an episode; returns its result, and what went wrong."""
         try:
             return self._play(seed), None

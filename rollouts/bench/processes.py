@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import signal
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing, contextmanager, suppress
 from multiprocessing.connection import Connection
@@ -17,11 +16,10 @@ from numpy.typing import NDArray
 from rollouts.bench.measurement import BenchmarkError, Measurement, by_series
 from rollouts.bench.settings import CORES, Clock, Settings
 from rollouts.bench.steps import PHYSICS, random_actions
+from tasks import processes
 
 VECTOR = "vector"
 FEW, MANY = 4, 36  # environments in a worker whose memory is compared
-
-_context = multiprocessing.get_context("spawn")  # SAPIEN does not survive a fork
 
 
 def workers(settings: Settings) -> Measurement:
@@ -124,9 +122,11 @@ class PhysicsProcesses:
         self._processes: list[Any] = []
         self._num_envs = num_envs
         for _ in range(count):
-            ours, theirs = _context.Pipe()
-            process = _context.Process(target=_work, args=(theirs, task_id, num_envs), daemon=True)
-            process.start()
+            ours, theirs = processes.context.Pipe()
+            process = processes.context.Process(
+                target=_work, args=(theirs, task_id, num_envs), daemon=True
+            )
+            processes.start(process)
             theirs.close()
             self._connections.append(ours)
             self._processes.append(process)
@@ -175,7 +175,7 @@ def _work(connection: Connection, task_id: str, num_envs: int) -> None:
 
     import tasks
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C: the process that started this one acts
+    processes.end_with_parent()
     torch.set_num_threads(1)
     env = tasks.make(task_id, num_envs=num_envs)
     connection.send(0.0)

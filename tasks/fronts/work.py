@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import pickle
-import threading
 import traceback
 from multiprocessing import reduction
 from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 from typing import TYPE_CHECKING, Any
 
 from robots import RobotLayoutsError
+from tasks.processes import end_with_parent
 
 if TYPE_CHECKING:
     from tasks.fronts.batch import Batch
@@ -76,15 +74,3 @@ def _attach(connection: Connection, batch: Batch, shapes: Any, num_envs: int) ->
 def _said(error: Exception) -> str:
     last = traceback.extract_tb(error.__traceback__)[-1]
     return f"failed with {type(error).__name__}: {error} ({last.filename}:{last.lineno})"
-
-
-def end_with_parent() -> None:
-    """Let this process end when the one that started it is gone, even killed."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
-
-
-def _end_after(parent: BaseProcess) -> None:
-    parent.join()
-    os._exit(1)

@@ -7,13 +7,14 @@ import pickle
 import select
 import signal
 import time
-from collections.abc import Generator, Iterable, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing import get_context, reduction, resource_tracker
+from multiprocessing import reduction
 from typing import Any
 
 from robots import RobotLayoutsError
+from tasks import processes
 from tasks.fronts.batch import Part
 from tasks.fronts.board import (
     Arrays,
@@ -27,8 +28,6 @@ from tasks.fronts.work import work
 
 START_SECONDS = 300.0  # until all workers have built their worlds
 _FAREWELL_SECONDS = 2.0  # that workers may take to end by themselves
-
-_context = get_context("spawn")  # SAPIEN does not survive a fork
 
 
 @dataclass(frozen=True)
@@ -258,11 +257,10 @@ class _Worker:
     """One process, which holds one part."""
 
     def __init__(self, part: Part) -> None:
-        self.connection, theirs = _context.Pipe()
+        self.connection, theirs = processes.context.Pipe()
         self.busy = True  # until it has told the shapes
-        self._process = _context.Process(target=work, args=(theirs,), daemon=True)
-        with _no_interrupts():
-            self._process.start()
+        self._process = processes.context.Process(target=work, args=(theirs,), daemon=True)
+        processes.start(self._process)
         theirs.close()
         self.pid = self._process.pid
         try:
@@ -317,17 +315,3 @@ class _Worker:
         if code is None:
             return "closed its connection"
         return f"died by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
-
-
-@contextmanager
-def _no_interrupts() -> Generator[None]:
-    """Hold back Ctrl-C here, and for good in processes that are started meanwhile.
-
-    A terminal sends it to all of them; only the main process is to act on it.
-    """
-    resource_tracker.ensure_running()  # else the first start runs it, which lets Ctrl-C through
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

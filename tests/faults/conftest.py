@@ -1,0 +1,68 @@
+"""``--write-faults FILE``: the list of all faults tried, as a page."""
+
+from __future__ import annotations
+
+import html
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+SHOWN = 240  # characters of a message
+
+HEADING = """\
+# Faults
+
+What was tried to break the library, what it promises then, and what happens. Written by
+`make faults`, which tries all of it again: hostile files, wrong arguments, processes killed or
+stopped, disks and networks that fail. "One clear error" means a `RobotLayoutsError` that says what
+is wrong; "goes on" means that results are the same as without the fault, or that nothing was lost.
+"""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--write-faults", metavar="FILE", help="write the list of faults to a page")
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    path = terminalreporter.config.getoption("write_faults", None)
+    if not path:
+        return
+    tried: dict[str, list[tuple[str, str, str, bool]]] = defaultdict(list)
+    for outcome in ("passed", "failed"):
+        for report in terminalreporter.stats.get(outcome, []):
+            said = dict(report.user_properties)
+            if "fault" in said:
+                area, what, promise = said["fault"]
+                happened = said.get("happened", _last_line(report))
+                tried[area].append((what, promise, happened, outcome == "passed"))
+    Path(path).write_text(_page(tried), encoding="utf-8")
+    count = sum(map(len, tried.values()))
+    kept = sum(ok for rows in tried.values() for *_, ok in rows)
+    terminalreporter.write_line(f"{count} faults tried, {kept} promises kept: {path}")
+
+
+def _page(tried: dict[str, list[tuple[str, str, str, bool]]]) -> str:
+    lines = [HEADING, "| area | tried | promises kept |", "| --- | ---: | ---: |"]
+    for area, rows in sorted(tried.items()):
+        lines.append(f"| {area} | {len(rows)} | {sum(ok for *_, ok in rows)} |")
+    everything = [row for rows in tried.values() for row in rows]
+    lines.append(f"| **all** | {len(everything)} | {sum(ok for *_, ok in everything)} |")
+    for area, rows in sorted(tried.items()):
+        lines += ["", f"## {area[:1].upper()}{area[1:]}", ""]
+        lines += ["| tried | promised | what happens |", "| --- | --- | --- |"]
+        for what, promise, happened, ok in sorted(rows):
+            broken = "" if ok else "**broken**: "
+            lines.append(f"| {_cell(what)} | {promise} | {broken}{_cell(happened)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _cell(text: str) -> str:
+    text = " ".join(text.split())
+    text = text if len(text) <= SHOWN else f"{text[: SHOWN - 1]}…"
+    return html.escape(text, quote=False).replace("|", "\\|").replace("`", "'")
+
+
+def _last_line(report: pytest.TestReport) -> str:
+    lines = str(report.longrepr).strip().splitlines()
+    return next((line for line in reversed(lines) if line.startswith("E ")), lines[-1])

@@ -1,0 +1,76 @@
+"""What a fault is: something wrong that the library meets, and what it promises to do then."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from robots import RobotLayoutsError
+
+REFUSED = "one clear error"
+GOES_ON = "goes on"
+
+COMMAND_SECONDS = 90.0
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Something wrong that the library meets.
+
+    Attributes:
+        area: Which part of the library meets it, in one or two words.
+        what: What was tried, in a few words; unique in its area.
+        run: Tries it, given an empty folder. If the promise is `REFUSED`, it must raise a
+            `RobotLayoutsError`; if it is `GOES_ON`, it must return, after it has asserted that
+            nothing was lost and that what came out is right. It may return a few words that say
+            what happened.
+        promise: `REFUSED` or `GOES_ON`.
+    """
+
+    area: str
+    what: str
+    run: Callable[[Path], str | None]
+    promise: str = REFUSED
+
+
+def run_command(
+    *words: str,
+    cwd: Path | None = None,
+    env: Mapping[str, str] | None = None,
+    seconds: float = COMMAND_SECONDS,
+) -> subprocess.CompletedProcess[str]:
+    """Run ``python -m WORDS`` in a process of its own and return what it printed.
+
+    A command that refuses, which is one that ends with status 1 or 2 and one line ``error: …``,
+    raises that line as a `RobotLayoutsError`, as if it had been called here.
+
+    Raises:
+        RobotLayoutsError: If the command refuses.
+        AssertionError: If it hangs, prints a traceback, or ends in another way than by itself.
+    """
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", *words],
+            capture_output=True,
+            text=True,
+            errors="replace",
+            check=False,
+            cwd=cwd,
+            env=env,
+            timeout=seconds,
+            stdin=subprocess.DEVNULL,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise AssertionError(f"hangs: no end after {seconds:g} s") from error
+    printed = done.stdout + done.stderr
+    assert "Traceback (most recent call last)" not in printed, f"a raw error: {printed[-2000:]}"
+    assert done.returncode >= 0, f"died by signal {-done.returncode}: {printed[-2000:]}"
+    if done.returncode:
+        assert done.returncode in (1, 2), f"ended with {done.returncode}: {printed[-2000:]}"
+        said = [line for line in done.stderr.splitlines() if "error: " in line]
+        assert said, f"ended with {done.returncode} and says no reason: {printed[-2000:]}"
+        raise RobotLayoutsError(said[-1].partition("error: ")[2])
+    return done
