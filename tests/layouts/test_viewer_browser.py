@@ -56,7 +56,7 @@ def test_robots_are_shown_moved_and_checked(tmp_path):
         page.get_by_text("No robot touches another or itself.").wait_for()
         assert changed(settled(page), start) < 50
 
-        at = view.url.removeprefix("http://")
+        at = urlsplit(view.url).netloc
         assert {urlsplit(address.removeprefix("blob:")).netloc for address in asked} <= {at, ""}
         status, rest = view.interrupt()
         assert status == 0
