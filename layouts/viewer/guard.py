@@ -46,7 +46,7 @@ class Guard:
 
     Attributes:
         port: Where the server listens.
-        names: Names of this machine, in lower case, that may stand in ``Host``, besides the address
+        names: Names of this machine, in lower case, that may stand in ``Host``. So may the address
             at which a request arrives and, if that is a loopback address, ``localhost``.
         token: What every request must hold as ``?token=…``.
     """
@@ -64,7 +64,7 @@ class Guard:
                 machine's own host name leads to it, too.
             port: Its port.
         """
-        names = set[str]() if is_wildcard(host) else {host.lower()}
+        names = {host.lower()} if _literal(host) is None else set[str]()
         if not is_loopback(host):
             own = socket.gethostname().lower()
             names |= {own, f"{own}.local"}
@@ -112,7 +112,7 @@ class Guard:
             len(hosts) == len(given) == 1
             and self._names_us(hosts[0].lower(), arrived_at)
             and {origin.lower() for origin in origins} <= {f"http://{hosts[0].lower()}"}
-            and hmac.compare_digest(given[0].encode(), self.token.encode())
+            and hmac.compare_digest(given[0].encode(errors="replace"), self.token.encode())
         )
 
     def _names_us(self, host: str, arrived_at: str) -> bool:

@@ -49,7 +49,7 @@ def _decoded(data: str | bytes, kinds: tuple[type, ...]) -> Any:
     raise ValueError(f"no message of kind {called!r} is taken")
 
 
-def _takes(control: Any, value: object) -> bool:
+def _takes(control: Any, value: Any) -> bool:
     """Return whether a control can be brought to a value by hand."""
     import viser
 
