@@ -54,6 +54,8 @@ def save_html(cell: Cell, path: str | os.PathLike[str]) -> Path:
             unfinished.write_text(page, encoding="utf-8")
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
+        if isinstance(error, (FileExistsError, NotADirectoryError)):
+            reason = f"{target.parent} is no folder"
         raise ViewerError(f"cannot save a page as {str(target)!r}: {reason}") from error
     return target
 

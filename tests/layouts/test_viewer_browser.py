@@ -8,7 +8,8 @@ import viser
 from layouts.__main__ import main
 from layouts.viewer.saved import save_html
 from layouts.viewer.text import printable
-from tests.layouts.guests import HOSTILE_NAMES, site, small_cell
+from tests.layouts.guests import site, small_cell
+from tests.layouts.hostile_names import HOSTILE_NAMES
 from tests.layouts.hostile_site import ATTACK, NOTHING, hostile_site
 from tests.pages import (
     PATIENCE,

@@ -15,7 +15,6 @@ from layouts.viewer.saved import NO_SLIDERS, save_html
 from layouts.viewer.server import serving
 from layouts.viewer.text import as_html, node, printable
 from tests.layouts.guests import (
-    HOSTILE_NAMES,
     WEBSOCKET,
     Guest,
     ask,
@@ -23,6 +22,7 @@ from tests.layouts.guests import (
     small_cell,
     talk,
 )
+from tests.layouts.hostile_names import HOSTILE_NAMES
 from tests.pages import wait_until
 
 EVIL = "evil.example"
