@@ -76,7 +76,9 @@ class Guard:
         Args:
             host: Address or name at which the server listens.
         """
-        name = "localhost" if is_wildcard(host) else host
+        name = host
+        if is_wildcard(host):
+            name = "::1" if ":" in host else "localhost"
         return f"http://{f'[{name}]' if ':' in name else name}:{self.port}/?token={self.token}"
 
     def answer(

@@ -12,7 +12,8 @@ def fits(server: Any, data: str | bytes) -> bool:
     """Return whether a message is one that the controls of a page send.
 
     viser takes much more: requests for a share tunnel, files, values of any type for any attribute
-    of a control. Whoever has the token may steer, and nothing else.
+    of a control. Whoever has the token may steer, and nothing else. A page with controls of other
+    kinds adds them to `_takes`.
 
     Args:
         server: The viser server.

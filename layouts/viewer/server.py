@@ -99,7 +99,7 @@ def _guarded(guard: Guard, started: list[Any]) -> Generator[None, None, None]:
     """
     from websockets.asyncio import server as websockets
 
-    serve, connection_class = websockets.serve, _connection_class(started)
+    serve = websockets.serve
 
     def serve_guarded(handler: Callable[..., Any], *where: Any, **options: Any) -> Any:
         if not handler.__module__.startswith("viser."):  # of another thread, and none of ours
@@ -109,8 +109,8 @@ def _guarded(guard: Guard, started: list[Any]) -> Generator[None, None, None]:
         def answer(connection: Any, request: Any) -> Any:
             return guard.answer(connection, request, page)
 
-        options |= {"process_request": answer, "create_connection": connection_class}
-        return serve(handler, *where, **options | {"max_size": MESSAGE_BYTES, "logger": LOG})
+        options |= {"process_request": answer, "max_size": MESSAGE_BYTES, "logger": LOG}
+        return serve(_sifted(handler, started), *where, **options)
 
     with _STARTING:
         websockets.serve = serve_guarded  # pyright: ignore[reportAttributeAccessIssue]
@@ -120,18 +120,22 @@ def _guarded(guard: Guard, started: list[Any]) -> Generator[None, None, None]:
             websockets.serve = serve
 
 
-def _connection_class(started: list[Any]) -> type[Any]:
-    """Return the class of connections that pass only messages on which `fits` a page's controls."""
-    from websockets.asyncio.server import ServerConnection
+def _sifted(handler: Callable[..., Any], started: list[Any]) -> Callable[..., Any]:
+    """Return a handler of connections that receives only messages which `fits` lets through."""
 
-    class Connection(ServerConnection):
-        async def recv(self, decode: bool | None = None) -> Any:
+    async def handle(connection: Any) -> None:
+        receive = connection.recv
+
+        async def receive_fitting() -> Any:
             while True:
-                data = await super().recv(decode)
+                data = await receive()
                 if started and fits(started[0], data):
                     return data
 
-    return Connection
+        connection.recv = receive_fitting
+        await handler(connection)
+
+    return handle
 
 
 def _check_guarded(server: Any, host: str, port: int) -> None:

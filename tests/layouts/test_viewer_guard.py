@@ -3,7 +3,9 @@
 import html
 import re
 import socket
+import urllib.request
 from types import SimpleNamespace
+from urllib.parse import urlsplit
 
 import msgspec
 import pytest
@@ -81,6 +83,17 @@ def test_the_printed_address_leads_to_the_page_and_tells_it_where_its_websocket_
     status, answer = ask(port, host, f"/?token={token}&websocket=ws://{EVIL}/")
     assert status == 302
     assert EVIL.encode() not in answer
+
+
+@pytest.mark.parametrize("host", ["localhost", "0.0.0.0", "::1", "::"])
+def test_the_printed_address_opens_wherever_the_server_listens(host, tmp_path):
+    with site(small_cell(tmp_path), host) as running:
+        with urllib.request.urlopen(running.address) as answer:
+            assert b"<title>Viser</title>" in answer.read()
+        with Guest(running.address) as guest:
+            guest.wait_for("ReplayDoneMessage")
+        named = urlsplit(running.address).netloc.rpartition(":")[0]
+        assert named == ("[::1]" if ":" in host else "localhost")
 
 
 @pytest.mark.parametrize(
