@@ -202,8 +202,8 @@ def serve(cell: Cell, host: str, port: int, announce: Callable[[str], None]) -> 
         page = Page(server, cell)
         if not is_loopback(host):
             announce(
-                f"listening at {host}: others on this network can open and move it, too, with the"
-                " token in its address; it is not encrypted"
+                f"listening at {host}: others on this network can open and move it, too, at this"
+                " machine's name or address and with the token; nothing is encrypted"
             )
         announce(f"{cell.title}: {address} (Ctrl-C ends it)")
         before = time.monotonic()

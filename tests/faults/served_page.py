@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import tempfile
+import atexit
 from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 from urllib.parse import quote
 
 _UNTIL_THE_END = ExitStack()
+atexit.register(_UNTIL_THE_END.close)
 
 
 @cache
@@ -20,7 +22,7 @@ def cell() -> Any:
     from layouts.viewer import Cell, Motion
     from tests.layouts.guests import small_cell
 
-    bare = small_cell(Path(tempfile.mkdtemp()))
+    bare = small_cell(Path(_UNTIL_THE_END.enter_context(TemporaryDirectory())))
     start = np.tile(bare.start["arm"], (3, 1))
     return Cell("cell", bare.layout, motion=Motion(0.05, {"arm": start}))
 
