@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from robots import scenery
 from robots.asset_sources import AssetSource, InstalledManiSkill, LocalCopy, ManiSkillWheel
 from robots.asset_store import AssetStore, FileState, default_root
 from robots.assets import default_sources, ensure
-from robots.errors import RobotLayoutsError, UnknownNameError
+from robots.commands import exit_code, start
 from robots.hub_source import REVISION_VARIABLE, HubSource
 from robots.locator import UrdfLocator
 from robots.manifest import AssetFile, load_manifest
@@ -32,20 +31,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if options.offline and options.source in ONLINE_SOURCES:
         parser.error(f"--source {options.source} needs the network, which --offline rules out")
-    try:
-        needs = robot_files(options.robots, pictures=not options.physics_only)
-        if not (options.robots or options.physics_only):
-            needs["scenery"] = load_manifest().package(scenery.PACKAGE).files
-        store = AssetStore((options.dest or default_root()).expanduser().absolute())
-        if not options.check:
-            ensure(_union(needs), store, _sources(options, store), trust=options.trust_source)
-        return _report(needs, store)
-    except UnknownNameError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    return exit_code(lambda: _fetch(options))
+
+
+def _fetch(options: argparse.Namespace) -> int:
+    needs = robot_files(options.robots, pictures=not options.physics_only)
+    if not (options.robots or options.physics_only):
+        needs["scenery"] = load_manifest().package(scenery.PACKAGE).files
+    store = AssetStore((options.dest or default_root()).expanduser().absolute())
+    if not options.check:
+        ensure(_union(needs), store, _sources(options, store), trust=options.trust_source)
+    return _report(needs, store)
 
 
 def robot_files(robots: Sequence[str], *, pictures: bool) -> dict[str, tuple[AssetFile, ...]]:
@@ -136,4 +132,4 @@ def _report(needs: dict[str, tuple[AssetFile, ...]], store: AssetStore) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(main)

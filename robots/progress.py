@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+
+from robots.commands import is_watched, notice
 
 Advance = Callable[[int], None]
 
 
 def say(text: str) -> None:
     """Print one line."""
-    print(f"robot files: {text}", file=sys.stderr, flush=True)
+    notice(f"robot files: {text}")
 
 
 @contextmanager
@@ -25,7 +26,7 @@ def download_bar(title: str, total: int | None) -> Generator[Advance]:
     Yields:
         A function to call with the number of bytes that arrived.
     """
-    if not sys.stderr.isatty():
+    if not is_watched():
         yield lambda count: None
         return
     from rich.console import Console

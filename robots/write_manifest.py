@@ -6,13 +6,13 @@ import argparse
 import hashlib
 import posixpath
 import re
-import sys
 from importlib import metadata
 from pathlib import Path
 
 from robots import scenery
 from robots.asset_sources import find_mani_skill
-from robots.errors import AssetError, RobotLayoutsError
+from robots.commands import exit_code, start
+from robots.errors import AssetError
 from robots.locator import UrdfLocator
 from robots.manifest import CHECKOUT_CACHE, AssetFile, AssetPackage, Manifest, PackageOrigin
 from robots.registry import CATALOGUE, RobotRegistry
@@ -28,12 +28,12 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m robots.write_manifest", description=__doc__)
     parser.add_argument("--check", action="store_true", help="only compare; exit code 1 if stale")
     check = parser.parse_args(arguments).check
+    return exit_code(lambda: _write(check=check))
+
+
+def _write(*, check: bool) -> int:
     path = CHECKOUT_CACHE / "manifest.json"
-    try:
-        text = build_manifest(find_mani_skill()).to_json()
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    text = build_manifest(find_mani_skill()).to_json()
     if check:
         fresh = path.is_file() and path.read_text(encoding="utf-8") == text
         print(
@@ -182,4 +182,4 @@ def _asset_file(
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(main)
