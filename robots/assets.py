@@ -6,18 +6,14 @@ from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
-from robots.asset_sources import (
-    AssetSource,
-    InstalledManiSkill,
-    ManiSkillWheel,
-    SourceError,
-)
-from robots.asset_store import AssetStore, default_root
+from robots.asset_sources import AssetSource, InstalledManiSkill, SourceError
+from robots.asset_store import AssetStore, FileState, default_root
 from robots.errors import AssetError
 from robots.hub_source import HubSource
 from robots.manifest import AssetFile, load_manifest
-from robots.progress import say, size
+from robots.progress import listing, say, size
 from robots.urdf_xml import read_references
+from robots.wheel_source import ManiSkillWheel
 
 
 def locate(package: str, urdf: str, *, pictures: bool) -> Path:
@@ -108,6 +104,8 @@ class _Fetch:
 
     def __init__(self, source: AssetSource, store: AssetStore, scratch: Path, trust: bool) -> None:
         self._source, self._store, self._scratch, self._trust = source, store, scratch, trust
+        self._kept: set[str] = set()  # packages of which files came along
+        self._room = True
 
     def run(self, files: Sequence[AssetFile]) -> str:
         """Fetch, refetch once what differs, and return why something is still missing."""
@@ -120,24 +118,48 @@ class _Fetch:
             return str(error)
         if not different:
             return ""
-        listing = ", ".join(map(str, different))
         return (
-            f"refused, as {len(different)} files differ from the manifest, twice: {listing}"
+            f"refused, as {len(different)} files differ from the manifest, twice:"
+            f" {listing([str(file) for file in different])}"
             f" (--source {self._source.name} --trust-source would accept them)"
         )
 
     def _install(self, files: Sequence[AssetFile], *, again: bool) -> list[AssetFile]:
         different: list[AssetFile] = []
+        asked = set(files)
         trust = self._trust and again
-        with closing(self._source.fetch(files, self._scratch, again=again)) as contents:
+        fetch = self._source.fetch(files, self._scratch, again=again, trust=trust)
+        with closing(fetch) as contents:
             for file, data in contents:
-                if trust:
-                    _expect_known_references(file, data)
-                if not self._store.install(
-                    file, data, scratch=self._scratch, source=self._source.title, trust=trust
-                ):
+                if file not in asked:
+                    self._keep(file, data)
+                elif not self._accept(file, data, trust=trust):
                     different.append(file)
         return different
+
+    def _accept(self, file: AssetFile, data: bytes, *, trust: bool) -> bool:
+        if len(data) > file.limit(trust=trust):
+            return False
+        if trust:
+            _expect_known_references(file, data)
+        return self._store.install(
+            file, data, scratch=self._scratch, source=self._source.title, trust=trust
+        )
+
+    def _keep(self, file: AssetFile, data: bytes) -> None:
+        """Keep a file that nobody asked for, so that it need not be fetched another time."""
+        if not self._room or self._store.state(file) is not FileState.MISSING:
+            return
+        origin = file.origin
+        if origin.name not in self._kept:
+            self._kept.add(origin.name)
+            say(f"keeping {origin.name}, too, which came along")
+            say(f"licence {origin.licence}: {origin.licence_note}")
+        try:
+            self._accept(file, data, trust=False)
+        except AssetError as error:  # what was asked for is there
+            self._room = False
+            say(f"{error} What came along is not kept.")
 
 
 def _expect_known_references(file: AssetFile, data: bytes) -> None:
@@ -166,11 +188,11 @@ def _shorten(text: str, length: int = 160) -> str:
 
 
 def _failure_text(wanted: list[AssetFile], store: AssetStore, failures: list[str]) -> str:
-    listing = "".join(f"\n    {file}: {store.state(file).value}" for file in wanted)
+    states = listing([f"{file}: {store.state(file).value}" for file in wanted], "\n    ")
     tried = "".join(f"\n    {failure}" for failure in failures) or "\n    none"
     wheel = wanted[0].origin.wheel
     return (
-        f"{len(wanted)} robot files cannot be used in {store.root}:{listing}\n"
+        f"{len(wanted)} robot files cannot be used in {store.root}:\n    {states}\n"
         f"  sources tried:{tried}\n"
         f"  what to do: connect to the network and run `python -m robots.fetch_assets`, or"
         f" `pip install {wheel}`, or copy the files into {store.root} from another machine"

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 
 from robots import scenery
-from robots.asset_sources import AssetSource, InstalledManiSkill, LocalCopy, ManiSkillWheel
-from robots.asset_store import AssetStore, FileState, default_root
+from robots.asset_sources import AssetSource, InstalledManiSkill, LocalCopy
+from robots.asset_store import AssetStore, FileState, default_root, folder
 from robots.assets import default_sources, ensure
 from robots.commands import exit_code, start
 from robots.hub_source import REVISION_VARIABLE, HubSource
@@ -16,6 +15,7 @@ from robots.locator import UrdfLocator
 from robots.manifest import AssetFile, load_manifest
 from robots.progress import size
 from robots.registry import RobotRegistry
+from robots.wheel_source import ManiSkillWheel
 
 SOURCES = ("local", "hf", "mani_skill", "wheel")
 ONLINE_SOURCES = ("hf", "wheel")
@@ -38,7 +38,8 @@ def _fetch(options: argparse.Namespace) -> int:
     needs = robot_files(options.robots, pictures=not options.physics_only)
     if not (options.robots or options.physics_only):
         needs["scenery"] = load_manifest().package(scenery.PACKAGE).files
-    store = AssetStore((options.dest or default_root()).expanduser().absolute())
+    chosen = options.dest
+    store = AssetStore(default_root() if chosen is None else folder(chosen, "--dest"))
     if not options.check:
         ensure(_union(needs), store, _sources(options, store), trust=options.trust_source)
     return _report(needs, store)
@@ -69,7 +70,8 @@ def describe_file(file: AssetFile, store: AssetStore) -> str:
     """Return one line: state, path, size, what it is for, where it came from."""
     state = store.state(file)
     use = "physics" if file.physics else "pictures"
-    source = store.record().get(str(file), {}).get("source") if state.usable else None
+    fetched = store.record().files.get(str(file)) if state.usable else None
+    source = fetched["source"] if fetched else None
     return f"{state.value}: {file} ({size(file.bytes)}, {use}{f'; {source}' if source else ''})"
 
 
@@ -80,7 +82,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--check", action="store_true", help="fetch nothing, only list what is missing or wrong")
     add("--offline", action="store_true", help="never use the network")
     add("--source", choices=SOURCES, help="use this source alone")
-    add("--dest", type=Path, metavar="DIR", help="folder to fill, instead of the usual local copy")
+    add("--dest", metavar="DIR", help="folder to fill, instead of the usual local copy")
     add("--physics-only", action="store_true", help="leave out what only pictures need")
     add(
         "--trust-source",

@@ -1,7 +1,7 @@
 """Downloads files from a Hugging Face dataset, in a process of its own that `hub_source` can end.
 
 The Hub's client waits without limit for some answers and blocks in name look-ups, which no thread
-can be freed from; a process can. It answers with JSON lines, and ends when its stdin does.
+can be freed from; a process can. It reads a job from stdin and answers with JSON lines.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any, TextIO, TypeVar
 _ATTEMPTS = 3
 _FIRST_WAIT = 0.3  # s, tripled after each attempt
 _DOWNLOADS_AT_ONCE = 8
-_CHUNK_SIZE = 2**16  # bytes
+_CHUNK_SIZE = 2**13  # bytes
 _FINAL_STATUSES = {
     401: "access refused (401): the dataset is private, gated or gone, and no token is sent",
     403: "access refused (403): the dataset is gated or private, and no token is sent",
@@ -29,23 +29,24 @@ _FINAL_STATUSES = {
 Result = TypeVar("Result")
 
 
-def main(job_json: str) -> None:
-    """Do a job and tell stdout how it goes.
+def main() -> None:
+    """Do the job on stdin, and report on stdout how it goes.
 
-    Args:
-        job_json: ``dataset``, ``revision``, ``endpoint``, ``files`` and ``again`` (whether to pass
-            by the Hub's cache) as JSON.
+    The job is JSON: ``dataset``, ``revision``, ``endpoint``, ``files`` (the most bytes of each, by
+    path) and ``again`` (whether to pass by the Hub's cache).
     """
     channel = _Channel(os.fdopen(os.dup(1), "w", encoding="utf-8"))
     os.dup2(2, 1)  # whatever else prints must not disturb the channel
-    job = json.loads(job_json)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
-        _download_all(job, channel)
+        _download_all(json.load(sys.stdin), channel)
     except Exception as error:  # the border of the process: the client may raise anything
         channel.tell(failed=_reason(error))
     channel.tell(done=True)
     os._exit(0)  # downloads still running in threads are of no use any more
+
+
+class _TooLargeError(Exception):
+    """A file is larger than it may be."""
 
 
 class _Channel:
@@ -97,6 +98,8 @@ def _download_all(job: dict[str, Any], channel: _Channel) -> None:
 def _tell_outcome(result: Callable[[], str], path: str, channel: _Channel) -> None:
     try:
         channel.tell(file=path, at=result())
+    except _TooLargeError:
+        channel.tell(too_large=path)
     except Exception as error:  # the border of the process, as in main
         if _status(error) == 404:
             channel.tell(absent=path)
@@ -118,20 +121,27 @@ def _download(job: dict[str, Any], path: str, revision: str, channel: _Channel) 
             endpoint=job["endpoint"],
             token=False,
             force_download=job["again"],
-            tqdm_class=_counter(channel),
+            tqdm_class=_counter(channel, job["files"][path]),
         )
     )
 
 
-def _counter(channel: _Channel) -> type[Any]:
-    """Return a progress bar that shows nothing and passes on how many bytes arrived."""
+def _counter(channel: _Channel, limit: int) -> type[Any]:
+    """Return a progress bar that shows nothing, passes on how many bytes arrived, and bounds them.
+
+    Some servers send no length, or a wrong one: this sees every chunk before it is written.
+    """
     from tqdm import tqdm
 
     class Counter(tqdm):  # pyright: ignore[reportMissingTypeArgument]
         def __init__(self, *args: Any, **settings: Any) -> None:  # noqa: ANN401
+            self._arrived = int(settings.get("initial") or 0)
             super().__init__(*args, **{**settings, "disable": True})
 
         def update(self, n: float | None = 1) -> None:
+            self._arrived += int(n or 0)
+            if self._arrived > limit:
+                raise _TooLargeError
             channel.tell(bytes=int(n or 0))
 
     return Counter
@@ -142,6 +152,8 @@ def _with_retries(call: Callable[[], Result]) -> Result:
     for _ in range(_ATTEMPTS - 1):
         try:
             return call()
+        except _TooLargeError:
+            raise
         except Exception as error:  # the client lets its HTTP library's errors through
             if _status(error) in _FINAL_STATUSES or isinstance(error, OSError) and error.errno:
                 raise
@@ -173,8 +185,3 @@ def _reason(error: BaseException) -> str:
 
 def _is_commit(revision: str) -> bool:
     return len(revision) == 40 and set(revision) <= set("0123456789abcdef")
-
-
-def _end_with_parent() -> None:
-    sys.stdin.read()  # returns when the parent closes its end, or dies
-    os._exit(1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 
 from robots.commands import is_watched, notice
@@ -54,3 +54,11 @@ def download_bar(title: str, total: int | None) -> Generator[Advance]:
 def size(count: int) -> str:
     """Return a number of bytes as people write it."""
     return f"{count / 1e6:.1f} MB" if count >= 1e5 else f"{count / 1e3:.1f} kB"
+
+
+def listing(entries: Sequence[str], separator: str = ", ", most: int = 12) -> str:
+    """Return entries as a list for a message, and how many more there are beyond the first."""
+    shown = list(entries[:most])
+    if len(entries) > most:
+        shown.append(f"and {len(entries) - most} more")
+    return separator.join(shown)
