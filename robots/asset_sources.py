@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Generator, Iterable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -9,11 +10,12 @@ from typing import Protocol
 
 from robots.asset_store import AssetStore, FileState
 from robots.errors import AssetError, UnreadableFileError
-from robots.files import open_regular
+from robots.files import read_regular
 from robots.manifest import AssetFile
 from robots.progress import listing
 
-Contents = Generator[tuple[AssetFile, bytes], None, None]
+# None stands for contents that are more than the file may have.
+Contents = Generator[tuple[AssetFile, bytes | None], None, None]
 
 
 class SourceError(AssetError):
@@ -38,8 +40,8 @@ class AssetSource(Protocol):
     ) -> Contents:
         """Yield the contents of files, unchecked, as they arrive.
 
-        Of a file that is larger than `AssetFile.limit`, at most one byte more than that is given.
-        Files that were not asked for may follow those that were, if they came along.
+        Of a file that is larger than `AssetFile.limit`, no more than that is read, and None is
+        given. Files that were not asked for may follow those that were, if they came along.
 
         Args:
             files: What is wanted.
@@ -125,14 +127,15 @@ def expect_none(absent: Sequence[str]) -> None:
         raise SourceError(f"lacks {len(absent)} files: {listing(absent)}")
 
 
-def read_bounded(path: Path, limit: int) -> bytes:
-    """Return the contents of a file, or one byte more than the limit of one that is larger.
+def read_bounded(path: Path, limit: int) -> bytes | None:
+    """Return the contents of a file, or None if it has more bytes than the limit.
 
     Raises:
         UnreadableFileError: If it cannot be read, or is no regular file.
     """
-    with open_regular(path) as stream:
-        try:
-            return stream.read(limit + 1)
-        except OSError as error:
-            raise UnreadableFileError(path, error.strerror or str(error), error.errno) from error
+    try:
+        return read_regular(path, limit)
+    except UnreadableFileError as error:
+        if error.errno == errno.EFBIG:
+            return None
+        raise

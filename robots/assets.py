@@ -10,7 +10,7 @@ from robots.asset_sources import AssetSource, InstalledManiSkill, SourceError
 from robots.asset_store import AssetStore, FileState, default_root
 from robots.errors import AssetError
 from robots.hub_source import HubSource
-from robots.manifest import AssetFile, load_manifest
+from robots.manifest import AssetFile, PackageOrigin, load_manifest
 from robots.progress import listing, say, size
 from robots.urdf_xml import read_references
 from robots.wheel_source import ManiSkillWheel
@@ -109,23 +109,24 @@ class _Fetch:
 
     def run(self, files: Sequence[AssetFile]) -> str:
         """Fetch, refetch once what differs, and return why something is still missing."""
-        different = list(files)
+        different: dict[AssetFile, str] = {}
         try:
             different = self._install(files, again=False)
             if different:
-                different = self._install(different, again=True)
+                different = self._install(list(different), again=True)
         except SourceError as error:
             return str(error)
         if not different:
             return ""
         return (
             f"refused, as {len(different)} files differ from the manifest, twice:"
-            f" {listing([str(file) for file in different])}"
+            f" {listing([f'{file}{how}' for file, how in different.items()])}"
             f" (--source {self._source.name} --trust-source would accept them)"
         )
 
-    def _install(self, files: Sequence[AssetFile], *, again: bool) -> list[AssetFile]:
-        different: list[AssetFile] = []
+    def _install(self, files: Sequence[AssetFile], *, again: bool) -> dict[AssetFile, str]:
+        """Install what the source gives, and return what differs from the manifest, and how."""
+        different: dict[AssetFile, str] = {}
         asked = set(files)
         trust = self._trust and again
         fetch = self._source.fetch(files, self._scratch, again=again, trust=trust)
@@ -133,33 +134,36 @@ class _Fetch:
             for file, data in contents:
                 if file not in asked:
                     self._keep(file, data)
+                elif data is None:
+                    different[file] = f" (more than {file.limit(trust=trust):,} bytes)"
                 elif not self._accept(file, data, trust=trust):
-                    different.append(file)
+                    different[file] = ""
         return different
 
     def _accept(self, file: AssetFile, data: bytes, *, trust: bool) -> bool:
-        if len(data) > file.limit(trust=trust):
-            return False
         if trust:
             _expect_known_references(file, data)
         return self._store.install(
             file, data, scratch=self._scratch, source=self._source.title, trust=trust
         )
 
-    def _keep(self, file: AssetFile, data: bytes) -> None:
+    def _keep(self, file: AssetFile, data: bytes | None) -> None:
         """Keep a file that nobody asked for, so that it need not be fetched another time."""
-        if not self._room or self._store.state(file) is not FileState.MISSING:
+        if data is None or not self._room:
             return
-        origin = file.origin
-        if origin.name not in self._kept:
-            self._kept.add(origin.name)
-            say(f"keeping {origin.name}, too, which came along")
-            say(f"licence {origin.licence}: {origin.licence_note}")
         try:
-            self._accept(file, data, trust=False)
+            if self._store.state(file) is FileState.MISSING:
+                self._say_kept(file.origin)
+                self._accept(file, data, trust=False)
         except AssetError as error:  # what was asked for is there
             self._room = False
             say(f"{error} What came along is not kept.")
+
+    def _say_kept(self, origin: PackageOrigin) -> None:
+        if origin.name not in self._kept:
+            self._kept.add(origin.name)
+            say(f"keeping what came along of {origin.name}")
+            say(f"licence {origin.licence}: {origin.licence_note}")
 
 
 def _expect_known_references(file: AssetFile, data: bytes) -> None:

@@ -49,6 +49,10 @@ class _TooLargeError(Exception):
     """A file is larger than it may be."""
 
 
+class _HostileAnswerError(Exception):
+    """A server answers with what a Hub never says."""
+
+
 class _Channel:
     """JSON lines to the parent process, from any thread."""
 
@@ -73,7 +77,8 @@ class _WarningTeller(logging.Handler):
 
 def _download_all(job: dict[str, Any], channel: _Channel) -> None:
     try:
-        from huggingface_hub import HfApi, constants
+        from huggingface_hub import HfApi, constants, set_client_factory
+        from huggingface_hub.utils._http import default_client_factory
     except ImportError as error:
         channel.tell(failed=f"{error} (pip install huggingface_hub)")
         return
@@ -81,18 +86,37 @@ def _download_all(job: dict[str, Any], channel: _Channel) -> None:
     constants.DOWNLOAD_CHUNK_SIZE = _CHUNK_SIZE
     logger = logging.getLogger("huggingface_hub")
     logger.handlers, logger.propagate = [_WarningTeller(channel)], False
+    set_client_factory(lambda: _careful(default_client_factory()))
     revision = job["revision"]
     if not _is_commit(revision):
         api = HfApi(endpoint=job["endpoint"], token=False)
         revision = _with_retries(
             lambda: api.dataset_info(job["dataset"], revision=revision, expand=["sha"]).sha
         )
+        if not _is_commit(str(revision)):
+            raise _HostileAnswerError(f"the server names no commit, but {revision!r}")
     with ThreadPoolExecutor(_DOWNLOADS_AT_ONCE) as pool:
         downloads = {
             pool.submit(_download, job, path, str(revision), channel): path for path in job["files"]
         }
         for download in as_completed(downloads):
             _tell_outcome(download.result, downloads[download], channel)
+
+
+def _careful(client: Any) -> Any:
+    """Return the HTTP client, which from now on refuses names that lead out of the Hub's cache.
+
+    The Hub's client calls files of its cache by what these headers say, whatever that is.
+    """
+    client.event_hooks["response"].append(_refuse_paths)
+    return client
+
+
+def _refuse_paths(response: Any) -> None:
+    for header in ("etag", "x-linked-etag", "x-repo-commit"):
+        value = response.headers.get(header, "").lstrip("W/").strip('"')
+        if value.startswith(".") or "/" in value or "\\" in value:
+            raise _HostileAnswerError(f"the server sends {header}: {value[:100]!r}")
 
 
 def _tell_outcome(result: Callable[[], str], path: str, channel: _Channel) -> None:
@@ -152,7 +176,7 @@ def _with_retries(call: Callable[[], Result]) -> Result:
     for _ in range(_ATTEMPTS - 1):
         try:
             return call()
-        except _TooLargeError:
+        except (_TooLargeError, _HostileAnswerError):
             raise
         except Exception as error:  # the client lets its HTTP library's errors through
             if _status(error) in _FINAL_STATUSES or isinstance(error, OSError) and error.errno:
@@ -179,6 +203,8 @@ def _reason(error: BaseException) -> str:
         return f"the Hub's cache cannot be written: {error.strerror}: {error.filename}"
     if type(error).__name__ == "LocalEntryNotFoundError" and error.__cause__ is not None:
         return _reason(error.__cause__)
+    if isinstance(error, _HostileAnswerError):
+        return f"{error}, which no Hub does"
     first_line = str(error).strip().split("\n")[0]
     return f"{type(error).__name__}: {first_line}"
 

@@ -81,7 +81,6 @@ class HubSource:
         self, job: dict[str, Any], wanted: dict[str, AssetFile], scratch: Path
     ) -> Contents:
         absent: list[str] = []
-        too_large: list[str] = []
         total = sum(file.bytes for file in wanted.values())
         with download_bar(job["dataset"], total) as advance:
             for message in self._messages(job, scratch):
@@ -93,20 +92,14 @@ class HubSource:
                 elif "absent" in message:
                     absent.append(message["absent"])
                 elif "too_large" in message:
-                    path = message["too_large"]
-                    too_large.append(f"{path} (more than {job['files'][path]:,} bytes)")
+                    yield wanted[message["too_large"]], None
                 elif "failed" in message:
                     raise SourceError(f"{job['dataset']} at {job['revision']}: {message['failed']}")
-        problems = [
-            f"{problem}: {listing(sorted(paths))}"
-            for problem, paths in (
-                (f"lacks {len(absent)} files (404)", absent),
-                (f"sends too much of {len(too_large)} files", too_large),
+        if absent:
+            raise SourceError(
+                f"{job['dataset']} at {job['revision']} lacks {len(absent)} files (404):"
+                f" {listing(sorted(absent))}"
             )
-            if paths
-        ]
-        if problems:
-            raise SourceError(f"{job['dataset']} at {job['revision']} {'; '.join(problems)}")
 
     def _messages(self, job: dict[str, Any], scratch: Path) -> Iterator[dict[str, Any]]:
         """Yield what the client reports, until it is done or out of patience."""
@@ -187,7 +180,7 @@ def _pump(stream: IO[bytes], lines: queue.Queue[str | None]) -> None:
     lines.put(None)
 
 
-def _read(path: Path, limit: int) -> bytes:
+def _read(path: Path, limit: int) -> bytes | None:
     try:
         return read_bounded(path, limit)
     except UnreadableFileError as error:

@@ -91,11 +91,11 @@ def _member(file: AssetFile) -> str:
     return f"mani_skill/{file.origin.mani_skill}/{file.path}"
 
 
-def _read_member(archive: zipfile.ZipFile, file: AssetFile, limit: int) -> bytes:
-    """Return the contents of a member, or one byte more than the limit of one that is larger."""
+def _read_member(archive: zipfile.ZipFile, file: AssetFile, limit: int) -> bytes | None:
     try:
         with archive.open(_member(file)) as stream:
-            return stream.read(limit + 1)
+            data = stream.read(limit + 1)  # whatever size the archive claims
+            return data if len(data) <= limit else None
     except _BAD_ARCHIVE as error:
         raise SourceError(f"the wheel's {file} is damaged: {error}") from error
 
