@@ -10,7 +10,7 @@ from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from typing import IO
 
-MEMORY = 4 * 2**30  # bytes; what a server sends is never a reason for more
+MEMORY = 2**30  # bytes; what a server sends is never a reason for more
 
 # Becomes another program, which keeps the limits, and the signal that comes when the parent dies.
 _BECOME = """

@@ -9,7 +9,9 @@ from robots import scenery
 from robots.asset_sources import AssetSource, InstalledManiSkill, LocalCopy
 from robots.asset_store import AssetStore, FileState, default_root, folder
 from robots.assets import default_sources, ensure
-from robots.commands import exit_code, start
+from robots.commands import exit_code, print_error, start
+from robots.descriptor import RobotDescriptor
+from robots.errors import DescriptorError
 from robots.hub_source import REVISION_VARIABLE, HubSource
 from robots.locator import UrdfLocator
 from robots.manifest import AssetFile, load_manifest
@@ -35,35 +37,38 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _fetch(options: argparse.Namespace) -> int:
-    needs = robot_files(options.robots, pictures=not options.physics_only)
-    if not (options.robots or options.physics_only):
+    pictures = not options.physics_only
+    failures: list[DescriptorError] = []
+    if options.robots:
+        robots = [RobotRegistry.load(name) for name in options.robots]
+    else:
+        robots, failures = RobotRegistry.load_all()
+    needs = {robot.name: robot_files(robot, pictures=pictures) for robot in robots}
+    if pictures and not options.robots:
         needs["scenery"] = load_manifest().package(scenery.PACKAGE).files
     chosen = options.dest
     store = AssetStore(default_root() if chosen is None else folder(chosen, "--dest"))
     if not options.check:
         ensure(_union(needs), store, _sources(options, store), trust=options.trust_source)
-    return _report(needs, store)
+    code = _report(needs, store)
+    for failure in failures:
+        print_error(failure)
+    return 1 if failures else code
 
 
-def robot_files(robots: Sequence[str], *, pictures: bool) -> dict[str, tuple[AssetFile, ...]]:
-    """Return the files that each robot needs; robots with a URDF of the user's own need none.
+def robot_files(robot: RobotDescriptor, *, pictures: bool) -> tuple[AssetFile, ...]:
+    """Return the files that a robot needs; one with a URDF of the user's own needs none.
 
     Args:
-        robots: Registry names; none means all.
-        pictures: Whether they will also be drawn.
+        robot: The robot.
+        pictures: Whether it will also be drawn.
 
     Raises:
-        UnknownNameError: If no robot has such a name.
+        UnknownNameError: If the manifest has no such package or URDF.
     """
-    needs: dict[str, tuple[AssetFile, ...]] = {}
-    for name in robots or RobotRegistry.names():
-        urdf = RobotRegistry.load(name).urdf
-        if isinstance(urdf, UrdfLocator):
-            package = load_manifest().package(urdf.package)
-            needs[name] = package.needed(urdf.file, pictures=pictures)
-        else:
-            needs[name] = ()
-    return needs
+    if not isinstance(robot.urdf, UrdfLocator):
+        return ()
+    return load_manifest().package(robot.urdf.package).needed(robot.urdf.file, pictures=pictures)
 
 
 def describe_file(file: AssetFile, store: AssetStore) -> str:

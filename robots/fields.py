@@ -22,6 +22,15 @@ _NUMBERS = {
 }
 
 
+def show(value: Any) -> str:
+    """Return a value for a message: as it is written, cut short, or its type if that fails."""
+    try:
+        text = repr(value)
+    except Exception as error:  # whatever a class of the user's own does
+        text = f"of type {type(value).__name__} ({type(error).__name__} when shown)"
+    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 1]}…"
+
+
 class _Wrong(Exception):
     """A value is not what its field takes; the message says what it would take."""
 
@@ -79,7 +88,7 @@ def _settle(value: Any, hint: Any, name: str) -> Any:
     if origin in (Mapping, dict):
         return {
             _settle_plain(key, str, f"a name in {name}"): _settle(
-                inner, arguments[1], f"{name}[{_show(key)}]"
+                inner, arguments[1], f"{name}[{show(key)}]"
             )
             for key, inner in _mapping(value, name).items()
         }
@@ -112,12 +121,12 @@ def _settle_union(value: Any, hints: Sequence[Any], name: str) -> Any:
         except _Wrong:
             if several:
                 raise  # which of the numbers is wrong
-    raise _Wrong(f"{name} is {_show(value)}; it must be {' or '.join(map(_describe, hints))}")
+    raise _Wrong(f"{name} is {show(value)}; it must be {' or '.join(map(_describe, hints))}")
 
 
 def _settle_sequence(value: Any, origin: Any, hints: Sequence[Any], name: str) -> Any:
     if not isinstance(value, (list, tuple)):
-        raise _Wrong(f"{name} is {_show(value)}; it must be {_describe_sequence(hints)}")
+        raise _Wrong(f"{name} is {show(value)}; it must be {_describe_sequence(hints)}")
     each = [hints[0]] * len(value) if len(hints) == 1 or hints[1:] == (...,) else hints
     if len(value) != len(each):
         raise _Wrong(f"{name} has {len(value)} entries; it must be {_describe_sequence(hints)}")
@@ -135,21 +144,21 @@ def _settle_typed_dict(value: Any, hint: Any, name: str) -> dict[str, Any]:
     hints, given = _hints(hint), _mapping(value, name)
     missing = sorted(hint.__required_keys__ - given.keys())
     if missing:
-        raise _Wrong(f"{name} has no {_show(missing[0])}")
+        raise _Wrong(f"{name} has no {show(missing[0])}")
     unknown = [key for key in given if key not in hints]
     if unknown:
-        raise _Wrong(f"{name} has {_show(unknown[0])}; it takes {', '.join(hints)} alone")
+        raise _Wrong(f"{name} has {show(unknown[0])}; it takes {', '.join(hints)} alone")
     return {key: _settle(inner, hints[key], f"{name}.{key}") for key, inner in given.items()}
 
 
 def _mapping(value: Any, name: str) -> Mapping[Any, Any]:
     if not isinstance(value, Mapping):
-        raise _Wrong(f"{name} is {_show(value)}; it must map names to values")
+        raise _Wrong(f"{name} is {show(value)}; it must map names to values")
     return value
 
 
 def _wrong(value: Any, hint: Any, name: str) -> _Wrong:
-    return _Wrong(f"{name} is {_show(value)}; it must be {_describe(hint)}")
+    return _Wrong(f"{name} is {show(value)}; it must be {_describe(hint)}")
 
 
 def _describe(hint: Any) -> str:
@@ -169,15 +178,6 @@ def _describe_sequence(hints: Sequence[Any]) -> str:
 
 def _can_be_written(text: str) -> bool:
     return "\0" not in text and not any("\ud800" <= character <= "\udfff" for character in text)
-
-
-def _show(value: Any) -> str:
-    """Return a value for a message, cut short, however large it is."""
-    try:
-        text = repr(value)
-    except Exception as error:  # whatever a class of the user's own does
-        text = f"of type {type(value).__name__} ({type(error).__name__} when shown)"
-    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 1]}…"
 
 
 def _is(one: object, other: object) -> bool:

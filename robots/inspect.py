@@ -8,7 +8,7 @@ from pathlib import Path
 
 from robots.asset_sources import SourceError, find_mani_skill
 from robots.asset_store import AssetStore, FileState, default_root
-from robots.commands import exit_code, start
+from robots.commands import exit_code, print_error, start
 from robots.descriptor import JointGroup, RobotDescriptor
 from robots.errors import AssetError
 from robots.fetch_assets import describe_file
@@ -33,11 +33,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return exit_code(lambda: _print(robots))
 
 
-def _print(robots: Sequence[str]) -> None:
-    if not robots:
-        print("\n".join(_catalogue()))
-    for name in robots:
+def _print(names: Sequence[str]) -> int:
+    for name in names:
         print(report(RobotRegistry.load(name), AssetStore(default_root())))
+    if names:
+        return 0
+    robots, failures = RobotRegistry.load_all()
+    print("\n".join(_catalogue(robots)))
+    for failure in failures:
+        print_error(failure)
+    return 1 if failures else 0
 
 
 def report(robot: RobotDescriptor, store: AssetStore) -> str:
@@ -96,8 +101,7 @@ def _fetch_hint(robot: RobotDescriptor) -> str:
     return f"`python -m robots.fetch_assets {robot.name}` fetches it"
 
 
-def _catalogue() -> Iterator[str]:
-    robots = [RobotRegistry.load(name) for name in RobotRegistry.names()]
+def _catalogue(robots: Iterable[RobotDescriptor]) -> Iterator[str]:
     rows = [("robot", "joints", "action", "reach (m)", "numbers from")]
     rows += [(r.name, str(r.dof), str(r.action_dim), f"{r.reach:g}", r.source) for r in robots]
     return _table(rows)

@@ -60,7 +60,7 @@ def test_a_second_robot_of_the_same_name_is_refused(name):
 
 
 def test_only_descriptors_are_registered():
-    with pytest.raises(DescriptorError, match="register gave a str; a RobotDescriptor is needed"):
+    with pytest.raises(DescriptorError, match="register gave 'panda', of type str; a Robot"):
         RobotRegistry.register("panda")  # type: ignore[arg-type]
 
 
@@ -106,5 +106,6 @@ def test_another_packages_nonsense_is_named(other_package):
     )
     said = run_with(other_package, code)
     assert said == (
-        "DescriptorError entry point 'acme:NONSENSE' gave a int; a RobotDescriptor is needed\n"
+        "DescriptorError entry point 'acme:NONSENSE' of acme 1.0 gave 42, of type int;"
+        " a RobotDescriptor is needed\n"
     )
