@@ -226,8 +226,11 @@ def _destination_errors(root: Path) -> Generator[None]:
     except OSError as error:
         place = error.filename2 or error.filename
         where = f" ({place})" if isinstance(place, (str, Path)) and str(place) != str(root) else ""
+        reason = error.strerror or str(error)
+        if error.errno == errno.EEXIST:
+            reason = "something that is no folder is in its place"
         raise AssetError(
-            f"cannot write robot files to {root}: {error.strerror or error}{where}. Make room or"
+            f"cannot write robot files to {root}: {reason}{where}. Make room or"
             f" give write permission there, or choose another folder with --dest or"
             f" {ROOT_VARIABLE}."
         ) from error

@@ -196,8 +196,9 @@ def _failure_text(wanted: list[AssetFile], store: AssetStore, failures: list[str
     tried = "".join(f"\n    {failure}" for failure in failures) or "\n    none"
     wheel = wanted[0].origin.wheel
     return (
-        f"{len(wanted)} robot files cannot be used in {store.root}:\n    {states}\n"
+        f"{len(wanted)} robot files cannot be used in {store.root}\n"
         f"  sources tried:{tried}\n"
+        f"  files:\n    {states}\n"
         f"  what to do: connect to the network and run `python -m robots.fetch_assets`, or"
         f" `pip install {wheel}`, or copy the files into {store.root} from another machine"
     )

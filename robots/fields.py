@@ -18,7 +18,7 @@ _NUMBERS = {
     bool: "True or False",
     int: "a whole number",
     float: "a finite number (below 3.4e38)",
-    str: "a text that is not empty (in Unicode, without null)",
+    str: "a text (not empty, in Unicode)",
 }
 
 
@@ -173,7 +173,8 @@ def _describe(hint: Any) -> str:
 
 def _describe_sequence(hints: Sequence[Any]) -> str:
     many = len(hints) == 1 or hints[1:] == (...,)
-    return f"a tuple, each entry {_describe(hints[0])}" if many else f"a tuple of {len(hints)}"
+    count = "a tuple" if many else f"a tuple of {len(hints)}"
+    return f"{count}, each {_describe(hints[0])}"
 
 
 def _can_be_written(text: str) -> bool:

@@ -50,11 +50,11 @@ class PackageOrigin:
         settle_fields(self, AssetError)
         _expect_inside(self.mani_skill, f"{self.name}: mani_skill")
         _expect_inside(self.hub_folder, f"{self.name}: hub_folder")
-        if not re.fullmatch(r"\w[\w-]*", self.name):
+        if not re.fullmatch(r"\w[\w-]{0,99}", self.name):
             raise AssetError(
                 f"a package is called {self.name!r}; its name has letters, digits, _ -"
             )
-        if not re.fullmatch(r"[\w.-]+/[\w.-]+", self.hub_dataset):
+        if not re.fullmatch(r"\w[\w.-]*/\w[\w.-]*", self.hub_dataset):
             raise AssetError(f"{self.name}: hub_dataset is {self.hub_dataset!r}, not OWNER/NAME")
         if not re.fullmatch(r"\w[\w.-]*==\w[\w.!+-]*", self.wheel):
             raise AssetError(f"{self.name}: wheel is {self.wheel!r}, not NAME==VERSION")

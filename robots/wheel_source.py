@@ -181,4 +181,6 @@ def _pip_command() -> list[str]:
 def _last_words(log: str) -> str:
     lines = [line.strip() for line in log.splitlines() if line.strip()]
     errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
+    if errors and errors[-1] == "Exception:":  # and its traceback, in the log alone
+        errors = [lines[-1]]
     return "pip failed: " + (errors or lines or ["it said nothing"])[-1]
