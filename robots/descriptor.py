@@ -222,7 +222,8 @@ class RobotDescriptor:
 
     def __post_init__(self) -> None:
         """Freeze the keyframes and refuse contradictions."""
-        settle_fields(self, DescriptorError, str(self.name))
+        named = isinstance(self.name, str) and self.name.isprintable()
+        settle_fields(self, DescriptorError, owner=self.name if named else None)
         _expect(
             re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", self.name) is not None,
             f"robot name {self.name!r} must be a letter followed by letters, digits and _",

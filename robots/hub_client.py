@@ -91,7 +91,8 @@ def _download_all(job: dict[str, Any], channel: _Channel) -> None:
     if not _is_commit(revision):
         api = HfApi(endpoint=job["endpoint"], token=False)
         revision = _with_retries(
-            lambda: api.dataset_info(job["dataset"], revision=revision, expand=["sha"]).sha
+            lambda: api.dataset_info(job["dataset"], revision=revision, expand=["sha"]).sha,
+            channel,
         )
         if not _is_commit(str(revision)):
             raise _HostileAnswerError(f"the server names no commit, but {revision!r}")
@@ -146,7 +147,8 @@ def _download(job: dict[str, Any], path: str, revision: str, channel: _Channel) 
             token=False,
             force_download=job["again"],
             tqdm_class=_counter(channel, job["files"][path]),
-        )
+        ),
+        channel,
     )
 
 
@@ -171,7 +173,7 @@ def _counter(channel: _Channel, limit: int) -> type[Any]:
     return Counter
 
 
-def _with_retries(call: Callable[[], Result]) -> Result:
+def _with_retries(call: Callable[[], Result], channel: _Channel) -> Result:
     wait = _FIRST_WAIT
     for _ in range(_ATTEMPTS - 1):
         try:
@@ -181,6 +183,7 @@ def _with_retries(call: Callable[[], Result]) -> Result:
         except Exception as error:  # the client lets its HTTP library's errors through
             if _status(error) in _FINAL_STATUSES or isinstance(error, OSError) and error.errno:
                 raise
+            channel.tell(warning=_reason(error))
         time.sleep(wait)
         wait *= 3
     return call()
@@ -203,6 +206,8 @@ def _reason(error: BaseException) -> str:
         return f"the Hub's cache cannot be written: {error.strerror}: {error.filename}"
     if type(error).__name__ == "LocalEntryNotFoundError" and error.__cause__ is not None:
         return _reason(error.__cause__)
+    if isinstance(error, json.JSONDecodeError):
+        return "the server answers with something that is no JSON, such as a login page"
     if isinstance(error, _HostileAnswerError):
         return f"{error}, which no Hub does"
     first_line = str(error).strip().split("\n")[0]

@@ -80,6 +80,7 @@ class HubSource:
     def _download(
         self, job: dict[str, Any], wanted: dict[str, AssetFile], scratch: Path
     ) -> Contents:
+        dataset = f"{job['dataset']} at {job['revision']:.80}"
         absent: list[str] = []
         total = sum(file.bytes for file in wanted.values())
         with download_bar(job["dataset"], total) as advance:
@@ -88,17 +89,16 @@ class HubSource:
                     advance(message["bytes"])
                 elif "file" in message:
                     path = message["file"]
-                    yield wanted[path], _read(Path(message["at"]), job["files"][path])
+                    yield wanted[path], _read(Path(message["at"]), job["files"][path], job["again"])
                 elif "absent" in message:
                     absent.append(message["absent"])
                 elif "too_large" in message:
                     yield wanted[message["too_large"]], None
                 elif "failed" in message:
-                    raise SourceError(f"{job['dataset']} at {job['revision']}: {message['failed']}")
+                    raise SourceError(f"{dataset}: {message['failed']}")
         if absent:
             raise SourceError(
-                f"{job['dataset']} at {job['revision']} lacks {len(absent)} files (404):"
-                f" {listing(sorted(absent))}"
+                f"{dataset} lacks {len(absent)} files (404): {listing(sorted(absent))}"
             )
 
     def _messages(self, job: dict[str, Any], scratch: Path) -> Iterator[dict[str, Any]]:
@@ -118,6 +118,7 @@ class HubSource:
                 if line is None:
                     errors.seek(0)
                     last = errors.read().decode(errors="replace").strip().split("\n")[-1]
+                    last = last or "it was killed, or has no memory left"
                     raise SourceError(f"the client ended unexpectedly{_quote(warnings)}: {last}")
                 message = json.loads(line)
                 if "done" in message:
@@ -180,10 +181,12 @@ def _pump(stream: IO[bytes], lines: queue.Queue[str | None]) -> None:
     lines.put(None)
 
 
-def _read(path: Path, limit: int) -> bytes | None:
+def _read(path: Path, limit: int, again: bool) -> bytes | None:
     try:
         return read_bounded(path, limit)
     except UnreadableFileError as error:
+        if not again:  # the client writes it anew
+            return None
         raise SourceError(f"cannot read {path} in the Hub's cache: {error.strerror}") from error
 
 

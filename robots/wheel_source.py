@@ -145,7 +145,7 @@ def _wait(
             advance(max(0, size - shown))
             shown = max(shown, size)
             if size > LARGEST_DOWNLOAD:
-                raise SourceError(f"pip wrote {size:,} bytes, and no end; the wheel has 1e8")
+                raise SourceError(f"pip wrote {size:,} bytes, without an end")
             if size - counted >= LEAST_RATE * patience:
                 counted, deadline = size, time.monotonic() + patience
             if time.monotonic() > deadline:

@@ -36,7 +36,8 @@ from tests.robots.processes import children_of, is_alive
 from tests.robots.wheel_index import WHEEL, WheelIndex, build_wheel
 
 AREA = "fetching"
-PATIENCE = 2.0  # s
+PATIENCE = 2.5  # s
+LONG_PATIENCE = 20.0  # s; where files are to arrive
 API = "/api/datasets/"
 LARGEST_READ = 64 * 2**20  # bytes; mostly what fits into the buffers of connections
 NOBODY = "http://127.0.0.1:9/x"
@@ -169,7 +170,7 @@ def faults() -> Iterator[Fault]:
     yield Fault(AREA, "Hub behind TLS that nobody has signed", _tls)
     yield Fault(AREA, "Hub redirects to another host that has it", _elsewhere(right=True), GOES_ON)
     yield Fault(AREA, "Hub redirects to another host that lies", _elsewhere(right=False))
-    yield Fault(AREA, "the Hub's cache has a FIFO", _in_hub_cache(os.mkfifo))
+    yield Fault(AREA, "the Hub's cache has a FIFO", _in_hub_cache(os.mkfifo), GOES_ON)
     yield Fault(AREA, "the Hub's cache has ten terabytes", _in_hub_cache(_sparse), GOES_ON)
     yield Fault(AREA, "the Hub's cache has other bytes", _in_hub_cache(_other), GOES_ON)
     yield Fault(AREA, "the Hub's client is killed", _killed(signal.SIGKILL))
@@ -215,7 +216,7 @@ def _once(fault: hub_server.Fault) -> Callable[[Path], None]:
     def run(folder: Path) -> None:
         with _hub(folder) as server:
             server.fail("GET", "a.stl", fault, times=1)
-            fetch(AssetStore(folder / "assets"), [HubSource(patience=8.0)])
+            fetch(AssetStore(folder / "assets"), [HubSource(patience=LONG_PATIENCE)])
 
     return run
 
@@ -271,7 +272,7 @@ def _elsewhere(*, right: bool) -> Callable[[Path], None]:
             _hub(folder) as server,
         ):
             server.fail("GET", "a.stl", redirect(f"{other.endpoint}{path}"))
-            fetch(AssetStore(folder / "assets"), [HubSource(patience=PATIENCE)])
+            fetch(AssetStore(folder / "assets"), [HubSource(patience=LONG_PATIENCE)])
 
     return run
 
@@ -280,13 +281,13 @@ def _in_hub_cache(put: Callable[[Path], object]) -> Callable[[Path], None]:
     def run(folder: Path) -> None:
         with _hub(folder):
             store = AssetStore(folder / "assets")
-            fetch(store, [HubSource(patience=PATIENCE)])
+            fetch(store, [HubSource(patience=LONG_PATIENCE)])
             (cached,) = (folder / "hf_home").rglob("snapshots/*/robots/*/meshes/a.stl")
             blob = cached.resolve()
             blob.unlink()
             put(blob)
             shutil.rmtree(store.root)
-            fetch(store, [HubSource(patience=PATIENCE)])
+            fetch(store, [HubSource(patience=LONG_PATIENCE)])
 
     return run
 
