@@ -19,6 +19,7 @@ from robots.errors import AssetError, UnreadableFileError
 from robots.fetched import FetchRecord
 from robots.files import open_regular
 from robots.manifest import CHECKOUT_CACHE, AssetFile
+from robots.paths import absolute
 
 ROOT_VARIABLE = "ROBOT_LAYOUTS_ASSETS"
 _LOCK, _PARTIAL, _RECORD = ".lock", ".partial", "fetched.json"
@@ -41,34 +42,12 @@ def default_root() -> Path:
     """
     chosen = os.environ.get(ROOT_VARIABLE)
     if chosen:
-        return folder(chosen, ROOT_VARIABLE)
+        return absolute(chosen, ROOT_VARIABLE)
     if (CHECKOUT_CACHE / "manifest.json").is_file():
         return CHECKOUT_CACHE
     from platformdirs import user_cache_path
 
     return user_cache_path("robot-layouts", appauthor=False)
-
-
-def folder(text: str, setting: str) -> Path:
-    """Return the absolute path of a folder that a person wrote; ``~`` is the home directory.
-
-    Args:
-        text: What was written.
-        setting: Where it was written, for messages.
-
-    Raises:
-        AssetError: If it is empty, or in the home directory of a user that does not exist.
-    """
-    if not text:
-        raise AssetError(f"{setting} is empty; it takes the path of a folder")
-    try:
-        return Path(text).expanduser().absolute()
-    except RuntimeError:
-        user = text.split("/")[0]
-        raise AssetError(
-            f"{setting} is {text!r}, but {user!r} has no home directory here; write the folder out"
-            f" in full, or ./{user} if it is called so"
-        ) from None
 
 
 class FileState(Enum):

@@ -7,14 +7,15 @@ from collections.abc import Sequence
 
 from robots import scenery
 from robots.asset_sources import AssetSource, InstalledManiSkill, LocalCopy
-from robots.asset_store import AssetStore, FileState, default_root, folder
+from robots.asset_store import AssetStore, FileState, default_root
 from robots.assets import default_sources, ensure
-from robots.commands import exit_code, print_error, start
+from robots.commands import exit_code, print_error, printable, start
 from robots.descriptor import RobotDescriptor
 from robots.errors import DescriptorError
 from robots.hub_source import REVISION_VARIABLE, HubSource
 from robots.locator import UrdfLocator
 from robots.manifest import AssetFile, load_manifest
+from robots.paths import absolute
 from robots.progress import size
 from robots.registry import RobotRegistry
 from robots.wheel_source import ManiSkillWheel
@@ -47,7 +48,7 @@ def _fetch(options: argparse.Namespace) -> int:
     if pictures and not options.robots:
         needs["scenery"] = load_manifest().package(scenery.PACKAGE).files
     chosen = options.dest
-    store = AssetStore(default_root() if chosen is None else folder(chosen, "--dest"))
+    store = AssetStore(default_root() if chosen is None else absolute(chosen, "--dest"))
     if not options.check:
         ensure(_union(needs), store, _sources(options, store), trust=options.trust_source)
     code = _report(needs, store)
@@ -122,7 +123,7 @@ def _union(needs: dict[str, tuple[AssetFile, ...]]) -> list[AssetFile]:
 
 
 def _report(needs: dict[str, tuple[AssetFile, ...]], store: AssetStore) -> int:
-    print(f"robot files in {store.root}")
+    print(printable(f"robot files in {store.root}"))
     for robot, files in needs.items():
         bad = len(store.unusable(files))
         total = f"{len(files)} files, {size(sum(file.bytes for file in files))}"

@@ -20,6 +20,7 @@ from typing import Any
 from robots.commands import exit_code, start
 from robots.errors import AssetError, MissingPackageError, UnknownNameError
 from robots.guess import Guess, guess
+from robots.paths import absolute
 
 __all__ = ["Guess", "guess_descriptor", "main"]
 
@@ -68,10 +69,10 @@ def _print(options: argparse.Namespace) -> None:
 
 def _find(path_or_name: str | os.PathLike[str]) -> Path:
     """Return the path, or what robot_descriptions has of that name."""
-    path = Path(path_or_name).expanduser()
+    path = absolute(path_or_name, "the path of the URDF")
     is_name = isinstance(path_or_name, str) and path_or_name.isidentifier()
-    if path.exists() or not is_name:
-        return path.absolute()
+    if os.path.exists(path) or not is_name:
+        return path
     return _described(str(path_or_name))
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 
-from robots.commands import is_watched, notice
+from robots.commands import is_watched, notice, printable
 
 Advance = Callable[[int], None]
 
 
 def say(text: str) -> None:
-    """Print one line."""
-    notice(f"robot files: {text}")
+    """Print one line; no name in it steers the terminal."""
+    notice(f"robot files: {printable(text)}")
 
 
 @contextmanager

@@ -43,7 +43,7 @@ class RobotRegistry:
             DescriptorError: If another package brings the robot, and that goes wrong.
         """
         if not isinstance(name, str):
-            raise UnknownNameError("robot", name, cls.names(), "A robot's name is a text.")
+            raise UnknownNameError("robot", f"of type {type(name).__name__}", cls.names())
         if name in cls._registered:
             return cls._registered[name]
         if name in CATALOGUE:

@@ -220,7 +220,7 @@ PACKAGES = {
     "a module of null characters": ("\0\0", "acme_arm = {}:ARM"),
     "a wrong declaration": (MODULE.replace('source="acme"', "reach=-1"), "acme_arm = {}:ARM"),
     "None": ("ARM = None", "acme_arm = {}:ARM"),
-    "a function": ("def ARM(): ...", "acme_arm = {}:ARM"),
+    "a function": ("ARM = len", "acme_arm = {}:ARM"),
     "a class": (MODULE + "\nARM = type(ARM)", "acme_arm = {}:ARM"),
     "no attribute, only a module": (MODULE, "acme_arm = {}"),
     "a robot of another name": (MODULE.replace("acme_arm", "other_arm"), "acme_arm = {}:ARM"),
@@ -307,7 +307,7 @@ def _same(make: Callable[[], RobotDescriptor]) -> None:
 def _package(folder: Path, what: str) -> Iterator[None]:
     """Install a package of someone else."""
     text, entry_points = PACKAGES[what]
-    module = f"acme_{abs(hash(str(folder)))}"
+    module = f"acme_{list(PACKAGES).index(what)}"
     site = folder / "site"
     info = site / f"{module}-1.0.dist-info"
     info.mkdir(parents=True)
