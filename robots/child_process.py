@@ -40,7 +40,8 @@ def running(
     """Run a program while the context lasts.
 
     It is killed at the end of the context, and whenever the thread that started it ends or this
-    process dies, be that by SIGKILL. It sees no Ctrl-C of the terminal.
+    process dies, be that by SIGKILL, whatever it is doing then. (Where that happens in the first
+    hundredths of a second, it ends by itself.) It sees no Ctrl-C of the terminal.
 
     Args:
         command: Absolute path of the program, and its arguments.

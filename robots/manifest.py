@@ -272,7 +272,7 @@ def _package_from_json(name: str, data: _PackageJson) -> AssetPackage:
     origin = PackageOrigin(name, **about)
     return AssetPackage(
         origin,
-        tuple(AssetFile(origin, path, **entry) for path, entry in files.items()),
+        tuple(AssetFile(origin, path, **entry) for path, entry in sorted(files.items())),
         undrawable,
     )
 

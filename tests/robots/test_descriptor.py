@@ -5,9 +5,20 @@ from __future__ import annotations
 import math
 from dataclasses import FrozenInstanceError, replace
 
+import numpy as np
 import pytest
 
-from robots import ActionSplit, DescriptorError, JointGroup, RobotRegistry, UnknownNameError
+from robots import (
+    ActionSplit,
+    CameraMount,
+    DescriptorError,
+    Fingers,
+    GripperMaterial,
+    Home,
+    JointGroup,
+    RobotRegistry,
+    UnknownNameError,
+)
 
 PANDA = RobotRegistry.load("panda")
 ARM = PANDA.action_split.groups["arm"]
@@ -86,6 +97,54 @@ def test_a_descriptor_refuses_nonsense(changes, message):
     with pytest.raises(DescriptorError) as error:
         replace(PANDA, **changes)
     assert message in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: group(joints="ab"), "JointGroup: joints is 'ab'; it must be a tuple, each a text"),
+        (lambda: group(joints=("a", 5)), "JointGroup: joints[1] is 5; it must be a text"),
+        (lambda: group(lower="0"), "JointGroup: lower is '0'; it must be a finite number"),
+        (lambda: group(delta=1), "JointGroup: delta is 1; it must be True or False"),
+        (lambda: group(stiffness=1e300), "stiffness is 1e+300; it must be a finite number"),
+        (lambda: group(limits=((0, 1, 2), (0, 1))), "limits[0] has 3 entries; it must be a tuple"),
+        (lambda: ActionSplit(arm=None), "ActionSplit['arm'] is None; it must be a JointGroup"),
+        (lambda: GripperMaterial((), 1.0, 1.0), "GripperMaterial: links is empty"),
+        (lambda: GripperMaterial(("a",), -1.0, 1.0), "static_friction is -1.0; it must not be"),
+        (lambda: GripperMaterial(("a",), 1.0, 1.0, 2.0), "restitution is 2.0; it must be between"),
+        (lambda: Fingers(("a",)), "Fingers: links has 1 entries; it must be a tuple of 2"),
+        (lambda: Fingers(("a", "b"), (0, 1)), "opening_signs is (0, 1); each must be 1 or -1"),
+        (lambda: Fingers(("a", "b"), max_angle=0.0), "max_angle is 0.0 degrees; it must be"),
+        (lambda: CameraMount("", "hand"), "CameraMount: name is ''; it must be a text"),
+        (lambda: CameraMount("eye", "hand", width=0), "camera 'eye': width is 0 pixels"),
+        (lambda: CameraMount("eye", "hand", fov=4.0), "camera 'eye': fov is 4.0 rad; it must be"),
+        (lambda: CameraMount("eye", "hand", near=200.0), "it must be 0 < near < far"),
+        (lambda: Home(quaternion=(0, 0, 0, 0)), "Home: quaternion (0, 0, 0, 0) has length 0"),
+        (lambda: replace(PANDA, urdf="x.urdf"), "panda: urdf is 'x.urdf'; it must be a UrdfSource"),
+        (lambda: replace(PANDA, keyframes=[]), "panda: keyframes is []; it must map names"),
+        (lambda: replace(PANDA, home=None), "panda: home is None; it must be a Home"),
+        (lambda: replace(PANDA, name=5), "RobotDescriptor: name is 5; it must be a text"),
+        (
+            lambda: replace(PANDA, cameras=(CameraMount("eye", "a"), CameraMount("eye", "b"))),
+            "panda: cameras has eye more than once",
+        ),
+    ],
+)
+def test_what_is_declared_wrongly_is_said_in_words(make, message):
+    with pytest.raises(DescriptorError) as error:
+        make()
+    assert message in str(error.value)
+
+
+def test_lists_and_numbers_of_numpy_are_taken_as_what_they_mean():
+    same = replace(
+        PANDA,
+        reach=np.float64(PANDA.reach),
+        keyframes={key: np.array(qpos) for key, qpos in PANDA.keyframes.items()},
+        gripper_material=replace(PANDA.gripper_material, links=list(PANDA.gripper_material.links)),
+    )
+    assert same == PANDA
+    assert hash(same) == hash(PANDA)
 
 
 def test_a_home_at_an_unknown_keyframe_is_refused():
