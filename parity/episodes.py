@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots import RobotLayoutsError
+from rollouts.summary import recorded_task
 from rollouts.trajectory import (
     Trajectory,
     TrajectoryError,
     TrajectoryFile,
     expect_file,
-    recorded_task,
 )
 
 Bounds = Sequence[tuple[float, float]]
