@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Callable, Collection, Generator, Iterator
-from contextlib import contextmanager
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from itertools import islice
 from os import PathLike
@@ -21,7 +20,6 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from robots import RobotLayoutsError
 from robots.files import open_regular
 
 MAX_BYTES = 2**30  # of one episode's arrays
@@ -45,29 +43,9 @@ _PIPELINES = [
 ]
 _CHECK_BYTES = 4  # that fletcher32 adds
 
-_HOW_H5PY_FAILS = (
-    *(OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError),
-    *(MemoryError, zlib.error),
-)
-
 
 class ContentError(ValueError):
     """Something in an h5 file that is not read; the message says what, without the file's name."""
-
-
-@contextmanager
-def hdf5_errors(refusal: Callable[[str], RobotLayoutsError]) -> Generator[None]:
-    """Turn what h5py says about damaged or foreign files, in several ways, into our error.
-
-    Args:
-        refusal: Makes the error, given the reason.
-    """
-    try:
-        yield
-    except RobotLayoutsError:
-        raise
-    except _HOW_H5PY_FAILS as error:
-        raise refusal(str(error) or repr(error)) from error
 
 
 class Hdf5File:

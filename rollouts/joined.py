@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 
 from robots import RecordingError
 from robots.files import parse_json
+from rollouts.damage import damage_errors
 from rollouts.disk import replaced
 from rollouts.fields import FieldError
-from rollouts.hdf5_reading import Hdf5File, Hdf5Group, hdf5_errors
+from rollouts.hdf5_reading import Hdf5File, Hdf5Group
 from rollouts.parts import CHECKSUM, Stored, checksum, read_part
 from rollouts.provenance import read_described
 from rollouts.summary import OWN_EPISODE
@@ -57,13 +58,13 @@ def read_joined(path: Path) -> Joined:
     """
     episodes: dict[str, dict[str, Any]] = {}
     damaged: list[str] = []
-    with hdf5_errors(lambda reason: _refusal(path, reason)), Hdf5File(path) as file:
+    with damage_errors(lambda reason: _refusal(path, reason)), Hdf5File(path) as file:
         header = {name: parse_json(text) for name, text in file.root.texts().items()}
         if "env_info" not in header:
             raise FieldError("it does not say what was recorded")
         for name in file.root.names():
             try:
-                with hdf5_errors(RecordingError):
+                with damage_errors(RecordingError):
                     episodes[name] = _read_episode(file.root, name).about
             except RecordingError:
                 damaged.append(name)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import glob
 import json
 import os
@@ -15,7 +14,7 @@ from typing import Any, NamedTuple
 
 from robots import RecordingError, UnreadableFileError
 from robots.files import open_regular, read_text
-from rollouts.disk import PARTIAL, disk_errors, write_text
+from rollouts.disk import PARTIAL, claim, disk_errors, write_text
 from rollouts.episode import Episode
 from rollouts.joined import join, read_joined
 from rollouts.parts import (
@@ -98,7 +97,9 @@ class Recorder:
         self._header = _header(task, source, source_desc)
         with disk_errors(self.path):
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            lock = _lock(self.parts)
+            lock = claim(self.parts)
+            if lock is None:
+                raise RecordingError(f"another process is recording into {self.parts}")
             try:
                 self._joined = self._begin(overwrite=overwrite, resume=resume)
             except BaseException:
@@ -290,25 +291,3 @@ def _control_mode(task: MultiRobotTask) -> str | dict[str, str]:
     mode = task.made_from.control_mode
     keys = [key for key in observation_keys(task.layout).values() if key is not None]
     return dict.fromkeys(keys, mode) if keys else mode
-
-
-def _lock(folder: Path) -> int:
-    """Make a folder and take the only right to it; the open descriptor holds the right.
-
-    Raises:
-        RecordingError: If another process has it.
-    """
-    while True:
-        folder.mkdir(exist_ok=True)
-        descriptor = os.open(folder, os.O_RDONLY)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(descriptor)
-            raise RecordingError(f"another process is recording into {folder}") from None
-        except OSError:
-            return descriptor  # a file system without locks
-        with suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(descriptor), folder.stat()):
-                return descriptor
-        os.close(descriptor)  # its owner removed it meanwhile

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots import closest_match
+from rollouts.damage import damage_errors
 from rollouts.episode import States
-from rollouts.hdf5_reading import Hdf5Array, Hdf5File, Hdf5Group, hdf5_errors
+from rollouts.hdf5_reading import Hdf5Array, Hdf5File, Hdf5Group
 from rollouts.parts import CHECKSUM, STATES, checksum
 from rollouts.provenance import (
     LAYOUT,
@@ -287,7 +288,7 @@ class TrajectoryFile(Sequence[Trajectory]):
         raise TrajectoryError(f"{entry.group} of {self.path} cannot be played: {why}")
 
     def _damage(self, what: str) -> AbstractContextManager[None]:
-        return hdf5_errors(
+        return damage_errors(
             lambda reason: TrajectoryError(
                 f"{self.path} holds no readable episodes: {what} is of another kind, truncated or"
                 f" damaged ({reason})"
