@@ -2,7 +2,8 @@
 
 HDF5 files can name other files (external links, external storage, virtual datasets), code to load
 (filters), and arrays of any size at no cost. Everything is therefore looked at before it is read,
-by h5py's low-level interface, which follows nothing by itself.
+by h5py's low-level interface, which follows nothing by itself. The HDF5 library itself may crash on
+damaged files, or never come to an end: `rollouts.hdf5_file` has all this done in another process.
 """
 
 from __future__ import annotations
@@ -12,15 +13,11 @@ import zlib
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from itertools import islice
-from os import PathLike
-from types import TracebackType
 from typing import Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
-
-from robots.files import open_regular
 
 MAX_BYTES = 2**30  # of one episode's arrays
 MAX_ARRAYS = 10_000  # of one episode
@@ -48,36 +45,9 @@ class ContentError(ValueError):
     """Something in an h5 file that is not read; the message says what, without the file's name."""
 
 
-class Hdf5File:
-    """An h5 file that is open for reading."""
-
-    def __init__(self, path: str | PathLike[str]) -> None:
-        """Open a file; nothing but regular ones is opened.
-
-        Raises:
-            UnreadableFileError: If it is missing or no regular file.
-            OSError: If it is no h5 file.
-        """
-        open_regular(path).close()
-        self._file = h5py.File(path, "r")
-        self.root = Hdf5Group(self._file.id)
-
-    def __enter__(self) -> Hdf5File:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        """Close the file."""
-        self.close()
-
-    def close(self) -> None:
-        """Close the file; closing twice is allowed."""
-        self._file.close()
+def root(file: h5py.File) -> Hdf5Group:
+    """Return what is in a file."""
+    return Hdf5Group(file.id)
 
 
 @dataclass(frozen=True)
@@ -127,8 +97,11 @@ class Hdf5Group:
             raise ContentError(f"its arrays have {size:,} bytes, more than {MAX_BYTES:,}")
         return found
 
-    def texts(self) -> dict[str, str]:
-        """Return all attributes, which must be texts.
+    def texts(self, names: Collection[str] | None = None) -> dict[str, str]:
+        """Return attributes, which must be texts; those that are not there are left out.
+
+        Args:
+            names: Which; all if None.
 
         Raises:
             ContentError: If one is not, or there are too many.
@@ -136,18 +109,11 @@ class Hdf5Group:
         count = _HDF5.h5a.get_num_attrs(self.identifier)
         if count > MAX_ATTRIBUTES:
             raise ContentError(f"it has {count:,} attributes, more than {MAX_ATTRIBUTES}")
-        names: list[bytes] = []
-        _HDF5.h5a.iterate(self.identifier, names.append)
-        return {name.decode(): _text(self.identifier, name) for name in names}
-
-    def text(self, name: str) -> str | None:
-        """Return an attribute, which must be a text; None if there is none.
-
-        Raises:
-            ContentError: If it is something else.
-        """
-        key = name.encode()
-        return _text(self.identifier, key) if _HDF5.h5a.exists(self.identifier, key) else None
+        found: list[bytes] = []
+        _HDF5.h5a.iterate(self.identifier, found.append)
+        keys = {name.decode(): name for name in found}
+        wanted = keys if names is None else [name for name in names if name in keys]
+        return {name: _text(self.identifier, keys[name]) for name in wanted}
 
     def _walk(
         self, names: Collection[str] | None, prefix: str = "", depth: int = 0

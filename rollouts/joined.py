@@ -23,7 +23,7 @@ from robots.files import parse_json
 from rollouts.damage import damage_errors
 from rollouts.disk import replaced
 from rollouts.fields import FieldError
-from rollouts.hdf5_reading import Hdf5File, Hdf5Group
+from rollouts.hdf5_file import Hdf5File
 from rollouts.parts import CHECKSUM, Stored, checksum, read_part
 from rollouts.provenance import read_described
 from rollouts.summary import OWN_EPISODE
@@ -59,13 +59,13 @@ def read_joined(path: Path) -> Joined:
     episodes: dict[str, dict[str, Any]] = {}
     damaged: list[str] = []
     with damage_errors(lambda reason: _refusal(path, reason)), Hdf5File(path) as file:
-        header = {name: parse_json(text) for name, text in file.root.texts().items()}
+        header = {name: parse_json(text) for name, text in (file.texts() or {}).items()}
         if "env_info" not in header:
             raise FieldError("it does not say what was recorded")
-        for name in file.root.names():
+        for name in file.members():
             try:
                 with damage_errors(RecordingError):
-                    episodes[name] = _read_episode(file.root, name).about
+                    episodes[name] = _read_episode(file, name).about
             except RecordingError:
                 damaged.append(name)
         seeds = [about["episode_seed"] for about in episodes.values()]
@@ -95,7 +95,7 @@ def join(
         _reserve(partial, _room(path, episodes))
         with ExitStack() as stack:
             file = stack.enter_context(h5py.File(partial, "r+", libver=_VERSIONS))
-            present = stack.enter_context(Hdf5File(path)).root if path.exists() else None
+            present = stack.enter_context(Hdf5File(path)) if path.exists() else None
             for name, value in header.items():
                 file.attrs[name] = json.dumps(value)
             writer = _GroupWriter(file)
@@ -107,7 +107,7 @@ def join(
     return about
 
 
-def _read(present: Hdf5Group | None, episode: Path | str) -> Stored:
+def _read(present: Hdf5File | None, episode: Path | str) -> Stored:
     if isinstance(episode, Path):
         return read_part(episode)[1]
     assert present is not None  # its groups were listed
@@ -182,21 +182,17 @@ class _GroupWriter:
         dataset.write(_HDF5.h5s.ALL, _HDF5.h5s.ALL, rows, kind)
 
 
-def _read_episode(root: Hdf5Group, name: str) -> Stored:
+def _read_episode(file: Hdf5File, name: str) -> Stored:
     """Read an episode that was written here.
 
     Raises:
         ValueError: If its checksum is another, or it is none; h5py raises other errors, too.
     """
-    group = root.open(name)
-    if not isinstance(group, Hdf5Group):
-        raise FieldError(f"{name} is no group")
-    attributes = group.texts()
-    arrays = {key: array.read() for key, array in group.arrays().items()}
+    attributes, arrays = file.texts(name) or {}, file.numbers(name)
     own = attributes.pop(CHECKSUM, None)  # an earlier version wrote none
     if own not in (None, checksum(attributes, arrays)):
         raise FieldError(f"the checksum of {name} is another")
-    if read_described(group, "episode", OWN_EPISODE) is None:
+    if read_described(attributes, "episode", OWN_EPISODE) is None:
         raise FieldError(f"{name} has no attribute 'episode'")
     return Stored(attributes, arrays)
 

@@ -23,7 +23,6 @@ from rollouts.fields import (
     maybe,
     whole,
 )
-from rollouts.hdf5_reading import Hdf5Group
 from tasks import MultiRobotTask
 
 _ACTION_NUMBERS = 10_000  # of all robots
@@ -90,16 +89,15 @@ def describe_simulation(task: MultiRobotTask) -> dict[str, Any]:
     }
 
 
-def read_described(group: Hdf5Group, name: str, kind: Kind) -> Any:
-    """Return the json of a group's attribute; None if there is none.
+def read_described(texts: Mapping[str, str], name: str, kind: Kind) -> Any:
+    """Return what is written as json in one of several attributes; None if it is not there.
 
     Raises:
         ValueError: If it is not json, or of another kind.
     """
-    text = group.text(name)
-    if text is None:
+    if name not in texts:
         return None
-    described = parse_json(text)
+    described = parse_json(texts[name])
     kind.expect(described, name)
     return described
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from robots import closest_match
 from rollouts.damage import damage_errors
 from rollouts.episode import States
-from rollouts.hdf5_reading import Hdf5Array, Hdf5File, Hdf5Group
+from rollouts.hdf5_file import Hdf5File, Shapes
 from rollouts.parts import CHECKSUM, STATES, checksum
 from rollouts.provenance import (
     LAYOUT,
@@ -112,8 +112,9 @@ class TrajectoryFile(Sequence[Trajectory]):
         self.seeds = tuple(entry.seed for entry in self._entries)
         with self._damage("this h5 file"):
             self._file = Hdf5File(self.path)
-            self.layout = read_described(self._file.root, "layout", LAYOUT)
-            self.simulation = read_described(self._file.root, "simulation", SIMULATION)
+            described = self._file.texts(names=("layout", "simulation")) or {}
+            self.layout = read_described(described, "layout", LAYOUT)
+            self.simulation = read_described(described, "simulation", SIMULATION)
             self.action_split = action_split(self.layout) if self.layout else None
 
     def __enter__(self) -> TrajectoryFile:
@@ -169,7 +170,8 @@ class TrajectoryFile(Sequence[Trajectory]):
         if not self._entries:
             raise TrajectoryError(f"{self.path} holds no episodes")
         for entry in self._entries:
-            shape = self._actions(entry, self._arrays(entry, ("actions",))).shape
+            self._texts(entry)
+            shape = self._action_shape(entry, self._shapes(entry, ("actions",)))
             if shape[1] != action_dim:
                 self._refuse(
                     entry,
@@ -199,15 +201,14 @@ class TrajectoryFile(Sequence[Trajectory]):
             )
 
     def _read(self, entry: Entry) -> Trajectory:
+        own = CHECKSUM in self._texts(entry)
+        names = None if own else _KNOWN
+        self._expect_shapes(entry, self._shapes(entry, names))
         with self._damage(entry.group):
-            own = self._group(entry).text(CHECKSUM)
-        headers = self._arrays(entry, None if own else _KNOWN)
-        self._expect_shapes(entry, headers)
-        with self._damage(entry.group):
-            arrays = {name: header.read() for name, header in headers.items()}
+            arrays = self._file.numbers(entry.group, names)
         self._expect_numbers(entry, arrays)
         if own:
-            self._expect_checksum(entry, own, arrays)
+            self._expect_checksum(entry, arrays)
         return Trajectory(
             episode_id=entry.episode_id,
             seed=entry.seed,
@@ -219,48 +220,48 @@ class TrajectoryFile(Sequence[Trajectory]):
             rebuilt=entry.rebuilt,
         )
 
-    def _group(self, entry: Entry) -> Hdf5Group:
+    def _texts(self, entry: Entry) -> dict[str, str]:
+        """Return the attributes of an episode that say what it is, if it has any."""
         with self._damage(entry.group):
-            group = self._file.root.open(entry.group)
-            if not isinstance(group, Hdf5Group):
+            texts = self._file.texts(entry.group, ("episode", CHECKSUM))
+            if texts is None:
                 self._refuse(entry, "the json beside it lists it, but it is not in the file")
-            own = read_described(group, "episode", OWN_EPISODE)
+            own = read_described(texts, "episode", OWN_EPISODE)
         if own is not None and own["episode_seed"] != entry.episode_seed:
             self._refuse(
                 entry,
                 f"the json beside it says seed {entry.episode_seed}, the file"
                 f" {own['episode_seed']}: the recording was killed as it ended; resume it once",
             )
-        return group
+        return texts
 
-    def _arrays(self, entry: Entry, names: Collection[str] | None) -> dict[str, Hdf5Array]:
-        """Look at an episode's arrays, without reading their numbers."""
+    def _shapes(self, entry: Entry, names: Collection[str] | None) -> Shapes:
+        """Return the shapes of an episode's arrays, whose numbers are not read."""
         with self._damage(entry.group):
-            return self._group(entry).arrays(names)
+            return self._file.shapes(entry.group, names)
 
-    def _actions(self, entry: Entry, headers: Mapping[str, Hdf5Array]) -> Hdf5Array:
-        actions = headers.get("actions")
-        if actions is None:
-            robots = [name.partition("/")[2] for name in headers if name.startswith("actions/")]
+    def _action_shape(self, entry: Entry, shapes: Shapes) -> tuple[int, int]:
+        """Return (T, A), after a look whether T is what the json says."""
+        shape = shapes.get("actions")
+        if shape is None:
+            robots = [name.partition("/")[2] for name in shapes if name.startswith("actions/")]
             by_robot = f"its actions are by robot ({', '.join(robots)}), not one flat array"
             self._refuse(entry, by_robot if robots else "it has no actions")
-        if len(actions.shape) != 2 or not actions.shape[0]:
-            self._refuse(entry, f"its actions have shape {actions.shape}, not (T, A)")
-        if actions.shape[0] != (entry.steps or min(actions.shape[0], MAX_STEPS)):
+        if len(shape) != 2 or not shape[0]:
+            self._refuse(entry, f"its actions have shape {shape}, not (T, A)")
+        if shape[0] != (entry.steps or min(shape[0], MAX_STEPS)):
             self._refuse(
                 entry,
-                f"its actions have shape {actions.shape}; the json beside it says"
+                f"its actions have shape {shape}; the json beside it says"
                 f" {entry.steps or f'nothing, and at most {MAX_STEPS}'} steps",
             )
-        return actions
+        return shape
 
-    def _expect_shapes(self, entry: Entry, headers: Mapping[str, Hdf5Array]) -> None:
-        steps = self._actions(entry, headers).shape[0]
-        for name in _COLUMNS:
-            if name in headers and headers[name].shape != (steps,):
-                self._refuse(entry, f"{name} has shape {headers[name].shape}, not ({steps},)")
-        for name, header in headers.items():
-            shape = header.shape
+    def _expect_shapes(self, entry: Entry, shapes: Shapes) -> None:
+        steps, _ = self._action_shape(entry, shapes)
+        for name, shape in shapes.items():
+            if name in _COLUMNS and shape != (steps,):
+                self._refuse(entry, f"{name} has shape {shape}, not ({steps},)")
             if name.startswith(STATES) and (len(shape) != 2 or shape[0] != steps + 1):
                 what = f"its states of {name.rpartition('/')[2]} have shape {shape}"
                 self._refuse(entry, f"{what}, not ({steps + 1}, k)")
@@ -274,10 +275,10 @@ class TrajectoryFile(Sequence[Trajectory]):
             if not np.isfinite(rows).all():
                 self._refuse(entry, f"its {name} are not all finite")
 
-    def _expect_checksum(self, entry: Entry, own: str, arrays: Mapping[str, NDArray[Any]]) -> None:
+    def _expect_checksum(self, entry: Entry, arrays: Mapping[str, NDArray[Any]]) -> None:
         with self._damage(entry.group):
-            texts = self._group(entry).texts()
-        if own != checksum(texts, arrays):
+            texts = self._file.texts(entry.group) or {}
+        if texts.get(CHECKSUM) != checksum(texts, arrays):
             self._refuse(
                 entry,
                 "it is damaged, or was changed after it was recorded: its checksum is another"
