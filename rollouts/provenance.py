@@ -97,7 +97,10 @@ def read_described(texts: Mapping[str, str], name: str, kind: Kind) -> Any:
     """
     if name not in texts:
         return None
-    described = parse_json(texts[name])
+    try:
+        described = parse_json(texts[name])
+    except ValueError as error:
+        raise FieldError(f"attribute {name}: {error}") from error
     kind.expect(described, name)
     return described
 

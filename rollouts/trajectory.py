@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -13,7 +14,8 @@ from typing import Any, NoReturn, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from robots import closest_match
+from robots import UnreadableFileError, closest_match
+from robots.files import open_regular
 from rollouts.damage import damage_errors
 from rollouts.episode import States
 from rollouts.hdf5_file import Hdf5File, Shapes
@@ -262,11 +264,13 @@ class TrajectoryFile(Sequence[Trajectory]):
         for name, shape in shapes.items():
             if name in _COLUMNS and shape != (steps,):
                 self._refuse(entry, f"{name} has shape {shape}, not ({steps},)")
-            if name.startswith(STATES) and (len(shape) != 2 or shape[0] != steps + 1):
+            if not f"{name}/".startswith(STATES):
+                continue
+            if name.count("/") != 2:
+                self._refuse(entry, f"its states are not by kind and name ({name})")
+            if len(shape) != 2 or shape[0] != steps + 1:
                 what = f"its states of {name.rpartition('/')[2]} have shape {shape}"
                 self._refuse(entry, f"{what}, not ({steps + 1}, k)")
-            if name.startswith(STATES) and name.count("/") != 2:
-                self._refuse(entry, f"its states are not by kind and name ({name})")
 
     def _expect_numbers(self, entry: Entry, arrays: Mapping[str, NDArray[Any]]) -> None:
         if arrays["actions"].dtype.kind != "f" or not np.isfinite(arrays["actions"]).all():
@@ -303,6 +307,11 @@ def expect_file(path: Path, suffixes: Sequence[str]) -> None:
     Raises:
         TrajectoryError: If so; names the file in the folder that is most like it.
     """
+    if os.path.lexists(path) and not path.is_file():
+        try:
+            open_regular(path).close()
+        except UnreadableFileError as error:
+            raise TrajectoryError(str(error)) from error
     if not path.is_file():
         siblings = (p.name for p in path.parent.glob("*") if p.suffix in suffixes)
         match = closest_match(path.name, siblings)

@@ -373,9 +373,11 @@ def _put(make: Callable[[Path], Any]) -> Callable[[Path], None]:
 
 
 def _endless_texts(content: bytes) -> bytes:
-    """Give the texts of attributes a length of 0 where they are stored: HDF5 looks on for ever."""
-    place = content.index(b"GCOL")
-    return content[: place + 24] + bytes(8) + content[place + 32 :]
+    """Say that after the first text there is free space of no size: HDF5 looks on for ever."""
+    first = content.index(b"GCOL") + 16
+    size = int.from_bytes(content[first + 8 : first + 16], "little")
+    second = first + 16 + -(-size // 8) * 8
+    return content[:second] + bytes(16) + content[second + 16 :]
 
 
 _FILES: dict[str, Callable[[Path], None]] = {
