@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import io
 import os
-import select
 import signal
 import sys
 from collections.abc import Callable
@@ -96,37 +95,38 @@ def _stream(present: TextIO | None, descriptor: int, *, needed: bool) -> TextIO:
     if present is None:
         return open(os.devnull, "w", encoding="utf-8")
     present.flush()
-    return io.TextIOWrapper(
-        io.BufferedWriter(_Output(descriptor, needed=needed)),
+    return _Output(
+        io.BufferedWriter(io.FileIO(descriptor, "w", closefd=False)),
+        needed=needed,
         encoding=present.encoding,
         errors="backslashreplace",  # where a terminal is not UTF-8
         line_buffering=not needed or present.isatty(),
     )
 
 
-class _Output(io.FileIO):
-    """The end of stdout or stderr; what cannot be written there is dropped from then on."""
+class _Output(io.TextIOWrapper):
+    """Stdout or stderr; what cannot be written there is dropped from then on."""
 
-    def __init__(self, descriptor: int, *, needed: bool) -> None:
-        super().__init__(descriptor, "w", closefd=False)
+    def __init__(self, buffer: io.BufferedWriter, *, needed: bool, **options: Any) -> None:
+        super().__init__(buffer, **options)
         self._needed = needed
 
-    def write(self, data: Any, /) -> int:
+    def write(self, text: str, /) -> int:
         try:
-            return self._write(data)
+            return super().write(text)
         except OSError as error:
-            self._drop()
-            if self._needed and error.errno not in _NOBODY_READS:
-                reason = f"cannot write what is to be printed: {error.strerror}"
-                raise OutputError(reason) from error
-            return memoryview(data).nbytes
+            self._drop(error)
+            return len(text)
 
-    def _write(self, data: Any) -> int:
-        while (count := super().write(data)) is None:  # a terminal that another made non-blocking
-            select.select([], [self], [])
-        return count
+    def flush(self) -> None:
+        try:
+            super().flush()
+        except OSError as error:
+            self._drop(error)
 
-    def _drop(self) -> None:
+    def _drop(self, error: OSError) -> None:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, self.fileno())
         os.close(nowhere)
+        if self._needed and error.errno not in _NOBODY_READS:
+            raise OutputError(f"cannot write what is to be printed: {error.strerror}") from error

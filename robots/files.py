@@ -13,6 +13,7 @@ from typing import Any, BinaryIO
 from robots.errors import UnreadableFileError
 
 MAX_JSON_DEPTH = 64  # arrays and objects inside one another; a recording's json has 7
+_BLOCK = 2**16  # bytes
 
 _KINDS = {
     stat.S_IFDIR: "a directory",
@@ -57,10 +58,10 @@ def read_regular(path: str | PathLike[str], limit: int) -> bytes:
     """
     with open_regular(path) as file:
         try:
-            contents = file.read(limit + 1)
+            contents = _read(file, limit)
         except OSError as error:
             raise _unreadable(path, error) from error
-    if len(contents) > limit:
+    if contents is None:
         raise UnreadableFileError(path, f"it has more than {limit:,} bytes", errno.EFBIG)
     return contents
 
@@ -125,6 +126,16 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         names = [name for name, _ in pairs]
         raise ValueError(f"the key {next(n for n in names if names.count(n) > 1)!r} is there twice")
     return found
+
+
+def _read(file: BinaryIO, limit: int) -> bytes | None:
+    """Return all of a file, or None if it is larger; the size of some files is only known then."""
+    size = os.fstat(file.fileno()).st_size
+    contents = file.read(size) if size <= limit else b""
+    while size <= limit and (more := file.read(min(_BLOCK, limit + 1 - size))):
+        contents += more
+        size += len(more)
+    return contents if size <= limit else None
 
 
 def _expect_regular(path: str | PathLike[str], status: os.stat_result) -> None:
