@@ -116,7 +116,7 @@ class Fingers:
             f"Fingers: min_force is {self.min_force} N; it must not be negative",
         )
         _expect(
-            0 < self.max_angle <= 180,
+            0 <= self.max_angle <= 180,
             f"Fingers: max_angle is {self.max_angle} degrees; it must be between 0 and 180",
         )
 

@@ -136,7 +136,7 @@ DECLARATIONS: dict[str, tuple[Callable[..., object], dict[str, tuple[Mapping[str
             "links": (NO_TUPLES, {"one": ("a",), "three": ("a", "b", "c"), "equal": ("a", "a")}),
             "opening_signs": ({"0": (0, 1), "2": (2, 1), "one": (1,), "halves": (0.5, 1)},),
             "min_force": (NO_NUMBERS, {"negative": -1.0}),
-            "max_angle": (NO_NUMBERS, {"0": 0.0, "negative": -1.0, "200": 200.0}),
+            "max_angle": (NO_NUMBERS, {"negative": -1.0, "200": 200.0}),
         },
     ),
     "CameraMount": (

@@ -114,7 +114,7 @@ def test_a_descriptor_refuses_nonsense(changes, message):
         (lambda: GripperMaterial(("a",), 1.0, 1.0, 2.0), "restitution is 2.0; it must be between"),
         (lambda: Fingers(("a",)), "Fingers: links has 1 entries; it must be a tuple of 2"),
         (lambda: Fingers(("a", "b"), (0, 1)), "opening_signs is (0, 1); each must be 1 or -1"),
-        (lambda: Fingers(("a", "b"), max_angle=0.0), "max_angle is 0.0 degrees; it must be"),
+        (lambda: Fingers(("a", "b"), max_angle=-1.0), "max_angle is -1.0 degrees; it must be"),
         (lambda: CameraMount("", "hand"), "CameraMount: name is ''; it must be a text"),
         (lambda: CameraMount("eye", "hand", width=0), "camera 'eye': width is 0 pixels"),
         (lambda: CameraMount("eye", "hand", fov=4.0), "camera 'eye': fov is 4.0 rad; it must be"),
