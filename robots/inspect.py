@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from robots.asset_sources import SourceError, find_mani_skill
 from robots.asset_store import AssetStore, FileState, default_root
+from robots.commands import exit_code, print_error, start
 from robots.descriptor import JointGroup, RobotDescriptor
-from robots.errors import AssetError, RobotLayoutsError, UnknownNameError
+from robots.errors import AssetError
 from robots.fetch_assets import describe_file
 from robots.locator import LocalUrdf, UrdfLocator
 from robots.manifest import AssetFile, AssetPackage, load_manifest
@@ -30,18 +30,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m robots.inspect", description=__doc__)
     parser.add_argument("robots", nargs="*", metavar="ROBOT", help="robots to report on")
     robots = parser.parse_args(arguments).robots
-    try:
-        if not robots:
-            print("\n".join(_catalogue()))
-        for name in robots:
-            print(report(RobotRegistry.load(name), AssetStore(default_root())))
-    except UnknownNameError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    return 0
+    return exit_code(lambda: _print(robots))
+
+
+def _print(names: Sequence[str]) -> int:
+    for name in names:
+        print(report(RobotRegistry.load(name), AssetStore(default_root())))
+    if names:
+        return 0
+    robots, failures = RobotRegistry.load_all()
+    print("\n".join(_catalogue(robots)))
+    for failure in failures:
+        print_error(failure)
+    return 1 if failures else 0
 
 
 def report(robot: RobotDescriptor, store: AssetStore) -> str:
@@ -100,8 +101,7 @@ def _fetch_hint(robot: RobotDescriptor) -> str:
     return f"`python -m robots.fetch_assets {robot.name}` fetches it"
 
 
-def _catalogue() -> Iterator[str]:
-    robots = [RobotRegistry.load(name) for name in RobotRegistry.names()]
+def _catalogue(robots: Iterable[RobotDescriptor]) -> Iterator[str]:
     rows = [("robot", "joints", "action", "reach (m)", "numbers from")]
     rows += [(r.name, str(r.dof), str(r.action_dim), f"{r.reach:g}", r.source) for r in robots]
     return _table(rows)
@@ -249,4 +249,4 @@ def _table(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(main)

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from robots.commands import printable
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -66,13 +68,13 @@ def run(options: argparse.Namespace) -> int:
         count = len(file) if options.episodes is None else max(0, min(options.episodes, len(file)))
         numbers = track(range(count), "replaying", console=Console(stderr=True), transient=True)
         found = [replay(task, file[number], options.start) for number in numbers]
-        console = Console()
+        console = Console(markup=False, highlight=False)
         console.print(
-            f"{file.path}: {file.task_id}, {file.control_mode}", highlight=False, soft_wrap=True
+            printable(f"{file.path}: {file.task_id}, {file.control_mode}"), soft_wrap=True
         )
     console.print(_table(found))
     for sentence in _sentences(found, options.start):
-        console.print(sentence, highlight=False, soft_wrap=True)
+        console.print(sentence, soft_wrap=True)
     return 0 if found and all(episode.agrees for episode in found) else 1
 
 
@@ -117,7 +119,7 @@ def _sentences(found: Sequence[Replayed], start: str) -> list[str]:
 def _states(episode: Replayed) -> str:
     if not episode.compared:
         return "not recorded"
-    return "equal" if episode.difference is None else f"differ {episode.difference}"
+    return "equal" if episode.difference is None else f"differ {printable(str(episode.difference))}"
 
 
 def _word(success: bool | None) -> str:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import wraps
+from functools import cache, wraps
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from robots import SimulationError
+from robots import Fingers, SimulationError
 from simulation.arrays import Flags, Floats, norm
 from simulation.contacts import LinkTouch, grasped, link_touches, pairwise_forces
 from simulation.rotations import last_euler_angle, rotation_matrix
@@ -239,7 +239,7 @@ class State:
         if forces is None:
             return np.zeros(self.num_envs, bool)
         if max_angle is not None:
-            fingers = replace(fingers, max_angle=max_angle)
+            fingers = _within(fingers, max_angle)
         return grasped(fingers, forces, [self.link_pose(robot, link) for link in fingers.links])
 
     # -- distances ---------------------------------------------------------------------------
@@ -338,3 +338,8 @@ class State:
 
 def _rows(parts: list[Floats], count: int) -> Floats:
     return np.concatenate(parts).reshape(count, -1)
+
+
+@cache  # making one checks it, which is too slow for every step
+def _within(fingers: Fingers, max_angle: float) -> Fingers:
+    return replace(fingers, max_angle=max_angle)

@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 import duckdb
-import h5py
 import numpy as np
 import pytest
 
@@ -22,7 +21,7 @@ from rollouts.export.columns import ColumnReader
 from rollouts.export.dataset import Export, export
 from rollouts.recorder import Recorder
 from rollouts.trajectory import Trajectory, TrajectoryError, TrajectoryFile
-from tests.rollouts.recordings import record, succeed
+from tests.rollouts.recordings import edited, record, succeed
 
 TASK = "PushT-v1"
 
@@ -67,7 +66,7 @@ def test_failures_can_be_left_out(recording, tmp_path, capsys):
 
 
 def test_a_recording_without_a_layout_is_of_the_tasks_own_robots(recording, tmp_path):
-    with h5py.File(recording, "r+") as file:
+    with edited(recording) as file:
         del file.attrs["layout"]  # as in native's files
     assert run(recording, "--format", "lerobot", "--out", tmp_path / "out") == 0
     info = json.loads((tmp_path / "out/meta/info.json").read_text())
@@ -83,7 +82,7 @@ def test_a_rate_of_the_task_is_the_datasets(tmp_path):
 
 
 def test_a_recording_of_other_robots_is_refused(recording, tmp_path, capsys):
-    with h5py.File(recording, "r+") as file:
+    with edited(recording) as file:
         layout = json.loads(file.attrs["layout"])
         layout["arm"]["joint_groups"]["arm"]["stiffness"] = 1.0
         file.attrs["layout"] = json.dumps(layout)
@@ -105,7 +104,7 @@ def test_joint_positions_as_actions_are_exported_too(tmp_path):
 
 
 def test_what_was_not_recorded_is_left_out(recording, tmp_path):
-    with h5py.File(recording, "r+") as file:
+    with edited(recording) as file:
         for episode in file.values():
             del episode["rewards"], episode["success"]
     assert run(recording, "--format", "lerobot", "--out", tmp_path / "out") == 0
@@ -181,7 +180,7 @@ def nothing_was_left(folder: Path) -> bool:
 def test_an_episode_that_lacks_something_ends_the_export(
     recording, tmp_path, capsys, form, entry, complaint
 ):
-    with h5py.File(recording, "r+") as file:
+    with edited(recording) as file:
         del file[f"traj_1/{entry}"]
     assert run(recording, "--format", form, "--out", tmp_path / "out") == 1
     assert complaint in capsys.readouterr().err
@@ -247,7 +246,7 @@ class Blind:
 
 def test_pictures_follow_the_recorded_states(recording, monkeypatch):
     monkeypatch.setattr(pictures, "Cameras", Blind)
-    with h5py.File(recording, "r+") as file:
+    with edited(recording) as file:
         file["traj_2/env_states/actors/Tee"][1:, 0] += 0.05  # no replay ends there
     with TrajectoryFile(recording) as file:
         task = tasks.make(TASK)

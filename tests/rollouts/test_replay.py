@@ -4,7 +4,6 @@ import json
 import shutil
 from dataclasses import replace
 
-import h5py
 import numpy as np
 import pytest
 
@@ -17,6 +16,7 @@ from rollouts.recorder import Recorder
 from rollouts.replay import find_official, open_recording, replay, task_for
 from rollouts.trajectory import TrajectoryError, TrajectoryFile
 from tests.rollouts.plays import at_random
+from tests.rollouts.recordings import edited
 
 TASK = "PushT-v1"
 SEEDS = (3, 5)
@@ -50,7 +50,7 @@ def run(capsys, *words):
 
 
 def change(path, entry, edit):
-    with h5py.File(path, "a") as file:
+    with edited(path) as file:
         values = file[entry][()]
         edit(values)
         file[entry][...] = values
@@ -109,7 +109,7 @@ def test_from_a_state(capsys, path):
 
 
 def test_a_file_without_states(capsys, path):
-    with h5py.File(path, "a") as file:
+    with edited(path) as file:
         del file["traj_0/env_states"]
     code, printed, _ = run(capsys, path)
     assert code == 0
@@ -129,7 +129,7 @@ def test_a_replay_from_the_wrong_state_is_seen(recording):
 
 
 def test_another_world_is_refused(capsys, path):
-    with h5py.File(path, "a") as file:
+    with edited(path) as file:
         layout = json.loads(file.attrs["layout"])
         layout["arm"]["position"][2] = 0.1
         file.attrs["layout"] = json.dumps(layout)
