@@ -226,6 +226,7 @@ class MultiRobotTask:
         """Let the worlds go; closing twice is allowed."""
         self._simulation = None
         self._camera = None
+        vars(self).pop("_state", None)  # it holds the worlds as well
         self.observer.close()
 
     # -- episodes ----------------------------------------------------------------------------
@@ -261,7 +262,7 @@ class MultiRobotTask:
             elif reconfigure:
                 self._rngs[i].reseed_for_rebuild()
         if reconfigure:
-            self.simulation.rebuild(ids)
+            self.simulation.rebuild(ids, self._build_world)
         return self._begin(ids, reconfigured=reconfigure)
 
     def step(
