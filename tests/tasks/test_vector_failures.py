@@ -124,7 +124,7 @@ def test_a_restart_that_fails_may_be_tried_again(shared, monkeypatch):
 
 
 def test_an_error_in_a_worker_is_told_with_its_place(shared):
-    with pytest.raises(WorkerError, match="failed with AttributeError: .*no_such_method.*work.py"):
+    with pytest.raises(WorkerError, match=r"failed in no_such_method\(\) with AttributeError: .*work.py"):
         shared._call("no_such_method", {0: ()}, lambda: None)
     shared.restart()
     assert shared.step(ACTION)[0].shape == (4, 42)
