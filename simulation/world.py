@@ -13,7 +13,7 @@ from layouts import Layout
 from robots import SimulationError, UnknownNameError
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, apply
-from simulation.render_device import expect_render_device
+from simulation.render_device import expect_render_device, outlive_forks
 from simulation.robot import Blueprint, SimulatedRobot, read_blueprint
 from simulation.shapes import Shape, add_collision
 
@@ -92,6 +92,7 @@ class World:
         systems: list[Any] = [self.system]
         if visuals:
             systems.append(_render_system())
+            outlive_forks(self)
         self.scene = sapien.Scene(systems)
         self.system.timestep = self.physics.timestep
         blueprints = {} if blueprints is None else blueprints

@@ -19,7 +19,8 @@ from threading import Thread
 from typing import TypeAlias
 
 from robots import RobotLayoutsError
-from tasks.fork_server import ProcessError, WorkerProcess, end_with, ending
+from tasks.fork_server import ProcessError, end_with
+from tasks.forks import WorkerProcess, ending
 
 __all__ = [
     "ProcessError",
@@ -115,12 +116,13 @@ class Sendable:
     one line; the ``__cause__`` of what arrives is a `WorkerTraceback`.
     """
 
-    def __init__(self, error: Exception, otherwise: Callable[[str], RobotLayoutsError]) -> None:
+    def __init__(self, error: BaseException, otherwise: Callable[[str], RobotLayoutsError]) -> None:
         """Keep the error and its traceback, as text."""
         lines = traceback.format_exception(type(error), error, error.__traceback__)
         self._traceback = "".join(lines).rstrip()
-        self._error = error
-        if not (isinstance(error, RobotLayoutsError) and _survives_pickling(error)):
+        if isinstance(error, RobotLayoutsError) and _survives_pickling(error):
+            self._error = error
+        else:
             last = traceback.extract_tb(error.__traceback__)[-1]
             what = "".join(traceback.format_exception_only(error)).strip()
             self._error = otherwise(f"{what} ({last.filename}:{last.lineno})")

@@ -17,7 +17,7 @@ class Remade:
 
     def __new__(cls: type[_Self], *args: Any, **kwargs: Any) -> _Self:
         """Note the arguments."""
-        self = super().__new__(cls)
+        self = object.__new__(cls)
         self._arguments = args, kwargs
         return self
 

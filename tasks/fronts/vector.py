@@ -40,7 +40,7 @@ def _alone(
 
     @wraps(method)
     def call(self: VectorTask, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
-        if not self._busy.acquire(blocking=False):
+        if not self.busy.acquire(blocking=False):
             raise SimulationError(
                 f"{method.__name__}() while this vector is in the middle of another call; give each"
                 " thread a vector of its own, or let them take turns"
@@ -48,7 +48,7 @@ def _alone(
         try:
             return method(self, *args, **kwargs)
         finally:
-            self._busy.release()
+            self.busy.release()
 
     return call
 
@@ -71,6 +71,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         num_envs: Number of environments N.
         num_workers: Number of worker processes; 0 if the environments are in this one.
         action_split: Robot name → slice of one environment's action.
+        busy: Locked while a thread calls it.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": RENDER_MODES, "render_fps": 20}
@@ -109,7 +110,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             AssetError: If robot files cannot be found.
             WorkerError: If a worker ends before it is ready.
         """
-        self._busy = Lock()
+        self.busy = Lock()
         mode = _checked_mode(autoreset_mode)
         cls = get_task_class(task_id)
         scenario = make_scenario(cls, num_envs, render_mode=render_mode, **fields)

@@ -42,7 +42,7 @@ def _build(connection: Connection) -> Batch | None:
 
         torch.set_num_threads(1)
         batch = Batch(_loaded(part))
-    except Exception as error:
+    except BaseException as error:
         connection.send((None, Sendable(error, CallFailed)))
         return None
     connection.send((batch.shapes(), None))
@@ -67,7 +67,7 @@ def _serve(connection: Connection, batch: Batch) -> None:
                 answer = _attach(connection, batch, *arguments)
             else:
                 answer = getattr(batch, method)(*arguments)
-        except Exception as error:
+        except BaseException as error:  # a task's exit() as well: the others go on
             connection.send((None, Sendable(error, CallFailed)))
         else:
             connection.send_bytes(pickle.dumps((answer, None)))

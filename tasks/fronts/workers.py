@@ -335,7 +335,8 @@ class _Worker:
             raise error
         what = str(error) if isinstance(error, CallFailed) else f"{type(error).__name__}: {error}"
         call = "making its task" if self._asked == "__init__" else f"{self._asked}()"
-        raise _Gone(f"failed in {call} with {what}", error.__cause__.args[0])
+        where = error.__cause__.args if error.__cause__ else ()
+        raise _Gone(f"failed in {call} with {what}", *where)
 
     def end(self, patience: float) -> None:
         """End it, after a while in which it may do so by itself (s)."""
