@@ -7,6 +7,7 @@ import time
 
 from tasks.push_cube import PushCube
 from tasks.registry import register_task
+from tasks.task import FIRST_SEED
 
 HOOKS = ("build", "sample", "evaluate", "observe", "dense_reward", "begin_episodes", "respond")
 
@@ -52,13 +53,17 @@ WAYS = {
 
 
 class Breaks(PushCube):
-    """Breaks in one of its hooks, at once or in the third step."""
+    """Breaks in one of its hooks, at once or after the first step, in the first worker."""
 
     hook, way, late = "", "ValueError", False
 
+    def __init__(self, scenario, *, first_seed=FIRST_SEED):
+        self._first = first_seed == FIRST_SEED
+        super().__init__(scenario, first_seed=first_seed)
+
     def meets(self, hook):
         """Break if this is the place and the time."""
-        if hook == self.hook and (not self.late or self._elapsed.any()):
+        if hook == self.hook and self._first and (not self.late or self._elapsed.any()):
             WAYS[self.way]()
 
 
