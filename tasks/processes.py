@@ -34,10 +34,11 @@ __all__ = [
 ]
 
 _WHAT_RAN_OUT = {
-    errno.EMFILE: "; each takes about four file descriptors: raise `ulimit -n` or take fewer",
+    errno.EMFILE: "; each takes three file descriptors: raise `ulimit -n` or take fewer",
     errno.ENFILE: "; this machine has too many files open",
     errno.EAGAIN: "; this user may have no more processes: raise `ulimit -u` or take fewer",
     errno.ENOMEM: "; there is too little memory: take fewer",
+    errno.EFBIG: "; what they share must fit a file: raise `ulimit -f` or take fewer environments",
     errno.ENOSPC: "; there is too little memory to share: take fewer environments",
 }
 

@@ -42,8 +42,8 @@ def _alone(
     def call(self: VectorTask, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
         if not self.busy.acquire(blocking=False):
             raise SimulationError(
-                f"{method.__name__}() while this vector is in the middle of another call; give each"
-                " thread a vector of its own, or let them take turns"
+                "this vector is in the middle of another call; give each thread a vector of its"
+                " own, or let them take turns"
             )
         try:
             return method(self, *args, **kwargs)

@@ -741,8 +741,7 @@ def _too_little() -> Iterator[Fault]:
         what = f"8 workers in a process with ulimit -n {limit}"
         yield Fault(AREA, what, lambda folder, n=limit: _limited(folder, f"ulimit -n {n}"))
     yield Fault(AREA, "no memory to share", lambda _: _no_shared_memory())
-    yield Fault(AREA, "no memory for the server to fork", lambda _: _no_memory_to_fork())
-    for megabytes in (1, 4, 16):
+    for megabytes in (0, 1, 4, 16):
         what = f"workers that may take {megabytes} MB more"
         yield Fault(AREA, what, lambda _, more=megabytes: _little_memory(more))
 
@@ -821,14 +820,6 @@ def _server_may_take(more: int) -> Generator[None]:
         yield
     finally:
         resource.prlimit(server, resource.RLIMIT_AS, (resource.RLIM_INFINITY, hard))
-
-
-def _no_memory_to_fork() -> None:
-    from tasks import processes
-
-    with _server_may_take(-(10**12)), processes.enough():
-        with _vector(num_workers=2) as env:
-            env.step(_actions(env))
 
 
 def _little_memory(megabytes: int) -> None:

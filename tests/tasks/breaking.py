@@ -5,6 +5,7 @@ import os
 import sys
 import time
 
+from robots import TaskError
 from tasks.push_cube import PushCube
 from tasks.registry import register_task
 from tasks.task import FIRST_SEED
@@ -125,3 +126,11 @@ class Grows(PushCube):
 
 for _cls in (SlowSteps, BusySteps, SlowBuild, Grows):
     register_task(f"{_cls.__name__}-v1")(_cls)
+
+
+@register_task("Refuses-v1")
+class Refuses(PushCube):
+    """Cannot be built, for a reason of ours."""
+
+    def build(self, world):
+        raise TaskError("no such goal")

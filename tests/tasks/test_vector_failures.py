@@ -124,7 +124,9 @@ def test_a_restart_that_fails_may_be_tried_again(shared, monkeypatch):
 
 
 def test_an_error_in_a_worker_is_told_with_its_place(shared):
-    with pytest.raises(WorkerError, match=r"failed in no_such_method\(\) with AttributeError: .*work.py"):
+    with pytest.raises(
+        WorkerError, match=r"failed in no_such_method\(\) with AttributeError: .*work.py"
+    ):
         shared._call("no_such_method", {0: ()}, lambda: None)
     shared.restart()
     assert shared.step(ACTION)[0].shape == (4, 42)
@@ -168,7 +170,8 @@ def test_a_script_without_a_guard_is_told_so(tmp_path):
         check=False,
     )
     assert done.returncode == 1
-    assert "needs `if __name__ == '__main__':` around what it runs" in done.stderr
+    assert "put what the script runs under `if __name__ == '__main__':`" in done.stderr
+    assert done.stderr.count("Traceback") == 1
 
 
 SCRIPT = """
