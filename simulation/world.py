@@ -13,6 +13,7 @@ from layouts import Layout
 from robots import SimulationError, UnknownNameError
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, apply
+from simulation.render_device import expect_render_device, outlive_forks
 from simulation.robot import Blueprint, SimulatedRobot, read_blueprint
 from simulation.shapes import Shape, add_collision
 
@@ -91,6 +92,7 @@ class World:
         systems: list[Any] = [self.system]
         if visuals:
             systems.append(_render_system())
+            outlive_forks(self)
         self.scene = sapien.Scene(systems)
         self.system.timestep = self.physics.timestep
         blueprints = {} if blueprints is None else blueprints
@@ -217,6 +219,7 @@ def _draw(entity: sapien.Entity, shapes: tuple[Shape, ...]) -> None:
 def _render_system() -> Any:
     from sapien.render import RenderSystem
 
+    expect_render_device()
     try:
         return RenderSystem()
     except RuntimeError as error:

@@ -22,6 +22,7 @@ from tasks.layout_check import refuse_collisions
 from tasks.native_format import StateDict, StateTape, read_state_dict, write_state_dict
 from tasks.observation import Observer, read_mode, space_of
 from tasks.randomness import EpisodeRandom
+from tasks.remade import Remade
 from tasks.scenario import Scenario
 
 FIRST_SEED = 2022  # native seeds environment i with 2022 + i when it is made
@@ -40,7 +41,7 @@ class _FreshScenario:
         return Scenario(layout=owner.layout, physics=owner.physics)
 
 
-class MultiRobotTask:
+class MultiRobotTask(Remade):
     """Something to achieve, for one robot or many; subclasses say what.
 
     A subclass sets ``layout`` and ``max_episode_steps``, adds its bodies in `build`, places them
@@ -226,6 +227,7 @@ class MultiRobotTask:
         """Let the worlds go; closing twice is allowed."""
         self._simulation = None
         self._camera = None
+        vars(self).pop("_state", None)  # it holds the worlds as well
         self.observer.close()
 
     # -- episodes ----------------------------------------------------------------------------
@@ -261,7 +263,7 @@ class MultiRobotTask:
             elif reconfigure:
                 self._rngs[i].reseed_for_rebuild()
         if reconfigure:
-            self.simulation.rebuild(ids)
+            self.simulation.rebuild(ids, self._build_world)
         return self._begin(ids, reconfigured=reconfigure)
 
     def step(

@@ -12,11 +12,12 @@ from robots import TaskError
 from tasks.fronts.numbers import info_row, row
 from tasks.observation import space_of
 from tasks.registry import make
+from tasks.remade import Remade
 
 RENDER_MODES = ["rgb_array"]
 
 
-class GymnasiumTask(gymnasium.Env[Any, NDArray[np.float32]]):
+class GymnasiumTask(Remade, gymnasium.Env[Any, NDArray[np.float32]]):
     """What ``gymnasium.make("RobotLayouts/PickCube-v1")`` gives.
 
     It truncates when the task does; a ``max_episode_steps`` given to ``gymnasium.make`` can only

@@ -15,6 +15,7 @@ from tasks.fronts.numbers import info_row, row
 from tasks.native_format import observation_keys
 from tasks.observation import space_of
 from tasks.registry import make
+from tasks.remade import Remade
 
 Observation = Any
 """An array, or with images a mapping of them."""
@@ -24,7 +25,7 @@ RobotReward = Callable[[str, Observation, float, dict[str, Any]], float]
 _Space = TypeVar("_Space", bound=Space[Any])
 
 
-class ParallelTask(ParallelEnv[str, Observation, NDArray[np.float32]]):
+class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
     """What `tasks.parallel_env` gives: every robot observes and acts for itself.
 
     A robot observes its own joint positions and velocities, then all that the task observes

@@ -20,11 +20,12 @@ from robots import TaskError, UnknownNameError, unknown_name_message
 from tasks.fronts import NAMESPACE
 from tasks.fronts.vector import RESET_OPTIONS, VectorTask
 from tasks.registry import get_task_class
+from tasks.remade import Remade
 
 _OPTIONS = tuple(option for option in RESET_OPTIONS if option != "reset_mask")
 
 
-class SB3Task(VecEnv):
+class SB3Task(Remade, VecEnv):
     """What `tasks.sb3_vec_env` gives: a `VectorTask` that speaks Stable-Baselines3's language.
 
     An environment whose episode ends begins the next one in the same step. What it said then is
