@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Generator, Iterable, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -177,8 +177,11 @@ def joined(ray: Any, address: str, modules: Sequence[str]) -> Generator[None]:
                 raise _not_joined(address, str(error)) from error
     try:
         yield
-    finally:
-        _leave(ray)
+    except BaseException:
+        with suppress(WorkerError):  # the first error counts
+            _leave(ray)
+        raise
+    _leave(ray)
 
 
 def _expect_cluster(ray: Any, address: str) -> None:
@@ -188,9 +191,9 @@ def _expect_cluster(ray: Any, address: str) -> None:
         WorkerError: If that is impossible.
     """
     environment = {**os.environ, "RAY_gcs_server_port_wait_time_s": "1"}  # one attempt
+    named = os.environ.get("RAY_ADDRESS", "") if address == "auto" else address
     try:
-        if address != "auto":
-            _connect(address, ray.util.get_node_ip_address())
+        _connect(named, ray.util.get_node_ip_address())
         subprocess.run(
             [sys.executable, "-c", _JOIN, address],
             env=environment,
@@ -226,16 +229,37 @@ def _connect(address: str, own_host: str = "") -> None:
 def _not_joined(address: str, reason: str) -> WorkerError:
     """Return what to raise; the reason may be a traceback and what Ray has logged."""
     last = next((line for line in reversed(reason.splitlines()) if line.strip()), "no reason")
-    words = _TOKEN if "auth token" in reason.lower() or "AuthToken" in reason else last.strip()
+    if "AuthToken" in reason or "AuthenticationError" in reason:
+        words = _TOKEN
+    elif address == "auto":
+        words = f"{last.strip().rstrip('.')}; `ray start` on each machine starts or joins one"
+    else:
+        words = f"{last.strip()}; its head must be there, and this machine part of it (`ray start`)"
     return WorkerError(f"the Ray cluster at {address!r} cannot be joined: {words}")
 
 
 def _leave(ray: Any) -> None:
-    """Leave the cluster, or what is left of it."""
+    """Leave the cluster.
+
+    Raises:
+        WorkerError: If it does not let go. Ray then waits for it until this process ends, and
+            would keep that from ending, too: it ends at once, with exit code 1.
+    """
     try:
         _within(_ANSWER_SECONDS, ray.shutdown)
     except TimeoutError:
-        atexit.unregister(ray.shutdown)  # which would wait for ever, too
+        atexit.unregister(ray.shutdown)
+        atexit.register(_end_process)
+        raise WorkerError(
+            "the head of the Ray cluster does not answer, not even a farewell"
+        ) from None
+
+
+def _end_process() -> None:
+    with suppress(OSError, ValueError):  # closed streams
+        sys.stdout.flush()
+        sys.stderr.flush()
+    os._exit(1)
 
 
 def _within(seconds: float, function: Callable[[], _T]) -> _T:
@@ -272,7 +296,7 @@ def gather_code(folder: Path, modules: Iterable[str] = ()) -> None:
         spec = find_spec(name)
         if spec is None:
             raise UnknownNameError("module", name, (), "It must be importable here.")
-        for path in spec.submodule_search_locations or ():
+        for path in reversed([*(spec.submodule_search_locations or ())]):  # the first one counts
             shutil.copytree(path, folder / name, ignore=_CACHES, dirs_exist_ok=True)
         if not spec.submodule_search_locations and spec.origin is not None:
             shutil.copy(spec.origin, folder)

@@ -77,7 +77,14 @@ def test_how_it_reads():
         (still, TASK, [1, 2, 1], {}, TaskError, "seed 1 is there twice; each episode is played o"),
         ("exprt", TASK, [0], {}, TaskError, "policy is 'exprt'; it must be callable, obs → acti"),
         (fails, TASK, [7], {}, WorkerError, "seed 7: KeyError: 'no such key' .*policies.py:"),
-        (lambda obs: obs, TASK, [7], {}, WorkerError, "cannot be sent .*a policy must be def.* workers=0"),
+        (
+            lambda obs: obs,
+            TASK,
+            [7],
+            {},
+            WorkerError,
+            "cannot be sent .*a policy must be def.* workers=0",
+        ),
     ],
 )
 def test_what_cannot_be_evaluated(policy, task, seeds, making, error, complaint):
