@@ -193,22 +193,34 @@ class EvaluationJob:
     def __call__(self) -> Callable[[int], Score]:
         """Make the task in a worker, and return what plays the episode of a seed."""
         torch.set_num_threads(1)  # as many everywhere, so that sums are the same
-        env = self.task(self.scenario)
-        planner = Planner(env, self.expert) if self.expert is not None else None
+        return _Player(self)
 
-        def play(seed: int) -> Score:
-            random.seed(seed)
-            np.random.seed(seed % 2**32)
-            torch.manual_seed(seed)
-            if planner is None:
-                return _play(env, seed, deepcopy(self.policy), env.max_episode_steps)
-            try:
-                plan = planner(seed)
-            except TaskError:
-                return Score(False, 0.0, 0)
-            return _play(env, seed, _follow(plan), len(plan))
 
-        return play
+class _Player:
+    """Plays episodes in one world, which is built anew for each."""
+
+    def __init__(self, job: EvaluationJob) -> None:
+        self._env, self._policy = job.task(job.scenario), job.policy
+        self._planner = None if job.expert is None else Planner(self._env, job.expert)
+
+    def __call__(self, seed: int) -> Score:
+        """Play the episode of a seed."""
+        random.seed(seed)
+        np.random.seed(seed)
+        torch.manual_seed(seed)
+        if self._planner is None:
+            return _play(self._env, seed, deepcopy(self._policy), self._env.max_episode_steps)
+        try:
+            plan = self._planner(seed)
+        except TaskError:
+            return Score(False, 0.0, 0)
+        return _play(self._env, seed, _follow(plan), len(plan))
+
+    def close(self) -> None:
+        """Let the worlds go."""
+        self._env.close()
+        if self._planner is not None:
+            self._planner.close()
 
 
 def _follow(plan: NDArray[np.float32]) -> Policy:

@@ -17,7 +17,8 @@ class InProcessExecutor:
     """This very process, one episode after the other; what plays need not be picklable.
 
     Nothing limits how long an episode takes. The number of torch's threads and the state of the
-    random generators are those of before whenever nothing is being played.
+    random generators are those of before whenever nothing is being played. If what plays has a
+    method ``close``, that is called in the end.
     """
 
     def run(self, prepare: Callable[[], Play], seeds: Iterable[int]) -> Generator[Event]:
@@ -25,10 +26,15 @@ class InProcessExecutor:
         inside = _Inside()
         with inside:
             play = prepare()
-        for seed in seeds:
-            with inside:
-                event = _played(play, seed)
-            yield event
+        try:
+            for seed in seeds:
+                with inside:
+                    event = _played(play, seed)
+                yield event
+        finally:
+            close = getattr(play, "close", None)
+            if close is not None:
+                close()
 
 
 def _played(play: Play, seed: int) -> Event:

@@ -218,7 +218,7 @@ def _answer(play: Play, seed: int) -> bytes:
     """Play an episode; returns its `_Answer`, pickled."""
     try:
         return pickle.dumps(_Answer(play(seed), None))
-    except SystemExit as stop:
+    except (SystemExit, KeyboardInterrupt) as stop:
         return pickle.dumps(_Answer(None, WorkerError(described(stop))))
     except Exception as error:
         return pickle.dumps(_Answer(None, portable(error)))

@@ -74,18 +74,29 @@ class EpisodeJob:
             RecordingError: If the robot files of this machine are not those of the recording.
         """
         torch.set_num_threads(1)  # the tensors are small, and other workers want the cores
-        env = self.task(self.scenario)
-        self._expect_same_robots(env)
-        plan = Planner(env, self.expert)
+        return _Player(self)
 
-        def record(seed: int) -> tuple[Played, bytes]:
-            episode = play(env, seed, plan(seed))
-            return Played(episode.solved, len(episode.actions)), self.writer.encode(episode)
 
-        return record
+class _Player:
+    """Plays episodes in one world, which is built anew for each, and encodes them."""
 
-    def _expect_same_robots(self, env: MultiRobotTask) -> None:
-        found = differences(self.writer.header["layout"], describe_layout(env.layout))
+    def __init__(self, job: EpisodeJob) -> None:
+        self._env, self._writer = job.task(job.scenario), job.writer
+        self._expect_same_robots()
+        self._plan = Planner(self._env, job.expert)
+
+    def __call__(self, seed: int) -> tuple[Played, bytes]:
+        """Play and encode the episode of a seed."""
+        episode = play(self._env, seed, self._plan(seed))
+        return Played(episode.solved, len(episode.actions)), self._writer.encode(episode)
+
+    def close(self) -> None:
+        """Let the worlds go."""
+        self._env.close()
+        self._plan.close()
+
+    def _expect_same_robots(self) -> None:
+        found = differences(self._writer.header["layout"], describe_layout(self._env.layout))
         if found:
             raise RecordingError(
                 f"a worker would record something else than this recording is of ({listing(found)})"

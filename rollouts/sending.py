@@ -82,12 +82,19 @@ def as_ours(error: Exception) -> RobotLayoutsError:
 
 def described(error: BaseException) -> str:
     """Return an error's kind and words, and the line of the user's own code that it came from."""
-    words = f"{type(error).__name__}: {error}".rstrip(": ")
+    words = f"{type(error).__name__}: {_message(error)}".rstrip(": ")
     frames = traceback.extract_tb(error.__traceback__)
     if not frames:
         return words
     where = next((frame for frame in reversed(frames) if _is_users(frame.filename)), frames[-1])
     return f"{words} ({where.filename}:{where.lineno}, in {where.name})"
+
+
+def _message(error: BaseException) -> str:
+    try:
+        return str(error)
+    except Exception:  # whatever a class of the user's own does
+        return "its message cannot be read"
 
 
 def is_installed(path: Path) -> bool:

@@ -83,10 +83,10 @@ def zero_or_more(text: str) -> int:
 
 
 def _timeout(text: str) -> float | None:
-    seconds = None if text == "none" else float(text)
     try:
+        seconds = None if text == "none" else float(text)
         check_timeout(seconds)
-    except TaskError:
+    except (ValueError, TaskError):
         words = f"{text} is no limit; it must be seconds, more than 0, or none"
         raise argparse.ArgumentTypeError(words) from None
     return seconds
