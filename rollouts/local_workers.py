@@ -19,6 +19,10 @@ from rollouts.shift import Sign, Worker
 from tasks import processes
 
 _PATIENCE = 10.0  # s that a worker may take to end by itself
+_UNGUARDED = (
+    ". Workers load the program that starts them: there, what evaluates or records belongs below"
+    " `if __name__ == '__main__':`"
+)
 
 
 def report(said: Any) -> None:
@@ -79,7 +83,9 @@ class _Process:
                 self._process = processes.context.Process(target=_work, args=(theirs,), daemon=True)
                 processes.start(self._process)
         except (OSError, AssertionError) as error:  # too many files; a daemon has no children
-            raise WorkerError(f"a worker process cannot be started: {error}") from error
+            raise WorkerError(
+                f"a worker process cannot be started: {error}; workers=0 plays in this process"
+            ) from error
         self.name = f"process {self._process.pid}"
         self._thread = Thread(target=self._converse, args=(job, senders), daemon=True)
         self._thread.start()
@@ -155,13 +161,14 @@ class _Process:
         Raises:
             WorkerError: If every other one would die like that.
         """
+        self._process.join(_PATIENCE)
         self.kill()
         code = self._process.exitcode or 0
         if code > 0 and not self._begun:
+            hint = _UNGUARDED if code == 1 else ""
             raise WorkerError(
                 f"a worker process ended with exit code {code} before it could begin; it has"
-                " printed why. Workers load the program that starts them: there, what evaluates or"
-                " records belongs below `if __name__ == '__main__':`"
+                f" printed why{hint}"
             )
         how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
         return self._death(f"died {how}")

@@ -7,7 +7,7 @@ import pickle
 import sys
 import sysconfig
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -54,21 +54,22 @@ def loaded(job: bytes) -> Callable[[], Play]:
         return pickle.loads(job)
     except Exception as error:
         raise WorkerError(
-            f"a worker cannot load what it is to play: {described(error)}; {HINT}"
+            f"a worker cannot load what it is to play: {_words(error)}{_users_line(error)}; {HINT}"
         ) from error
 
 
 def unsendable(error: Exception) -> WorkerError:
     """Return what to raise if pickling what the workers need raised ``error``."""
     return WorkerError(
-        f"what the workers need cannot be sent to them: {described(error)}; a task, an expert or a"
-        f" policy must be defined where they can load it: {HINT}"
+        f"what the workers need cannot be sent to them: {_words(error)}{_users_line(error)}; a"
+        " task, an expert or a policy must be defined in a module that they can import and hold"
+        " what can be pickled, or play in this process with workers=0"
     )
 
 
 def portable(error: Exception) -> Sendable:
     """Return what arrives elsewhere as an error of ours, with its traceback as its cause."""
-    return Sendable(error, lambda _: WorkerError(described(error)))
+    return Sendable(as_ours(error), WorkerError)
 
 
 def as_ours(error: Exception) -> RobotLayoutsError:
@@ -81,20 +82,26 @@ def as_ours(error: Exception) -> RobotLayoutsError:
 
 
 def described(error: BaseException) -> str:
-    """Return an error's kind and words, and the line of the user's own code that it came from."""
-    words = f"{type(error).__name__}: {_message(error)}".rstrip(": ")
-    frames = traceback.extract_tb(error.__traceback__)
-    if not frames:
-        return words
-    where = next((frame for frame in reversed(frames) if _is_users(frame.filename)), frames[-1])
-    return f"{words} ({where.filename}:{where.lineno}, in {where.name})"
+    """Return an error's kind and words, and the line that it came from, if possible the user's."""
+    return _words(error) + (_users_line(error) or _line(traceback.extract_tb(error.__traceback__)))
 
 
-def _message(error: BaseException) -> str:
+def _words(error: BaseException) -> str:
     try:
-        return str(error)
+        return f"{type(error).__name__}: {error}".rstrip(": ")
     except Exception:  # whatever a class of the user's own does
-        return "its message cannot be read"
+        return f"{type(error).__name__}: its message cannot be read"
+
+
+def _users_line(error: BaseException) -> str:
+    frames = traceback.extract_tb(error.__traceback__)
+    return _line([frame for frame in frames if _is_users(frame.filename)])
+
+
+def _line(frames: Sequence[traceback.FrameSummary]) -> str:
+    if not frames:
+        return ""
+    return f" ({frames[-1].filename}:{frames[-1].lineno}, in {frames[-1].name})"
 
 
 def is_installed(path: Path) -> bool:
