@@ -45,7 +45,7 @@ class Kind:
         if value is _ABSENT:
             raise FieldError(f"it has no {where}; that must be {self.words}")
         if not self.fits(value):
-            raise FieldError(f"{where} is {_shown.repr(value)}; it must be {self.words}")
+            raise FieldError(f"{where or 'it'} is {_shown.repr(value)}; it must be {self.words}")
         for name, inner, kind in self.inside(value):
             kind.expect(inner, f"{where}{name}".removeprefix("."))
 
@@ -87,9 +87,7 @@ def items(kind: Kind, length: int | None = None) -> Kind:
     def inside(value: Sequence[Any]) -> Iterator[Field]:
         return ((f"[{number}]", inner, kind) for number, inner in enumerate(value))
 
-    return Kind(
-        f"a list of {length if length is not None else 'any number of'} values", fits, inside
-    )
+    return Kind("a list" if length is None else f"a list of {length} values", fits, inside)
 
 
 def by_name(kind: Kind) -> Kind:

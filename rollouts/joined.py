@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -31,6 +32,7 @@ from rollouts.summary import OWN_EPISODE
 # From HDF5 1.8, the first in which attributes may be larger than 64 kB.
 _VERSIONS = "v108", "latest"
 _OVERHEAD = 16_384  # bytes of an episode besides its numbers: four times those of ten arrays
+_GROUP = re.compile("traj_[0-9]+")
 _TEXT = h5py.string_dtype()
 _HDF5: Any = h5py  # whose low-level modules pyright cannot look into
 
@@ -63,6 +65,8 @@ def read_joined(path: Path) -> Joined:
         if "env_info" not in header:
             raise FieldError("it does not say what was recorded")
         for name in file.members():
+            if not _GROUP.fullmatch(name):
+                raise FieldError(f"{name} is no episode")
             try:
                 with damage_errors(RecordingError):
                     episodes[name] = _read_episode(file, name).about

@@ -30,6 +30,8 @@ from rollouts.summary import MAX_SEED, OWN_EPISODE
 
 CHECKSUM = "checksum"  # attribute of an episode's group in the h5 file
 STATES = "env_states/"
+ARRAYS = ("actions", STATES.rstrip("/"), "rewards", "success", "terminated", "truncated")
+TEXTS = ("action_split", "episode")
 
 _SUFFIX = ".part"
 _EARLIER = ".h5"
@@ -200,13 +202,17 @@ def read_part(path: Path) -> tuple[dict[str, Any], Stored]:
 
 
 def checksum(attributes: Mapping[str, str], arrays: Mapping[str, NDArray[Any]]) -> str:
-    """Return the checksum of an episode, whatever file it is in and in whatever order."""
+    """Return the checksum of an episode, whatever file it is in and in whatever order.
+
+    It covers `TEXTS` and `ARRAYS`; what others may have added is left out.
+    """
+    names = sorted(name for name in arrays if name.partition("/")[0] in ARRAYS)
     about = [
-        sorted((name, text) for name, text in attributes.items() if name != CHECKSUM),
-        [(name, arrays[name].dtype.str, arrays[name].shape) for name in sorted(arrays)],
+        [(name, attributes.get(name)) for name in TEXTS],
+        [(name, arrays[name].dtype.str, arrays[name].shape) for name in names],
     ]
     found = zlib.crc32(json.dumps(about).encode())
-    for name in sorted(arrays):
+    for name in names:
         found = zlib.crc32(np.ascontiguousarray(arrays[name]).data, found)
     return f"crc32 {found:08x}"
 

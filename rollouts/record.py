@@ -110,6 +110,7 @@ class Summary:
     Attributes:
         recorded: Episodes in the file in the end.
         already: How many of those asked for were there before.
+        damaged: Episodes that were there before and are damaged, in words.
         played: Episodes played this time, by seed.
         failed: Why an episode could not be played, by seed.
         deaths: Workers that died, in words.
@@ -118,6 +119,7 @@ class Summary:
 
     recorded: int = 0
     already: int = 0
+    damaged: list[str] = field(default_factory=list[str])
     played: dict[int, Played] = field(default_factory=dict[int, Played])
     failed: dict[int, Exception] = field(default_factory=dict[int, Exception])
     deaths: list[str] = field(default_factory=list[str])
@@ -169,7 +171,7 @@ def record(
     summary = Summary()
     with Recorder(folder / FILE, env, resume=True, source_desc=description) as recorder:
         env.close()
-        there = recorder.seeds
+        summary.damaged, there = recorder.damaged, recorder.seeds
         missing = [seed for seed in seeds if seed not in there]
         summary.already, summary.recorded = len(seeds) - len(missing), len(there)
         on_event(summary, None)

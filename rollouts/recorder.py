@@ -97,6 +97,8 @@ class Recorder:
         self._header = _header(task, source, source_desc)
         with disk_errors(self.path):
             self.path.parent.mkdir(parents=True, exist_ok=True)
+            if os.path.lexists(self.parts) and not self.parts.is_dir():
+                raise RecordingError(f"{self.parts} is no folder; move it somewhere else")
             lock = claim(self.parts)
             if lock is None:
                 raise RecordingError(f"another process is recording into {self.parts}")
@@ -233,7 +235,9 @@ class Recorder:
 
     def _join(self) -> None:
         parts = {seed_of(part): part for part in list_parts(self.parts)}
-        if parts or self.damaged or not self.path.exists():
+        numbered = [entry.group for entry in self._joined.values()]
+        in_order = numbered == [f"traj_{number}" for number in range(len(numbered))]
+        if parts or self.damaged or not in_order or not self.path.exists():
             places = {**{seed: entry.group for seed, entry in self._joined.items()}, **parts}
             seeds = sorted(places)
             joined = join(self.path, self._header, [places[seed] for seed in seeds])

@@ -58,16 +58,19 @@ def run(options: argparse.Namespace) -> int:
     """
     import torch
     from rich.console import Console
-    from rich.progress import track
 
+    from rollouts.progress import LiveLine
     from rollouts.replay import open_recording, replay, task_for
 
     torch.set_num_threads(1)
     with open_recording(options.file, options.task) as file:
         task = task_for(file)
         count = len(file) if options.episodes is None else max(0, min(options.episodes, len(file)))
-        numbers = track(range(count), "replaying", console=Console(stderr=True), transient=True)
-        found = [replay(task, file[number], options.start) for number in numbers]
+        found: list[Replayed] = []
+        with LiveLine(count, "episodes") as line:
+            for number in range(count):
+                found.append(replay(task, file[number], options.start))
+                line.advance(1, "replaying")
         console = Console(markup=False, highlight=False)
         console.print(
             printable(f"{file.path}: {file.task_id}, {file.control_mode}"), soft_wrap=True

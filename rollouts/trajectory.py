@@ -19,7 +19,7 @@ from robots.files import open_regular
 from rollouts.damage import damage_errors
 from rollouts.episode import States
 from rollouts.hdf5_file import Hdf5File, Shapes
-from rollouts.parts import CHECKSUM, STATES, checksum
+from rollouts.parts import ARRAYS, CHECKSUM, STATES, TEXTS, checksum
 from rollouts.provenance import (
     LAYOUT,
     SIMULATION,
@@ -37,7 +37,6 @@ __all__ = ["Trajectory", "TrajectoryError", "TrajectoryFile", "expect_file"]
 
 _FLAGS = ("success", "terminated", "truncated")
 _COLUMNS = ("rewards", *_FLAGS)
-_KNOWN = ("actions", *_COLUMNS, STATES.rstrip("/"))  # what else native's files hold is not read
 
 Number = TypeVar("Number", np.float32, np.bool_)
 
@@ -203,14 +202,17 @@ class TrajectoryFile(Sequence[Trajectory]):
             )
 
     def _read(self, entry: Entry) -> Trajectory:
-        own = CHECKSUM in self._texts(entry)
-        names = None if own else _KNOWN
-        self._expect_shapes(entry, self._shapes(entry, names))
+        texts = self._texts(entry)
+        self._expect_shapes(entry, self._shapes(entry, ARRAYS))
         with self._damage(entry.group):
-            arrays = self._file.numbers(entry.group, names)
+            arrays = self._file.numbers(entry.group, ARRAYS)
         self._expect_numbers(entry, arrays)
-        if own:
-            self._expect_checksum(entry, arrays)
+        if texts.get(CHECKSUM) not in (None, checksum(texts, arrays)):
+            self._refuse(
+                entry,
+                "it is damaged, or was changed after it was recorded: its checksum is another"
+                f" (after a change on purpose, delete its attribute {CHECKSUM!r})",
+            )
         return Trajectory(
             episode_id=entry.episode_id,
             seed=entry.seed,
@@ -225,7 +227,7 @@ class TrajectoryFile(Sequence[Trajectory]):
     def _texts(self, entry: Entry) -> dict[str, str]:
         """Return the attributes of an episode that say what it is, if it has any."""
         with self._damage(entry.group):
-            texts = self._file.texts(entry.group, ("episode", CHECKSUM))
+            texts = self._file.texts(entry.group, (*TEXTS, CHECKSUM))
             if texts is None:
                 self._refuse(entry, "the json beside it lists it, but it is not in the file")
             own = read_described(texts, "episode", OWN_EPISODE)
@@ -237,7 +239,7 @@ class TrajectoryFile(Sequence[Trajectory]):
             )
         return texts
 
-    def _shapes(self, entry: Entry, names: Collection[str] | None) -> Shapes:
+    def _shapes(self, entry: Entry, names: Collection[str]) -> Shapes:
         """Return the shapes of an episode's arrays, whose numbers are not read."""
         with self._damage(entry.group):
             return self._file.shapes(entry.group, names)
@@ -278,16 +280,6 @@ class TrajectoryFile(Sequence[Trajectory]):
         for name, rows in arrays.items():
             if not np.isfinite(rows).all():
                 self._refuse(entry, f"its {name} are not all finite")
-
-    def _expect_checksum(self, entry: Entry, arrays: Mapping[str, NDArray[Any]]) -> None:
-        with self._damage(entry.group):
-            texts = self._file.texts(entry.group) or {}
-        if texts.get(CHECKSUM) != checksum(texts, arrays):
-            self._refuse(
-                entry,
-                "it is damaged, or was changed after it was recorded: its checksum is another"
-                f" (after a change on purpose, delete its attribute {CHECKSUM!r})",
-            )
 
     def _refuse(self, entry: Entry, why: str) -> NoReturn:
         raise TrajectoryError(f"{entry.group} of {self.path} cannot be played: {why}")

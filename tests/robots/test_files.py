@@ -39,7 +39,8 @@ def _fifo(path):
 
 
 def _socket(path):
-    socket.socket(socket.AF_UNIX).bind(str(path))
+    with socket.socket(socket.AF_UNIX) as made:
+        made.bind(path.name)
 
 
 @pytest.mark.parametrize(

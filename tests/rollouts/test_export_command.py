@@ -2,6 +2,9 @@
 
 import dataclasses
 import json
+import shutil
+import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -13,7 +16,7 @@ import rollouts.export.pictures as pictures
 import rollouts.progress as progress
 import tasks
 from layouts import Layout, Placement
-from robots import RecordingError, RobotRegistry
+from robots import RecordingError, RobotRegistry, TaskError
 from robots.descriptor import ActionSplit
 from rollouts.__main__ import main
 from rollouts.episode import play
@@ -267,6 +270,55 @@ def test_pictures_of_an_exact_replay_need_no_help(recording, monkeypatch):
         task = tasks.make(TASK)
         monkeypatch.setattr(task, "set_state_dict", lambda state: pytest.fail("put into a state"))
         assert len(list(pictures.draw(task, ColumnReader(task).read(file[2])))) == 4
+
+
+UNFINISHED = """
+import sys, time
+from robots.commands import start
+from rollouts.export.dataset import Export, export
+def main():
+    def wait(done, total):
+        print("writing", flush=True)
+        time.sleep(600)
+    export(Export(sys.argv[1], "robomimic", sys.argv[2]), wait)
+start(main)
+"""
+
+
+def partials(folder: Path) -> list[str]:
+    return [path.name for path in folder.iterdir() if path.name.endswith(".partial")]
+
+
+def test_what_a_killed_export_leaves_is_removed_by_the_next(recording, tmp_path):
+    out = tmp_path / "out"
+    words = [sys.executable, "-c", UNFINISHED, str(recording), str(out)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as killed:
+        assert killed.stdout is not None
+        assert killed.stdout.readline() == "writing\n"
+        with pytest.raises(TaskError):  # refused before anything is removed
+            export(Export(recording, "robomimic", out, fps=3))
+        export(Export(recording, "robomimic", tmp_path / "other"))
+        assert len(partials(tmp_path)) == 1
+        export(Export(recording, "robomimic", out))
+        assert len(partials(tmp_path)) == 1  # of one that lives
+        killed.kill()
+    shutil.rmtree(out)
+    (tmp_path / ".out.mine.partial").mkdir()  # whoever it is of
+    export(Export(recording, "robomimic", out))
+    assert partials(tmp_path) == [".out.mine.partial"]
+
+
+def test_ctrl_c_ends_an_export_without_a_traceback(recording, tmp_path):
+    words = [sys.executable, "-c", UNFINISHED, str(recording), str(tmp_path / "out")]
+    with subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as export_:
+        assert export_.stdout is not None
+        assert export_.stdout.readline() == "writing\n"
+        export_.send_signal(signal.SIGINT)
+        _, said = export_.communicate(timeout=60)
+    assert (export_.returncode, said) == (130, "interrupted\n")
+    assert partials(tmp_path) == []
 
 
 def test_joints_are_in_the_order_of_their_names():

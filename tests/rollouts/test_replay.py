@@ -70,6 +70,29 @@ def test_the_first_episodes_only(capsys, recording):
     assert "1 of 1 episodes end as recorded" in printed
 
 
+def test_the_body_with_the_largest_difference_is_named(capsys, path):
+    def push(amount):
+        def edit(rows):
+            rows[7, 2] += np.float32(amount)
+
+        return edit
+
+    change(path, "traj_0/env_states/actors/Tee", push(0.001))
+    change(path, "traj_0/env_states/actors/goal_Tee", push(0.25))
+    _, printed, _ = run(capsys, path)
+    assert "from step 7 in Tee, max |Δ| 2.5e-01 in goal_Tee" in printed
+
+
+def test_a_path_with_brackets_is_printed_as_it_is(capsys, path):
+    folder = path.parent / "[red][" / "b]"
+    folder.mkdir(parents=True)
+    for suffix in (".h5", ".json"):
+        path.with_suffix(suffix).rename((folder / path.name).with_suffix(suffix))
+    code, printed, _ = run(capsys, folder)
+    assert code == 0
+    assert f"{folder}/{path.name}: PushT-v1" in printed
+
+
 def test_states_that_differ_are_found(capsys, path):
     def nudge(rows):
         rows[7, 2] = np.nextafter(rows[7, 2], np.float32(1))
