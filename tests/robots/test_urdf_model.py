@@ -141,7 +141,7 @@ BAD = {
                 ),
             )
         ),
-        "refers to files that do not exist: ",
+        "toy.urdf refers to 'http://127.0.0.1:9/a.stl'; only paths, package:// and file://",
     ),
 }
 
