@@ -12,7 +12,7 @@ import os
 import posixpath
 import re
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 from urllib.parse import unquote
 
@@ -80,10 +80,11 @@ def read_corners(path: str, scale: Sequence[float], where: str, urdf: str) -> Fl
 
     scene = load_scene(path, where, urdf, process=False)
     try:
-        corners = np.asarray(scene.to_mesh().vertices, float).reshape(-1, 3) * scale
+        mesh = scene.to_mesh()
+        corners = np.asarray(mesh.vertices, float).reshape(-1, 3) * scale
     except Exception as error:  # what the reader left behind may be anything
         raise AssetError(f"{where}: cannot read the mesh {path}: {_line(error)}") from error
-    if len(corners) == 0:
+    if len(corners) == 0 or len(mesh.faces) == 0:
         raise AssetError(f"{where}: the mesh {path} is empty")
     if not np.isfinite(corners).all():
         raise AssetError(f"{where}: the mesh {path} has corners that are not finite")
@@ -139,13 +140,13 @@ class _SideFiles:
 
     def collect(self, ending: str, contents: bytes) -> None:
         """Read every file that a file names, and that those name."""
-        scan = _SCANS.get(ending)
         try:
-            names = list(scan(contents)) if scan else []
-        except AssetError:
-            raise
-        except (ValueError, struct.error, KeyError, TypeError) as error:
-            raise self._broken(_line(error)) from error
+            names = list(_SCANS[ending](contents))
+        except (ValueError, TypeError, AttributeError) as error:  # json of other types
+            reason = _line(error)
+            raise AssetError(
+                f"{self._where}: cannot read the mesh {self._path}: {reason}"
+            ) from error
         for name in names:
             for variant in dict.fromkeys(_variants(name)):
                 self._add(name, variant)
@@ -175,9 +176,6 @@ class _SideFiles:
             self._contents.setdefault(key, contents)
         if path.lower().endswith(".mtl"):
             self.collect(".mtl", contents)
-
-    def _broken(self, reason: str) -> AssetError:
-        return AssetError(f"{self._where}: cannot read the mesh {self._path}: {reason}")
 
 
 def _variants(name: str) -> Iterator[str]:
@@ -209,8 +207,21 @@ def _in_ply(contents: bytes) -> Iterator[str]:
         yield match[1].decode("utf-8", "replace").strip()
 
 
+def _in_stl(contents: bytes) -> Iterator[str]:
+    faces = int.from_bytes(contents[80:84], "little")
+    expected = 84 + 50 * faces
+    is_text = contents.lstrip()[:5].lower() == b"solid" and b"facet" in contents
+    if len(contents) != expected and not is_text:
+        raise ValueError(f"{faces} faces need {expected} bytes; it has {len(contents)}")
+    return iter(())
+
+
 def _in_dae(contents: bytes) -> Iterator[str]:
-    for element in parse_xml(contents, "the mesh", "Collada").iter():
+    try:
+        root = parse_xml(contents, "it", "Collada")
+    except AssetError as error:
+        raise ValueError(str(error)) from error
+    for element in root.iter():
         tag = element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
         if tag in ("init_from", "ref") and element.text:
             yield element.text.strip()
@@ -221,6 +232,8 @@ def _in_dae(contents: bytes) -> Iterator[str]:
 
 
 def _in_glb(contents: bytes) -> Iterator[str]:
+    if len(contents) < 20:
+        raise ValueError("it is too short")
     magic, _, length, size, kind = struct.unpack_from("<4sIII4s", contents)
     if magic != b"glTF" or kind != b"JSON" or length > len(contents) or 20 + size > length:
         raise ValueError("its header does not fit what follows")
@@ -236,8 +249,12 @@ def _in_gltf(contents: bytes) -> Iterator[str]:
             for key in ("count", "byteLength", "byteOffset", "byteStride"):
                 _expect_possible(entry.get(key, 0), MAX_ELEMENTS)
             uri = entry.get("uri", "")
-            if not uri.startswith("data:"):
-                yield from [uri] if uri else []
+            if uri and not uri.startswith("data:"):
+                yield uri
+    children = [child for node in tree.get("nodes", []) for child in node.get("children", [])]
+    starts = [node for scene in tree.get("scenes", []) for node in scene.get("nodes", [])]
+    if len({*children, *starts}) < len(children) + len(starts):
+        raise ValueError("its nodes are no tree")
 
 
 def _expect_possible(count: Any, limit: int) -> None:
@@ -247,11 +264,15 @@ def _expect_possible(count: Any, limit: int) -> None:
 
 def _line(error: Exception) -> str:
     """Return an error's message on one line of bounded length."""
-    text = " ".join(str(error).split()) or type(error).__name__
+    text = " ".join(str(error).split())
+    if " " not in text:  # the name of a key alone, or nothing
+        text = f"{type(error).__name__} {text}".rstrip()
     return text if len(text) <= 200 else f"{text[:200]}…"
 
 
-_SCANS: dict[str, Callable[[bytes], Iterator[str]]] = {
+# What each kind of file names; a ValueError says why one is broken.
+_SCANS: Mapping[str, Callable[[bytes], Iterator[str]]] = {
+    ".stl": _in_stl,
     ".obj": _in_obj,
     ".mtl": _in_mtl,
     ".ply": _in_ply,

@@ -150,7 +150,7 @@ def read_joint(joint: ElementTree.Element, urdf: str) -> UrdfJoint:
         upper=numbers.get("upper", 0.0) if bounded else None,
         effort=numbers.get("effort"),
         velocity=numbers.get("velocity"),
-        mimics=mimic.get("joint") if mimic is not None else None,
+        mimics=mimic.get("joint", "") if mimic is not None else None,
     )
 
 
