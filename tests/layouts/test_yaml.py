@@ -290,7 +290,7 @@ class TestFiles:
             Layout.load(tmp_path / "none.yaml")
         latin = tmp_path / "latin.yaml"
         latin.write_bytes("# größe".encode("latin-1"))
-        with pytest.raises(LayoutError, match="it is not UTF-8 text"):
+        with pytest.raises(LayoutError, match="it is not UTF-8: "):
             Layout.load(latin)
 
     def test_a_layout_that_cannot_be_written_leaves_the_old_file(self, tmp_path):
