@@ -44,12 +44,15 @@ def load_scene(path: str, where: str, urdf: str | None = None, **options: Any) -
     Raises:
         AssetError: If it is missing, no regular file, too large, of an unknown kind or broken, or
             if it refers to files that the URDF may not refer to.
-        MissingPackageError: If trimesh is not installed.
+        MissingPackageError: If trimesh or pycollada is not installed.
     """
     try:
+        import collada  # noqa: F401  # pyright: ignore[reportUnusedImport]  # trimesh, for .dae
         import trimesh
     except ImportError as error:
-        raise MissingPackageError("reading meshes needs trimesh: pip install trimesh") from error
+        raise MissingPackageError(
+            "reading meshes needs trimesh and pycollada: pip install trimesh pycollada"
+        ) from error
 
     ending = _ending(path, where)
     contents = _read(path, where)
@@ -74,7 +77,7 @@ def read_corners(path: str, scale: Sequence[float], where: str, urdf: str) -> Fl
     Raises:
         AssetError: If it cannot be read (see `load_scene`), is empty or flat, or has corners that
             are not finite or more than `LARGEST` away.
-        MissingPackageError: If trimesh is not installed.
+        MissingPackageError: If trimesh or pycollada is not installed.
     """
     import numpy as np
 

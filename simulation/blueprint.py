@@ -31,6 +31,7 @@ MOST_PAIRS = 31  # that SAPIEN's loader can keep apart: a bit each
 ELEMENTS = ("link", "joint", "material")
 JOINT_PARTS = ("parent", "child", "origin", "axis")
 MOVING_PARTS = (*JOINT_PARTS, "limit", "dynamics", "mimic")
+DEFAULTS = {"limit": ("lower", "upper"), "dynamics": ("damping", "friction")}  # 0, if left out
 
 
 @dataclass
@@ -94,7 +95,7 @@ def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
             loader.set_link_material(link, *friction)
             loader.set_link_patch_radius(link, material.patch_radius)
             loader.set_link_min_patch_radius(link, material.patch_radius)
-    text = _without_unused(parse_urdf(contents, urdf.as_posix()), visuals=visuals)
+    text = _for_sapien(parse_urdf(contents, urdf.as_posix()), visuals=visuals)
     pairs = _pairs(read_excluded_pairs(urdf), model, urdf)
     try:
         builder = loader.load_text(text, urdf, pairs)
@@ -136,15 +137,18 @@ class _Loader(URDFLoader):
         super()._build_link(link, link_builder)
 
 
-def _without_unused(root: ElementTree.Element, *, visuals: bool) -> str:
-    """Return a URDF's XML without what neither physics nor pictures use."""
+def _for_sapien(root: ElementTree.Element, *, visuals: bool) -> str:
+    """Return a URDF's XML without what neither physics nor pictures use, and with defaults."""
     for element in list(root):
         if element.tag not in ELEMENTS or (element.tag == "material" and not visuals):
             root.remove(element)
     for joint in root.iterfind("joint"):
         used = JOINT_PARTS if joint.get("type") == "fixed" else MOVING_PARTS
-        for part in [part for part in joint if part.tag not in used]:
-            joint.remove(part)
+        for part in list(joint):
+            if part.tag not in used:
+                joint.remove(part)
+            for key in DEFAULTS.get(part.tag, ()):
+                part.set(key, part.get(key, "0"))
     for link in root.iterfind("link") if not visuals else ():
         for visual in link.findall("visual"):
             link.remove(visual)
