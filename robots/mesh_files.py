@@ -46,15 +46,8 @@ def load_scene(path: str, where: str, urdf: str | None = None, **options: Any) -
             if it refers to files that the URDF may not refer to.
         MissingPackageError: If trimesh or pycollada is not installed.
     """
-    try:
-        import collada  # noqa: F401  # pyright: ignore[reportUnusedImport]  # trimesh, for .dae
-        import trimesh
-    except ImportError as error:
-        raise MissingPackageError(
-            "reading meshes needs trimesh and pycollada: pip install trimesh pycollada"
-        ) from error
-
     ending = _ending(path, where)
+    trimesh = _reader(ending)
     contents = _read(path, where)
     beside: Any = _SideFiles(path, posixpath.dirname(urdf or path), where)
     beside.collect(ending, contents)
@@ -114,6 +107,20 @@ def has_volume(corners: Floats) -> bool:
     spread = corners - corners.mean(axis=0)
     _, directions = np.linalg.eigh(spread.T @ spread)
     return bool(np.ptp(spread @ directions[:, 0]) >= SMALLEST)
+
+
+def _reader(ending: str) -> Any:
+    """Return the package that reads meshes, once it can read those of an ending."""
+    try:
+        import trimesh
+
+        if ending == ".dae":
+            import collada  # noqa: F401  # pyright: ignore[reportUnusedImport]
+    except ImportError as error:
+        raise MissingPackageError(
+            "reading meshes needs trimesh and pycollada: pip install trimesh pycollada"
+        ) from error
+    return trimesh
 
 
 def _ending(path: str, where: str) -> str:

@@ -26,7 +26,7 @@ from robots.urdf_numbers import shown
 Exists = Callable[[str], bool]
 
 PACKAGE_MARKS = ("package.xml", ".git/HEAD", ".git")
-URDF_FOLDERS = ("urdf", "urdfs", "robot", "robots", "xacro", "model", "models")
+URDF_FOLDERS = ("urdf", "urdfs", "xacro")
 MESH_FOLDERS = ("mesh", "meshes")
 
 
