@@ -47,9 +47,9 @@ def check_ply(contents: bytes) -> None:
     known = {element.name: element for element in elements}
     if len(known) < len(elements) or not {"vertex", "face"} <= set(known):
         raise ValueError("its header needs one element vertex and one element face")
-    if not (
-        {"x", "y", "z"} <= set(known["vertex"].types) and {*INDICES} & set(known["face"].types)
-    ):
+    vertex, face = known["vertex"].types, known["face"].types
+    lists = [name for name in INDICES if len(face.get(name, ())) == 2]
+    if not ({"x", "y", "z"} <= set(vertex) and lists):
         raise ValueError("its header needs x, y and z of each vertex, and vertex_indices of faces")
     values = _Binary(match[2], order) if order else _Ascii(match[2])
     for element in elements:

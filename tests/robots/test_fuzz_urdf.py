@@ -27,7 +27,7 @@ SRDF = '<robot name="toy"><disable_collisions link1="base" link2="hand" reason="
 MESH_KINDS = st.sampled_from(KINDS).flatmap(
     lambda kind: st.tuples(st.just(kind), damaged_bytes(good(kind)))
 )
-FUZZ = settings(max_examples=1500, deadline=None, suppress_health_check=list(HealthCheck))
+FUZZ = settings(max_examples=1000, deadline=None, suppress_health_check=list(HealthCheck))
 BUILT = settings(FUZZ, max_examples=600, phases=[Phase.explicit, Phase.generate])
 
 
@@ -70,7 +70,7 @@ def test_damaged_urdfs_in_other_encodings(data):
     assert read({"toy.urdf": data})
 
 
-@FUZZ
+@settings(FUZZ, max_examples=400)
 @given(damaged_text(SRDF))
 @example('<robot><disable_collisions reason="Default"/></robot>')
 def test_damaged_srdfs(text):
