@@ -172,13 +172,14 @@ def resolve(poses: Mapping[str, tuple[str | None, Pose]]) -> dict[str, Pose]:
     """
     world: dict[str, Pose] = {}
     for name in poses:
-        chain: list[str] = []  # from ``name`` towards the world, as far as it is not known yet
+        chain: dict[str, None] = {}  # from ``name`` to the world, as far as it is not known yet
         at: str | None = name
         while at is not None and at not in world:
             if at in chain:
-                circle = " on ".join(map(repr, [*chain[chain.index(at) :], at]))
+                links = list(chain)
+                circle = " on ".join(map(repr, [*links[links.index(at) :], at]))
                 raise HangingError(f"these hang on each other: {circle}; let one stand free", at)
-            chain.append(at)
+            chain[at] = None
             at = _support(at, poses)
         for at in reversed(chain):
             on, local = poses[at]

@@ -10,7 +10,6 @@ from robots.asset_sources import SourceError, find_mani_skill
 from robots.asset_store import AssetStore, FileState, default_root
 from robots.commands import exit_code, print_error, start
 from robots.descriptor import JointGroup, RobotDescriptor
-from robots.errors import AssetError
 from robots.fetch_assets import describe_file
 from robots.locator import LocalUrdf, UrdfLocator
 from robots.manifest import AssetFile, AssetPackage, load_manifest
@@ -18,7 +17,7 @@ from robots.progress import size
 from robots.registry import RobotRegistry
 from robots.urdf_model import read_model
 from robots.urdf_reach import link_frame
-from robots.urdf_xml import UrdfJoint, read_joints
+from robots.urdf_xml import UrdfJoint, read_joints, read_urdf
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -114,7 +113,7 @@ def _joints(robot: RobotDescriptor, urdf: Path | None) -> Iterable[str]:
         joint: name for name, group in robot.action_split.groups.items() for joint in group.joints
     }
     rows = [("joint", "type", "limits", "effort", "speed", "driven by")]
-    for joint in read_joints(_read(urdf), urdf.name):
+    for joint in read_joints(read_urdf(urdf), urdf.name):
         driven = groups.get(joint.name, "nothing")
         mimics = f" (URDF: mimics {joint.mimics})" if joint.mimics else ""
         rows.append((joint.name, joint.type, _limits(joint), *_bounds(joint), driven + mimics))
@@ -171,7 +170,7 @@ def _keyframes(robot: RobotDescriptor, urdf: Path | None) -> Iterator[str]:
 
 def _tcp_places(robot: RobotDescriptor, urdf: Path) -> dict[str, Sequence[float]]:
     """Return the TCP link's position at each keyframe, in the base frame (m)."""
-    model = read_model(_read(urdf), urdf.name)
+    model = read_model(read_urdf(urdf), urdf.name)
     return {
         name: link_frame(model, robot.tcp_link, dict(zip(robot.joints, qpos, strict=True))).position
         for name, qpos in robot.keyframes.items()
@@ -229,13 +228,6 @@ def _summary(files: Sequence[AssetFile], store: AssetStore) -> str:
     states = [store.state(file) for file in files]
     counts = [f"{states.count(state)} {state.value}" for state in FileState if state in states]
     return f"{len(files)} files, {size(sum(file.bytes for file in files))}: {', '.join(counts)}"
-
-
-def _read(urdf: Path) -> bytes:
-    try:
-        return urdf.read_bytes()
-    except OSError as error:
-        raise AssetError(f"cannot read the URDF {urdf}: {error.strerror}") from error
 
 
 def _row(values: Iterable[float]) -> str:

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from layouts import Layout
 from robots import RobotDescriptor
+from simulation.blueprint import Blueprint
 from simulation.controller import JointPositionController
 from simulation.physics import PhysicsSettings
 from simulation.readout import ReadoutIndex
-from simulation.robot import Blueprint
 from simulation.state import State
 from simulation.world import World
 

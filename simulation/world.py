@@ -12,9 +12,10 @@ import sapien.physx as physx
 from layouts import Layout
 from robots import SimulationError, UnknownNameError
 from robots.descriptor import IDENTITY, Quaternion, Vector3
+from simulation.blueprint import Blueprint, read_blueprint
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, apply
 from simulation.render_device import expect_render_device, outlive_forks
-from simulation.robot import Blueprint, SimulatedRobot, read_blueprint
+from simulation.robot import SimulatedRobot
 from simulation.shapes import Shape, add_collision
 
 BodyKind = Literal["dynamic", "kinematic", "static"]

@@ -15,8 +15,8 @@ from robots import (
 )
 from robots.descriptor import ActionSplit
 from simulation import Box, PhysicsSettings, Simulation, Sphere, World, add_table
+from simulation.blueprint import read_blueprint
 from simulation.controller import JointPositionController
-from simulation.robot import read_blueprint
 from simulation.shapes import Capsule, Cylinder
 
 HALF = 0.02
@@ -223,7 +223,7 @@ def test_a_urdf_is_read_once_for_all_worlds_and_keeps_none_of_them_alive(monkeyp
     simulation = Simulation(layout, with_cube, 3)
     simulation.rebuild([1, 2], with_cube)
     assert [name for name, _ in read] == ["panda", "panda_stick"]
-    assert [blueprint.scene for _, blueprint in read] == [None, None]
+    assert [blueprint.builder.scene for _, blueprint in read] == [None, None]
 
 
 def test_anchored_bodies_return_and_velocities_vanish():
