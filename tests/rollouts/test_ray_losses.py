@@ -29,6 +29,8 @@ from tests.rollouts.test_recorder import same_files
 
 ray = pytest.importorskip("ray")
 
+FIRST = 2000  # seed
+
 
 @pytest.fixture
 def nodes():
@@ -111,25 +113,36 @@ class StopsItselfOnce:
 
 
 def record_with(nodes, out: Path, episodes: int, *more: str) -> subprocess.Popen[str]:
-    return start(*arguments(out, episodes), f"--ray={nodes.address}", *more)
+    return start(*arguments(out, episodes, seed=FIRST), f"--ray={nodes.address}", *more)
 
 
 @pytest.mark.long
-def test_the_node_of_this_machine_is_lost(nodes, tmp_path):
+def test_the_node_of_this_machine_is_stopped_before(nodes, monkeypatch):
+    monkeypatch.setattr(rollouts.ray_cluster, "_JOIN_SECONDS", 10.0)
+    pid = nodes.signal_head("raylet", signal.SIGSTOP)
+    with pytest.raises(WorkerError, match="cannot be joined: "):
+        next(RayExecutor(nodes.address).run(Play(), [0]))
+    os.kill(pid, signal.SIGCONT)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
+def test_the_node_of_this_machine_is_lost(nodes, tmp_path, how):
     recording = record_with(nodes, tmp_path, 10**5)
     wait_for_parts(tmp_path, 5)
-    nodes.signal_head("raylet", signal.SIGKILL)
+    nodes.signal_head("raylet", how)
     printed, said = recording.communicate(timeout=180)
     assert recording.returncode == 1, said
     assert "Traceback" not in said
     assert "error: the Ray node of this machine has died" in said
-    (kept,) = re.findall(r"stopped; (\d+) episodes are recorded", said)
-    again = start(*arguments(tmp_path, int(kept) + 5))
-    _, said = again.communicate(timeout=180)
-    assert again.returncode == 0, said
-    assert f"{kept} of {int(kept) + 5} episodes were recorded before" in said
-    whole = recorded_directly(tmp_path / "direct" / FILE, range(int(kept) + 5))
-    assert same_files(tmp_path / FILE, whole)
+    if how is signal.SIGKILL:
+        (kept,) = map(int, re.findall(r"stopped; (\d+) episodes are recorded", said))
+        again = start(*arguments(tmp_path, kept + 5, seed=FIRST))
+        _, said = again.communicate(timeout=180)
+        assert again.returncode == 0, said
+        assert f"{kept} of {kept + 5} episodes were recorded before" in said
+        whole = recorded_directly(tmp_path / "direct" / FILE, range(FIRST, FIRST + kept + 5))
+        assert same_files(tmp_path / FILE, whole)
 
 
 @pytest.mark.long
@@ -150,6 +163,24 @@ def test_the_head_is_lost(nodes, tmp_path, how):
     assert "error: the head of the Ray cluster, 127.0.0.2:" in said
     (kept,) = re.findall(r"stopped; (\d+) episodes are recorded", said)
     assert int(kept) >= 5
+
+
+@pytest.mark.long
+def test_a_short_recording_may_go_on_without_the_head(nodes, tmp_path):
+    recording = record_with(nodes, tmp_path, 150)
+    wait_for_parts(tmp_path, 5)
+    nodes.signal_head("gcs_server", signal.SIGKILL)
+    printed, said = recording.communicate(timeout=180)
+    assert "Traceback" not in said
+    if recording.returncode == 0:
+        assert f"{FILE}: 150 episodes" in printed
+        assert same_files(
+            tmp_path / FILE,
+            recorded_directly(tmp_path / "direct" / FILE, range(FIRST, FIRST + 150)),
+        )
+    else:
+        assert recording.returncode == 1
+        assert "error: the head of the Ray cluster, 127.0.0.2:" in said
 
 
 @contextmanager

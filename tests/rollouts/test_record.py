@@ -147,9 +147,9 @@ def test_an_executor_that_forgets_episodes(tmp_path):
 
 @pytest.mark.long
 def test_a_worker_that_is_stopped(tmp_path):
-    process = start(*arguments(tmp_path, 40, 2, episode_timeout=10))
+    process = start(*arguments(tmp_path, 40, episode_timeout=10))
     wait_for_parts(tmp_path, 2)
-    stopped = workers_of(process)[0]
+    (stopped,) = workers_of(process)
     os.kill(stopped, signal.SIGSTOP)
     printed, said = process.communicate(timeout=180)
     assert process.returncode == 0, said
