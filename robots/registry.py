@@ -39,6 +39,8 @@ class RobotRegistry:
         Raises:
             UnknownNameError: If no robot has that name (also a ``KeyError``).
         """
+        if not isinstance(name, str):
+            raise UnknownNameError("robot", name, cls.names(), "It takes a robot's name.")
         if name in cls._registered:
             return cls._registered[name]
         if name in CATALOGUE:

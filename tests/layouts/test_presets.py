@@ -425,7 +425,7 @@ class TestGrid:
 
     @pytest.mark.parametrize("columns", [0, -1, 1.5, "2", True])
     def test_columns_that_are_no_count(self, columns):
-        with pytest.raises(LayoutError, match="columns is .*; it must be 1 or a larger whole"):
+        with pytest.raises(LayoutError, match="columns is .*; it must be an integer of 1 or more"):
             grid({"a": "panda"}, columns=columns)
 
 
