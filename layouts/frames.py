@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from layouts.orientation import multiplied, normalised, rotated, rpy_quaternion
 from robots import LayoutError, UnknownNameError
-from robots.bounds import FAR, as_float, shown
+from robots.bounds import FAR, as_float, checked_numbers, shown
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 
 ORIGIN: Vector3 = (0.0, 0.0, 0.0)
@@ -259,22 +259,7 @@ def numbers(what: str, values: Any, count: int) -> tuple[float, ...]:
     Raises:
         LayoutError: If ``values`` are not that.
     """
-    floats = [as_float(x) for x in values] if _is_row(values) else [None]
-    known = tuple(x for x in floats if x is not None)
-    if len(known) != len(floats):
-        raise LayoutError(f"{what} is {shown(values)}; it takes {count} numbers")
-    if len(known) != count or not all(abs(x) <= FAR for x in known):
-        raise LayoutError(
-            f"{what} is {shown(known)}; it takes {count} finite numbers, none beyond {FAR:g}"
-        )
-    return known
-
-
-def _is_row(values: Any) -> bool:
-    """Whether values have an order and an end, so that each has its place."""
-    return (isinstance(values, Sequence) and not isinstance(values, (str, bytes))) or (
-        getattr(values, "ndim", 0) == 1  # an array or a tensor
-    )
+    return checked_numbers(what, values, count, FAR, LayoutError)
 
 
 def _support(name: str, poses: Mapping[str, tuple[str | None, Pose]]) -> str | None:

@@ -23,7 +23,7 @@ from layouts.frames import (
 from layouts.orientation import yaw_quaternion
 from layouts.placement import Placement, RobotLike, placed
 from robots import LayoutError, UnknownNameError
-from robots.bounds import shown
+from robots.bounds import FAR, checked_number, shown
 from robots.descriptor import Vector3
 
 if TYPE_CHECKING:
@@ -184,7 +184,7 @@ class Layout(Mapping[str, Placement]):
         Raises:
             LayoutError: If they are not finite.
         """
-        (yaw,) = numbers("yaw", (yaw,), 1)
+        yaw = checked_number("yaw", yaw, -FAR, FAR, LayoutError, "rad")
         x, y, z = numbers("position", position, 3)
         move = Pose((x, y, z), yaw_quaternion(yaw))
         return Layout(

@@ -220,7 +220,7 @@ def grid(
         for other in ((row + 1, column), (row, column + 1))
         if other in cells
     ]
-    if spacing == "auto":
+    if _is_auto(spacing):
         distance = max((apart(*pair) for pair in neighbours), default=0.0)
     else:
         distance = _given("spacing", spacing)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from numbers import Integral, Real
-from reprlib import repr as shortened
+from reprlib import Repr
 from typing import Any
 
 from robots.errors import RobotLayoutsError
@@ -60,6 +61,40 @@ def checked_whole(
     return whole
 
 
+def checked_numbers(
+    what: str,
+    values: Any,
+    count: int,
+    largest: float,
+    error: type[RobotLayoutsError],
+    unit: str = "",
+) -> tuple[float, ...]:
+    """Return some numbers in a row, such as a position, as floats.
+
+    Args:
+        what: What they are, in words.
+        values: What was given: something with an order, or an array or tensor.
+        count: How many there must be.
+        largest: The largest of them may be that, and the smallest its negative.
+        error: What to raise.
+        unit: Their unit; none if empty.
+
+    Raises:
+        RobotLayoutsError: ``error``, if they are not that.
+    """
+    floats = [as_float(x) for x in values] if _is_row(values) else [None]
+    known = tuple(x for x in floats if x is not None)
+    end = f" {unit}" if unit else ""
+    if len(known) != len(floats):
+        raise error(f"{what} is {shown(values)}; it takes {count} numbers{end and f' ({unit})'}")
+    if len(known) != count or not all(abs(x) <= largest for x in known):
+        raise error(
+            f"{what} is {shown(known)}; it takes {count} finite numbers, none beyond"
+            f" {largest:g}{end}"
+        )
+    return known
+
+
 def checked_flag(what: str, value: Any, error: type[RobotLayoutsError]) -> bool:
     """Return a truth value, Python's or NumPy's.
 
@@ -85,8 +120,8 @@ def checked_choice(
 
 
 def shown(value: Any) -> str:
-    """Return what a user gave, as short as it has to be in a message."""
-    return shortened(value)
+    """Return what a user gave, as short as it has to be in a message, without addresses."""
+    return _SHORT.repr(value)
 
 
 def as_float(value: Any) -> float | None:
@@ -99,5 +134,26 @@ def as_float(value: Any) -> float | None:
         return None
 
 
+class _Short(Repr):
+    """Representations of some 80 characters."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxstring = self.maxother = self.maxlong = 80
+
+    def repr_instance(self, x: Any, level: int) -> str:
+        text = super().repr_instance(x, level)
+        return f"<{type(x).__name__}>" if type(x).__repr__ is object.__repr__ else text
+
+
+_SHORT = _Short()
+
+
 def _is_flag(value: Any) -> bool:
     return type(value).__name__ in ("bool", "bool_")  # NumPy's too, which this room does not load
+
+
+def _is_row(values: Any) -> bool:
+    """Whether values have an order and an end, so that each has its place."""
+    ordered = isinstance(values, Sequence) and not isinstance(values, (str, bytes))
+    return ordered or getattr(values, "ndim", 0) == 1  # an array or a tensor
