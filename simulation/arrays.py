@@ -7,6 +7,7 @@ they are torch's here.
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,16 @@ Array = NDArray[Any]
 def constants(*values: float) -> tuple[Floats, ...]:
     """Return numbers as float32 arrays of shape (), which NumPy need not convert at every use."""
     return tuple(np.array(value, np.float32) for value in values)
+
+
+def all_finite(values: Array) -> bool:
+    """Tell whether every number is finite; takes half a microsecond, where `numpy.all` takes two.
+
+    A sum of squares is finite unless a number is not, or is larger than 1e19.
+    """
+    if values.size == 1:
+        return isfinite(values.item())
+    return isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())
 
 
 def tanh(x: Array) -> Floats:

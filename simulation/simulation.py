@@ -12,7 +12,7 @@ from layouts import Layout
 from robots import RobotDescriptor
 from simulation.blueprint import Blueprint
 from simulation.controller import JointPositionController
-from simulation.physics import PhysicsSettings
+from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, substeps
 from simulation.readout import ReadoutIndex
 from simulation.state import State
 from simulation.world import World
@@ -48,13 +48,17 @@ class Simulation:
             physics: Solver settings; None keeps SAPIEN's own defaults.
             control_frequency: Control steps per second (Hz).
             visuals: Whether to build what pictures need.
+
+        Raises:
+            SimulationError: If a control step is not a whole number of physics steps.
+            AssetError: If robot files cannot be found.
         """
+        self.substeps = substeps(physics or SAPIEN_DEFAULTS, control_frequency)
         self.layout = layout
         self._physics, self._visuals = physics, visuals
         self._blueprints: dict[str, Blueprint] = {}
         self.stamp = 0
         self.worlds = [self._build_world(i, build) for i in range(num_envs)]
-        self.substeps = round(1 / (self.worlds[0].physics.timestep * control_frequency))
         self._after_build()
 
     def rebuild(self, env_ids: Sequence[int], build: Callable[[World, int], None]) -> None:

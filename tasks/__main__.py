@@ -11,14 +11,21 @@ from rich.console import Console
 
 from layouts.view_command import add_page_options, page_words, show
 from robots.commands import exit_code, start
-from tasks.description import TaskFacts, describe, facts, list_table, parity_verdicts
+from tasks.description import (
+    declared_facts,
+    describe,
+    list_table,
+    parity_verdicts,
+    recorded_sizes,
+)
 from tasks.registry import list_tasks, make
 from tasks.view import task_cell
 
 MIN_WIDTH = 120  # columns that a table may take; a narrower terminal wraps it
 LEGEND = (
     "norm is normalized_dense; the first reward mode is the default. parity: the last recorded"
-    " comparison with native ManiSkill, where there was one."
+    " comparison with native ManiSkill, where there was one; obs is the size recorded there."
+    " `describe TASK` counts the observation of any task, which takes its robots' files."
 )
 
 
@@ -36,21 +43,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _list(options: argparse.Namespace) -> None:
-    verdicts = parity_verdicts()
+    verdicts, sizes = parity_verdicts(), recorded_sizes()
+    rows = [declared_facts(task_id, sizes.get(task_id)) for task_id in list_tasks()]
     console = _console()
-    console.print(list_table(_all_facts(), verdicts))
+    console.print(list_table(rows, verdicts))
     console.print(LEGEND)
-
-
-def _all_facts() -> list[TaskFacts]:
-    """Make every task once, which takes seconds, and say so where someone watches."""
-    found: list[TaskFacts] = []
-    task_ids = list_tasks()
-    with Console(stderr=True).status("") as status:
-        for number, task_id in enumerate(task_ids, start=1):
-            status.update(f"making {task_id} to count its numbers ({number} of {len(task_ids)})")
-            found.append(facts(task_id))
-    return found
 
 
 def _describe(options: argparse.Namespace) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 import os
 import weakref
 from collections.abc import Callable, Mapping, Sequence
@@ -18,15 +17,17 @@ from numpy.typing import NDArray
 
 from robots import SimulationError, TaskError, unknown_name_message
 from tasks.actions import ActionReader
+from tasks.arguments import RECONFIGURE, checked_options, checked_seeds
 from tasks.fronts.batch import FINAL, INFO, OBSERVATION, Beginning, Part
 from tasks.fronts.gymnasium import RENDER_MODES
 from tasks.fronts.workers import Failure, InProcess, WorkerError, Workers, WorkersFailed
 from tasks.observation import space_of
+from tasks.randomness import FirstSeeds
 from tasks.registry import get_task_class, make_scenario
 from tasks.remade import Remade
 from tasks.task import FIRST_SEED
 
-RESET_OPTIONS = ("reconfigure", "reset_mask")
+RESET_OPTIONS = (RECONFIGURE, "reset_mask")
 
 _Flags = NDArray[np.bool_]
 _Arguments = ParamSpec("_Arguments")
@@ -123,6 +124,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         self.action_split = layout.action_split
         self._reader = ActionReader(layout, num_envs)
         self._seeds = [FIRST_SEED + i for i in range(num_envs)]
+        self._first = FirstSeeds(num_envs)
         self._everywhere = np.ones(num_envs, bool)
         bounds = [(i * num_envs) // max(workers, 1) for i in range(max(workers, 1) + 1)]
         parts = [
@@ -153,23 +155,26 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
 
         Args:
             seed: ``k`` seeds environment i with k + i; a list gives each its own; None lets the
-                random streams run on.
+                random streams run on, the first time from a seed that the system's entropy gives.
             options: ``{"reset_mask": mask}`` resets only where the mask, (N,) bool, is true;
                 ``{"reconfigure": True}`` rebuilds the worlds.
 
         Returns:
-            Observation of all environments and info, which tells of those that were reset.
+            Observation of all environments and info, which tells of those that were reset:
+            ``info["seed"]`` is what their random streams began with, (N,) int64.
 
         Raises:
             TaskError: If an argument makes no sense; nothing is reset then.
             WorkerError: If workers die, hang or fail.
         """
         mask, reconfigure = self._checked_options(options)
-        seeds = self._checked_seeds(seed)
+        everyone = range(self.num_envs)
+        seeds = self._first.fill(checked_seeds(seed, everyone), everyone)
         if seed is None or isinstance(seed, int):
             super().reset(seed=seed)
         ids = np.flatnonzero(mask).tolist()
         self._call("reset", self._beginnings(ids, seeds, reconfigure), lambda: self._begun(mask))
+        self._first.given(ids)
         self._note(ids, seeds)
         return self._begun(mask)
 
@@ -215,7 +220,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         if wrong := [i for i in given if i not in ids]:
             raise TaskError(f"environments {wrong} are not gone; those that are: {ids}")
         wanted = [given.get(i, own) for i, own in enumerate(self._seeds)]
-        seeds = self._checked_seeds(wanted)
+        seeds = checked_seeds(wanted, range(self.num_envs))
         try:
             if gone:
                 self._crew.start(gone)
@@ -356,10 +361,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
     # -- checks ------------------------------------------------------------------------------
 
     def _checked_options(self, options: Mapping[str, Any] | None) -> tuple[_Flags, bool]:
-        options = options or {}
-        for key in options:
-            if key not in RESET_OPTIONS:
-                raise TaskError(unknown_name_message("reset option", key, RESET_OPTIONS))
+        options = checked_options(options, RESET_OPTIONS)
         mask = options.get("reset_mask")
         if mask is None:
             mask = self._everywhere
@@ -371,23 +373,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             )
         elif not mask.any():
             raise TaskError("reset_mask is false everywhere; it must be true somewhere")
-        return mask, bool(options.get("reconfigure", False))
-
-    def _checked_seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
-        if seed is None:
-            return [None] * self.num_envs
-        try:
-            if isinstance(seed, Sequence | np.ndarray):
-                seeds = [None if s is None else operator.index(s) for s in seed]
-            else:
-                seeds = [operator.index(seed) + i for i in range(self.num_envs)]
-        except TypeError:
-            raise TaskError(f"seed is {seed!r}; it takes an integer or a list of them") from None
-        if len(seeds) != self.num_envs:
-            raise TaskError(f"{len(seeds)} seeds for {self.num_envs} environments")
-        if not all(s is None or 0 <= s < 2**32 for s in seeds):
-            raise TaskError(f"seeds {seeds} must lie from 0 to 2**32 - 1")
-        return list(seeds)
+        return mask, bool(options.get(RECONFIGURE, False))
 
 
 def _checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
