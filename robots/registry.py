@@ -43,7 +43,8 @@ class RobotRegistry:
             DescriptorError: If another package brings the robot, and that goes wrong.
         """
         if not isinstance(name, str):
-            raise UnknownNameError("robot", name, cls.names(), "It takes a robot's name.")
+            kind = f"of type {type(name).__name__}"
+            raise UnknownNameError("robot", kind, cls.names(), "It takes a robot's name.")
         if name in cls._registered:
             return cls._registered[name]
         if name in CATALOGUE:

@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -970,13 +970,10 @@ def _server_cannot_load() -> None:
 def _vector(task_id: str = TASK, num_envs: int = 2, **fields: Any) -> Generator[Any]:
     """Give a vector, and close it in the end."""
     from tasks.fronts.vector import VectorTask
-    from tests.tasks import breaking  # noqa: F401  (offers its tasks)
+    from tests.tasks.breaking import offered
 
-    env = VectorTask(task_id, num_envs, **{"num_workers": 1, **fields})
-    try:
+    with offered(), closing(VectorTask(task_id, num_envs, **{"num_workers": 1, **fields})) as env:
         yield env
-    finally:
-        env.close()
 
 
 def _actions(env: Any) -> Any:

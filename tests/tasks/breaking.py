@@ -4,8 +4,12 @@ import ctypes
 import os
 import sys
 import time
+from contextlib import contextmanager
+
+import gymnasium
 
 from robots import TaskError
+from tasks import registry
 from tasks.push_cube import PushCube
 from tasks.registry import register_task
 from tasks.task import FIRST_SEED
@@ -78,10 +82,13 @@ def _in_hook(name):
     return hook
 
 
+TASKS = {}  # id → class of each task that can be offered
+
+
 def _offer(name, **attributes):
     hooks = {attributes["hook"]: _in_hook(attributes["hook"])}
     cls = type(name, (Breaks,), {**attributes, **hooks, "__module__": __name__})
-    globals()[name] = register_task(f"{name}-v1")(cls)
+    globals()[name] = TASKS[f"{name}-v1"] = cls
 
 
 for _hook in HOOKS:
@@ -124,13 +131,28 @@ class Grows(PushCube):
         return {**super().evaluate(state), **more}
 
 
-for _cls in (SlowSteps, BusySteps, SlowBuild, Grows):
-    register_task(f"{_cls.__name__}-v1")(_cls)
-
-
-@register_task("Refuses-v1")
 class Refuses(PushCube):
     """Cannot be built, for a reason of ours."""
 
     def build(self, world):
         raise TaskError("no such goal")
+
+
+TASKS.update(
+    {f"{cls.__name__}-v1": cls for cls in (SlowSteps, BusySteps, SlowBuild, Grows, Refuses)}
+)
+
+
+@contextmanager
+def offered():
+    """Register these tasks meanwhile, so that no other test meets them in the catalogue."""
+    new = {task_id: cls for task_id, cls in TASKS.items() if task_id not in registry._listed}
+    for task_id, cls in new.items():
+        register_task(task_id)(cls)
+    try:
+        yield
+    finally:
+        for task_id in new:
+            del registry._registered[task_id.lower()]
+            registry._listed.remove(task_id)
+            gymnasium.registry.pop(f"RobotLayouts/{task_id}", None)

@@ -31,6 +31,12 @@ TASK = "PushCube-v1"
 ACTION = np.full((2, 8), 0.2, np.float32)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def tasks_that_break():
+    with breaking.offered():
+        yield
+
+
 def vector(workers, task_id=TASK, **fields):
     return closing(VectorTask(task_id, 2, num_workers=workers, **fields))
 
@@ -347,6 +353,3 @@ def test_a_closed_vector_can_be_pickled():
     with suppress(SimulationError):
         env.reset()
         raise AssertionError("the closed one is open again")
-
-
-assert breaking  # whose tasks are registered
