@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from layouts import around_table
 from robots.descriptor import Vector3
 from simulation import Camera, PhysicsSettings, State, World
-from simulation.arrays import Array, Flags, Floats, constants, norm
+from simulation.maths import Array, Flags, Floats, norm, stack, where
 from simulation.shapes import Color
 from tasks.props import (
     BLUE,
@@ -76,18 +74,18 @@ class FourRobotStack(MultiRobotTask):
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: stacked in order at the middle, at rest and let go."""
-        told: dict[str, Array] = {}
+        info: dict[str, Array] = {}
         below: str | None = None
-        done = np.ones(self.num_envs, bool)
+        done = state.full(True)
         for place in ORDER:
             grasped = state.is_grasping(place, f"cube_{place}")
             done = done & _lies_in_place(state, place, below)
-            told |= {f"is_{place}_grasping": grasped, f"is_{place}_placed": done & ~grasped}
+            info |= {f"is_{place}_grasping": grasped, f"is_{place}_placed": done & ~grasped}
             below = place
         success = done
         for place in ORDER:
-            success = success & told[f"is_{place}_placed"] & is_at_rest(state, f"cube_{place}")
-        return {**told, "success": success}
+            success = success & info[f"is_{place}_placed"] & is_at_rest(state, f"cube_{place}")
+        return {**info, "success": success}
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:
         """Of each arm: TCP, cube, the way between them and the cube's to its place."""
@@ -97,7 +95,7 @@ class FourRobotStack(MultiRobotTask):
             parts[f"{place}_tcp_pose"] = state.tcp_pose(place)
             parts[f"{cube}_pose"] = state.pose(cube)
             parts[f"{place}_tcp_to_cube_pos"] = state.tcp_offset(place, cube)
-            parts[f"{cube}_to_place_pos"] = _PLACES[level] - state.position(cube)
+            parts[f"{cube}_to_place_pos"] = state.array(_PLACES[level]) - state.position(cube)
             parts[f"is_{place}_grasping"] = info[f"is_{place}_grasping"]
         return parts
 
@@ -105,29 +103,23 @@ class FourRobotStack(MultiRobotTask):
         """For each arm reach (0.2), grasp (0.3) and carry (0.9), 1 when placed; 5 on success."""
         cubes = {place: f"cube_{place}" for place in ORDER}
         to_cube = [state.tcp_distance(place, cube) for place, cube in cubes.items()]
-        astray = norm(_PLACES[:, None] - [state.position(cube) for cube in cubes.values()])
-        near = np.array(closeness(*to_cube, *astray)).reshape(2, len(ORDER), -1)
-        grasped, placed = (
-            np.array([info[f"is_{place}_{what}"] for place in ORDER])
-            for what in ("grasping", "placed")
-        )
-        parts = np.where(grasped, _GRASPED + _CARRIED * near[1], _REACHED * near[0])
-        reward = np.add.reduce(np.where(placed, _ONE, parts))
-        return np.where(info["success"], _DONE, reward)
+        positions = stack([state.position(cube) for cube in cubes.values()])
+        astray = norm(state.array(_PLACES)[:, None] - positions)
+        terms = closeness(*to_cube, *astray)
+        reach, carry = stack(terms[: len(ORDER)]), stack(terms[len(ORDER) :])
+        grasped = stack([info[f"is_{place}_grasping"] for place in ORDER])
+        placed = stack([info[f"is_{place}_placed"] for place in ORDER])
+        parts = where(placed, 1.0, where(grasped, 0.3 + 0.6 * carry, 0.2 * reach))
+        return where(info["success"], 5.0, sum(parts))
 
 
 def _lies_in_place(state: State, place: str, below: str | None) -> Flags:
     """Whether a cube lies on the one below it, the lowest one at the middle, shape (N,) bool."""
     cube = f"cube_{place}"
     if below is not None:
-        return lies_on(state, cube, f"cube_{below}", _ASIDE, _CUBE_SIZE)
-    return state.planar_distance(cube, "goal_region") <= _GOAL_RADIUS
+        return lies_on(state, cube, f"cube_{below}", _ASIDE, 2 * CUBE_HALF_SIZE)
+    return state.planar_distance(cube, "goal_region") <= GOAL_RADIUS
 
 
-_ONE, _DONE = constants(1.0, 5.0)
-_REACHED, _GRASPED, _CARRIED = constants(0.2, 0.3, 0.6)
-_GOAL_RADIUS, _CUBE_SIZE = constants(GOAL_RADIUS, 2 * CUBE_HALF_SIZE)
-_ASIDE = diagonal(CUBE_HALF_SIZE) + np.float32(TOLERANCE)
-_PLACES = np.array(
-    [[0.0, 0.0, (2 * i + 1) * CUBE_HALF_SIZE] for i in range(len(ORDER))], np.float32
-)
+_ASIDE = diagonal(CUBE_HALF_SIZE, TOLERANCE)
+_PLACES = tuple((0.0, 0.0, (2 * i + 1) * CUBE_HALF_SIZE) for i in range(len(ORDER)))

@@ -13,7 +13,7 @@ from torch import Tensor
 from layouts import Layout
 from robots import TaskError, unknown_name_message
 from simulation import Simulation, State
-from simulation.arrays import Floats
+from simulation.maths import Floats
 
 StateDict = dict[str, dict[str, Tensor]]
 

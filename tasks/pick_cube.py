@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import ClassVar
-
-import numpy as np
 
 from layouts import single
 from simulation import PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, Floats, constants
+from simulation.maths import Array, Floats, where
 from tasks.props import add_cube, add_goal
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -49,10 +46,6 @@ class PickCube(MultiRobotTask):
     spawn_centre: ClassVar[tuple[float, float]] = (0.0, 0.0)
     max_goal_height: ClassVar[float] = 0.3
 
-    @cached_property
-    def _goal_radius(self) -> Floats:
-        return np.array(self.goal_radius, np.float32)
-
     def build(self, world: World) -> None:
         """Add the table, the cube and the goal."""
         add_table(world)
@@ -69,11 +62,11 @@ class PickCube(MultiRobotTask):
 
     def _place(self, rng: EpisodeRandom) -> list[float]:
         offset = rng.uniform(1, 2) * (self.spawn_half_size * 2) - self.spawn_half_size
-        return (offset[0].numpy() + np.array(self.spawn_centre, np.float32)).tolist()
+        return (offset[0] + offset.new_tensor(self.spawn_centre)).tolist()
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: placed and static."""
-        placed = state.distance("cube", "goal_site") <= self._goal_radius
+        placed = state.distance("cube", "goal_site") <= self.goal_radius
         static = state.is_static("arm", STATIC_SPEED)
         return {
             "success": placed & static,
@@ -102,7 +95,4 @@ class PickCube(MultiRobotTask):
         )
         grasped, placed = info["is_grasped"], info["is_obj_placed"]
         reward = reach + grasped + place * grasped + still * placed
-        return np.where(info["success"], _DONE, reward)
-
-
-(_DONE,) = constants(5.0)
+        return where(info["success"], 5.0, reward)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from layouts import single
 from simulation import Box, Camera, PhysicsSettings, Sphere, State, World, add_table
-from simulation.arrays import Array, Floats, constants
+from simulation.maths import Array, Floats, where
 from tasks.props import DARK_BLUE, WHITE
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -57,7 +55,7 @@ class PlaceSphere(MultiRobotTask):
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: in the bin, at rest and let go."""
         grasped = state.is_grasping("arm", "sphere")
-        placed = lies_on(state, "sphere", "bin", _TOLERANCE, _RADIUS, _WALL)
+        placed = lies_on(state, "sphere", "bin", TOLERANCE, RADIUS, WALL)
         static = is_at_rest(state, "sphere")
         return {
             "is_obj_grasped": grasped,
@@ -81,14 +79,14 @@ class PlaceSphere(MultiRobotTask):
         grasped = info["is_obj_grasped"]
         reach, place = closeness(
             state.tcp_distance("arm", "sphere"),
-            distance_to_top(state, "sphere", "bin", _WALL, _RADIUS),
+            distance_to_top(state, "sphere", "bin", WALL, RADIUS),
         )
-        released = letting_go(state, "arm", grasped, _RELEASED)
+        released = letting_go(state, "arm", grasped, 16.0)
         arm_static = state.is_static("arm", STATIC_SPEED)
-        placed = _FROM_3 + (released + stillness(state, "sphere") + arm_static) / _THREE
-        reward = np.where(grasped, _FROM_2 + place, _TWO * reach)
-        reward = np.where(info["is_obj_on_bin"], placed, reward)
-        return np.where(info["success"], _DONE, reward)
+        placed = 6.0 + (released + stillness(state, "sphere") + arm_static) / 3.0
+        reward = where(grasped, 4.0 + place, 2.0 * reach)
+        reward = where(info["is_obj_on_bin"], placed, reward)
+        return where(info["success"], 13.0, reward)
 
 
 def _bin() -> list[Box]:
@@ -106,8 +104,3 @@ def _bin() -> list[Box]:
             for y in (-across, across)
         ),
     ]
-
-
-_TWO, _THREE = constants(2.0, 3.0)
-_FROM_2, _FROM_3, _RELEASED, _DONE = constants(4.0, 6.0, 16.0, 13.0)  # rewards
-_RADIUS, _WALL, _TOLERANCE = constants(RADIUS, WALL, TOLERANCE)  # m

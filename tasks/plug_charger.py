@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import pi
-
-import numpy as np
 
 from layouts import single
 from robots.descriptor import Vector3
 from simulation import Box, PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, constants, norm
+from simulation.maths import Array, norm
 from simulation.shapes import POLISHED, Finish, linear
 from tasks.poses import angle_between, compose
 from tasks.props import WHITE
@@ -126,24 +123,19 @@ class PlugCharger(MultiRobotTask):
         turn = rng.yaw_quaternion(*RECEPTACLE_YAW)
         world.set_pose("receptacle", (x, y, RECEPTACLE_HEIGHT), turn)
 
-    def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
-        """Remember where the charger belongs; native takes that at a reset, never later."""
-        goal = compose(state.pose("receptacle"), _HALF_TURN)
-        if len(env_ids) == self.num_envs:
-            self._goal = goal
-        else:
-            self._goal = self._goal.copy()
-            self._goal[list(env_ids)] = goal[list(env_ids)]
+    def remember(self, state: State) -> dict[str, Array]:
+        """Where the charger belongs; native takes that at a reset, never later."""
+        return {"goal": compose(state.pose("receptacle"), state.array(_HALF_TURN))}
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: near the plugged-in pose, in position and angle."""
         charger = state.pose("charger")
-        distance = norm(self._goal[:, :3] - charger[:, :3])
-        angle = angle_between(self._goal[:, 3:], charger[:, 3:])
+        distance = norm(self.memory.goal[:, :3] - charger[:, :3])
+        angle = angle_between(self.memory.goal[:, 3:], charger[:, 3:])
         return {
             "obj_to_goal_dist": distance,
             "obj_to_goal_angle": angle,
-            "success": (distance <= _PLUGGED_DISTANCE) & (angle <= _PLUGGED_ANGLE),
+            "success": (distance <= PLUGGED_DISTANCE) & (angle <= PLUGGED_ANGLE),
         }
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:
@@ -152,10 +144,9 @@ class PlugCharger(MultiRobotTask):
             "tcp_pose": state.tcp_pose("arm"),
             "charger_pose": state.pose("charger"),
             "receptacle_pose": state.pose("receptacle"),
-            "goal_pose": self._goal,
+            "goal_pose": self.memory.goal,
         }
 
 
-_PLUGGED_DISTANCE, _PLUGGED_ANGLE = constants(PLUGGED_DISTANCE, PLUGGED_ANGLE)
 # The charger plugs in facing the plate. The cosine of a quarter turn is 6e-17 in native, too.
-_HALF_TURN = np.array([[0.0, 0.0, 0.0, 6.123233995736766e-17, 0.0, 0.0, 1.0]], np.float32)
+_HALF_TURN = ((0.0, 0.0, 0.0, 6.123233995736766e-17, 0.0, 0.0, 1.0),)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from math import pi
 
-import numpy as np
-
 from layouts import single
 from simulation import PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, Floats, constants, norm
+from simulation.maths import Array, Floats, norm, where
 from tasks.props import DARK_BLUE, FACE_UP, TARGET_HEIGHT, add_cube, add_peg, add_target
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -74,13 +72,13 @@ class PokeCube(MultiRobotTask):
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: the cube is over the target, and the arm static."""
-        placed = state.planar_distance("cube", "goal_region") < _GOAL_RADIUS
-        angle = np.abs(state.last_euler_angle("peg") - state.last_euler_angle("cube"))
+        placed = state.planar_distance("cube", "goal_region") < GOAL_RADIUS
+        angle = abs(state.last_euler_angle("peg") - state.last_euler_angle("cube"))
         head_distance = norm(_cube_to_head(state)[:, :2])
         return {
             "success": placed & state.is_static("arm", STATIC_SPEED),
             "is_cube_placed": placed,
-            "is_peg_cube_fit": (angle < _MAX_ANGLE) & (head_distance <= _MAX_HEAD_DISTANCE),
+            "is_peg_cube_fit": (angle < MAX_ANGLE) & (head_distance <= MAX_HEAD_DISTANCE),
             "is_peg_grasped": state.is_grasping("arm", "peg"),
             "angle_diff": angle,
             "head_to_cube_dist": head_distance,
@@ -109,17 +107,11 @@ class PokeCube(MultiRobotTask):
             state.distance("cube", "goal_region"),
             state.arm_speed("arm"),
         )
-        held = info["is_peg_grasped"] & (tcp_to_peg < _GRASP_RADIUS)
-        reward = np.where(held, _FROM_2 + near + align, _TWO * reach)
-        reward = np.where(held & info["is_peg_cube_fit"], _FROM_3 + place, reward)
-        reward = np.where(info["is_cube_placed"], reward + still, reward)
-        return np.where(info["success"], _DONE, reward)
-
-
-_TWO, _FROM_2, _FROM_3, _DONE = constants(2.0, 4.0, 7.0, 10.0)
-_GOAL_RADIUS, _GRASP_RADIUS = constants(GOAL_RADIUS, GRASP_RADIUS)
-_MAX_ANGLE, _MAX_HEAD_DISTANCE = constants(MAX_ANGLE, MAX_HEAD_DISTANCE)
-_HEAD_OFFSET = np.array([PEG_HALF_LENGTH, 0.0, 0.0], np.float32)
+        held = info["is_peg_grasped"] & (tcp_to_peg < GRASP_RADIUS)
+        reward = where(held, 4.0 + near + align, 2.0 * reach)
+        reward = where(held & info["is_peg_cube_fit"], 7.0 + place, reward)
+        reward = where(info["is_cube_placed"], reward + still, reward)
+        return where(info["success"], 10.0, reward)
 
 
 def _cube_to_head(state: State) -> Floats:
@@ -128,4 +120,4 @@ def _cube_to_head(state: State) -> Floats:
     As in native, the head is half a peg along the world's x axis from the peg's middle, however
     the peg is turned.
     """
-    return state.position("peg") + _HEAD_OFFSET - state.position("cube")
+    return state.position("peg") + state.array((PEG_HALF_LENGTH, 0.0, 0.0)) - state.position("cube")

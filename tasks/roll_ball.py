@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import hypot
-
-import numpy as np
 
 from layouts import Layout, Placement
 from layouts.placement import load_robot
 from simulation import Camera, PhysicsSettings, Sphere, State, World, add_table
-from simulation.arrays import Array, Floats, constants, norm, tanh
+from simulation.maths import Array, Floats, norm, tanh, where
 from tasks.props import FACE_UP, TARGET_HEIGHT, add_target
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -63,16 +60,13 @@ class RollBall(MultiRobotTask):
         y = rng.uniform(1) * SPAWN_DEPTH - 1.0 + GOAL_RADIUS
         world.set_pose("goal_region", (x.item(), y.item(), TARGET_HEIGHT), FACE_UP)
 
-    def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
-        """Forget that the arm was where it should hit from."""
-        if len(env_ids) == self.num_envs:
-            self._reached = np.zeros(self.num_envs, bool)
-        else:
-            self._reached[list(env_ids)] = False
+    def remember(self, state: State) -> dict[str, Array]:
+        """Whether the arm has been where it should hit from."""
+        return {"reached": state.full(False)}
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: over the target."""
-        return {"success": state.planar_distance("ball", "goal_region") < _GOAL_RADIUS}
+        return {"success": state.planar_distance("ball", "goal_region") < GOAL_RADIUS}
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP, target, ball, how it rolls, and the ways between them."""
@@ -93,14 +87,10 @@ class RollBall(MultiRobotTask):
         """
         off_target = state.offset("goal_region", "ball")
         off_target = off_target / state.distance("goal_region", "ball")[:, None]
-        hit_from = state.position("ball") + off_target * _HIT_OFFSET
+        hit_from = state.position("ball") + off_target * HIT_OFFSET
         hit_distance = norm(hit_from - state.tcp_position("arm"))
-        self._reached |= hit_distance < _HIT_RADIUS
-        rolled = _ONE - tanh(state.planar_distance("ball", "goal_region"))
-        reach = _ONE - tanh(_TWO * hit_distance)
-        reward = np.where(self._reached, _TWENTY * rolled + _ONE, reach)
-        return np.where(info["success"], _DONE, reward)
-
-
-_ONE, _TWO, _TWENTY, _DONE = constants(1.0, 2.0, 20.0, 30.0)
-_GOAL_RADIUS, _HIT_OFFSET, _HIT_RADIUS = constants(GOAL_RADIUS, HIT_OFFSET, HIT_RADIUS)
+        self.memory.reached |= hit_distance < HIT_RADIUS
+        rolled = 1.0 - tanh(state.planar_distance("ball", "goal_region"))
+        reach = 1.0 - tanh(2.0 * hit_distance)
+        reward = where(self.memory.reached, 20.0 * rolled + 1.0, reach)
+        return where(info["success"], 30.0, reward)

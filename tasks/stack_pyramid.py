@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from layouts import single
 from simulation import Camera, PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, Flags, constants
+from simulation.maths import Array, Flags
 from tasks.props import BLUE, GREEN, RED, add_cube
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -82,9 +80,8 @@ def _is_beside(state: State, cube: str, other: str) -> Flags:
 
 def _differs_in_height(state: State, base: str) -> Flags:
     """Whether the blue cube is higher or lower than another one, shape (N,) bool."""
-    return np.abs(state.offset(base, "cubeC")[:, 2]) > _MIN_HEIGHT
+    return abs(state.offset(base, "cubeC")[:, 2]) > MIN_HEIGHT
 
 
-(_MIN_HEIGHT,) = constants(MIN_HEIGHT)
-_ASIDE = diagonal(2 * CUBE_HALF_SIZE) + np.float32(TOLERANCE)
-_APART = 2 * float(diagonal(CUBE_HALF_SIZE))
+_ASIDE = diagonal(2 * CUBE_HALF_SIZE, TOLERANCE)
+_APART = 2 * diagonal(CUBE_HALF_SIZE)

@@ -15,10 +15,11 @@ from torch import Tensor
 from layouts import Layout
 from robots import SimulationError, TaskError
 from simulation import Camera, PhysicsSettings, Simulation, State, World
-from simulation.arrays import Array, Floats
+from simulation.maths import Array, Floats
 from tasks.actions import ActionReader
 from tasks.arguments import check_places, checked_ids, checked_seeds, wants_rebuild
 from tasks.layout_check import refuse_collisions
+from tasks.memory import Memory
 from tasks.native_format import StateDict, StateTape, read_state_dict, write_state_dict
 from tasks.observation import Observer, read_mode, space_of
 from tasks.randomness import EpisodeRandom
@@ -70,6 +71,7 @@ class MultiRobotTask:
         action_space: Actions of all environments, (N, A).
         action_split: Robot name → slice of the flat action, in declared order.
         moving: Which environments the present step advances.
+        memory: What `remember` returned, as attributes.
         observer: What puts its observations together, and its cameras.
         observation_slices: Where each named part stands in the flat observation.
         start: Observation and info of the first reset, when it was made.
@@ -133,8 +135,16 @@ class MultiRobotTask:
         """Return the dense reward, (N,)."""
         raise NotImplementedError
 
+    def remember(self, state: State) -> Mapping[str, Array]:
+        """Return what later steps look back at, by name, each (N, …), as it is after a reset.
+
+        The task finds it as an attribute of `memory` and may change it there; the rows of
+        environments that are reset are taken anew.
+        """
+        return {}
+
     def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
-        """Remember what later steps compare with; called after ``env_ids`` were reset."""
+        """Do what a new episode needs besides; called after ``env_ids`` were reset."""
 
     def respond(self, state: State) -> None:
         """Move bodies in answer to a control step, before the step is judged.
@@ -198,6 +208,7 @@ class MultiRobotTask:
         self._elapsed = np.zeros(self.num_envs, np.int32)
         self._everywhere: Sequence[int] = range(self.num_envs)
         self.moving = self._everywhere
+        self.memory = Memory()
         self._simulation: Simulation | None = Simulation(
             self.layout,
             self._build_world,
@@ -371,6 +382,7 @@ class MultiRobotTask:
             self._camera = None
         self._elapsed[ids] = 0
         state = self._state = self.simulation.read()
+        self.memory.renew(self.remember(state), ids)
         self.begin_episodes(state, ids)
         info = self._info(state)
         self.observer.changed(ids)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from math import cos, pi, radians
 
-import numpy as np
-
 from layouts import face_to_face
 from simulation import Box, Camera, PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, Flags, Floats, arccos, constants, norm
+from simulation.maths import Array, Flags, Floats, arccos, clip, maximum, norm, where
 from tasks.poses import transform
 from tasks.props import DARK_BLUE, RED
 from tasks.randomness import EpisodeRandom
@@ -78,8 +76,8 @@ class TwoRobotLiftBar(MultiRobotTask):
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: lifted, level, held by both arms, which are static."""
         left, right = state.is_grasping("left", "bar"), state.is_grasping("right", "bar")
-        lifted = state.position("bar")[:, 2] >= _HEIGHT
-        level = state.rotation("bar")[:, 2, 2] >= _LEVEL
+        lifted = state.position("bar")[:, 2] >= HEIGHT
+        level = state.rotation("bar")[:, 2, 2] >= cos(LARGEST_TILT)
         static = state.is_static("left", STATIC_SPEED) & state.is_static("right", STATIC_SPEED)
         return {
             "is_bar_lifted": lifted,
@@ -104,8 +102,8 @@ class TwoRobotLiftBar(MultiRobotTask):
     def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Reach (1), grasp (2), lift (4) level (5) and hold still (6); 7 on success."""
         left, right = info["is_left_grasping"], info["is_right_grasping"]
-        below = np.maximum(_HEIGHT - state.position("bar")[:, 2], _ZERO)
-        upright = np.clip(state.rotation("bar")[:, 2, 2], -_ONE, _ONE)
+        below = maximum(HEIGHT - state.position("bar")[:, 2], 0.0)
+        upright = clip(state.rotation("bar")[:, 2, 2], -1.0, 1.0)
         reach_left, reach_right, lift, level, still_left, still_right = closeness(
             norm(_to_grip(state, "left")),
             norm(_to_grip(state, "right")),
@@ -115,21 +113,16 @@ class TwoRobotLiftBar(MultiRobotTask):
             state.arm_speed("right"),
         )
         both: Flags = left & right
-        reward = (reach_left + reach_right + left + right) * _HALF
-        reward = np.where(both, _TWO + _TWO * lift + level, reward)
+        reward = (reach_left + reach_right + left + right) * 0.5
+        reward = where(both, 2.0 + 2.0 * lift + level, reward)
         raised = both & info["is_bar_lifted"] & info["is_bar_level"]
-        reward = np.where(raised, _FIVE + (still_left + still_right) * _HALF, reward)
-        return np.where(info["success"], _DONE, reward)
+        reward = where(raised, 5.0 + (still_left + still_right) * 0.5, reward)
+        return where(info["success"], 7.0, reward)
 
 
 def _to_grip(state: State, robot: str) -> Floats:
     """Way from a robot's TCP to its grip on the bar, shape (N, 3) (m, world)."""
-    return transform(state.pose("bar"), _GRIPS[robot]) - state.tcp_position(robot)
+    return transform(state.pose("bar"), state.array(_GRIPS[robot])) - state.tcp_position(robot)
 
 
-_ZERO, _HALF, _ONE, _TWO, _FIVE, _DONE = constants(0.0, 0.5, 1.0, 2.0, 5.0, 7.0)
-_HEIGHT, _LEVEL = constants(HEIGHT, cos(LARGEST_TILT))
-_GRIPS = {
-    robot: np.array([[side * GRIP, 0.0, 0.0]], np.float32)
-    for robot, side in (("left", -1), ("right", 1))
-}
+_GRIPS = {"left": ((-GRIP, 0.0, 0.0),), "right": ((GRIP, 0.0, 0.0),)}  # in the bar's frame

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from math import pi
 
-import numpy as np
-
 from layouts import face_to_face
 from simulation import Box, Camera, Friction, PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, Floats, constants, norm
+from simulation.maths import Array, Floats, maximum, norm, where
 from tasks.props import DARK_RED, add_goal
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -62,10 +60,10 @@ class TwoRobotPushPick(MultiRobotTask):
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: placed, and held by the picker, which is static."""
-        placed = state.distance("cube", "goal_site") <= _GOAL_RADIUS
+        placed = state.distance("cube", "goal_site") <= GOAL_RADIUS
         grasped = state.is_grasping("picker", "cube")
         return {
-            "is_cube_in_reach": state.position("cube")[:, 1] >= _IN_REACH_Y,
+            "is_cube_in_reach": state.position("cube")[:, 1] >= IN_REACH_Y,
             "is_cube_grasped": grasped,
             "is_cube_placed": placed,
             "success": placed & grasped & state.is_static("picker", STATIC_SPEED),
@@ -87,22 +85,17 @@ class TwoRobotPushPick(MultiRobotTask):
     def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Reach and push (1), approach (2), grasp and carry (5), hold still (7); 8 on success."""
         cube = state.position("cube")
-        push_place = cube + _PUSH_OFFSET
+        push_place = cube + state.array((0.0, PUSH_OFFSET, 0.0))
         reach, across, take, carry, still = closeness(
             norm(push_place - state.tcp_position("pusher")),
-            np.maximum(_IN_REACH_Y - cube[:, 1], _ZERO),
+            maximum(IN_REACH_Y - cube[:, 1], 0.0),
             state.tcp_distance("picker", "cube"),
             state.distance("cube", "goal_site"),
             state.arm_speed("picker"),
         )
         grasped = info["is_cube_grasped"]
-        reward = (reach + across) * _HALF
-        reward = np.where(info["is_cube_in_reach"], _ONE + take, reward)
-        reward = np.where(grasped, _THREE + _TWO * carry, reward)
-        reward = np.where(grasped & info["is_cube_placed"], _SIX + still, reward)
-        return np.where(info["success"], _DONE, reward)
-
-
-_ZERO, _HALF, _ONE, _TWO, _THREE, _SIX, _DONE = constants(0.0, 0.5, 1.0, 2.0, 3.0, 6.0, 8.0)
-_GOAL_RADIUS, _IN_REACH_Y = constants(GOAL_RADIUS, IN_REACH_Y)
-_PUSH_OFFSET = np.array([0.0, PUSH_OFFSET, 0.0], np.float32)
+        reward = (reach + across) * 0.5
+        reward = where(info["is_cube_in_reach"], 1.0 + take, reward)
+        reward = where(grasped, 3.0 + 2.0 * carry, reward)
+        reward = where(grasped & info["is_cube_placed"], 6.0 + still, reward)
+        return where(info["success"], 8.0, reward)
