@@ -3,20 +3,11 @@
 from __future__ import annotations
 
 from layouts import around_table
-from robots.descriptor import Vector3
 from simulation import Camera, PhysicsSettings, State, World
 from simulation.maths import Array, Flags, Floats, norm, stack, where
 from simulation.shapes import Color
-from tasks.props import (
-    BLUE,
-    FACE_UP,
-    GREEN,
-    RED,
-    TARGET_HEIGHT,
-    add_cube,
-    add_target,
-    add_wide_table,
-)
+from tasks.bodies import Cube, Target, WideTable
+from tasks.props import BLUE, FACE_UP, GREEN, RED, TARGET_HEIGHT
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness
@@ -31,12 +22,7 @@ TOLERANCE = 0.005  # beyond half a cube's diagonal
 
 YELLOW: Color = (1.0, 0.8, 0.0, 1.0)
 # Who puts which cube, from the bottom up: the way from the middle to its side of the table.
-ORDER: dict[str, tuple[Vector3, Color]] = {
-    "south": ((0.0, -1.0, 0.0), RED),
-    "east": ((1.0, 0.0, 0.0), GREEN),
-    "north": ((0.0, 1.0, 0.0), BLUE),
-    "west": ((-1.0, 0.0, 0.0), YELLOW),
-}
+ORDER = {"south": (0.0, -1.0), "east": (1.0, 0.0), "north": (0.0, 1.0), "west": (-1.0, 0.0)}
 
 
 @register_task("FourRobotStack-v1")
@@ -56,18 +42,17 @@ class FourRobotStack(MultiRobotTask):
     viewpoint = ((1.3, 1.0, 1.0), (0.0, 0.0, 0.1))
     cameras = (Camera((0.6, 0.6, 0.8), (0.0, 0.0, 0.1)),)
 
-    def build(self, world: World) -> None:
-        """Add the table, the cubes and the target."""
-        add_wide_table(world)
-        for place, (side, color) in ORDER.items():
-            start = (side[0] * SPAWN_LOW[0], side[1] * SPAWN_LOW[0], CUBE_HALF_SIZE)
-            add_cube(world, f"cube_{place}", CUBE_HALF_SIZE, position=start, color=color)
-        add_target(world, GOAL_RADIUS)
+    table = WideTable()
+    cube_south = Cube(CUBE_HALF_SIZE, RED, start=(0.0, -SPAWN_LOW[0], CUBE_HALF_SIZE))
+    cube_east = Cube(CUBE_HALF_SIZE, GREEN, start=(SPAWN_LOW[0], 0.0, CUBE_HALF_SIZE))
+    cube_north = Cube(CUBE_HALF_SIZE, BLUE, start=(0.0, SPAWN_LOW[0], CUBE_HALF_SIZE))
+    cube_west = Cube(CUBE_HALF_SIZE, YELLOW, start=(-SPAWN_LOW[0], 0.0, CUBE_HALF_SIZE))
+    goal_region = Target(GOAL_RADIUS)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay a cube before each arm."""
         world.set_pose("goal_region", (0.0, 0.0, TARGET_HEIGHT), FACE_UP)
-        for place, ((x, y, _), _) in ORDER.items():
+        for place, (x, y) in ORDER.items():
             out, aside = rng.uniform_between(SPAWN_LOW, SPAWN_HIGH).tolist()
             position = (out * x - aside * y, out * y + aside * x, CUBE_HALF_SIZE)
             world.set_pose(f"cube_{place}", position, rng.yaw_quaternion())

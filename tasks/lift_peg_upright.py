@@ -5,9 +5,10 @@ from __future__ import annotations
 from math import cos, pi, sin
 
 from layouts import single
-from simulation import PhysicsSettings, State, World, add_table
+from simulation import PhysicsSettings, State, World
 from simulation.maths import Array, Floats, where
-from tasks.props import DARK_BLUE, DARK_RED, add_peg
+from tasks.bodies import Peg
+from tasks.props import DARK_BLUE, DARK_RED
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness
@@ -37,18 +38,7 @@ class LiftPegUpright(MultiRobotTask):
     max_episode_steps = 50
     max_reward = 3
 
-    def build(self, world: World) -> None:
-        """Add the table and the peg."""
-        add_table(world)
-        add_peg(
-            world,
-            "peg",
-            PEG_HALF_LENGTH,
-            PEG_HALF_WIDTH,
-            tail=DARK_RED,
-            head=DARK_BLUE,
-            position=(0.0, 0.0, 0.1),
-        )
+    peg = Peg(PEG_HALF_LENGTH, PEG_HALF_WIDTH, DARK_RED, DARK_BLUE, start=(0.0, 0.0, 0.1))
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the peg on the table."""

@@ -6,9 +6,10 @@ from typing import ClassVar
 
 from layouts import single
 from robots.descriptor import Vector3
-from simulation import PhysicsSettings, State, World, add_table
+from simulation import PhysicsSettings, State, World
 from simulation.maths import Array, Floats, norm
-from tasks.props import DARK_BLUE, FACE_UP, TARGET_HEIGHT, add_cube, add_target
+from tasks.bodies import Cube, Target
+from tasks.props import DARK_BLUE, FACE_UP, TARGET_HEIGHT
 from tasks.randomness import EpisodeRandom
 from tasks.task import Info, MultiRobotTask
 
@@ -34,11 +35,8 @@ class MovedCube(MultiRobotTask):
     direction: ClassVar[int]
     touch_offset: ClassVar[Vector3]
 
-    def build(self, world: World) -> None:
-        """Add the table, the cube and the target."""
-        add_table(world)
-        add_cube(world, "cube", CUBE_HALF_SIZE, (0.0, 0.0, CUBE_HALF_SIZE), DARK_BLUE)
-        add_target(world, GOAL_RADIUS)
+    cube = Cube(CUBE_HALF_SIZE, DARK_BLUE)
+    goal_region = Target(GOAL_RADIUS)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the cube on the table and the target behind it or before it."""

@@ -6,9 +6,10 @@ from math import pi
 
 from layouts import single
 from robots.descriptor import Vector3
-from simulation import Box, PhysicsSettings, State, World, add_table
+from simulation import Box, PhysicsSettings, State, World
 from simulation.maths import Array, norm
 from simulation.shapes import POLISHED, Finish, linear
+from tasks.bodies import Compound
 from tasks.poses import angle_between, compose
 from tasks.props import WHITE
 from tasks.randomness import EpisodeRandom
@@ -33,7 +34,7 @@ BRASS = linear("#DBB539")
 GLOSSY = Finish(roughness=0.1)
 
 
-def charger() -> list[Box]:
+def charger_shapes() -> tuple[Box, ...]:
     """Return the two prongs and the body; the origin is where the prongs leave the body."""
     prongs = [
         Box(
@@ -50,10 +51,10 @@ def charger() -> list[Box]:
         color=WHITE,
         finish=GLOSSY,
     )
-    return [*prongs, body]
+    return (*prongs, body)
 
 
-def receptacle() -> list[Box]:
+def receptacle_shapes() -> tuple[Box, ...]:
     """Return the plate around two slots, as five boxes, and the brass that shows in the slots."""
     depth, width, height = RECEPTACLE_HALF_SIZE
     slot_width, slot_height = (size + CLEARANCE for size in PRONG_HALF_SIZE[1:])
@@ -71,7 +72,7 @@ def receptacle() -> list[Box]:
             collides=not brass,
         )
 
-    return [
+    return (
         box(0.0, lid_z, (depth, width, lid)),
         box(0.0, -lid_z, (depth, width, lid)),
         box(side_y, 0.0, (depth, side, height)),
@@ -79,7 +80,7 @@ def receptacle() -> list[Box]:
         box(0.0, 0.0, (depth, PRONG_OFFSET - slot_width, slot_height)),
         box(-slot_y, 0.0, (depth, slot_width, slot_height), brass=True),
         box(slot_y, 0.0, (depth, slot_width, slot_height), brass=True),
-    ]
+    )
 
 
 @register_task("PlugCharger-v1", "maniskill.plug_charger_native")
@@ -98,12 +99,10 @@ class PlugCharger(MultiRobotTask):
     reward_modes = ("none", "sparse")
     viewpoint = ((0.3, 0.4, 0.35), (-0.05, 0.0, 0.08))
 
-    def build(self, world: World) -> None:
-        """Add the table, the charger and the receptacle."""
-        add_table(world)
-        world.add("charger", *charger(), position=(0.0, 0.0, BODY_HALF_SIZE[2]))
-        above = (0.0, 0.0, RECEPTACLE_HEIGHT)
-        world.add("receptacle", *receptacle(), kind="kinematic", position=above)
+    charger = Compound(charger_shapes(), start=(0.0, 0.0, BODY_HALF_SIZE[2]))
+    receptacle = Compound(
+        receptacle_shapes(), start=(0.0, 0.0, RECEPTACLE_HEIGHT), kind="kinematic"
+    )
 
     def reset_robots(self, world: World, rng: EpisodeRandom) -> None:
         """Stand the arm with noise from the torch stream.

@@ -5,9 +5,10 @@ from __future__ import annotations
 from math import pi
 
 from layouts import single
-from simulation import PhysicsSettings, State, World, add_table
+from simulation import PhysicsSettings, State, World
 from simulation.maths import Array, Floats, norm, where
-from tasks.props import DARK_BLUE, FACE_UP, TARGET_HEIGHT, add_cube, add_peg, add_target
+from tasks.bodies import Cube, Peg, Target
+from tasks.props import DARK_BLUE, FACE_UP, TARGET_HEIGHT
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness
@@ -45,20 +46,9 @@ class PokeCube(MultiRobotTask):
     max_reward = 10
     viewpoint = ((0.6, 0.7, 0.6), (0.2, 0.2, 0.35))
 
-    def build(self, world: World) -> None:
-        """Add the table, the cube, the peg and the target."""
-        add_table(world)
-        add_cube(world, "cube", CUBE_HALF_SIZE, (1.0, 0.0, CUBE_HALF_SIZE))
-        add_peg(
-            world,
-            "peg",
-            PEG_HALF_LENGTH,
-            PEG_HALF_WIDTH,
-            tail=DARK_BLUE,
-            head=DARK_BLUE,
-            position=(0.0, 0.0, PEG_HALF_WIDTH),
-        )
-        add_target(world, GOAL_RADIUS)
+    cube = Cube(CUBE_HALF_SIZE, start=(1.0, 0.0, CUBE_HALF_SIZE))
+    peg = Peg(PEG_HALF_LENGTH, PEG_HALF_WIDTH, DARK_BLUE, DARK_BLUE)
+    goal_region = Target(GOAL_RADIUS)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay down the peg, the cube beyond its head and the target behind the cube."""

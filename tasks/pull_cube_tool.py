@@ -5,11 +5,12 @@ from __future__ import annotations
 from math import pi
 
 from layouts import single
-from simulation import Box, Camera, PhysicsSettings, State, World, add_table
+from simulation import Box, Camera, PhysicsSettings, State, World
 from simulation.maths import Array, Flags, Floats, floats, norm, tanh, where
 from simulation.shapes import POLISHED
 from simulation.state import once_per_state
-from tasks.props import DARK_BLUE, RED, add_cube
+from tasks.bodies import Compound, Cube
+from tasks.props import DARK_BLUE, RED
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness
@@ -28,6 +29,24 @@ PULLED_DISTANCE = 0.6  # of the cube from the robot's base, seen from above
 MAX_GRASP_ANGLE = 20.0  # degrees; of the tool, for the reward
 
 
+def tool_shapes() -> tuple[Box, Box]:
+    """Return handle and hook; the origin is the handle's end."""
+    handle = Box(
+        half_size=(HANDLE_LENGTH / 2, WIDTH / 2, HEIGHT / 2),
+        position=(HANDLE_LENGTH / 2, 0.0, 0.0),
+        density=HANDLE_DENSITY,
+        color=RED,
+        finish=POLISHED,
+    )
+    hook = Box(
+        half_size=(HOOK_LENGTH / 2, WIDTH, HEIGHT / 2),
+        position=(HANDLE_LENGTH - HOOK_LENGTH / 2, WIDTH, 0.0),
+        color=RED,
+        finish=POLISHED,
+    )
+    return handle, hook
+
+
 @register_task("PullCubeTool-v1", "maniskill.pull_cube_tool_native")
 class PullCubeTool(MultiRobotTask):
     """Grasp an L-shaped tool and pull a cube with it that is out of the arm's reach.
@@ -44,25 +63,8 @@ class PullCubeTool(MultiRobotTask):
     max_reward = 5
     cameras = (Camera((0.3, 0.0, 0.5), (-0.1, 0.0, 0.1)),)
 
-    def build(self, world: World) -> None:
-        """Add the table, the cube and the tool."""
-        add_table(world)
-        origin = (0.0, 0.0, 0.0)
-        add_cube(world, "cube", CUBE_HALF_SIZE, position=origin, color=DARK_BLUE)
-        handle = Box(
-            half_size=(HANDLE_LENGTH / 2, WIDTH / 2, HEIGHT / 2),
-            position=(HANDLE_LENGTH / 2, 0.0, 0.0),
-            density=HANDLE_DENSITY,
-            color=RED,
-            finish=POLISHED,
-        )
-        hook = Box(
-            half_size=(HOOK_LENGTH / 2, WIDTH, HEIGHT / 2),
-            position=(HANDLE_LENGTH - HOOK_LENGTH / 2, WIDTH, 0.0),
-            color=RED,
-            finish=POLISHED,
-        )
-        world.add("l_shape_tool", handle, hook)
+    cube = Cube(CUBE_HALF_SIZE, DARK_BLUE, start=(0.0, 0.0, 0.0))
+    l_shape_tool = Compound(tool_shapes())
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the tool before the robot and the cube beyond its reach."""
@@ -78,11 +80,9 @@ class PullCubeTool(MultiRobotTask):
 
         Progress and distance are told per environment; native averages them over its batch.
         """
-        way = state.position("cube") - state.base_position("arm")
-        success = norm(way[:, :2]) < PULLED_DISTANCE
-        distance = _distance(
-            state.position("cube"), state.base_position("arm") + state.array(_CENTRE)
-        )
+        success = self._success(state)
+        centre = state.base_position("arm") + state.array(_CENTRE)
+        distance = _distance(state.position("cube"), centre)
         return {
             "success": success,
             "success_once": success,  # native's words for the same

@@ -6,8 +6,10 @@ import math
 from math import pi
 
 from layouts import single
-from simulation import Box, Cylinder, Friction, PhysicsSettings, State, World, add_table
+from simulation import Box, Cylinder, Friction, PhysicsSettings, State, World
 from simulation.maths import Array, Floats, cos, rounded, sqrt, where
+from simulation.shapes import Color
+from tasks.bodies import Compound, Table
 from tasks.pixel_cover import CENTRE_OF_MASS_Y, cover, yaw
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -22,6 +24,9 @@ TEE_FRICTION = Friction(3.0, 3.0, 0.0)
 GOAL_XY = (-0.156, -0.1)
 GOAL_YAW = (5 / 3) * pi
 END_MARKER = (-0.321, 0.284, 1e-3)
+ABOVE = (0.0, 0.0, 0.1)  # where everything is built
+RED: Color = (194 / 255, 19 / 255, 22 / 255, 1.0)
+GREY: Color = (128 / 255, 128 / 255, 128 / 255, 1.0)
 SPAWN_SIZE = (0.2, 0.3)
 SPAWN_OFFSET = -0.1
 COVERED = 0.90  # share of the outline that must be covered
@@ -31,7 +36,7 @@ COVERED = 0.90  # share of the outline that must be covered
 FARTHEST_COVERED = 0.045
 
 
-def tee(*, thickness: float, color: tuple[float, float, float, float], collides: bool) -> list[Box]:
+def tee(thickness: float, color: Color, *, collides: bool) -> tuple[Box, ...]:
     """Return the two boxes of a T around its centre of mass, bar first.
 
     Args:
@@ -40,7 +45,7 @@ def tee(*, thickness: float, color: tuple[float, float, float, float], collides:
         collides: Whether it is solid.
     """
     stem_y = 4 * BAR_HALF_SIZE[1] - CENTRE_OF_MASS_Y
-    return [
+    return tuple(
         Box(
             half_size=(*half_size, thickness),
             position=(0.0, y, 0.0),
@@ -49,7 +54,7 @@ def tee(*, thickness: float, color: tuple[float, float, float, float], collides:
             friction=TEE_FRICTION,
         )
         for half_size, y in ((BAR_HALF_SIZE, 0.0 - CENTRE_OF_MASS_Y), (STEM_HALF_SIZE, stem_y))
-    ]
+    )
 
 
 @register_task("PushT-v1", "maniskill.push_t_native")
@@ -67,16 +72,14 @@ class PushT(MultiRobotTask):
     joint_noise_draws = 2
     viewpoint = ((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1))
 
-    def build(self, world: World) -> None:
-        """Add the table, the T, its outline and the marker where the stick starts."""
-        add_table(world, textured=False)
-        red, grey = (194 / 255, 19 / 255, 22 / 255, 1.0), (128 / 255, 128 / 255, 128 / 255, 1.0)
-        above = (0.0, 0.0, 0.1)
-        world.add("Tee", *tee(thickness=HALF_THICKNESS, color=red, collides=True), position=above)
-        outline = tee(thickness=1e-4, color=grey, collides=False)
-        world.add("goal_Tee", *outline, kind="kinematic", position=above)
-        marker = Cylinder(radius=0.02, half_length=1e-4, color=grey, collides=False)
-        world.add("goal_ee", marker, kind="kinematic", position=above)
+    table = Table(textured=False)
+    Tee = Compound(tee(HALF_THICKNESS, RED, collides=True), start=ABOVE)
+    goal_Tee = Compound(tee(1e-4, GREY, collides=False), start=ABOVE, kind="kinematic")
+    goal_ee = Compound(
+        (Cylinder(radius=0.02, half_length=1e-4, color=GREY, collides=False),),
+        start=ABOVE,
+        kind="kinematic",
+    )
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the T down beside its outline."""

@@ -6,9 +6,10 @@ from math import hypot
 
 from layouts import Layout, Placement
 from layouts.placement import load_robot
-from simulation import Camera, PhysicsSettings, Sphere, State, World, add_table
+from simulation import Camera, PhysicsSettings, State, World
 from simulation.maths import Array, Floats, norm, tanh, where
-from tasks.props import FACE_UP, TARGET_HEIGHT, add_target
+from tasks.bodies import Ball, Target
+from tasks.props import FACE_UP, TARGET_HEIGHT
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.task import Info, MultiRobotTask
@@ -44,12 +45,8 @@ class RollBall(MultiRobotTask):
     viewpoint = ((-0.6, 1.3, 0.8), (0.0, 0.13, 0.0))
     cameras = (Camera((-0.1, 0.9, 0.3), (0.0, 0.0, 0.0)),)
 
-    def build(self, world: World) -> None:
-        """Add the table, the ball and the target."""
-        add_table(world)
-        ball = Sphere(radius=BALL_RADIUS, color=(0.0, 0.2, 0.8, 1.0))
-        world.add("ball", ball, position=(0.0, 0.0, 0.1))
-        add_target(world, GOAL_RADIUS)
+    ball = Ball(BALL_RADIUS, (0.0, 0.2, 0.8, 1.0), start=(0.0, 0.0, 0.1))
+    goal_region = Target(GOAL_RADIUS)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the ball before the arm and the target at the far end."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from layouts import single
-from simulation import PhysicsSettings, State, World, add_table
+from simulation import PhysicsSettings, State, World
 from simulation.maths import Array, Floats, where
-from tasks.props import GREEN, RED, add_cube
+from tasks.bodies import Cube
+from tasks.props import GREEN, RED
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness, letting_go, stillness
@@ -35,11 +36,8 @@ class StackCube(MultiRobotTask):
     max_episode_steps = 50
     max_reward = 8
 
-    def build(self, world: World) -> None:
-        """Add the table and both cubes."""
-        add_table(world)
-        add_cube(world, "cubeA", CUBE_HALF_SIZE, position=(0.0, 0.0, 0.1), color=RED)
-        add_cube(world, "cubeB", CUBE_HALF_SIZE, position=(1.0, 0.0, 0.1), color=GREEN)
+    cubeA = Cube(CUBE_HALF_SIZE, RED, start=(0.0, 0.0, 0.1))
+    cubeB = Cube(CUBE_HALF_SIZE, GREEN, start=(1.0, 0.0, 0.1))
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay both cubes on the table."""

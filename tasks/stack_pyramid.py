@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from layouts import single
-from simulation import Camera, PhysicsSettings, State, World, add_table
+from simulation import Camera, PhysicsSettings, State, World
 from simulation.maths import Array, Flags
-from tasks.props import BLUE, GREEN, RED, add_cube
+from tasks.bodies import Cube
+from tasks.props import BLUE, GREEN, RED
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.stacking import diagonal, is_at_rest
@@ -35,11 +36,9 @@ class StackPyramid(MultiRobotTask):
     reward_modes = ("none", "sparse")
     cameras = (Camera((0.3, 0.0, 0.4), (-0.05, 0.0, 0.1)),)
 
-    def build(self, world: World) -> None:
-        """Add the table and the cubes."""
-        add_table(world)
-        for name, x, color in (("cubeA", 0.0, RED), ("cubeB", 1.0, GREEN), ("cubeC", -1.0, BLUE)):
-            add_cube(world, name, CUBE_HALF_SIZE, position=(x, 0.0, 0.2), color=color)
+    cubeA = Cube(CUBE_HALF_SIZE, RED, start=(0.0, 0.0, 0.2))
+    cubeB = Cube(CUBE_HALF_SIZE, GREEN, start=(1.0, 0.0, 0.2))
+    cubeC = Cube(CUBE_HALF_SIZE, BLUE, start=(-1.0, 0.0, 0.2))
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the cubes on the table."""

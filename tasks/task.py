@@ -18,6 +18,7 @@ from simulation import Camera, PhysicsSettings, Simulation, State, World
 from simulation.maths import Array, Floats
 from tasks.actions import ActionReader
 from tasks.arguments import check_places, checked_ids, checked_seeds, wants_rebuild
+from tasks.bodies import Declared, Table, WideTable, declared_bodies
 from tasks.layout_check import refuse_collisions
 from tasks.memory import Memory
 from tasks.native_format import StateDict, StateTape, read_state_dict, write_state_dict
@@ -44,14 +45,18 @@ class _FreshScenario:
 class MultiRobotTask:
     """Something to achieve, for one robot or many; subclasses say what.
 
-    A subclass sets ``layout`` and ``max_episode_steps``, adds its bodies in `build`, places them
-    in `sample` and tells success in `evaluate`. It may say more in `observe` and `dense_reward`.
+    A subclass sets ``layout`` and ``max_episode_steps``, declares its bodies as class attributes
+    (`tasks.bodies`), and tells success in `evaluate`. It may say more in `observe` and
+    `dense_reward`, and override `build` and `sample`, which add and place what is declared.
 
     Attributes:
         task_id: The task's id.
         native_id: Id of the ManiSkill task that it clones; None for a task of our own.
         source: Where its numbers come from; of a clone package, version and file.
         layout: Default layout.
+        table: What the robots stand at, the first of its bodies.
+        bodies: The bodies that its class declares, by name, in the order declared; see
+            `tasks.bodies`.
         robot_counts: How many robots a layout may have, in places called as one likes; None if it
             takes exactly the places of ``layout``.
         physics: Solver settings; None keeps SAPIEN's own defaults.
@@ -83,6 +88,8 @@ class MultiRobotTask:
     source: ClassVar[str] = ""
     scenario: ClassVar[Any] = _FreshScenario()
     layout: Layout
+    table: ClassVar[Table | WideTable] = Table()
+    bodies: ClassVar[Mapping[str, Declared]] = {}
     robot_counts: ClassVar[range | None] = None
     physics: ClassVar[PhysicsSettings | None] = None
     max_episode_steps: ClassVar[int]
@@ -100,8 +107,9 @@ class MultiRobotTask:
     sensed: ClassVar[tuple[str, ...]] = ("*tcp_pose",)
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Offer dense modes exactly if the subclass computes a dense reward."""
+        """Collect the declared bodies; offer dense modes if there is a dense reward."""
         super().__init_subclass__(**kwargs)
+        cls.bodies = declared_bodies(cls)
         if "reward_modes" not in cls.__dict__:
             dense = cls.dense_reward is not MultiRobotTask.dense_reward
             cls.reward_modes = DENSE_MODES if dense else SPARSE_MODES
@@ -113,12 +121,14 @@ class MultiRobotTask:
         return None
 
     def build(self, world: World) -> None:
-        """Add the task's bodies to a world; the robots stand already."""
-        raise NotImplementedError
+        """Add the task's bodies to a world, in the order declared; the robots stand already."""
+        for name, body in self.bodies.items():
+            body.add_to(world, name)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Place the task's bodies for a new episode; the robots are placed already."""
-        raise NotImplementedError
+        for name, body in self.bodies.items():
+            body.place(world, name, rng)
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Return ``success`` (N,) bool and whatever else describes the state.

@@ -5,11 +5,11 @@ from __future__ import annotations
 from math import cos, pi, radians
 
 from layouts import face_to_face
-from simulation import Box, Camera, PhysicsSettings, State, World, add_table
+from simulation import Box, Camera, PhysicsSettings, State
 from simulation.maths import Array, Flags, Floats, arccos, clip, maximum, norm, where
+from tasks.bodies import Area, Compound
 from tasks.poses import transform
 from tasks.props import DARK_BLUE, RED
-from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness
 from tasks.task import Info, MultiRobotTask
@@ -22,11 +22,28 @@ END_HALF_LENGTH = 0.1
 GRIP = 0.25  # of a gripper from the bar's middle
 DENSITY = 500.0  # kg/m³, of wood: 0.8 kg in all, 1 N m about a grip
 
-SPAWN_HALF_SIZE = (0.05, 0.03)  # m
 LARGEST_TURN = radians(20)  # of the bar from the way between the arms
 HEIGHT = 0.2  # of the bar's middle (m)
 LARGEST_TILT = radians(5)
 STATIC_SPEED = 0.2  # rad/s
+
+
+def bar_shapes() -> tuple[Box, ...]:
+    """Return the bar's middle and its two ends."""
+    thick = HALF_THICKNESS
+    middle = Box(
+        half_size=(MIDDLE_HALF_LENGTH, MIDDLE_HALF_WIDTH, thick), density=DENSITY, color=RED
+    )
+    ends = [
+        Box(
+            half_size=(END_HALF_LENGTH, thick, thick),
+            position=(side * (MIDDLE_HALF_LENGTH + END_HALF_LENGTH), 0.0, 0.0),
+            density=DENSITY,
+            color=DARK_BLUE,
+        )
+        for side in (-1, 1)
+    ]
+    return (middle, *ends)
 
 
 @register_task("TwoRobotLiftBar-v1")
@@ -48,30 +65,16 @@ class TwoRobotLiftBar(MultiRobotTask):
     cameras = (Camera((1.0, 0.0, 0.75), (0.0, 0.0, 0.1)),)
     sensed = ("*_tcp_pose", "is_left_grasping", "is_right_grasping")
 
-    def build(self, world: World) -> None:
-        """Add the table and the bar."""
-        add_table(world)
-        thick = HALF_THICKNESS
-        middle = Box(
-            half_size=(MIDDLE_HALF_LENGTH, MIDDLE_HALF_WIDTH, thick), density=DENSITY, color=RED
-        )
-        ends = [
-            Box(
-                half_size=(END_HALF_LENGTH, thick, thick),
-                position=(side * (MIDDLE_HALF_LENGTH + END_HALF_LENGTH), 0.0, 0.0),
-                density=DENSITY,
-                color=DARK_BLUE,
-            )
-            for side in (-1, 1)
-        ]
-        world.add("bar", middle, *ends, position=(0.0, 0.0, thick))
-
-    def sample(self, world: World, rng: EpisodeRandom) -> None:
-        """Lay the bar between the arms, its +x end towards +y."""
-        low = [-half for half in SPAWN_HALF_SIZE]
-        x, y = rng.uniform_between(low, SPAWN_HALF_SIZE).tolist()
-        turn = rng.yaw_quaternion(pi / 2 - LARGEST_TURN, pi / 2 + LARGEST_TURN)
-        world.set_pose("bar", (x, y, HALF_THICKNESS), turn)
+    bar = Compound(
+        bar_shapes(),
+        HALF_THICKNESS,
+        start=(0.0, 0.0, HALF_THICKNESS),
+        spawn=Area(  # its +x end towards +y
+            x=(-0.05, 0.05),
+            y=(-0.03, 0.03),
+            yaw=(pi / 2 - LARGEST_TURN, pi / 2 + LARGEST_TURN),
+        ),
+    )
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: lifted, level, held by both arms, which are static."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from layouts import face_to_face
-from simulation import Camera, PhysicsSettings, State, World, add_table
+from simulation import Camera, PhysicsSettings, State, World
 from simulation.maths import Array, Floats, floats, maximum, norm, tanh, where
-from tasks.props import add_cube, add_goal
+from tasks.bodies import Cube, Goal
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness
@@ -35,11 +35,8 @@ class TwoRobotPickCube(MultiRobotTask):
     cameras = (Camera((1.0, 0.0, 0.75), (0.0, 0.0, 0.25)),)
     sensed = ("left_arm_tcp", "right_arm_tcp")
 
-    def build(self, world: World) -> None:
-        """Add the table, the cube and the goal."""
-        add_table(world)
-        add_cube(world, "cube", CUBE_HALF_SIZE, position=(0.0, 0.0, CUBE_HALF_SIZE))
-        add_goal(world, GOAL_RADIUS)
+    cube = Cube(CUBE_HALF_SIZE)
+    goal_site = Goal(GOAL_RADIUS)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the cube on the left and the goal on the right."""

@@ -5,23 +5,19 @@ from __future__ import annotations
 from math import pi
 
 from layouts import face_to_face
-from simulation import Box, Camera, Friction, PhysicsSettings, State, World, add_table
+from simulation import Camera, Friction, PhysicsSettings, State
 from simulation.maths import Array, Floats, maximum, norm, where
-from tasks.props import DARK_RED, add_goal
-from tasks.randomness import EpisodeRandom
+from tasks.bodies import Area, Cube, Goal
+from tasks.props import DARK_RED
 from tasks.registry import register_task
 from tasks.shaping import closeness
 from tasks.task import Info, MultiRobotTask
 
 # m; the picker's base is at y = 0.7, and a Panda that points down reaches about 0.8 m
 CUBE_HALF_SIZE = 0.02
-CUBE_LOW, CUBE_HIGH = (-0.1, -0.28), (0.1, -0.2)
-GOAL_LOW, GOAL_HIGH = (-0.1, 0.15, 0.1), (0.1, 0.25, 0.3)
 IN_REACH_Y = -0.05  # from here on the cube counts as within reach
 GOAL_RADIUS = 0.025
 PUSH_OFFSET = -0.03  # from the cube's middle to where a stick pushes it, along y
-LARGEST_TURN = pi / 6  # of the cube (rad)
-CUBE_FRICTION = Friction(1.0, 1.0, 0.0)  # so that a stick does not slip off at once
 STATIC_SPEED = 0.2  # rad/s
 
 
@@ -43,20 +39,13 @@ class TwoRobotPushPick(MultiRobotTask):
     cameras = (Camera((1.0, 0.0, 0.75), (0.0, 0.0, 0.1)),)
     sensed = ("*_tcp_pose", "goal_pos", "is_cube_grasped")
 
-    def build(self, world: World) -> None:
-        """Add the table, the cube and the goal."""
-        add_table(world)
-        half = CUBE_HALF_SIZE
-        cube = Box(half_size=(half, half, half), color=DARK_RED, friction=CUBE_FRICTION)
-        world.add("cube", cube, position=(0.0, 0.0, half))
-        add_goal(world, GOAL_RADIUS)
-
-    def sample(self, world: World, rng: EpisodeRandom) -> None:
-        """Lay the cube before the pusher, and the goal before the picker."""
-        x, y = rng.uniform_between(CUBE_LOW, CUBE_HIGH).tolist()
-        turn = rng.yaw_quaternion(-LARGEST_TURN, LARGEST_TURN)
-        world.set_pose("cube", (x, y, CUBE_HALF_SIZE), turn)
-        world.set_pose("goal_site", rng.uniform_between(GOAL_LOW, GOAL_HIGH))
+    cube = Cube(
+        CUBE_HALF_SIZE,
+        DARK_RED,
+        friction=Friction(1.0, 1.0, 0.0),  # so that a stick does not slip off at once
+        spawn=Area(x=(-0.1, 0.1), y=(-0.28, -0.2), yaw=(-pi / 6, pi / 6)),
+    )
+    goal_site = Goal(GOAL_RADIUS, spawn=Area(x=(-0.1, 0.1), y=(0.15, 0.25), z=(0.1, 0.3)))
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: placed, and held by the picker, which is static."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from layouts import face_to_face
-from simulation import PhysicsSettings, State, World, add_table
+from simulation import PhysicsSettings, State, World
 from simulation.maths import Array, Floats, norm, rounded, tanh, where
-from tasks.props import DARK_BLUE, FACE_UP, GREEN, TARGET_HEIGHT, add_cube, add_target
+from tasks.bodies import Cube, Target
+from tasks.props import DARK_BLUE, FACE_UP, GREEN, TARGET_HEIGHT
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness, letting_go
@@ -39,13 +40,9 @@ class TwoRobotStackCube(MultiRobotTask):
     viewpoint = ((0.6, 0.2, 0.4), (-0.1, 0.0, 0.1))
     sensed = ("left_arm_tcp", "right_arm_tcp")
 
-    def build(self, world: World) -> None:
-        """Add the table, both cubes and the target."""
-        add_table(world)
-        for name, x, color in (("cubeA", 1.0, DARK_BLUE), ("cubeB", -1.0, GREEN)):
-            position = (x, 0.0, CUBE_HALF_SIZE)
-            add_cube(world, name, CUBE_HALF_SIZE, position=position, color=color)
-        add_target(world, GOAL_RADIUS)
+    cubeA = Cube(CUBE_HALF_SIZE, DARK_BLUE, start=(1.0, 0.0, CUBE_HALF_SIZE))
+    cubeB = Cube(CUBE_HALF_SIZE, GREEN, start=(-1.0, 0.0, CUBE_HALF_SIZE))
+    goal_region = Target(GOAL_RADIUS)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay a cube before each arm, and the target between them."""

@@ -1,4 +1,4 @@
-"""Tasks compute the same on torch tensors as on NumPy's arrays, and never turn one into the other."""
+"""Tasks compute the same on torch tensors as on NumPy's arrays, and turn neither into the other."""
 
 from copy import deepcopy
 
