@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import inspect
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,8 @@ from layouts.maniskill import TASKS, from_maniskill
 from layouts.presets import FACING, PRESETS
 from layouts.validate_command import add_check_options
 from layouts.view_command import add_view_options
-from robots import LayoutError, RobotLayoutsError, RobotRegistry, UnknownNameError
+from robots import LayoutError, RobotRegistry, UnknownNameError
+from robots.commands import FAILED, exit_code, start
 
 # What presets take besides the robots.
 OPTIONS = ("spacing", "radius", "facing", "columns", "edges", "table", "inset", "keyframe")
@@ -32,11 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             checked and is not ok.
     """
     options = _parser().parse_args(arguments)
-    try:
-        return options.run(options) or 0
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    return exit_code(lambda: options.run(options), unknown_name=FAILED)
 
 
 def add_layout_words(parser: argparse.ArgumentParser) -> None:
@@ -176,4 +172,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    start(main)

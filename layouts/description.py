@@ -21,13 +21,14 @@ def describe(layout: Layout) -> str:
     (degrees), or the wxyz quaternion of that turn if it tilts the base. "on" is what a robot hangs
     on, where one hangs.
     """
+    split = layout.action_split
     hanging = any(placement.on is not None for placement in layout.values())
     rows = [
         (
             str(number),
             name,
             placement.robot.name,
-            action_text(layout.action_split[name]),
+            action_text(split[name]),
             ", ".join(decimal(x) for x in placement.base_position),
             facing_text(placement),
             placement.start_keyframe,

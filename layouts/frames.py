@@ -10,6 +10,7 @@ from typing import Any
 
 from layouts.orientation import multiplied, normalised, rotated, rpy_quaternion
 from robots import LayoutError, UnknownNameError
+from robots.bounds import FAR, as_float, checked_numbers, shown
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 
 ORIGIN: Vector3 = (0.0, 0.0, 0.0)
@@ -75,6 +76,7 @@ class Frame:
 
     def __post_init__(self) -> None:
         """Refuse poses that are no poses."""
+        object.__setattr__(self, "position", numbers("position", self.position, 3))
         check_pose(self)
 
     @property
@@ -106,9 +108,8 @@ def table(
     Raises:
         LayoutError: If a size is not positive.
     """
-    for what, size in (("width", width), ("depth", depth)):
-        check_positive(f"a table's {what}", size)
-    half_width, half_depth = width / 2, depth / 2
+    half_width = check_positive("a table's width", width) / 2
+    half_depth = check_positive("a table's depth", depth) / 2
     places = {
         "north": (0.0, half_depth, 0.0),
         "east": (half_width, 0.0, 0.0),
@@ -158,7 +159,8 @@ def ceiling(height: float, *, position: tuple[float, float] = (0.0, 0.0)) -> Fra
         height: Height of the ceiling (m).
         position: x and y of the frame (m, world).
     """
-    return Frame((*position, height), quaternion=(0.0, 1.0, 0.0, 0.0))
+    x, y = numbers("position", position, 2)
+    return Frame((x, y, height), quaternion=(0.0, 1.0, 0.0, 0.0))
 
 
 def resolve(poses: Mapping[str, tuple[str | None, Pose]]) -> dict[str, Pose]:
@@ -172,13 +174,14 @@ def resolve(poses: Mapping[str, tuple[str | None, Pose]]) -> dict[str, Pose]:
     """
     world: dict[str, Pose] = {}
     for name in poses:
-        chain: list[str] = []  # from ``name`` towards the world, as far as it is not known yet
+        chain: dict[str, None] = {}  # from ``name`` to the world, as far as it is not known yet
         at: str | None = name
         while at is not None and at not in world:
             if at in chain:
-                circle = " on ".join(map(repr, [*chain[chain.index(at) :], at]))
+                links = list(chain)
+                circle = " on ".join(map(repr, [*links[links.index(at) :], at]))
                 raise HangingError(f"these hang on each other: {circle}; let one stand free", at)
-            chain.append(at)
+            chain[at] = None
             at = _support(at, poses)
         for at in reversed(chain):
             on, local = poses[at]
@@ -237,29 +240,27 @@ def declared_quaternion(declared: Any, default: Quaternion) -> Quaternion:
     return default if declared.quaternion is None else declared.quaternion
 
 
-def check_positive(what: str, value: Any) -> None:
-    """Refuse a distance that is not a finite number greater than 0 (m).
+def check_positive(what: str, value: Any) -> float:
+    """Return a distance: a number greater than 0 and of at most `robots.bounds.FAR` (m).
 
     Raises:
-        LayoutError: If it is not.
+        LayoutError: If it is none.
     """
-    if isinstance(value, (str, bool)) or not (math.isfinite(value) and value > 0):
-        raise LayoutError(f"{what} is {value} m; it must be finite and greater than 0")
+    distance = as_float(value)
+    if distance is None or not 0 < distance <= FAR:
+        raise LayoutError(
+            f"{what} is {shown(value)} m; it must be finite and greater than 0, {FAR:g} at most"
+        )
+    return distance
 
 
-def numbers(what: str, values: object, count: int) -> tuple[float, ...]:
-    """Return ``count`` finite floats.
+def numbers(what: str, values: Any, count: int) -> tuple[float, ...]:
+    """Return ``count`` floats of at most `robots.bounds.FAR`.
 
     Raises:
         LayoutError: If ``values`` are not that.
     """
-    try:
-        floats = tuple(float(x) for x in values)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
-        raise LayoutError(f"{what} is {values!r}; it takes {count} numbers") from None
-    if len(floats) != count or not all(math.isfinite(x) for x in floats):
-        raise LayoutError(f"{what} is {floats}; it takes {count} finite numbers")
-    return floats
+    return checked_numbers(what, values, count, FAR, LayoutError)
 
 
 def _support(name: str, poses: Mapping[str, tuple[str | None, Pose]]) -> str | None:

@@ -23,6 +23,7 @@ from layouts.frames import (
 from layouts.orientation import yaw_quaternion
 from layouts.placement import Placement, RobotLike, placed
 from robots import LayoutError, UnknownNameError
+from robots.bounds import FAR, checked_number, shown
 from robots.descriptor import Vector3
 
 if TYPE_CHECKING:
@@ -51,6 +52,9 @@ class Layout(Mapping[str, Placement]):
             LayoutError: If there is no placement, a name is not an identifier or is given twice,
                 or something hangs on what is not there or on itself.
         """
+        for what, given in (("placements", placements), ("frames", frames or {})):
+            if not isinstance(given, Mapping):
+                raise LayoutError(f"{what} is {shown(given)}; it takes a mapping by name")
         frames = {} if frames is None else dict(frames)
         if not placements:
             raise LayoutError("a layout needs at least one robot")
@@ -78,8 +82,11 @@ class Layout(Mapping[str, Placement]):
         """Build from (name, placement) pairs; a name given twice is an error, not an overwrite.
 
         Raises:
-            LayoutError: If a name appears twice.
+            LayoutError: If a name appears twice, or one of them is no pair.
         """
+        for pair in placements:
+            if not (isinstance(pair, tuple) and len(pair) == 2):
+                raise LayoutError(f"{shown(pair)} is no pair of a name and a Placement")
         names = [name for name, _ in placements]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
@@ -92,7 +99,7 @@ class Layout(Mapping[str, Placement]):
 
     def __getitem__(self, name: str) -> Placement:
         """Return the placement called ``name``."""
-        if name not in self._placements:
+        if not isinstance(name, str) or name not in self._placements:
             raise UnknownNameError("robot of this layout", name, self._placements)
         return self._placements[name]
 
@@ -177,7 +184,7 @@ class Layout(Mapping[str, Placement]):
         Raises:
             LayoutError: If they are not finite.
         """
-        (yaw,) = numbers("yaw", (yaw,), 1)
+        yaw = checked_number("yaw", yaw, -FAR, FAR, LayoutError, "rad")
         x, y, z = numbers("position", position, 3)
         move = Pose((x, y, z), yaw_quaternion(yaw))
         return Layout(

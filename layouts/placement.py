@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from layouts.frames import ORIGIN, Pose, check_pose, declared_quaternion
 from layouts.orientation import inverted, multiplied, normalised
 from robots import LayoutError, RobotDescriptor, RobotRegistry
+from robots.bounds import as_float, shown
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 
 RobotLike = str | RobotDescriptor
+
+LARGEST_NOISE = 1.0  # rad; of twice that, a joint starts anywhere
 
 
 @dataclass(frozen=True)
@@ -26,7 +29,7 @@ class Placement:
             in the world, and the origin of what it hangs on.
         quaternion: Base orientation there, wxyz, unit length, or None for home.
         keyframe: Keyframe it starts from, or None for home.
-        qpos_noise: Standard deviation of the joint noise added at a reset (rad).
+        qpos_noise: Standard deviation of the joint noise added at a reset (rad), 0 … 1.
         rpy: Base orientation as roll, pitch and yaw (rad, about fixed x, y, z as in a URDF),
             instead of a quaternion.
         on: Name of the frame or robot it hangs on; None is the world.
@@ -46,13 +49,15 @@ class Placement:
         object.__setattr__(self, "robot", load_robot(self.robot))
         check_pose(self)
         if self.keyframe is not None:
+            if not isinstance(self.keyframe, str):
+                raise LayoutError(f"keyframe is {shown(self.keyframe)}; it takes a keyframe's name")
             self.robot.keyframe(self.keyframe)
-        try:
-            noise = float(self.qpos_noise)
-        except (TypeError, ValueError):
-            noise = math.nan
-        if not (math.isfinite(noise) and noise >= 0):
-            raise LayoutError(f"qpos_noise is {self.qpos_noise} rad; it must be 0 or more")
+        noise = as_float(self.qpos_noise)
+        if noise is None or not 0 <= noise <= LARGEST_NOISE:
+            raise LayoutError(
+                f"qpos_noise is {shown(self.qpos_noise)} rad; it must be 0 or more,"
+                f" {LARGEST_NOISE:g} at most"
+            )
         object.__setattr__(self, "qpos_noise", noise)
 
     @property
@@ -130,9 +135,27 @@ def load_robot(robot: RobotLike) -> RobotDescriptor:
     """Return a descriptor as it is, or look a name up in the registry.
 
     Raises:
+        LayoutError: If it is neither.
         UnknownNameError: If no robot has that name.
     """
-    return robot if isinstance(robot, RobotDescriptor) else RobotRegistry.load(robot)
+    if isinstance(robot, RobotDescriptor):
+        return robot
+    if not isinstance(robot, str):
+        raise LayoutError(f"robot is {shown(robot)}; it takes a robot's name or a RobotDescriptor")
+    return RobotRegistry.load(robot)
+
+
+def check_robots(robots: object) -> None:
+    """Refuse what is no mapping from places to robots.
+
+    Raises:
+        LayoutError: If it is none.
+    """
+    if not isinstance(robots, Mapping):
+        raise LayoutError(
+            f"robots is {shown(robots)}; it takes a mapping from each robot's place to its robot:"
+            " {'left': 'panda', 'right': 'panda'}"
+        )
 
 
 def placed(placement: Placement, world: Pose) -> Placement:

@@ -12,15 +12,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import Literal
+from typing import Literal, TypeGuard
 
 from layouts.distances import apart, centred, gaps, ring_of, share_at_table, table_for
 from layouts.frames import EDGES, check_positive
 from layouts.frames import table as table_frames
 from layouts.layout import Layout
 from layouts.orientation import yaw_quaternion
-from layouts.placement import Placement, RobotLike, faced, load_robot
+from layouts.placement import Placement, RobotLike, check_robots, faced, load_robot
 from robots import LayoutError, RobotDescriptor, UnknownNameError
+from robots.bounds import checked_whole, shown
 from robots.descriptor import Vector3
 
 Distance = float | Literal["auto"]  # m
@@ -42,9 +43,8 @@ def single(robots: Mapping[str, RobotLike], *, keyframe: str | None = None) -> L
         keyframe: Keyframe it starts from, if not its home's.
     """
     _expect_count("single", robots, 1)
-    return Layout(
-        {name: Placement(load_robot(robot), keyframe=keyframe) for name, robot in robots.items()}
-    )
+    loaded = _loaded(robots)
+    return Layout({name: Placement(robot, keyframe=keyframe) for name, robot in loaded.items()})
 
 
 def side_by_side(
@@ -58,7 +58,7 @@ def side_by_side(
         keyframe: Keyframe every robot starts from; None is each one's home.
     """
     loaded = _loaded(robots)
-    if spacing == "auto":
+    if _is_auto(spacing):
         along = centred(gaps(loaded.values()))
     else:
         distance = _given("spacing", spacing)
@@ -84,7 +84,7 @@ def face_to_face(
     """
     _expect_count("face_to_face", robots, 2)
     loaded = _loaded(robots)
-    distance = apart(*loaded.values()) if spacing == "auto" else _given("spacing", spacing)
+    distance = apart(*loaded.values()) if _is_auto(spacing) else _given("spacing", spacing)
     return Layout(
         {
             name: _placed(robot, (0.0, side * distance / 2, 0.0), -side * math.pi / 2, keyframe)
@@ -115,10 +115,10 @@ def ring(
     Raises:
         UnknownNameError: If a robot, a keyframe or the way to face does not exist.
     """
-    if facing not in FACING:
+    if not isinstance(facing, str) or facing not in FACING:
         raise UnknownNameError("way to face", facing, FACING)
     loaded = _loaded(robots)
-    if radius == "auto":
+    if _is_auto(radius):
         radius, angles = ring_of(list(loaded.values()))
     else:
         radius = _given("radius", radius)
@@ -164,13 +164,13 @@ def around_table(
     sides = _edges(tuple(loaded), edges)
     rows = {edge: [n for n in loaded if sides[n] == edge] for edge in EDGES}
     standing = {edge: [loaded[name] for name in row] for edge, row in rows.items()}
-    least = EDGE if inset == "auto" else _given("inset", inset)
-    size = table_for(standing, least) if table == "auto" else _given_table(table, least)
+    least = EDGE if _is_auto(inset) else _given("inset", inset)
+    size = table_for(standing, least) if _is_auto(table) else _given_table(table, least)
     lengths = {edge: size[0] if edge in ("north", "south") else size[1] for edge in EDGES}
     along: dict[str, float] = {}
     for edge, row in rows.items():
         even = [lengths[edge] / len(row) for _ in pairwise(row)]
-        spaces = gaps(standing[edge]) if table == "auto" else even
+        spaces = gaps(standing[edge]) if _is_auto(table) else even
         along.update(zip(row, centred(spaces), strict=False))
     share = share_at_table(standing)
     farthest = max(robot.reach for robot in loaded.values())
@@ -179,7 +179,7 @@ def around_table(
         across = size[1] if sides[name] in ("north", "south") else size[0]
         shorter = share * (farthest - robot.reach)
         to_middle = across / 2 - share * robot.reach
-        inwards = max(EDGE, min(EDGE + shorter, to_middle)) if inset == "auto" else least
+        inwards = max(EDGE, min(EDGE + shorter, to_middle)) if _is_auto(inset) else least
         placements[name] = Placement(
             robot, (inwards, along[name], 0.0), keyframe=keyframe, on=f"table.{sides[name]}"
         )
@@ -210,8 +210,7 @@ def grid(
     count = len(loaded)
     if columns is None:
         columns = math.ceil(math.sqrt(count))
-    if isinstance(columns, bool) or not isinstance(columns, int) or columns < 1:
-        raise LayoutError(f"columns is {columns!r}; it must be 1 or a larger whole number")
+    columns = checked_whole("columns", columns, 1, None, LayoutError)
     columns = min(columns, max(count, 1))
     rows = math.ceil(count / columns)
     cells = {divmod(i, columns): robot for i, robot in enumerate(loaded.values())}
@@ -221,7 +220,7 @@ def grid(
         for other in ((row + 1, column), (row, column + 1))
         if other in cells
     ]
-    if spacing == "auto":
+    if _is_auto(spacing):
         distance = max((apart(*pair) for pair in neighbours), default=0.0)
     else:
         distance = _given("spacing", spacing)
@@ -245,6 +244,7 @@ PRESETS: Mapping[str, Callable[..., Layout]] = {
 
 
 def _loaded(robots: Mapping[str, RobotLike]) -> dict[str, RobotDescriptor]:
+    check_robots(robots)
     if not robots:
         raise LayoutError("a layout needs at least one robot")
     return {name: load_robot(robot) for name, robot in robots.items()}
@@ -257,12 +257,15 @@ def _placed(
     return Placement(robot, position, faced(robot, yaw_quaternion(yaw)), keyframe)
 
 
-def _given(what: str, distance: Distance) -> float:
+def _is_auto(distance: object) -> TypeGuard[Literal["auto"]]:
+    return isinstance(distance, str) and distance == "auto"
+
+
+def _given(what: str, distance: object) -> float:
     """Return a distance (m) that is not automatic."""
     if isinstance(distance, str):
         raise LayoutError(f"{what} is {distance!r}; it takes a number (m) or 'auto'")
-    check_positive(what, distance)
-    return distance
+    return check_positive(what, distance)
 
 
 def _edges(
@@ -272,13 +275,16 @@ def _edges(
     if edges is None:
         order = ("south", "north", "west", "east")
         edges = [order[i % len(order)] for i in range(len(names))]
-    if isinstance(edges, str) or (not isinstance(edges, Mapping) and len(edges) != len(names)):
-        raise LayoutError(f"edges is {edges!r}; it takes one edge for each of {list(names)}")
-    chosen = dict(edges) if isinstance(edges, Mapping) else dict(zip(names, edges, strict=True))
+    if isinstance(edges, Mapping):
+        chosen = dict(edges)
+    elif isinstance(edges, Sequence) and not isinstance(edges, str) and len(edges) == len(names):
+        chosen = dict(zip(names, edges, strict=True))
+    else:
+        raise LayoutError(f"edges is {shown(edges)}; it takes one edge for each of {list(names)}")
     for name, edge in chosen.items():
         if name not in names:
             raise UnknownNameError("robot at the table", name, names)
-        if edge not in EDGES:
+        if not isinstance(edge, str) or edge not in EDGES:
             raise UnknownNameError("table edge", edge, EDGES)
     for name in names:
         if name not in chosen:
@@ -286,18 +292,20 @@ def _edges(
     return chosen
 
 
-def _given_table(table: tuple[float, float] | Literal["auto"], inset: float) -> tuple[float, float]:
+def _given_table(table: object, inset: float) -> tuple[float, float]:
     """Return width and depth (m) that are not automatic."""
-    if isinstance(table, str) or len(table) != 2:
-        raise LayoutError(f"table is {table!r}; it takes width and depth (m) or 'auto'")
-    for what, size in zip(("width", "depth"), table, strict=True):
-        check_positive(f"the table's {what}", size)
+    if not (isinstance(table, Sequence) and not isinstance(table, str) and len(table) == 2):
+        raise LayoutError(f"table is {shown(table)}; it takes width and depth (m) or 'auto'")
+    sizes: list[float] = []
+    for what, given in zip(("width", "depth"), table, strict=True):
+        size = check_positive(f"the table's {what}", given)
         if size <= 2 * inset:
             raise LayoutError(
                 f"the table's {what} is {size} m; with an inset of {inset} m it must be more than"
                 f" {2 * inset} m"
             )
-    return table
+        sizes.append(size)
+    return sizes[0], sizes[1]
 
 
 def _rounded(value: float) -> float:
@@ -306,6 +314,7 @@ def _rounded(value: float) -> float:
 
 
 def _expect_count(preset: str, robots: Mapping[str, RobotLike], count: int) -> None:
+    check_robots(robots)
     if len(robots) != count:
         raise LayoutError(
             f"{preset} places {count} robot{'s' * (count > 1)}; {len(robots)} given: {list(robots)}"

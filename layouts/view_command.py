@@ -60,8 +60,10 @@ def show(cell: Callable[[], Cell], options: argparse.Namespace) -> int:
     Raises:
         RobotLayoutsError: If the page cannot be served or saved.
     """
-    from layouts.viewer.page import save_html, serve
+    from layouts.viewer.page import serve
+    from layouts.viewer.saved import NO_SLIDERS, save_html
     from layouts.viewer.server import import_viser
+    from layouts.viewer.text import printable
 
     import_viser()
 
@@ -70,7 +72,7 @@ def show(cell: Callable[[], Cell], options: argparse.Namespace) -> int:
         for note in made.notes:
             print(note, flush=True)
         if options.html is not None:
-            print(f"page: {save_html(made, options.html)}")
+            print(f"page: {printable(str(save_html(made, options.html)))}\n{NO_SLIDERS}")
             return 0
         serve(made, options.host, options.port, lambda line: print(line, flush=True))
     except KeyboardInterrupt:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import posixpath
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,11 @@ import numpy as np
 
 from layouts.validation.kinematics import Floats, origin_matrix
 from robots import AssetError, MissingPackageError
-from robots.urdf_xml import numbers_of, parse_urdf, resolve
+from robots.mesh_files import load_scene
+from robots.urdf_numbers import numbers_of
+from robots.urdf_paths import resolve
+from robots.urdf_shapes import UrdfShape, read_shape
+from robots.urdf_xml import parse_urdf, read_urdf
 
 Rgba = tuple[float, float, float, float]  # 0 … 1
 
@@ -48,7 +51,7 @@ def read_visuals(urdf: Path) -> dict[str, tuple[Part, ...]]:
         MissingPackageError: If trimesh is not installed.
     """
     require_trimesh("drawing a robot")
-    root = parse_urdf(urdf.read_bytes(), str(urdf))
+    root = parse_urdf(read_urdf(urdf), str(urdf))
     colours = dict(_named_colours(root, urdf))
     drawn: dict[str, tuple[Part, ...]] = {}
     for link in root.iterfind("link"):
@@ -126,77 +129,61 @@ def _rgba(color: Element, urdf: Path) -> Rgba:
 def _visual_parts(
     visual: Element, where: str, urdf: Path, colours: Mapping[str, Rgba]
 ) -> Iterator[Part]:
-    geometry = visual.find("geometry")
-    shape = None if geometry is None else next(iter(geometry), None)
-    if shape is None:
-        raise AssetError(f"{where}: a visual without a shape")
+    shape = read_shape(visual, where)
     material = visual.find("material")
     rgba = None if material is None else colours.get(material.get("name", ""))
     if material is not None and (color := material.find("color")) is not None:
         rgba = _rgba(color, urdf)
-    origin = visual.find("origin")
-    xyz, rpy = (numbers_of(origin, key, (0.0, 0.0, 0.0), where) for key in ("xyz", "rpy"))
-    pose = origin_matrix(xyz, rpy)
-    if shape.tag == "mesh":
-        pose = pose @ np.diag([*numbers_of(shape, "scale", (1.0, 1.0, 1.0), where), 1.0])
-        yield from _mesh_parts(shape.get("filename", ""), urdf, where, pose, rgba)
+    pose = origin_matrix(shape.xyz, shape.rpy)
+    if shape.kind == "mesh":
+        yield from _mesh_parts(shape, urdf, pose @ np.diag([*shape.sizes, 1.0]), rgba)
         return
-    mesh = _primitive(shape, where)
+    mesh = _primitive(shape)
     mesh.apply_transform(pose)
     yield coloured(mesh, rgba or GREY)
 
 
-def _primitive(shape: Element, where: str) -> Any:
+def _primitive(shape: UrdfShape) -> Any:
     import trimesh
 
-    def size(key: str) -> float:
-        return numbers_of(shape, key, (0.0,), where)[0]
-
-    match shape.tag:
+    match shape.kind:
         case "box":
-            return trimesh.creation.box(numbers_of(shape, "size", (0.0, 0.0, 0.0), where))
+            return trimesh.creation.box(shape.sizes)
         case "sphere":
-            return trimesh.creation.icosphere(subdivisions=3, radius=size("radius"))
+            return trimesh.creation.icosphere(subdivisions=3, radius=shape.sizes[0])
         case "cylinder":
-            return trimesh.creation.cylinder(size("radius"), size("length"), sections=SIDES)
-        case "capsule":
-            return trimesh.creation.capsule(size("length"), size("radius"), count=[SIDES, SIDES])
-        case other:
-            raise AssetError(
-                f"{where}: a visual of shape {other!r}; choices: mesh, box, sphere, cylinder,"
-                " capsule"
-            )
+            return trimesh.creation.cylinder(*shape.sizes, sections=SIDES)
+        case _:
+            radius, length = shape.sizes
+            return trimesh.creation.capsule(length, radius, count=[SIDES, SIDES])
 
 
-def _mesh_parts(
-    reference: str, urdf: Path, where: str, pose: Floats, rgba: Rgba | None
-) -> Iterator[Part]:
-    path = resolve(reference, posixpath.dirname(urdf.as_posix()), os.path.isfile)
-    for mesh in load_meshes(path, where):
+def _mesh_parts(shape: UrdfShape, urdf: Path, pose: Floats, rgba: Rgba | None) -> Iterator[Part]:
+    path = resolve(shape.file, urdf.as_posix(), os.path.isfile)
+    for mesh in load_meshes(path, shape.where, urdf.as_posix()):
         mesh.apply_transform(pose)
         own = _own_colour(mesh)
         yield coloured(mesh, rgba or GREY) if own is None else Part(mesh, own)
 
 
-def load_meshes(path: str, where: str) -> list[Any]:
+def load_meshes(path: str, where: str, urdf: str | None = None) -> list[Any]:
     """Return the trimeshes of a file, each in the file's frame.
 
     Args:
         path: The file.
         where: What refers to it, for error messages.
+        urdf: The URDF that it belongs to, if it belongs to one.
 
     Raises:
         AssetError: If it does not exist, or holds no mesh that can be read.
     """
     import trimesh
 
-    if not os.path.isfile(path):
-        raise AssetError(f"{where} refers to a file that does not exist: {path}")
+    scene = load_scene(path, where, urdf)
     try:
-        meshes: list[Any] = trimesh.load_scene(path).dump()
-    except Exception as error:  # a reader of many formats, which raises whatever it meets
+        meshes = [mesh for mesh in scene.dump() if isinstance(mesh, trimesh.Trimesh)]
+    except Exception as error:  # what the reader left behind may be anything
         raise AssetError(f"{where}: cannot read the mesh {path}: {error}") from error
-    meshes = [mesh for mesh in meshes if isinstance(mesh, trimesh.Trimesh)]
     if not meshes:
         raise AssetError(f"{where}: the file {path} holds no mesh")
     return meshes

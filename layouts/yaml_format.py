@@ -13,7 +13,6 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, replace
 from os import PathLike
-from pathlib import Path
 from typing import Any, NoReturn
 
 import yaml
@@ -21,9 +20,19 @@ import yaml
 from layouts.frames import Frame, HangingError, check_frame_names
 from layouts.layout import Layout, check_name
 from layouts.placement import Placement
-from robots import LayoutError, RobotDescriptor, RobotLayoutsError, RobotRegistry, UnknownNameError
+from robots import (
+    LayoutError,
+    RobotDescriptor,
+    RobotLayoutsError,
+    RobotRegistry,
+    UnknownNameError,
+    UnreadableFileError,
+)
+from robots.files import read_text
 
 VERSION = 1
+MAX_LENGTH = 1 << 20  # bytes of a file, characters of a text; 20,000 robots fit
+MAX_WORD = 200  # characters
 UNITS = "# positions in m; quaternion: w, x, y, z; rpy and qpos_noise in rad"
 
 # Keys in the order in which they are written. Left-out keys keep the value of the declaration.
@@ -65,16 +74,21 @@ def from_yaml(text: str, source: str = "") -> Layout:
     Raises:
         LayoutError: If it describes none; the message names the line.
     """
+    if not isinstance(text, str):
+        raise LayoutError(
+            f"a layout's YAML is {type(text).__name__}; it takes text (Layout.load reads files)"
+        )
+    if len(text) > MAX_LENGTH:
+        raise LayoutError(f"a layout's YAML has {len(text):,} characters; {MAX_LENGTH:,} is most")
     return _Reader(source).layout(text)
 
 
 def read_layout(path: str | PathLike[str]) -> Layout:
     """Return the layout in a file; see `layouts.Layout.load`."""
     try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
-        raise LayoutError(f"cannot read the layout {str(path)!r}: {reason}") from error
+        text = read_text(path, MAX_LENGTH)
+    except UnreadableFileError as error:
+        raise LayoutError(f"cannot read the layout {str(path)!r}: {error.strerror}") from error
     return from_yaml(text, str(path))
 
 
@@ -128,6 +142,11 @@ class _Reader:
             ) from None
         except RecursionError:
             raise LayoutError(f"{self._where()}this is nested too deeply for a layout") from None
+        except (
+            ValueError,
+            OverflowError,
+        ) as error:  # a number in a directive or an escape that is none
+            raise LayoutError(f"{self._where()}this is not YAML: {error}") from None
         if root is None:
             raise LayoutError(f"{self._where()}this is empty; a layout has a version and robots")
         return root
@@ -217,11 +236,15 @@ class _Reader:
         self._expect_no_tag(node)
         if not isinstance(node, yaml.ScalarNode):
             self._fail(node, f"{what} is {_kind(node)}; a single word or number is needed")
+        if len(node.value) > MAX_WORD:
+            self._fail(node, f"{what} has {len(node.value):,} characters; {MAX_WORD} is most")
         return node.value
 
     def _expect_no_tag(self, node: Any) -> None:
         if node.tag not in TAGS:
-            self._fail(node, f"the tag {node.tag!r} is not allowed in a layout; leave it out")
+            self._fail(
+                node, f"the tag {node.tag[:MAX_WORD]!r} is not allowed in a layout; leave it out"
+            )
 
     @contextmanager
     def _at(self, node: Any) -> Generator[None, None, None]:
@@ -244,7 +267,7 @@ def _kind(node: Any) -> str:
         return "a mapping"
     if isinstance(node, yaml.SequenceNode):
         return "a list"
-    return repr(node.value) if node.value else "empty"
+    return repr(node.value[:MAX_WORD]) if node.value else "empty"
 
 
 def _registered_name(place: str, robot: RobotDescriptor) -> str:

@@ -6,7 +6,8 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from robots import RobotLayoutsError, unknown_name_message
+from robots import UnknownNameError
+from robots.commands import MEANINGLESS, exit_code, print_error, start
 
 # Command -> the module whose ``main(argv)`` runs it, and what it does.
 COMMANDS = {
@@ -37,14 +38,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             print(f"  {name:<10} {description}")
         return 0
     if command not in COMMANDS:
-        print(f"error: {unknown_name_message('command', command, COMMANDS)}", file=sys.stderr)
-        return 2
-    try:
-        return import_module(COMMANDS[command][0]).main(rest)
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+        print_error(UnknownNameError("command", command, COMMANDS))
+        return MEANINGLESS
+    return exit_code(lambda: import_module(COMMANDS[command][0]).main(rest), failed=MEANINGLESS)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(main)

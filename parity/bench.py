@@ -19,6 +19,7 @@ from layouts.files import written_whole
 from parity.bench_table import RECORD
 from parity.native import make_native, native_action, quiet
 from robots import RobotLayoutsError, TaskError
+from robots.commands import start
 from rollouts.bench.catalogue import BENCHMARKS
 from rollouts.bench.command import add_arguments, run_benchmarks, settings_of
 from rollouts.bench.episodes import timed_resets
@@ -208,4 +209,4 @@ def _keep(report: Report) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(main)

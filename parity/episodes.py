@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,13 +11,14 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from robots import RobotLayoutsError
+from rollouts.damage import damage_errors
+from rollouts.hdf5_reading import MAX_BYTES
+from rollouts.summary import MAX_SEED, recorded_task
 from rollouts.trajectory import (
     Trajectory,
     TrajectoryError,
     TrajectoryFile,
     expect_file,
-    recorded_task,
 )
 
 Bounds = Sequence[tuple[float, float]]
@@ -89,12 +91,10 @@ def load_episodes(path: Path, task_id: str, action_dim: int) -> list[Episode]:
     expect_file(path, SUFFIXES)
     if path.suffix == ".h5":
         return _read_h5(path, task_id, action_dim)
-    try:
+    with damage_errors(
+        lambda reason: TrajectoryError(f"{path} holds no readable episodes: {reason}")
+    ):
         episodes = _read_npz(path)
-    except (OSError, KeyError, ValueError, TypeError, AttributeError) as error:
-        if isinstance(error, RobotLayoutsError):
-            raise
-        raise TrajectoryError(f"{path} holds no readable episodes: {error!r}") from error
     if not episodes:
         raise TrajectoryError(f"{path} holds no episodes")
     return [_checked(path, number, episode, action_dim) for number, episode in enumerate(episodes)]
@@ -147,11 +147,17 @@ def _seed(path: Path, trajectory: Trajectory) -> int:
 
 
 def _read_npz(path: Path) -> list[Episode]:
+    with zipfile.ZipFile(path) as archive:
+        size = sum(entry.file_size for entry in archive.infolist())
+    if size > MAX_BYTES:
+        raise TrajectoryError(f"{path} unpacks to {size:,} bytes, more than {MAX_BYTES:,}")
     with np.load(path, allow_pickle=False) as data:
         names = sorted(data.files)
         if "seeds" not in data:
             raise TrajectoryError(f"{path} has no array 'seeds'; it has {', '.join(names)}")
         seeds = [int(seed) for seed in np.atleast_1d(data["seeds"])]
+        if wrong := [seed for seed in seeds if not 0 <= seed <= MAX_SEED]:
+            raise TrajectoryError(f"{path} has the seed {wrong[0]}; it must be 0 to {MAX_SEED}")
         missing = [f"a{i}" for i in range(len(seeds)) if f"a{i}" not in data]
         if missing:
             raise TrajectoryError(

@@ -17,7 +17,8 @@ from parity.native import native_tasks
 from parity.results import RESULTS, read
 from robots import MissingPackageError, RobotRegistry
 from rollouts.experts import list_experts
-from rollouts.trajectory import TrajectoryError, recorded_task
+from rollouts.summary import recorded_task
+from rollouts.trajectory import TrajectoryError
 from tasks import get_task_class, list_clones, list_tasks
 from tasks.description import UNKNOWN, TaskFacts, facts, short_modes
 from tasks.registry import other_names

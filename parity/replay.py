@@ -68,11 +68,11 @@ def _replay(args: argparse.Namespace) -> int:
     run = _run(cls, path, args.episodes)
     with LiveLine(run.steps) as line:
         (result,) = play([run], lambda _, count: line.advance(count, cls.task_id))
-    console = Console()
-    console.print(f"{cls.task_id}, {run.control_mode}, {path}", highlight=False, soft_wrap=True)
+    console = Console(markup=False, highlight=False)
+    console.print(f"{cls.task_id}, {run.control_mode}, {path}", soft_wrap=True)
     console.print(table(result))
     for sentence in sentences(result):
-        console.print(sentence, highlight=False, soft_wrap=True)
+        console.print(sentence, soft_wrap=True)
     return 0 if result.equal else 1
 
 

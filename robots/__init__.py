@@ -25,6 +25,7 @@ from robots.errors import (
     SimulationError,
     TaskError,
     UnknownNameError,
+    UnreadableFileError,
     closest_match,
     unknown_name_message,
 )
@@ -53,6 +54,7 @@ __all__ = [
     "SimulationError",
     "TaskError",
     "UnknownNameError",
+    "UnreadableFileError",
     "UrdfLocator",
     "closest_match",
     "unknown_name_message",

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from robots.errors import DescriptorError, UnknownNameError
+from robots.fields import settle, settle_fields
 
 
 def names(prefix: str, first: int, last: int) -> tuple[str, ...]:
@@ -67,6 +67,7 @@ class JointGroup:
 
     def __post_init__(self) -> None:
         """Refuse empty groups, repeated joints, inverted ranges and non-physical drives."""
+        settle_fields(self, DescriptorError)
         if not self.joints:
             raise DescriptorError("a joint group needs at least one joint")
         if len(set(self.joints)) != len(self.joints):
@@ -110,8 +111,8 @@ class JointGroup:
                 )
         for name in ("stiffness", "damping", "force_limit", "friction"):
             for value in _spread(getattr(self, name), 1):
-                if not (math.isfinite(value) and value >= 0):
-                    raise DescriptorError(f"{name} is {value}; it must be finite and not negative")
+                if value < 0:
+                    raise DescriptorError(f"{name} is {value}; it must not be negative")
 
     def _refuse_bad_followers(self) -> None:
         for name in ("multipliers", "offsets"):
@@ -122,8 +123,6 @@ class JointGroup:
                 raise DescriptorError(
                     f"{name} has {len(given)} numbers; the group has joints {self.joints}"
                 )
-            if not all(map(math.isfinite, given)):
-                raise DescriptorError(f"{name} of {self.joints} are not finite: {given}")
 
     def _refuse_bad_ranges(self) -> None:
         for name, value in (("lower", self.lower), ("upper", self.upper)):
@@ -136,7 +135,7 @@ class JointGroup:
                 f"limits has {len(self.limits)} pairs; the group has joints {self.joints}"
             )
         for low, high in (*self.ranges, *self.limits):
-            if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            if not low < high:
                 raise DescriptorError(f"range [{low}, {high}] of {self.joints} is not increasing")
 
     @property
@@ -208,8 +207,10 @@ class ActionSplit(Mapping[str, slice]):
             groups: Joint groups by name, for example ``arm=JointGroup(...)``.
 
         Raises:
-                DescriptorError: If no group takes an action number, or a joint is in two groups.
+            DescriptorError: If no group takes an action number, a joint is in two groups, or
+                something is no group.
         """
+        settle(groups, Mapping[str, JointGroup], "ActionSplit", DescriptorError)
         if not any(group.size for group in groups.values()):
             raise DescriptorError("an action split needs at least one joint group to drive")
         joints = [joint for group in groups.values() for joint in group.joints]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
-import json
 import os
 import shutil
 import sys
@@ -14,13 +14,17 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Any
 
-from robots.errors import AssetError
+from robots.errors import AssetError, UnreadableFileError
+from robots.fetched import FetchRecord
+from robots.files import open_regular
 from robots.manifest import CHECKOUT_CACHE, AssetFile
+from robots.paths import absolute
 
 ROOT_VARIABLE = "ROBOT_LAYOUTS_ASSETS"
 _LOCK, _PARTIAL, _RECORD = ".lock", ".partial", "fetched.json"
+_ABSENT = (errno.ENOENT, errno.ENOTDIR)
+_EXCHANGEABLE = (errno.EINVAL, errno.EFBIG, errno.ELOOP)  # no regular file, too large, a loop
 _WAIT_BEFORE_SAYING = 2.0  # s
 
 # sha256 of files hashed by this process, with what tells that a file has changed since.
@@ -32,10 +36,13 @@ def default_root() -> Path:
 
     ``ROBOT_LAYOUTS_ASSETS`` if it is set, else ``assets_cache/`` of a source checkout, else the
     user's cache directory.
+
+    Raises:
+        AssetError: If it is in the home directory of a user that does not exist.
     """
     chosen = os.environ.get(ROOT_VARIABLE)
     if chosen:
-        return Path(chosen).expanduser().absolute()
+        return absolute(chosen, ROOT_VARIABLE)
     if (CHECKOUT_CACHE / "manifest.json").is_file():
         return CHECKOUT_CACHE
     from platformdirs import user_cache_path
@@ -73,32 +80,27 @@ class AssetStore:
         Raises:
             AssetError: If it is there but cannot be read.
         """
-        path = self.path(file)
         try:
-            digest = _sha256(path)
-        except (FileNotFoundError, NotADirectoryError):
-            return FileState.MISSING
-        except OSError as error:
-            raise AssetError(f"cannot read {path}: {error.strerror or error}") from error
+            digest = _sha256(self.path(file), file.limit(trust=True))
+        except UnreadableFileError as error:
+            if error.errno in _ABSENT:
+                return FileState.MISSING
+            if error.errno in _EXCHANGEABLE:
+                return FileState.WRONG
+            raise AssetError(str(error)) from error
         if digest == file.sha256:
             return FileState.VERIFIED
-        entry = self.record().get(str(file), {})
-        trusted = entry.get("trusted") and entry.get("sha256") == digest
+        entry = self.record().files.get(str(file))
+        trusted = entry is not None and entry["trusted"] and entry["sha256"] == digest
         return FileState.TRUSTED if trusted else FileState.WRONG
 
     def unusable(self, files: Iterable[AssetFile]) -> list[AssetFile]:
         """Return the files that are missing or wrong."""
         return [file for file in files if not self.state(file).usable]
 
-    def record(self) -> dict[str, dict[str, Any]]:
-        """Return what was fetched: source, sha256 and trust, by package and path."""
-        path = self.root / _RECORD
-        try:
-            return json.loads(path.read_text(encoding="utf-8"))
-        except (FileNotFoundError, NotADirectoryError):
-            return {}
-        except (OSError, ValueError) as error:
-            raise AssetError(f"cannot read {path}: {error}; delete it and fetch again") from error
+    def record(self) -> FetchRecord:
+        """Return what was fetched: source, sha256 and trust of each file."""
+        return FetchRecord.read(self.root / _RECORD)
 
     @contextmanager
     def fetching(self, say: Callable[[str], None]) -> Generator[Path]:
@@ -114,13 +116,14 @@ class AssetStore:
         """
         with _destination_errors(self.root):
             self.root.mkdir(parents=True, exist_ok=True)
-            lock = (self.root / _LOCK).open("a")
-        with lock:
+            # Opened such that not even a FIFO is waited for.
+            lock = os.open(self.root / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        try:
             partial = self.root / _PARTIAL
             with _destination_errors(self.root):
-                alone = _wait_for_lock(lock.fileno(), self.root, say)
+                alone = _wait_for_lock(lock, self.root, say)
                 if alone:
-                    shutil.rmtree(partial, ignore_errors=True)
+                    _remove(partial)
                 partial.mkdir(exist_ok=True)
                 scratch = Path(tempfile.mkdtemp(dir=partial))
             try:
@@ -129,6 +132,8 @@ class AssetStore:
                 shutil.rmtree(scratch, ignore_errors=True)
                 with suppress(OSError):  # not empty: left by another, or in use by it
                     partial.rmdir()
+        finally:
+            os.close(lock)
 
     def install(
         self, file: AssetFile, data: bytes, *, scratch: Path, source: str, trust: bool = False
@@ -152,25 +157,35 @@ class AssetStore:
         matches = digest == file.sha256
         if not (matches or trust):
             return False
-        entry = {"source": source, "sha256": digest, "trusted": not matches}
-        record = {**self.record(), str(file): entry}
+        record = self.record()
+        record.files[str(file)] = {"source": source, "sha256": digest, "trusted": not matches}
         with _destination_errors(self.root):
             # The record goes first: a file is trusted only if the record names its sha256.
-            _write(self.root / _RECORD, json.dumps(record, indent=1).encode(), scratch)
+            record.set_aside()
+            _write(self.root / _RECORD, record.to_json().encode(), scratch)
             _write(self.path(file), data, scratch)
         return True
 
 
-def _sha256(path: Path) -> str:
-    with path.open("rb") as stream:
+def _sha256(path: Path, limit: int) -> str:
+    with open_regular(path) as stream:
         status = os.fstat(stream.fileno())
         stamp = (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
         known = _hashed.get(path)
         if known is not None and known[0] == stamp:
             return known[1]
-        digest = hashlib.sha256(stream.read()).hexdigest()
+        if status.st_size > limit:
+            raise UnreadableFileError(path, f"it has more than {limit:,} bytes", errno.EFBIG)
+        digest = hashlib.sha256(stream.read(limit)).hexdigest()
     _hashed[path] = (stamp, digest)
     return digest
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def _write(path: Path, data: bytes, scratch: Path) -> None:
@@ -188,9 +203,15 @@ def _destination_errors(root: Path) -> Generator[None]:
     try:
         yield
     except OSError as error:
+        place = error.filename2 or error.filename
+        where = f" ({place})" if isinstance(place, (str, Path)) and str(place) != str(root) else ""
+        reason = error.strerror or str(error)
+        if error.errno == errno.EEXIST:
+            reason = "something that is no folder is in its place"
         raise AssetError(
-            f"cannot write robot files to {root}: {error.strerror or error}. Make room or give"
-            f" write permission there, or choose another folder with --dest or {ROOT_VARIABLE}."
+            f"cannot write robot files to {root}: {reason}{where}. Make room or"
+            f" give write permission there, or choose another folder with --dest or"
+            f" {ROOT_VARIABLE}."
         ) from error
 
 

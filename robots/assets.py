@@ -6,18 +6,14 @@ from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
-from robots.asset_sources import (
-    AssetSource,
-    InstalledManiSkill,
-    ManiSkillWheel,
-    SourceError,
-)
-from robots.asset_store import AssetStore, default_root
+from robots.asset_sources import AssetSource, InstalledManiSkill, SourceError
+from robots.asset_store import AssetStore, FileState, default_root
 from robots.errors import AssetError
 from robots.hub_source import HubSource
-from robots.manifest import AssetFile, load_manifest
-from robots.progress import say, size
+from robots.manifest import AssetFile, PackageOrigin, load_manifest
+from robots.progress import listing, say, size
 from robots.urdf_xml import read_references
+from robots.wheel_source import ManiSkillWheel
 
 
 def locate(package: str, urdf: str, *, pictures: bool) -> Path:
@@ -108,36 +104,66 @@ class _Fetch:
 
     def __init__(self, source: AssetSource, store: AssetStore, scratch: Path, trust: bool) -> None:
         self._source, self._store, self._scratch, self._trust = source, store, scratch, trust
+        self._kept: set[str] = set()  # packages of which files came along
+        self._room = True
 
     def run(self, files: Sequence[AssetFile]) -> str:
         """Fetch, refetch once what differs, and return why something is still missing."""
-        different = list(files)
+        different: dict[AssetFile, str] = {}
         try:
             different = self._install(files, again=False)
             if different:
-                different = self._install(different, again=True)
+                different = self._install(list(different), again=True)
         except SourceError as error:
             return str(error)
         if not different:
             return ""
-        listing = ", ".join(map(str, different))
         return (
-            f"refused, as {len(different)} files differ from the manifest, twice: {listing}"
+            f"refused, as {len(different)} files differ from the manifest, twice:"
+            f" {listing([f'{file}{how}' for file, how in different.items()])}"
             f" (--source {self._source.name} --trust-source would accept them)"
         )
 
-    def _install(self, files: Sequence[AssetFile], *, again: bool) -> list[AssetFile]:
-        different: list[AssetFile] = []
+    def _install(self, files: Sequence[AssetFile], *, again: bool) -> dict[AssetFile, str]:
+        """Install what the source gives, and return what differs from the manifest, and how."""
+        different: dict[AssetFile, str] = {}
+        asked = set(files)
         trust = self._trust and again
-        with closing(self._source.fetch(files, self._scratch, again=again)) as contents:
+        fetch = self._source.fetch(files, self._scratch, again=again, trust=trust)
+        with closing(fetch) as contents:
             for file, data in contents:
-                if trust:
-                    _expect_known_references(file, data)
-                if not self._store.install(
-                    file, data, scratch=self._scratch, source=self._source.title, trust=trust
-                ):
-                    different.append(file)
+                if file not in asked:
+                    self._keep(file, data)
+                elif data is None:
+                    different[file] = f" (more than {file.limit(trust=trust):,} bytes)"
+                elif not self._accept(file, data, trust=trust):
+                    different[file] = ""
         return different
+
+    def _accept(self, file: AssetFile, data: bytes, *, trust: bool) -> bool:
+        if trust:
+            _expect_known_references(file, data)
+        return self._store.install(
+            file, data, scratch=self._scratch, source=self._source.title, trust=trust
+        )
+
+    def _keep(self, file: AssetFile, data: bytes | None) -> None:
+        """Keep a file that nobody asked for, so that it need not be fetched another time."""
+        if data is None or not self._room:
+            return
+        try:
+            if self._store.state(file) is FileState.MISSING:
+                self._say_kept(file.origin)
+                self._accept(file, data, trust=False)
+        except AssetError as error:  # what was asked for is there
+            self._room = False
+            say(f"{error} What came along is not kept.")
+
+    def _say_kept(self, origin: PackageOrigin) -> None:
+        if origin.name not in self._kept:
+            self._kept.add(origin.name)
+            say(f"keeping what came along of {origin.name}")
+            say(f"licence {origin.licence}: {origin.licence_note}")
 
 
 def _expect_known_references(file: AssetFile, data: bytes) -> None:
@@ -166,12 +192,13 @@ def _shorten(text: str, length: int = 160) -> str:
 
 
 def _failure_text(wanted: list[AssetFile], store: AssetStore, failures: list[str]) -> str:
-    listing = "".join(f"\n    {file}: {store.state(file).value}" for file in wanted)
+    states = listing([f"{file}: {store.state(file).value}" for file in wanted], "\n    ")
     tried = "".join(f"\n    {failure}" for failure in failures) or "\n    none"
     wheel = wanted[0].origin.wheel
     return (
-        f"{len(wanted)} robot files cannot be used in {store.root}:{listing}\n"
+        f"{len(wanted)} robot files cannot be used in {store.root}\n"
         f"  sources tried:{tried}\n"
+        f"  files:\n    {states}\n"
         f"  what to do: connect to the network and run `python -m robots.fetch_assets`, or"
         f" `pip install {wheel}`, or copy the files into {store.root} from another machine"
     )

@@ -9,10 +9,11 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NoReturn, Protocol
+from typing import Any, NoReturn, Protocol, runtime_checkable
 
 from robots.action_split import ActionNumber, ActionSplit, JointGroup, names
 from robots.errors import DescriptorError, UnknownNameError
+from robots.fields import settle_fields
 
 __all__ = [
     "CONTROL_MODES",
@@ -36,9 +37,13 @@ Quaternion = tuple[float, float, float, float]  # wxyz
 
 IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
+LARGEST_IMAGE = 16384  # pixels; what graphics drivers allow
+_UNIT_TOLERANCE = 1e-6  # rounding of a quaternion written with seven digits
+
 CONTROL_MODES = ("pd_joint_delta_pos", "pd_joint_pos")  # ManiSkill's names
 
 
+@runtime_checkable
 class UrdfSource(Protocol):
     """Where a URDF comes from; see `robots.locator.UrdfLocator`."""
 
@@ -65,6 +70,19 @@ class GripperMaterial:
     restitution: float = 0.0
     patch_radius: float = 0.0
 
+    def __post_init__(self) -> None:
+        """Refuse links that are none, and numbers that no contact has."""
+        settle_fields(self, DescriptorError)
+        _expect(bool(self.links), "GripperMaterial: links is empty; name the links that touch")
+        _expect_different("GripperMaterial: links", self.links)
+        for name in ("static_friction", "dynamic_friction", "patch_radius"):
+            value = getattr(self, name)
+            _expect(value >= 0, f"GripperMaterial: {name} is {value}; it must not be negative")
+        _expect(
+            0 <= self.restitution <= 1,
+            f"GripperMaterial: restitution is {self.restitution}; it must be between 0 and 1",
+        )
+
 
 @dataclass(frozen=True)
 class Fingers:
@@ -84,6 +102,23 @@ class Fingers:
     opening_signs: tuple[int, int] = (1, -1)
     min_force: float = 0.5
     max_angle: float = 85.0
+
+    def __post_init__(self) -> None:
+        """Refuse links that are not two, and numbers that tell no grasp."""
+        settle_fields(self, DescriptorError)
+        _expect_different("Fingers: links", self.links)
+        _expect(
+            set(self.opening_signs) <= {1, -1},
+            f"Fingers: opening_signs is {self.opening_signs}; each must be 1 or -1",
+        )
+        _expect(
+            self.min_force >= 0,
+            f"Fingers: min_force is {self.min_force} N; it must not be negative",
+        )
+        _expect(
+            0 <= self.max_angle <= 180,
+            f"Fingers: max_angle is {self.max_angle} degrees; it must be between 0 and 180",
+        )
 
 
 @dataclass(frozen=True)
@@ -112,6 +147,24 @@ class CameraMount:
     near: float = 0.01
     far: float = 100.0
 
+    def __post_init__(self) -> None:
+        """Refuse what no camera can be."""
+        settle_fields(self, DescriptorError)
+        camera = f"camera {self.name!r}"
+        _expect_unit(camera, self.quaternion)
+        for name, pixels in (("width", self.width), ("height", self.height)):
+            _expect(
+                0 < pixels <= LARGEST_IMAGE,
+                f"{camera}: {name} is {pixels} pixels; it must be between 1 and {LARGEST_IMAGE}",
+            )
+        _expect(
+            0 < self.fov < math.pi, f"{camera}: fov is {self.fov} rad; it must be between 0 and pi"
+        )
+        _expect(
+            0 < self.near < self.far,
+            f"{camera}: near is {self.near} m and far {self.far} m; it must be 0 < near < far",
+        )
+
 
 @dataclass(frozen=True)
 class Home:
@@ -126,6 +179,11 @@ class Home:
     position: Vector3 = (0.0, 0.0, 0.0)
     quaternion: Quaternion = IDENTITY
     keyframe: str = "rest"
+
+    def __post_init__(self) -> None:
+        """Refuse a pose that is none."""
+        settle_fields(self, DescriptorError)
+        _expect_unit("Home", self.quaternion)
 
 
 @dataclass(frozen=True)
@@ -164,21 +222,22 @@ class RobotDescriptor:
 
     def __post_init__(self) -> None:
         """Freeze the keyframes and refuse contradictions."""
-        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", self.name):
-            raise DescriptorError(
-                f"robot name {self.name!r} must be a letter followed by letters, digits and _"
-            )
-        if not (math.isfinite(self.reach) and self.reach > 0):
-            raise DescriptorError(f"{self.name}: reach is {self.reach} m; it must be positive")
+        named = isinstance(self.name, str) and self.name.isprintable()
+        settle_fields(self, DescriptorError, owner=self.name if named else None)
+        _expect(
+            re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", self.name) is not None,
+            f"robot name {self.name!r} must be a letter followed by letters, digits and _",
+        )
+        _expect(self.reach > 0, f"{self.name}: reach is {self.reach} m; it must be positive")
+        _expect_different(f"{self.name}: tcp_position_links", self.tcp_position_links)
+        _expect_different(f"{self.name}: cameras", [camera.name for camera in self.cameras])
         frozen = {key: tuple(float(x) for x in qpos) for key, qpos in self.keyframes.items()}
         for key, qpos in frozen.items():
-            if len(qpos) != self.dof:
-                raise DescriptorError(
-                    f"{self.name}: keyframe {key!r} has {len(qpos)} numbers;"
-                    f" the robot has {self.dof} joints ({', '.join(self.joints)})"
-                )
-            if not all(math.isfinite(x) for x in qpos):
-                raise DescriptorError(f"{self.name}: keyframe {key!r} is not finite: {qpos}")
+            _expect(
+                len(qpos) == self.dof,
+                f"{self.name}: keyframe {key!r} has {len(qpos)} numbers;"
+                f" the robot has {self.dof} joints ({', '.join(self.joints)})",
+            )
         object.__setattr__(self, "keyframes", _Frozen(frozen))
         self.keyframe(self.home.keyframe)
 
@@ -296,6 +355,25 @@ class RobotDescriptor:
                     )
                 )
         return tuple(numbers)
+
+
+def _expect(right: bool, otherwise: str) -> None:
+    if not right:
+        raise DescriptorError(otherwise)
+
+
+def _expect_different(what: str, names: Sequence[str]) -> None:
+    twice = sorted({name for name in names if names.count(name) > 1})
+    _expect(not twice, f"{what} has {', '.join(twice)} more than once")
+
+
+def _expect_unit(what: str, quaternion: Quaternion) -> None:
+    length = math.hypot(*quaternion)
+    _expect(
+        abs(length - 1) <= _UNIT_TOLERANCE,
+        f"{what}: quaternion {quaternion} has length {length:.6g}; a rotation has length 1"
+        " (order w, x, y, z)",
+    )
 
 
 class _Frozen(dict[str, tuple[float, ...]]):

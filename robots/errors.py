@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Iterable
 
 
@@ -48,6 +49,27 @@ class ActionError(RobotLayoutsError, ValueError):
 
 class AssetError(RobotLayoutsError, OSError):
     """Robot files that could not be found or did not match the manifest."""
+
+
+class UnreadableFileError(RobotLayoutsError, OSError):
+    """A file that cannot be read: it is missing, no regular file, too large, or not as it says."""
+
+    def __init__(
+        self, path: str | os.PathLike[str], reason: str, number: int | None = None
+    ) -> None:
+        """Compose the message.
+
+        Args:
+            path: The file.
+            reason: What is wrong with it; also the error's ``strerror``.
+            number: The error's ``errno``.
+        """
+        super().__init__(f"cannot read {os.fspath(path)}: {reason}")
+        self.filename, self.strerror, self.errno = path, reason, number
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle by what it was composed of, so that worker processes can send it home."""
+        return (type(self), (self.filename, self.strerror, self.errno))
 
 
 class SimulationError(RobotLayoutsError, RuntimeError):

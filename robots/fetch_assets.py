@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
-from pathlib import Path
 
 from robots import scenery
-from robots.asset_sources import AssetSource, InstalledManiSkill, LocalCopy, ManiSkillWheel
+from robots.asset_sources import AssetSource, InstalledManiSkill, LocalCopy
 from robots.asset_store import AssetStore, FileState, default_root
 from robots.assets import default_sources, ensure
-from robots.errors import RobotLayoutsError, UnknownNameError
+from robots.commands import exit_code, print_error, printable, start
+from robots.descriptor import RobotDescriptor
+from robots.errors import DescriptorError
 from robots.hub_source import REVISION_VARIABLE, HubSource
 from robots.locator import UrdfLocator
 from robots.manifest import AssetFile, load_manifest
+from robots.paths import absolute
 from robots.progress import size
 from robots.registry import RobotRegistry
+from robots.wheel_source import ManiSkillWheel
 
 SOURCES = ("local", "hf", "mani_skill", "wheel")
 ONLINE_SOURCES = ("hf", "wheel")
@@ -32,48 +34,50 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if options.offline and options.source in ONLINE_SOURCES:
         parser.error(f"--source {options.source} needs the network, which --offline rules out")
-    try:
-        needs = robot_files(options.robots, pictures=not options.physics_only)
-        if not (options.robots or options.physics_only):
-            needs["scenery"] = load_manifest().package(scenery.PACKAGE).files
-        store = AssetStore((options.dest or default_root()).expanduser().absolute())
-        if not options.check:
-            ensure(_union(needs), store, _sources(options, store), trust=options.trust_source)
-        return _report(needs, store)
-    except UnknownNameError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    return exit_code(lambda: _fetch(options))
 
 
-def robot_files(robots: Sequence[str], *, pictures: bool) -> dict[str, tuple[AssetFile, ...]]:
-    """Return the files that each robot needs; robots with a URDF of the user's own need none.
+def _fetch(options: argparse.Namespace) -> int:
+    pictures = not options.physics_only
+    failures: list[DescriptorError] = []
+    if options.robots:
+        robots = [RobotRegistry.load(name) for name in options.robots]
+    else:
+        robots, failures = RobotRegistry.load_all()
+    needs = {robot.name: robot_files(robot, pictures=pictures) for robot in robots}
+    if pictures and not options.robots:
+        needs["scenery"] = load_manifest().package(scenery.PACKAGE).files
+    chosen = options.dest
+    store = AssetStore(default_root() if chosen is None else absolute(chosen, "--dest"))
+    if not options.check:
+        ensure(_union(needs), store, _sources(options, store), trust=options.trust_source)
+    code = _report(needs, store)
+    for failure in failures:
+        print_error(failure)
+    return 1 if failures else code
+
+
+def robot_files(robot: RobotDescriptor, *, pictures: bool) -> tuple[AssetFile, ...]:
+    """Return the files that a robot needs; one with a URDF of the user's own needs none.
 
     Args:
-        robots: Registry names; none means all.
-        pictures: Whether they will also be drawn.
+        robot: The robot.
+        pictures: Whether it will also be drawn.
 
     Raises:
-        UnknownNameError: If no robot has such a name.
+        UnknownNameError: If the manifest has no such package or URDF.
     """
-    needs: dict[str, tuple[AssetFile, ...]] = {}
-    for name in robots or RobotRegistry.names():
-        urdf = RobotRegistry.load(name).urdf
-        if isinstance(urdf, UrdfLocator):
-            package = load_manifest().package(urdf.package)
-            needs[name] = package.needed(urdf.file, pictures=pictures)
-        else:
-            needs[name] = ()
-    return needs
+    if not isinstance(robot.urdf, UrdfLocator):
+        return ()
+    return load_manifest().package(robot.urdf.package).needed(robot.urdf.file, pictures=pictures)
 
 
 def describe_file(file: AssetFile, store: AssetStore) -> str:
     """Return one line: state, path, size, what it is for, where it came from."""
     state = store.state(file)
     use = "physics" if file.physics else "pictures"
-    source = store.record().get(str(file), {}).get("source") if state.usable else None
+    fetched = store.record().files.get(str(file)) if state.usable else None
+    source = fetched["source"] if fetched else None
     return f"{state.value}: {file} ({size(file.bytes)}, {use}{f'; {source}' if source else ''})"
 
 
@@ -84,7 +88,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--check", action="store_true", help="fetch nothing, only list what is missing or wrong")
     add("--offline", action="store_true", help="never use the network")
     add("--source", choices=SOURCES, help="use this source alone")
-    add("--dest", type=Path, metavar="DIR", help="folder to fill, instead of the usual local copy")
+    add("--dest", metavar="DIR", help="folder to fill, instead of the usual local copy")
     add("--physics-only", action="store_true", help="leave out what only pictures need")
     add(
         "--trust-source",
@@ -119,7 +123,7 @@ def _union(needs: dict[str, tuple[AssetFile, ...]]) -> list[AssetFile]:
 
 
 def _report(needs: dict[str, tuple[AssetFile, ...]], store: AssetStore) -> int:
-    print(f"robot files in {store.root}")
+    print(printable(f"robot files in {store.root}"))
     for robot, files in needs.items():
         bad = len(store.unusable(files))
         total = f"{len(files)} files, {size(sum(file.bytes for file in files))}"
@@ -136,4 +140,4 @@ def _report(needs: dict[str, tuple[AssetFile, ...]], store: AssetStore) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(main)

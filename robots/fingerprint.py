@@ -7,8 +7,11 @@ import os
 from pathlib import Path
 
 from robots.descriptor import UrdfSource
-from robots.errors import AssetError
-from robots.urdf_xml import read_references
+from robots.errors import AssetError, UnreadableFileError
+from robots.files import read_regular
+from robots.mesh_files import MAX_MESH_BYTES
+from robots.srdf import srdf_beside
+from robots.urdf_xml import read_references, read_urdf
 
 
 def asset_fingerprint(source: UrdfSource) -> str:
@@ -28,16 +31,14 @@ def asset_fingerprint(source: UrdfSource) -> str:
     try:
         for path in _physics_files(urdf):
             name = Path(os.path.relpath(path, urdf.parent)).as_posix()
-            contents = hashlib.sha256(path.read_bytes()).hexdigest()
+            contents = hashlib.sha256(read_regular(path, MAX_MESH_BYTES)).hexdigest()
             digest.update(f"{contents}  {name}\n".encode())
-    except OSError as error:
-        if isinstance(error, AssetError):
-            raise
-        raise AssetError(f"cannot read {error.filename}: {error.strerror}") from error
+    except UnreadableFileError as error:
+        raise AssetError(str(error)) from error
     return digest.hexdigest()
 
 
 def _physics_files(urdf: Path) -> list[Path]:
-    references = read_references(urdf.read_bytes(), urdf.as_posix(), exists=os.path.isfile)
-    srdf = urdf.with_suffix(".srdf")
-    return [urdf, *([srdf] if srdf.is_file() else []), *map(Path, references.collision)]
+    references = read_references(read_urdf(urdf), urdf.as_posix(), exists=os.path.isfile)
+    srdf = srdf_beside(urdf)
+    return [urdf, *([srdf] if srdf else []), *map(Path, references.collision)]

@@ -17,8 +17,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from robots.errors import AssetError, MissingPackageError, RobotLayoutsError, UnknownNameError
+from robots.commands import exit_code, start
+from robots.errors import AssetError, MissingPackageError, UnknownNameError
 from robots.guess import Guess, guess
+from robots.paths import absolute
 
 __all__ = ["Guess", "guess_descriptor", "main"]
 
@@ -57,24 +59,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--name", help="registry name of the robot")
     parser.add_argument("--module", action="store_true", help="print the data module to paste")
     options = parser.parse_args(arguments)
-    try:
-        found = guess_descriptor(options.urdf, options.name)
-    except UnknownNameError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    return exit_code(lambda: _print(options))
+
+
+def _print(options: argparse.Namespace) -> None:
+    found = guess_descriptor(options.urdf, options.name)
     print(found.module().rstrip("\n") if options.module else found)
-    return 0
 
 
 def _find(path_or_name: str | os.PathLike[str]) -> Path:
     """Return the path, or what robot_descriptions has of that name."""
-    path = Path(path_or_name).expanduser()
+    path = absolute(path_or_name, "the path of the URDF")
     is_name = isinstance(path_or_name, str) and path_or_name.isidentifier()
-    if path.exists() or not is_name:
-        return path.absolute()
+    if os.path.exists(path) or not is_name:
+        return path
     return _described(str(path_or_name))
 
 
@@ -102,4 +100,4 @@ def _described(name: str) -> Path:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(main)

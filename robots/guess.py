@@ -20,6 +20,7 @@ from robots.locator import LocalUrdf
 from robots.urdf_anatomy import FARTHEST_SLIDE, Anatomy, find_anatomy
 from robots.urdf_model import ModelJoint, UrdfModel, read_model
 from robots.urdf_reach import link_frame, reach
+from robots.urdf_xml import read_urdf
 
 STIFFNESS, DAMPING, FORCE = 1e3, 1e2, 100.0  # what ManiSkill gives its Panda
 STEP = 0.1  # of an arm joint, per control step (rad, m)
@@ -64,7 +65,7 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     """
     locator = LocalUrdf(str(urdf))
     path = locator.locate()
-    model = read_model(path.read_bytes(), path.as_posix())
+    model = read_model(read_urdf(path), path.as_posix())
     anatomy = find_anatomy(model, path.as_posix())
     split, drives = _action_split(anatomy)
     rest, stance = _rest(anatomy, split)

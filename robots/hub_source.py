@@ -12,13 +12,15 @@ import threading
 import time
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import IO, Any
 
-from robots.asset_sources import Contents, SourceError
+from robots.asset_sources import Contents, SourceError, read_bounded
+from robots.child_process import end, running
+from robots.errors import UnreadableFileError
 from robots.manifest import AssetFile
-from robots.progress import download_bar
+from robots.progress import download_bar, listing
 
 ENDPOINT_VARIABLE = "HF_ENDPOINT"
 REVISION_VARIABLE = "ROBOT_LAYOUTS_HF_REVISION"
@@ -27,7 +29,9 @@ PATIENCE_VARIABLE = "ROBOT_LAYOUTS_HF_PATIENCE"
 _DEFAULT_REVISION = "main"
 _DEFAULT_PATIENCE = 8.0  # s; with starting and ending a process, under ten are lost
 # The child sees the packages that this process sees, wherever it runs.
-_BOOT = "import sys; _, job, *sys.path[:] = sys.argv; import robots.hub_client as c; c.main(job)"
+_BOOT = "import sys; _, *sys.path[:] = sys.argv; import robots.hub_client as c; c.main()"
+_LARGEST_PATIENCE = 86400.0  # s
+_LEAST_RATE = 1000  # bytes per second; slower ones would hold a fetch for hours
 
 
 class HubSource:
@@ -46,9 +50,8 @@ class HubSource:
 
         Args:
             revision: Else ``ROBOT_LAYOUTS_HF_REVISION``, else ``main``.
-            patience: How long nothing may arrive before the Hub is given up (s), else
+            patience: How long next to nothing may arrive before the Hub is given up (s), else
                 ``ROBOT_LAYOUTS_HF_PATIENCE``, else 8.
-
         """
         self.endpoint = os.environ.get(ENDPOINT_VARIABLE) or None
         self.revision = revision or os.environ.get(REVISION_VARIABLE) or _DEFAULT_REVISION
@@ -59,7 +62,9 @@ class HubSource:
         """Name in messages."""
         return f"Hugging Face Hub at {self.endpoint}" if self.endpoint else "Hugging Face Hub"
 
-    def fetch(self, files: Sequence[AssetFile], scratch: Path, *, again: bool) -> Contents:
+    def fetch(
+        self, files: Sequence[AssetFile], scratch: Path, *, again: bool, trust: bool
+    ) -> Contents:
         """Yield files as they arrive; see `robots.asset_sources.AssetSource`."""
         for dataset in sorted({file.origin.hub_dataset for file in files}):
             wanted = {_hub_path(f): f for f in files if f.origin.hub_dataset == dataset}
@@ -67,7 +72,7 @@ class HubSource:
                 "dataset": dataset,
                 "revision": self.revision,
                 "endpoint": self.endpoint,
-                "files": list(wanted),
+                "files": {path: file.limit(trust=trust) for path, file in wanted.items()},
                 "again": again,
             }
             yield from self._download(job, wanted, scratch)
@@ -75,6 +80,7 @@ class HubSource:
     def _download(
         self, job: dict[str, Any], wanted: dict[str, AssetFile], scratch: Path
     ) -> Contents:
+        dataset = f"{job['dataset']} at {job['revision']:.80}"
         absent: list[str] = []
         total = sum(file.bytes for file in wanted.values())
         with download_bar(job["dataset"], total) as advance:
@@ -82,65 +88,84 @@ class HubSource:
                 if "bytes" in message:
                     advance(message["bytes"])
                 elif "file" in message:
-                    yield wanted[message["file"]], _read(message["at"])
+                    path = message["file"]
+                    yield wanted[path], _read(Path(message["at"]), job["files"][path], job["again"])
                 elif "absent" in message:
                     absent.append(message["absent"])
+                elif "too_large" in message:
+                    yield wanted[message["too_large"]], None
                 elif "failed" in message:
-                    raise SourceError(f"{job['dataset']} at {job['revision']}: {message['failed']}")
+                    raise SourceError(f"{dataset}: {message['failed']}")
         if absent:
             raise SourceError(
-                f"{job['dataset']} at {job['revision']} lacks {len(absent)} files (404):"
-                f" {', '.join(sorted(absent))}"
+                f"{dataset} lacks {len(absent)} files (404): {listing(sorted(absent))}"
             )
 
     def _messages(self, job: dict[str, Any], scratch: Path) -> Iterator[dict[str, Any]]:
-        """Yield what the client tells, until it is done or out of patience."""
+        """Yield what the client reports, until it is done or out of patience."""
         warnings: deque[str] = deque(maxlen=2)
         patience = _patience_from_environment() if self._patience is None else self._patience
-        with tempfile.TemporaryFile(dir=scratch) as errors, _client(job, errors) as lines:
-            deadline = time.monotonic() + patience
+        with _client(job, scratch) as (lines, errors):
+            deadline, arrived = time.monotonic() + patience, 0
             while True:
                 try:
                     line = lines.get(timeout=max(0.0, deadline - time.monotonic()))
                 except queue.Empty:
                     raise SourceError(
-                        f"nothing arrived for {patience:g} s{_quote(warnings)}"
-                        f"; {PATIENCE_VARIABLE} sets how long to wait"
+                        f"{'next to ' if arrived else ''}nothing arrived for {patience:g} s"
+                        f"{_quote(warnings)}; {PATIENCE_VARIABLE} sets how long to wait"
                     ) from None
                 if line is None:
                     errors.seek(0)
-                    said = errors.read().decode(errors="replace").strip().split("\n")[-1]
-                    raise SourceError(f"the client ended unexpectedly{_quote(warnings)}: {said}")
+                    last = errors.read().decode(errors="replace").strip().split("\n")[-1]
+                    last = last or "it was killed, or has no memory left"
+                    raise SourceError(f"the client ended unexpectedly{_quote(warnings)}: {last}")
                 message = json.loads(line)
                 if "done" in message:
                     return
                 if "warning" in message:
                     warnings.append(message["warning"])
-                else:
-                    deadline = time.monotonic() + patience
-                    yield message
+                    continue
+                arrived += max(0, message.get("bytes", 0))
+                if "bytes" not in message or arrived >= _LEAST_RATE * patience:
+                    deadline, arrived = time.monotonic() + patience, 0
+                yield message
 
 
 @contextmanager
-def _client(job: dict[str, Any], errors: IO[bytes]) -> Generator[queue.Queue[str | None]]:
-    """Run the client process; its lines come in a queue, None at the end."""
-    process = subprocess.Popen(
-        [sys.executable, "-c", _BOOT, json.dumps(job), *sys.path],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=errors,
-        env={**os.environ, "HF_HUB_DISABLE_TELEMETRY": "1"},
-        text=True,
-        encoding="utf-8",
-    )
+def _client(
+    job: dict[str, Any], scratch: Path
+) -> Generator[tuple[queue.Queue[str | None], IO[bytes]]]:
+    """Run the client process; its lines come in a queue, None at the end, its errors in a file.
+
+    Raises:
+        SourceError: If no process can be started.
+    """
+    environment = {**os.environ, "HF_HUB_DISABLE_TELEMETRY": "1", "HF_HUB_DISABLE_XET": "1"}
     lines: queue.Queue[str | None] = queue.Queue()
-    with process:
+    with ExitStack() as stack:
+        try:
+            errors = stack.enter_context(tempfile.TemporaryFile(dir=scratch))
+            work = stack.enter_context(tempfile.TemporaryFile(dir=scratch))
+            work.write(json.dumps(job).encode())
+            work.seek(0)
+            process = stack.enter_context(
+                running(
+                    [sys.executable, "-c", _BOOT, *sys.path],
+                    stdin=work,
+                    stdout=subprocess.PIPE,
+                    stderr=errors,
+                    env=environment,
+                )
+            )
+        except OSError as error:
+            raise SourceError(f"cannot start the Hub's client: {error.strerror}") from error
         pump = threading.Thread(target=_pump, args=(process.stdout, lines), daemon=True)
         pump.start()
         try:
-            yield lines
+            yield lines, errors
         finally:
-            process.kill()
+            end(process)
             pump.join()
 
 
@@ -149,16 +174,19 @@ def _quote(warnings: Iterable[str]) -> str:
     return f" (it warned: {text})" if text else ""
 
 
-def _pump(stream: IO[str], lines: queue.Queue[str | None]) -> None:
+def _pump(stream: IO[bytes], lines: queue.Queue[str | None]) -> None:
     for line in stream:
-        lines.put(line)
+        if line.endswith(b"\n"):  # else it was killed within the line
+            lines.put(line.decode())
     lines.put(None)
 
 
-def _read(path: str) -> bytes:
+def _read(path: Path, limit: int, again: bool) -> bytes | None:
     try:
-        return Path(path).read_bytes()
-    except OSError as error:
+        return read_bounded(path, limit)
+    except UnreadableFileError as error:
+        if not again:  # the client writes it anew
+            return None
         raise SourceError(f"cannot read {path} in the Hub's cache: {error.strerror}") from error
 
 
@@ -169,6 +197,11 @@ def _hub_path(file: AssetFile) -> str:
 def _patience_from_environment() -> float:
     text = os.environ.get(PATIENCE_VARIABLE) or str(_DEFAULT_PATIENCE)
     try:
-        return float(text)
+        patience = float(text)
     except ValueError:
-        raise SourceError(f"{PATIENCE_VARIABLE} is {text!r}; it is a number of seconds") from None
+        patience = 0.0
+    if not 0 < patience <= _LARGEST_PATIENCE:
+        raise SourceError(
+            f"{PATIENCE_VARIABLE} is {text!r}; it is a number of seconds, at most a day"
+        )
+    return patience

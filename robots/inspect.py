@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from robots.asset_sources import SourceError, find_mani_skill
 from robots.asset_store import AssetStore, FileState, default_root
+from robots.commands import exit_code, print_error, start
 from robots.descriptor import JointGroup, RobotDescriptor
-from robots.errors import AssetError, RobotLayoutsError, UnknownNameError
 from robots.fetch_assets import describe_file
 from robots.locator import LocalUrdf, UrdfLocator
 from robots.manifest import AssetFile, AssetPackage, load_manifest
@@ -18,7 +17,7 @@ from robots.progress import size
 from robots.registry import RobotRegistry
 from robots.urdf_model import read_model
 from robots.urdf_reach import link_frame
-from robots.urdf_xml import UrdfJoint, read_joints
+from robots.urdf_xml import UrdfJoint, read_joints, read_urdf
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -30,18 +29,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m robots.inspect", description=__doc__)
     parser.add_argument("robots", nargs="*", metavar="ROBOT", help="robots to report on")
     robots = parser.parse_args(arguments).robots
-    try:
-        if not robots:
-            print("\n".join(_catalogue()))
-        for name in robots:
-            print(report(RobotRegistry.load(name), AssetStore(default_root())))
-    except UnknownNameError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    return 0
+    return exit_code(lambda: _print(robots))
+
+
+def _print(names: Sequence[str]) -> int:
+    for name in names:
+        print(report(RobotRegistry.load(name), AssetStore(default_root())))
+    if names:
+        return 0
+    robots, failures = RobotRegistry.load_all()
+    print("\n".join(_catalogue(robots)))
+    for failure in failures:
+        print_error(failure)
+    return 1 if failures else 0
 
 
 def report(robot: RobotDescriptor, store: AssetStore) -> str:
@@ -100,8 +100,7 @@ def _fetch_hint(robot: RobotDescriptor) -> str:
     return f"`python -m robots.fetch_assets {robot.name}` fetches it"
 
 
-def _catalogue() -> Iterator[str]:
-    robots = [RobotRegistry.load(name) for name in RobotRegistry.names()]
+def _catalogue(robots: Iterable[RobotDescriptor]) -> Iterator[str]:
     rows = [("robot", "joints", "action", "reach (m)", "numbers from")]
     rows += [(r.name, str(r.dof), str(r.action_dim), f"{r.reach:g}", r.source) for r in robots]
     return _table(rows)
@@ -114,7 +113,7 @@ def _joints(robot: RobotDescriptor, urdf: Path | None) -> Iterable[str]:
         joint: name for name, group in robot.action_split.groups.items() for joint in group.joints
     }
     rows = [("joint", "type", "limits", "effort", "speed", "driven by")]
-    for joint in read_joints(_read(urdf), urdf.name):
+    for joint in read_joints(read_urdf(urdf), urdf.name):
         driven = groups.get(joint.name, "nothing")
         mimics = f" (URDF: mimics {joint.mimics})" if joint.mimics else ""
         rows.append((joint.name, joint.type, _limits(joint), *_bounds(joint), driven + mimics))
@@ -171,7 +170,7 @@ def _keyframes(robot: RobotDescriptor, urdf: Path | None) -> Iterator[str]:
 
 def _tcp_places(robot: RobotDescriptor, urdf: Path) -> dict[str, Sequence[float]]:
     """Return the TCP link's position at each keyframe, in the base frame (m)."""
-    model = read_model(_read(urdf), urdf.name)
+    model = read_model(read_urdf(urdf), urdf.name)
     return {
         name: link_frame(model, robot.tcp_link, dict(zip(robot.joints, qpos, strict=True))).position
         for name, qpos in robot.keyframes.items()
@@ -231,13 +230,6 @@ def _summary(files: Sequence[AssetFile], store: AssetStore) -> str:
     return f"{len(files)} files, {size(sum(file.bytes for file in files))}: {', '.join(counts)}"
 
 
-def _read(urdf: Path) -> bytes:
-    try:
-        return urdf.read_bytes()
-    except OSError as error:
-        raise AssetError(f"cannot read the URDF {urdf}: {error.strerror}") from error
-
-
 def _row(values: Iterable[float]) -> str:
     return "(" + ", ".join(f"{round(value, 6) + 0.0:.4g}" for value in values) + ")"
 
@@ -249,4 +241,4 @@ def _table(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(main)

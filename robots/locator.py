@@ -77,17 +77,15 @@ class LocalUrdf:
             pictures: Whether the visual meshes are needed too.
 
         Raises:
-            AssetError: If the URDF or a mesh is missing, or it describes no robot (see
-                `robots.urdf_model.read_model`).
+            AssetError: If the URDF or a mesh is missing, it describes no robot (see
+                `robots.urdf_model.read_model`), or refers to files that it may not refer to (see
+                `robots.urdf_paths`).
         """
         from robots.urdf_model import read_model
-        from robots.urdf_xml import read_references
+        from robots.urdf_xml import read_references, read_urdf
 
         path = Path(self.path).expanduser().absolute()
-        try:
-            xml = path.read_bytes()
-        except OSError as error:
-            raise AssetError(f"cannot read the URDF {path}: {error.strerror}") from error
+        xml = read_urdf(path)
         read_model(xml, path.as_posix())
         references = read_references(xml, path.as_posix(), exists=os.path.isfile)
         wanted = references.collision + (references.visual if pictures else ())

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
+
+from robots.commands import is_watched, notice, printable
 
 Advance = Callable[[int], None]
 
 
 def say(text: str) -> None:
-    """Print one line."""
-    print(f"robot files: {text}", file=sys.stderr, flush=True)
+    """Print one line; no name in it steers the terminal."""
+    notice(f"robot files: {printable(text)}")
 
 
 @contextmanager
@@ -25,7 +26,7 @@ def download_bar(title: str, total: int | None) -> Generator[Advance]:
     Yields:
         A function to call with the number of bytes that arrived.
     """
-    if not sys.stderr.isatty():
+    if not is_watched():
         yield lambda count: None
         return
     from rich.console import Console
@@ -53,3 +54,11 @@ def download_bar(title: str, total: int | None) -> Generator[Advance]:
 def size(count: int) -> str:
     """Return a number of bytes as people write it."""
     return f"{count / 1e6:.1f} MB" if count >= 1e5 else f"{count / 1e3:.1f} kB"
+
+
+def listing(entries: Sequence[str], separator: str = ", ", most: int = 12) -> str:
+    """Return entries as a list for a message, and how many more there are beyond the first."""
+    shown = list(entries[:most])
+    if len(entries) > most:
+        shown.append(f"and {len(entries) - most} more")
+    return separator.join(shown)

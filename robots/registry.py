@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from importlib import import_module, metadata
 
 from robots.descriptor import RobotDescriptor
-from robots.errors import DescriptorError, UnknownNameError
+from robots.errors import DescriptorError, RobotLayoutsError, UnknownNameError
+from robots.fields import show
 
 ENTRY_POINT_GROUP = "robot_layouts.robots"
 
@@ -38,15 +40,17 @@ class RobotRegistry:
 
         Raises:
             UnknownNameError: If no robot has that name (also a ``KeyError``).
+            DescriptorError: If another package brings the robot, and that goes wrong.
         """
+        if not isinstance(name, str):
+            raise UnknownNameError("robot", name, cls.names(), "It takes a robot's name.")
         if name in cls._registered:
             return cls._registered[name]
         if name in CATALOGUE:
             module, _, attribute = CATALOGUE[name].partition(":")
             return getattr(import_module(module), attribute)
-        for entry_point in metadata.entry_points(group=ENTRY_POINT_GROUP):
-            if entry_point.name == name:
-                return _checked(entry_point.load(), f"entry point {entry_point.value!r}")
+        if brought := [point for point in _entry_points() if point.name == name]:
+            return _load(name, brought)
         raise UnknownNameError(
             "robot", name, cls.names(), "Add your own with RobotRegistry.register(descriptor)."
         )
@@ -54,8 +58,20 @@ class RobotRegistry:
     @classmethod
     def names(cls) -> tuple[str, ...]:
         """Return every robot name, sorted."""
-        entry_points = (point.name for point in metadata.entry_points(group=ENTRY_POINT_GROUP))
+        entry_points = (point.name for point in _entry_points())
         return tuple(sorted({*cls._registered, *CATALOGUE, *entry_points}))
+
+    @classmethod
+    def load_all(cls) -> tuple[list[RobotDescriptor], list[DescriptorError]]:
+        """Return every robot, sorted by name, and why those of other packages that fail do so."""
+        robots: list[RobotDescriptor] = []
+        failures: list[DescriptorError] = []
+        for name in cls.names():
+            try:
+                robots.append(cls.load(name))
+            except DescriptorError as error:
+                failures.append(error)
+        return robots, failures
 
     @classmethod
     def register(cls, descriptor: RobotDescriptor) -> RobotDescriptor:
@@ -76,9 +92,43 @@ class RobotRegistry:
         return descriptor
 
 
+def _entry_points() -> Iterable[metadata.EntryPoint]:
+    return metadata.entry_points(group=ENTRY_POINT_GROUP)
+
+
+def _load(name: str, brought: Sequence[metadata.EntryPoint]) -> RobotDescriptor:
+    """Return the robot that other packages bring under a name."""
+    origins = {point.value: f"entry point {point.value!r}{_of_package(point)}" for point in brought}
+    if len(origins) > 1:
+        raise DescriptorError(
+            f"the robot {name!r} is brought more than once, by {' and by '.join(origins.values())};"
+            " uninstall all packages but one, or register the one that is meant"
+        )
+    ((_, origin),) = origins.items()
+    try:
+        found = brought[0].load()
+    except RobotLayoutsError as error:
+        raise DescriptorError(f"{origin} cannot be loaded: {error}") from error
+    except (Exception, SystemExit) as error:  # whatever the code of another package does
+        raise DescriptorError(f"{origin} cannot be loaded: {_in_words(error)}") from error
+    robot = _checked(found, origin)
+    if robot.name != name:
+        raise DescriptorError(f"{origin} is listed as {name!r}, but its robot is {robot.name!r}")
+    return robot
+
+
+def _of_package(point: metadata.EntryPoint) -> str:
+    return f" of {point.dist.name} {point.dist.version}" if point.dist is not None else ""
+
+
+def _in_words(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+
+
 def _checked(descriptor: object, origin: str) -> RobotDescriptor:
     if not isinstance(descriptor, RobotDescriptor):
         raise DescriptorError(
-            f"{origin} gave a {type(descriptor).__name__}; a RobotDescriptor is needed"
+            f"{origin} gave {show(descriptor)}, of type {type(descriptor).__name__};"
+            " a RobotDescriptor is needed"
         )
     return descriptor

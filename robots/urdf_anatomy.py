@@ -78,12 +78,13 @@ def _walk(
                 " chains side by side"
             )
             return chain, fingers, tuple(body)
-        longest = max(nexts, key=lambda joint: _depth(model, joint))  # the first of equals
-        others = [other for joint in nexts if joint != longest for other in model.below(joint)]
+        longest = max(nexts, key=lambda joint: model.depths[joint.name])  # the first of equals
+        shorter = [joint for joint in nexts if joint != longest]
+        others = [other for joint in shorter for other in model.below(joint)]
         if others:
             reasons.append(
                 f"body: {_listing(others)}, as {longest.name} leads on to the longer chain"
-                if _depth(model, longest) > max(_depth(model, j) for j in nexts if j != longest)
+                if model.depths[longest.name] > max(model.depths[joint.name] for joint in shorter)
                 else f"body: {_listing(others)}, a chain as long as that behind {longest.name}:"
                 " a second arm? Then make a group for each"
             )
@@ -94,12 +95,8 @@ def _walk(
 
 
 def _are_fingers(model: UrdfModel, joints: Sequence[ModelJoint]) -> bool:
-    depths = sorted((_depth(model, joint) for joint in joints), reverse=True)
+    depths = sorted((model.depths[joint.name] for joint in joints), reverse=True)
     return len(depths) > 1 and depths[0] <= LONGEST_FINGER and depths[0] - depths[1] <= 1
-
-
-def _depth(model: UrdfModel, joint: ModelJoint) -> int:
-    return 1 + max((_depth(model, behind) for behind in model.moving_on(joint.child)), default=0)
 
 
 def _is_jaw(joint: ModelJoint) -> bool:

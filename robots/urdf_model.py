@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from xml.etree import ElementTree
 
 from robots.errors import AssetError, closest_match
-from robots.urdf_xml import Vector3, numbers_of, parse_urdf, read_joint
+from robots.urdf_inertia import expect_inertia
+from robots.urdf_numbers import Vector3, numbers_of, shown
+from robots.urdf_shapes import UrdfShape, read_shape
+from robots.urdf_xml import parse_urdf, read_joint
 
+MAX_LINKS = 255  # of an articulation in PhysX 5, tried: with one more it has no joints, or crashes
+LONGEST_NAME = 200  # characters
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 DRIVEN_TYPES = ("revolute", "continuous", "prismatic")
 
@@ -76,30 +81,63 @@ class UrdfModel:
         name: The robot's name in the URDF.
         links: Link names, in the URDF's order.
         joints: Joints, in the URDF's order.
+        collisions: What each link collides with; links that collide with nothing are left out.
+        visuals: What each link looks like; links that are not drawn are left out.
     """
 
     name: str
     links: tuple[str, ...]
     joints: tuple[ModelJoint, ...]
+    collisions: Mapping[str, tuple[UrdfShape, ...]] = field(default_factory=dict)
+    visuals: Mapping[str, tuple[UrdfShape, ...]] = field(default_factory=dict)
 
     @cached_property
     def parent_joint(self) -> dict[str, ModelJoint]:
         """The joint that carries each link but the root."""
         return {joint.child: joint for joint in self.joints}
 
-    @property
+    @cached_property
     def root(self) -> str:
         """The link that no joint carries."""
         return next(link for link in self.links if link not in self.parent_joint)
 
-    @property
+    @cached_property
     def moving(self) -> tuple[ModelJoint, ...]:
         """Joints that are not fixed."""
         return tuple(joint for joint in self.joints if joint.moves)
 
-    def joints_on(self, link: str) -> Iterator[ModelJoint]:
-        """Yield the joints that a link carries."""
-        return (joint for joint in self.joints if joint.parent == link)
+    @cached_property
+    def _carried(self) -> dict[str, list[ModelJoint]]:
+        carried: dict[str, list[ModelJoint]] = {link: [] for link in self.links}
+        for joint in self.joints:
+            carried[joint.parent].append(joint)
+        return carried
+
+    @cached_property
+    def ordered(self) -> tuple[ModelJoint, ...]:
+        """All joints, depth first from the root: each after the one that carries its parent."""
+        found: list[ModelJoint] = []
+        waiting = list(reversed(self.joints_on(self.root)))
+        while waiting:
+            found.append(waiting.pop())
+            waiting += reversed(self.joints_on(found[-1].child))
+        return tuple(found)
+
+    @cached_property
+    def depths(self) -> dict[str, int]:
+        """For each joint that moves, how many moving joints the longest chain from it on has."""
+        behind = dict.fromkeys(self.links, 0)  # of what hangs on each link
+        depths: dict[str, int] = {}
+        for joint in reversed(self.ordered):
+            depth = behind[joint.child] + joint.moves
+            behind[joint.parent] = max(behind[joint.parent], depth)
+            if joint.moves:
+                depths[joint.name] = depth
+        return depths
+
+    def joints_on(self, link: str) -> tuple[ModelJoint, ...]:
+        """Return the joints that a link carries, in the URDF's order."""
+        return tuple(self._carried[link])
 
     def rigid_with(self, link: str) -> tuple[str, ...]:
         """Return a link and all that hangs on it by fixed joints, nearest first."""
@@ -137,26 +175,54 @@ def read_model(xml: bytes, urdf: str) -> UrdfModel:
         urdf: Its path, for messages.
 
     Raises:
-        AssetError: If it is no URDF, names are missing, repeated or unknown, its joints make no
-            tree or have impossible limits, or a link that moves has no mass or inertia.
+        AssetError: If it is no URDF, it has more links than PhysX can join, names are missing,
+            repeated or unknown, its joints make no tree or have impossible limits, a link that
+            moves has no mass or inertia, or a shape has no size or is of no known kind.
     """
     root = parse_urdf(xml, urdf)
-    links = tuple(link.get("name", "") for link in root.iterfind("link"))
-    joints = tuple(_read(joint, urdf) for joint in root.iterfind("joint"))
+    elements = root.findall("link")
+    links = tuple(link.get("name", "") for link in elements)
+    _expect_few(urdf, len(links))
     _expect_names(urdf, "link", links)
-    _expect_names(urdf, "joint", [joint.name for joint in joints])
-    model = UrdfModel(root.get("name", ""), links, joints)
+    _expect_names(urdf, "joint", [joint.get("name", "") for joint in root.iterfind("joint")])
+    joints = tuple(_read(joint, urdf) for joint in root.iterfind("joint"))
+    shapes = [dict(_shapes(elements, kind, urdf)) for kind in ("collision", "visual")]
+    model = UrdfModel(root.get("name", ""), links, joints, *shapes)
     _expect_tree(model, urdf)
+    leaders = {joint.name: joint for joint in model.moving}
     for joint in model.moving:
-        _expect_possible(joint, model, urdf)
-    _expect_inertia(root, model, urdf)
+        _expect_possible(joint, leaders, urdf)
+    moved = {joint.child for joint in model.moving}
+    for link in elements:
+        where = f"{urdf}: link {link.get('name')!r}"
+        expect_inertia(link, where, moves=link.get("name") in moved)
     return model
+
+
+def _expect_few(urdf: str, links: int) -> None:
+    if links > MAX_LINKS:
+        raise AssetError(
+            f"{urdf} has {links} links; PhysX joins {MAX_LINKS} at most. Links that are fixed to"
+            " each other can be made one"
+        )
+
+
+def _shapes(
+    links: Iterable[ElementTree.Element], kind: str, urdf: str
+) -> Iterable[tuple[str, tuple[UrdfShape, ...]]]:
+    for link in links:
+        where = f"{urdf}, link {link.get('name')!r}"
+        if shapes := tuple(read_shape(element, where) for element in link.iterfind(kind)):
+            yield link.get("name", ""), shapes
 
 
 def _read(element: ElementTree.Element, urdf: str) -> ModelJoint:
     about = read_joint(element, urdf)
     origin, axis, mimic = (element.find(part) for part in ("origin", "axis", "mimic"))
     where = f"{urdf}: joint {about.name!r}"
+    dynamics = element.find("dynamics")
+    for key in ("damping", "friction"):
+        numbers_of(dynamics, key, (0.0,), where)
     return ModelJoint(
         name=about.name,
         type=about.type,
@@ -191,6 +257,12 @@ def _expect_names(urdf: str, kind: str, found: Iterable[str]) -> None:
     counts = Counter(found)
     if "" in counts:
         raise AssetError(f"{urdf} has a {kind} without a name")
+    for name in counts:
+        if not name.isprintable() or len(name) > LONGEST_NAME:
+            raise AssetError(
+                f"{urdf} has a {kind} called {shown(name)}; names have at most {LONGEST_NAME}"
+                " characters, all of them printable"
+            )
     twice = sorted(name for name, count in counts.items() if count > 1)
     if twice:
         raise AssetError(
@@ -202,9 +274,10 @@ def _expect_names(urdf: str, kind: str, found: Iterable[str]) -> None:
 def _expect_tree(model: UrdfModel, urdf: str) -> None:
     if not model.links:
         raise AssetError(f"{urdf} has no link")
+    known = set(model.links)
     for joint in model.joints:
         for part in (joint.parent, joint.child):
-            if part not in model.links:
+            if part not in known:
                 raise AssetError(f"{urdf}: joint {joint.name!r} names {_unknown_link(part, model)}")
     carried = Counter(joint.child for joint in model.joints)
     twice = sorted(link for link, count in carried.items() if count > 1)
@@ -226,18 +299,18 @@ def _expect_tree(model: UrdfModel, urdf: str) -> None:
 
 def _unknown_link(name: str, model: UrdfModel) -> str:
     match = closest_match(name, model.links)
-    return f"the link {name!r}, which does not exist" + (
+    return f"the link {shown(name)}, which does not exist" + (
         f"; did you mean {match!r}?" if match else ""
     )
 
 
-def _expect_possible(joint: ModelJoint, model: UrdfModel, urdf: str) -> None:
+def _expect_possible(joint: ModelJoint, leaders: dict[str, ModelJoint], urdf: str) -> None:
     where = f"{urdf}: joint {joint.name!r}"
     if joint.type not in DRIVEN_TYPES:
         known = ", ".join(JOINT_TYPES)
         more = "" if joint.type in JOINT_TYPES else f" (the types are {known})"
         raise AssetError(
-            f"{where} is {joint.type!r}{more}; only revolute, continuous, prismatic and fixed"
+            f"{where} is {shown(joint.type)}{more}; only revolute, continuous, prismatic and fixed"
             " joints can be driven or left alone"
         )
     if joint.lower is not None and joint.upper is not None and not joint.lower < joint.upper:
@@ -246,9 +319,10 @@ def _expect_possible(joint: ModelJoint, model: UrdfModel, urdf: str) -> None:
             " no way to go; give it <limit lower= upper=>, or make it continuous or fixed"
         )
     if joint.mimics is not None:
-        leaders = {other.name: other for other in model.moving}
         if joint.mimics not in leaders:
-            raise AssetError(f"{where} mimics {joint.mimics!r}, which is no joint that moves")
+            raise AssetError(f"{where} mimics {shown(joint.mimics)}, which is no joint that moves")
+        if joint.multiplier == 0:
+            raise AssetError(f"{where} mimics with multiplier 0, so it never moves; make it fixed")
         _leader(joint, leaders, where)
 
 
@@ -260,30 +334,3 @@ def _leader(joint: ModelJoint, leaders: dict[str, ModelJoint], where: str) -> No
             raise AssetError(f"{where} mimics itself, by way of {' and '.join(seen)}")
         seen.append(leader.name)
         leader = leaders.get(leader.mimics or "")
-
-
-def _expect_inertia(root: ElementTree.Element, model: UrdfModel, urdf: str) -> None:
-    """Refuse links that a joint moves and whose mass or inertia is given as nothing.
-
-    A link without any shape may weigh nothing: that is how URDFs put two joints in one place, and
-    SAPIEN then takes a mass of its own.
-    """
-    moved = {joint.child for joint in model.moving}
-    for link in root.iterfind("link"):
-        inertial = link.find("inertial")
-        if inertial is None or link.get("name") not in moved:
-            continue
-        where = f"{urdf}: link {link.get('name')!r}"
-        (mass,) = numbers_of(inertial.find("mass"), "value", (0.0,), where)
-        tensor = inertial.find("inertia")
-        moments = [numbers_of(tensor, key, (0.0,), where)[0] for key in ("ixx", "iyy", "izz")]
-        shapes = link.find("collision") is not None or link.find("visual") is not None
-        if not shapes and not any((mass, *moments)):
-            continue
-        if mass <= 0 or min(moments) <= 0:
-            listing = ", ".join(f"{moment:g}" for moment in moments)
-            raise AssetError(
-                f"{where} moves, but has mass {mass:g} kg and moments of inertia {listing} kg·m²;"
-                " all must be positive (leave <inertial> out, and they follow from the collision"
-                " shapes)"
-            )

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from robots.urdf_model import ModelJoint, UrdfModel
-from robots.urdf_xml import Vector3
+from robots.urdf_numbers import Vector3
 
 Matrix = tuple[Vector3, Vector3, Vector3]
 

@@ -6,15 +6,23 @@ import argparse
 import hashlib
 import posixpath
 import re
-import sys
 from importlib import metadata
 from pathlib import Path
 
 from robots import scenery
 from robots.asset_sources import find_mani_skill
-from robots.errors import AssetError, RobotLayoutsError
+from robots.commands import exit_code, start
+from robots.errors import AssetError
+from robots.files import read_regular, read_text
 from robots.locator import UrdfLocator
-from robots.manifest import CHECKOUT_CACHE, AssetFile, AssetPackage, Manifest, PackageOrigin
+from robots.manifest import (
+    CHECKOUT_CACHE,
+    LARGEST_FILE,
+    AssetFile,
+    AssetPackage,
+    Manifest,
+    PackageOrigin,
+)
 from robots.registry import CATALOGUE, RobotRegistry
 from robots.urdf_xml import read_references
 
@@ -28,19 +36,24 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m robots.write_manifest", description=__doc__)
     parser.add_argument("--check", action="store_true", help="only compare; exit code 1 if stale")
     check = parser.parse_args(arguments).check
+    return exit_code(lambda: _write(check=check))
+
+
+def _write(*, check: bool) -> int:
     path = CHECKOUT_CACHE / "manifest.json"
-    try:
-        text = build_manifest(find_mani_skill()).to_json()
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    text = build_manifest(find_mani_skill()).to_json()
     if check:
-        fresh = path.is_file() and path.read_text(encoding="utf-8") == text
+        fresh = path.is_file() and read_text(path, LARGEST_FILE) == text
         print(
             f"{path} is {'up to date' if fresh else 'stale; run python -m robots.write_manifest'}"
         )
         return 0 if fresh else 1
-    path.write_text(text, encoding="utf-8")
+    partial = path.with_suffix(".partial")
+    try:
+        partial.write_text(text, encoding="utf-8")
+        partial.replace(path)
+    except OSError as error:
+        raise AssetError(f"cannot write {path}: {error.strerror}") from error
     print(f"wrote {path}")
     return 0
 
@@ -53,6 +66,7 @@ def build_manifest(mani_skill: Path) -> Manifest:
 
     Raises:
         AssetError: If a URDF refers to a file that mani_skill lacks.
+        UnreadableFileError: If a file cannot be read.
     """
     urdfs: dict[str, set[str]] = {}
     for name in CATALOGUE:
@@ -107,7 +121,12 @@ def build_package(name: str, mani_skill: Path, urdfs: set[str]) -> AssetPackage:
 
 def _origin(name: str, folder: Path, relative: str, kind: str) -> PackageOrigin:
     """Return where the files of a package come from; ``kind`` is their folder on the Hub."""
-    version = metadata.version("mani_skill")
+    try:
+        version = metadata.version("mani_skill")
+    except metadata.PackageNotFoundError:
+        raise AssetError(
+            f"{folder} is of no installed mani_skill, so its version is unknown"
+        ) from None
     licence, terms = _licence(folder)
     return PackageOrigin(
         name=name,
@@ -128,7 +147,7 @@ def _licence(folder: Path) -> tuple[str, str]:
             "CC BY-NC 4.0",
             "Creative Commons Attribution-NonCommercial 4.0: name the authors, no commercial use",
         )
-    beginning = " ".join(own.read_text(encoding="utf-8").split()[:20])  # after a copyright line
+    beginning = " ".join(read_text(own, LARGEST_FILE).split()[:20])  # after a copyright line
     if "Apache License Version 2.0," in beginning:
         return "Apache-2.0", "Apache License 2.0: keep the licence file with the files"
     raise AssetError(f"{own} is a licence this command does not know; tell it in write_manifest.py")
@@ -139,7 +158,9 @@ def _add_needs(
 ) -> bool:
     """Note what a URDF needs, and return whether all that its pictures need is there."""
     references = read_references(
-        (folder / urdf).read_bytes(), urdf, exists=lambda path: (folder / path).is_file()
+        read_regular(folder / urdf, LARGEST_FILE),
+        urdf,
+        exists=lambda path: (folder / path).is_file(),
     )
     beside = [urdf.removesuffix(".urdf") + ".srdf", LICENCE_FILE]
     optional = [path for path in beside if (folder / path).is_file()]
@@ -158,7 +179,7 @@ def _textures(folder: Path, mesh: str) -> list[str]:
     """Return the images that a Collada mesh names."""
     if not mesh.lower().endswith(".dae") or not (folder / mesh).is_file():
         return []
-    text = (folder / mesh).read_text(encoding="utf-8", errors="replace")
+    text = read_regular(folder / mesh, LARGEST_FILE).decode(errors="replace")
     images = re.findall(r"<init_from>([^<>]+\.(?:png|jpe?g|tga))</init_from>", text, re.IGNORECASE)
     beside = posixpath.dirname(mesh)
     return sorted({posixpath.normpath(posixpath.join(beside, image)) for image in images})
@@ -170,7 +191,7 @@ def _asset_file(
     if path.startswith("../") or not (folder / path).is_file():
         urdfs = ", ".join(sorted(physics | pictures)) or origin.name
         raise AssetError(f"{urdfs} refers to {path}, which is not a file inside {folder}")
-    data = (folder / path).read_bytes()
+    data = read_regular(folder / path, LARGEST_FILE)
     return AssetFile(
         origin,
         path,
@@ -182,4 +203,4 @@ def _asset_file(
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(main)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from robots import RobotLayoutsError, UnknownNameError
+from robots.commands import exit_code, start
 from rollouts import (
     evaluate_command,
     record_command,
@@ -29,11 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 if all went well, 1 if not, 2 if the command makes no sense.
     """
     options = _parser().parse_args(arguments)
-    try:
-        return options.run(options)
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2 if isinstance(error, UnknownNameError) else 1
+    return exit_code(lambda: options.run(options))
 
 
 def _demo(options: argparse.Namespace) -> int:
@@ -78,4 +73,4 @@ def _count(text: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(main)

@@ -30,6 +30,11 @@ class Planner:
         actions = self._expert(self._task, seed)
         return as_positions(self._task, seed, actions) if self._converts else actions
 
+    def close(self) -> None:
+        """Let the worlds of its own task go, if it made one."""
+        if self._converts:
+            self._task.close()
+
 
 def as_positions(
     task: MultiRobotTask, seed: int, actions: NDArray[np.float32]

@@ -9,6 +9,7 @@ from statistics import mean
 
 import torch
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 import tasks
@@ -78,7 +79,9 @@ def run_demo(options: DemoOptions, console: Console) -> bool:
             recorder.add(episodes[-1])
             live.console.print(_episode_line(episodes[-1]), highlight=False)
     _report(episodes, console)
-    console.print(f"episodes  {recording}, {recorder.json_path.name}", highlight=False)
+    console.print(
+        f"episodes  {escape(str(recording))}, {escape(recorder.json_path.name)}", highlight=False
+    )
     if film_why_not is None:
         _film(options, episodes, console)
     else:
@@ -88,7 +91,9 @@ def run_demo(options: DemoOptions, console: Console) -> bool:
 
 def _find_files(layout: Layout, console: Console) -> None:
     for robot in {placement.robot.name: placement.robot for placement in layout.values()}.values():
-        console.print(f"robot files of {robot.name}: {robot.urdf.locate()}", soft_wrap=True)
+        console.print(
+            f"robot files of {robot.name}: {escape(str(robot.urdf.locate()))}", soft_wrap=True
+        )
 
 
 def _pictures_problem(layout: Layout) -> str | None:
@@ -113,7 +118,9 @@ def _show_layout(layout: Layout, out: Path, console: Console) -> None:
     except OSError as error:
         raise RecordingError(f"cannot write to {out}: {error.strerror}") from error
     try:
-        console.print(f"seen from above  {layout.preview(out / 'layout.png')}", highlight=False)
+        console.print(
+            f"seen from above  {escape(str(layout.preview(out / 'layout.png')))}", highlight=False
+        )
     except MissingPackageError as error:
         console.print(f"no picture of the layout: {error}", highlight=False, soft_wrap=True)
 
@@ -157,4 +164,4 @@ def _film(options: DemoOptions, episodes: Sequence[Episode], console: Console) -
             progress=lambda frame, total: live.update(line, description=f"video {frame}/{total}"),
         )
     which = "the first episode" if shown == 1 else f"the first {shown} episodes"
-    console.print(f"video     {path}, {which}", highlight=False)
+    console.print(f"video     {escape(str(path))}, {which}", highlight=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import re
 from collections.abc import Generator
@@ -44,6 +45,36 @@ def disk_errors(path: Path) -> Generator[None]:
         raise
     except (OSError, RuntimeError, ValueError) as error:
         raise RecordingError(f"cannot write {path}: {_reason(error)}") from error
+
+
+def claim(folder: Path, *, certain: bool = False) -> int | None:
+    """Make a folder, unless it is there, and take the only right to it.
+
+    Args:
+        folder: The folder.
+        certain: Whether not to take the right where the file system has no locks.
+
+    Returns:
+        An open descriptor that holds the right until it is closed, which the death of the process
+        does too; None if another process has the right.
+    """
+    while True:
+        folder.mkdir(exist_ok=True)
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(descriptor)
+            return None
+        except OSError:
+            if certain:
+                os.close(descriptor)
+                return None
+            return descriptor
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(descriptor), folder.stat()):
+                return descriptor
+        os.close(descriptor)  # its owner removed it meanwhile
 
 
 def write_text(path: Path, text: str) -> None:

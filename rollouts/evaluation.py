@@ -1,4 +1,4 @@
-"""How well a policy does: whole episodes of a task, by as many workers as one likes."""
+"""How well a policy does: whole episodes of a task, in worker processes or in this one."""
 
 from __future__ import annotations
 
@@ -18,9 +18,17 @@ from numpy.typing import NDArray
 from robots import TaskError
 from rollouts.conversion import Planner
 from rollouts.episode import REBUILT
-from rollouts.executor import Event, Executor, ProcessExecutor, modules_of
+from rollouts.executor import (
+    EPISODE_SECONDS,
+    Event,
+    Executor,
+    choose_executor,
+    modules_of,
+    play_all,
+)
 from rollouts.experts import find_expert
 from rollouts.experts.registry import Expert
+from rollouts.seeds import checked_seeds
 from tasks import MultiRobotTask, Scenario, get_task_class
 from tasks.registry import make_scenario
 
@@ -101,8 +109,9 @@ def evaluate(
     task: str,
     seeds: Sequence[int],
     *,
-    workers: int = 1,
+    workers: int | None = None,
     executor: Executor | None = None,
+    episode_timeout: float | None = EPISODE_SECONDS,
     on_event: Callable[[Event], None] = lambda event: None,
     **making: Any,
 ) -> Evaluation:
@@ -115,25 +124,31 @@ def evaluate(
 
     Args:
         policy: Maps the observation, (1, D) float32 if ``obs_mode`` is ``"state"``, to the action,
-            (A,) or (1, A). It can be pickled. Or ``"expert"``, which makes a plan for each seed and
-            carries it out; where it finds none, the episode is a failure of 0 steps.
+            (A,) or (1, A). It can be pickled, unless ``workers`` is 0; what `copy.deepcopy` does
+            not copy, such as a function, is not copied for each episode. Or ``"expert"``, which
+            makes a plan for each seed and carries it out; where it finds none, the episode is a
+            failure of 0 steps.
         task: Id of the task.
         seeds: Which episodes, each once.
-        workers: How many processes play.
+        workers: How many processes play; None: one for each core that this process may use; 0:
+            none, but this one.
         executor: Who plays instead, such as `rollouts.ray_executor.RayExecutor`.
+        episode_timeout: Seconds that an episode may take in a worker until that is ended and the
+            episode played again, three times in all; None if it may take for ever.
         on_event: Called with each event of the executor, to show progress.
         making: Arguments of `tasks.make`, such as ``robots`` and ``obs_mode``.
 
     Raises:
         UnknownNameError: If the task, a place, a robot or a field is unknown.
-        TaskError: If the task cannot be made like that or has no expert, or there are no seeds or
-            one is there twice.
+        TaskError: If the task cannot be made like that or has no expert, a number makes no sense,
+            or there are no seeds or one is there twice.
         WorkerError: If the policy raised something, cannot be sent to the workers, or they die of
             it again and again.
     """
-    cls, seeds = get_task_class(task), [int(seed) for seed in seeds]
-    if not seeds or len(set(seeds)) < len(seeds):
-        raise TaskError(f"{len(seeds)} seeds were given; each must be there once, and at least one")
+    executor = choose_executor(workers, executor, episode_timeout)
+    cls, seeds = get_task_class(task), checked_seeds(seeds)
+    if not seeds:
+        raise TaskError("no seeds were given; an evaluation plays one or more")
     name, scenario = _name(policy), make_scenario(cls, **making)
     if scenario.num_envs != 1:
         raise TaskError(f"num_envs is {scenario.num_envs}; an evaluation plays 1 in each worker")
@@ -143,7 +158,7 @@ def evaluate(
     else:
         job = EvaluationJob(cls, scenario, expert=find_expert(cls.task_id))
     scores: dict[int, Score] = {}
-    with closing((executor or ProcessExecutor(workers)).run(job, seeds)) as events:
+    with closing(play_all(executor, job, seeds)) as events:
         for event in events:
             on_event(event)
             if event.error is not None:
@@ -178,22 +193,34 @@ class EvaluationJob:
     def __call__(self) -> Callable[[int], Score]:
         """Make the task in a worker, and return what plays the episode of a seed."""
         torch.set_num_threads(1)  # as many everywhere, so that sums are the same
-        env = self.task(self.scenario)
-        planner = Planner(env, self.expert) if self.expert is not None else None
+        return _Player(self)
 
-        def play(seed: int) -> Score:
-            random.seed(seed)
-            np.random.seed(seed % 2**32)
-            torch.manual_seed(seed)
-            if planner is None:
-                return _play(env, seed, deepcopy(self.policy), env.max_episode_steps)
-            try:
-                plan = planner(seed)
-            except TaskError:
-                return Score(False, 0.0, 0)
-            return _play(env, seed, _follow(plan), len(plan))
 
-        return play
+class _Player:
+    """Plays episodes in one world, which is built anew for each."""
+
+    def __init__(self, job: EvaluationJob) -> None:
+        self._env, self._policy = job.task(job.scenario), job.policy
+        self._planner = None if job.expert is None else Planner(self._env, job.expert)
+
+    def __call__(self, seed: int) -> Score:
+        """Play the episode of a seed."""
+        random.seed(seed)
+        np.random.seed(seed)
+        torch.manual_seed(seed)
+        if self._planner is None:
+            return _play(self._env, seed, deepcopy(self._policy), self._env.max_episode_steps)
+        try:
+            plan = self._planner(seed)
+        except TaskError:
+            return Score(False, 0.0, 0)
+        return _play(self._env, seed, _follow(plan), len(plan))
+
+    def close(self) -> None:
+        """Let the worlds go."""
+        self._env.close()
+        if self._planner is not None:
+            self._planner.close()
 
 
 def _follow(plan: NDArray[np.float32]) -> Policy:

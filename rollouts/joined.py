@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,31 +20,62 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots import RecordingError
+from robots.files import parse_json
+from rollouts.damage import damage_errors
 from rollouts.disk import replaced
-from rollouts.parts import Stored, read_part
+from rollouts.fields import FieldError
+from rollouts.hdf5_file import Hdf5File
+from rollouts.parts import CHECKSUM, Stored, checksum, read_part
+from rollouts.provenance import read_described
+from rollouts.summary import OWN_EPISODE
 
 # From HDF5 1.8, the first in which attributes may be larger than 64 kB.
 _VERSIONS = "v108", "latest"
 _OVERHEAD = 16_384  # bytes of an episode besides its numbers: four times those of ten arrays
+_GROUP = re.compile("traj_[0-9]+")
 _TEXT = h5py.string_dtype()
 _HDF5: Any = h5py  # whose low-level modules pyright cannot look into
 
 
-def read_joined(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-    """Return the header of a recording that was written here, and its episodes' json by group.
+@dataclass(frozen=True)
+class Joined:
+    """What is in a recording that was written here.
+
+    Attributes:
+        header: What its episodes have in common.
+        episodes: Its episodes' json by group.
+        damaged: The groups of episodes that are damaged.
+    """
+
+    header: dict[str, Any]
+    episodes: dict[str, dict[str, Any]]
+    damaged: tuple[str, ...]
+
+
+def read_joined(path: Path) -> Joined:
+    """Return what is in a recording; every episode is read, and its checksum compared.
 
     Raises:
-        RecordingError: If it was not written here, or is damaged.
+        RecordingError: If it was not written here, or is damaged as a whole.
     """
-    try:
-        with h5py.File(path, "r") as file:
-            header = {name: json.loads(text) for name, text in file.attrs.items()}
-            about = {name: json.loads(group.attrs["episode"]) for name, group in file.items()}
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
-        raise RecordingError(
-            f"{path} is no recording of this library, or it is damaged: {error}"
-        ) from error
-    return header, about
+    episodes: dict[str, dict[str, Any]] = {}
+    damaged: list[str] = []
+    with damage_errors(lambda reason: _refusal(path, reason)), Hdf5File(path) as file:
+        header = {name: parse_json(text) for name, text in (file.texts() or {}).items()}
+        if "env_info" not in header:
+            raise FieldError("it does not say what was recorded")
+        for name in file.members():
+            if not _GROUP.fullmatch(name):
+                raise FieldError(f"{name} is no episode")
+            try:
+                with damage_errors(RecordingError):
+                    episodes[name] = _read_episode(file, name).about
+            except RecordingError:
+                damaged.append(name)
+        seeds = [about["episode_seed"] for about in episodes.values()]
+        if len(set(seeds)) != len(seeds):
+            raise FieldError("it holds two episodes of one seed")
+    return Joined(header, episodes, tuple(damaged))
 
 
 def join(
@@ -56,7 +89,7 @@ def join(
         episodes: What to join: parts, and names of groups in the present file.
 
     Returns:
-        The episodes' json by group, as `read_joined` does.
+        The episodes' json by group.
 
     Raises:
         RecordingError: If it cannot be written, or an episode not be read; nothing is changed.
@@ -66,19 +99,23 @@ def join(
         _reserve(partial, _room(path, episodes))
         with ExitStack() as stack:
             file = stack.enter_context(h5py.File(partial, "r+", libver=_VERSIONS))
-            present = stack.enter_context(h5py.File(path, "r")) if path.exists() else file
+            present = stack.enter_context(Hdf5File(path)) if path.exists() else None
             for name, value in header.items():
                 file.attrs[name] = json.dumps(value)
             writer = _GroupWriter(file)
             for number, episode in enumerate(episodes):
-                if isinstance(episode, Path):
-                    stored = read_part(episode)[1]
-                else:
-                    stored = _read_group(present, episode)
+                stored = _read(present, episode)
                 writer.write(f"traj_{number}", stored)
                 about[f"traj_{number}"] = stored.about
         _sync(partial)
     return about
+
+
+def _read(present: Hdf5File | None, episode: Path | str) -> Stored:
+    if isinstance(episode, Path):
+        return read_part(episode)[1]
+    assert present is not None  # its groups were listed
+    return _read_episode(present, episode)
 
 
 def _room(path: Path, episodes: Sequence[Path | str]) -> int:
@@ -121,7 +158,8 @@ class _GroupWriter:
 
     def write(self, name: str, stored: Stored) -> None:
         groups = {"": self._create_group(self._file, name)}
-        for key, text in sorted(stored.attributes.items()):
+        own = {CHECKSUM: checksum(stored.attributes, stored.arrays)}
+        for key, text in sorted({**stored.attributes, **own}.items()):
             attribute = _HDF5.h5a.create(groups[""], key.encode(), self._text, self._one)
             attribute.write(np.array(text, _TEXT))
         for key, rows in sorted(stored.arrays.items()):
@@ -148,22 +186,23 @@ class _GroupWriter:
         dataset.write(_HDF5.h5s.ALL, _HDF5.h5s.ALL, rows, kind)
 
 
-def _read_group(file: h5py.File, name: str) -> Stored:
-    group = file[name]
-    attributes = {key: str(text) for key, text in group.attrs.items()}
-    return Stored(attributes, dict(_read_arrays(group.id, "")))
+def _read_episode(file: Hdf5File, name: str) -> Stored:
+    """Read an episode that was written here.
+
+    Raises:
+        ValueError: If its checksum is another, or it is none; h5py raises other errors, too.
+    """
+    attributes, arrays = file.texts(name) or {}, file.numbers(name)
+    own = attributes.pop(CHECKSUM, None)  # an earlier version wrote none
+    if own not in (None, checksum(attributes, arrays)):
+        raise FieldError(f"the checksum of {name} is another")
+    if read_described(attributes, "episode", OWN_EPISODE) is None:
+        raise FieldError(f"{name} has no attribute 'episode'")
+    return Stored(attributes, arrays)
 
 
-def _read_arrays(group: Any, prefix: str) -> Iterator[tuple[str, NDArray[Any]]]:
-    for name in group:
-        found = _HDF5.h5o.open(group, name)
-        key = prefix + name.decode()
-        if isinstance(found, _HDF5.h5g.GroupID):
-            yield from _read_arrays(found, f"{key}/")
-        else:
-            rows = np.empty(found.shape, found.dtype)
-            found.read(_HDF5.h5s.ALL, _HDF5.h5s.ALL, rows)
-            yield key, rows
+def _refusal(path: Path, reason: str) -> RecordingError:
+    return RecordingError(f"{path} is no recording of this library, or it is damaged: {reason}")
 
 
 def _sync(path: Path) -> None:

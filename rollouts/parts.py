@@ -1,8 +1,8 @@
 """Finished episodes, each in a small file of its own until the recording ends.
 
 A part is a line that says what it is, two lines of json, the bytes of its arrays, and a checksum of
-all that. It is written
-while episodes are played, where an h5 file of as many arrays would cost fifteen times as much.
+all that. It is written while episodes are played, where an h5 file of as many arrays would cost
+fifteen times as much.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,13 +21,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots import RecordingError
-from rollouts.disk import replaced
+from robots.files import parse_json, read_regular
+from rollouts.disk import PARTIAL, replaced
 from rollouts.episode import REBUILT, Episode
+from rollouts.fields import ANYTHING, OBJECT, TEXT, FieldError, Kind, fields, items, whole
+from rollouts.hdf5_reading import MAX_BYTES
+from rollouts.summary import MAX_SEED, OWN_EPISODE
+
+CHECKSUM = "checksum"  # attribute of an episode's group in the h5 file
+STATES = "env_states/"
+ARRAYS = ("actions", STATES.rstrip("/"), "rewards", "success", "terminated", "truncated")
+TEXTS = ("action_split", "episode")
 
 _SUFFIX = ".part"
 _EARLIER = ".h5"
+_SEED = re.compile(r"seed-([0-9]{10,})")
 _OPENING = b"robot-layouts episode 1\n"
 _CHECKSUM = 4  # bytes
+_MAX_PART = MAX_BYTES + 2**24  # bytes
+
+_ARRAY_NAME = re.compile(r"(actions|rewards|success|terminated|truncated|env_states(/[^/\0]+){2})")
+_CONTENT = fields(
+    {
+        "attributes": fields({"episode": TEXT}, {"action_split": TEXT}),
+        "arrays": items(items(ANYTHING, 3)),
+    }
+)
+_ARRAY = (
+    Kind("the name of an array", lambda v: isinstance(v, str) and bool(_ARRAY_NAME.fullmatch(v))),
+    Kind("a kind of numbers", lambda v: v in ("<f4", "<f8", "|b1")),
+    items(whole(0, MAX_BYTES)),
+)
 
 
 @dataclass(frozen=True)
@@ -37,6 +62,8 @@ class Stored:
         attributes: Attributes of its group in the h5 file; ``episode`` is its entry in the json,
             without ``episode_id``.
         arrays: The arrays of that group by their names there, as ``env_states/actors/cube``.
+
+    The attributes do not include the checksum.
     """
 
     attributes: Mapping[str, str]
@@ -115,13 +142,21 @@ def part_path(folder: Path, seed: int) -> Path:
 
 
 def seed_of(part: Path) -> int:
-    """Return the seed of a part, from its name."""
-    return int(part.stem.removeprefix("seed-"))
+    """Return the seed of a part, from its name.
+
+    Raises:
+        ValueError: If it is not the name of a part.
+    """
+    found = _SEED.fullmatch(part.stem)
+    seed = int(found[1]) if found and part.suffix == _SUFFIX else -1
+    if not 0 <= seed <= MAX_SEED or part_path(part.parent, seed) != part:
+        raise ValueError(f"{part.name} is not the name of a part")
+    return seed
 
 
 def list_parts(folder: Path) -> list[Path]:
     """Return the parts in a folder, sorted by seed; none if there is no folder."""
-    return sorted(folder.glob(f"seed-*{_SUFFIX}"))
+    return sorted(path for path in folder.glob(f"seed-*{_SUFFIX}") if _is_part(path))
 
 
 def list_earlier_parts(folder: Path) -> list[Path]:
@@ -129,32 +164,97 @@ def list_earlier_parts(folder: Path) -> list[Path]:
     return sorted(folder.glob(f"seed-*{_EARLIER}"))
 
 
-def read_part(path: Path) -> tuple[bytes, Stored]:
-    """Return the header of a part, as json, and its episode.
+def refuse_foreign(folder: Path) -> None:
+    """Refuse a folder of parts that holds something else, which nobody should delete.
 
     Raises:
-        RecordingError: If it is damaged.
-        OSError: If it cannot be read.
+        RecordingError: If so.
     """
-    content = path.read_bytes()
+    earlier = list_earlier_parts(folder)
+    for path in sorted(folder.iterdir()):
+        ours = path.suffix == PARTIAL or path in earlier or _is_part(path)
+        if not ours or path.is_symlink() or not path.is_file():
+            raise RecordingError(
+                f"{path} is no episode of this library, in a folder that is for such episodes only;"
+                " move it somewhere else"
+            )
+
+
+def read_part(path: Path) -> tuple[dict[str, Any], Stored]:
+    """Return the header of a part and its episode.
+
+    Raises:
+        RecordingError: If it is damaged, or the episode of another seed than its name says.
+        UnreadableFileError: If it cannot be read.
+    """
+    content = read_regular(path, _MAX_PART)
     whole, checksum = content[:-_CHECKSUM], content[-_CHECKSUM:]
     if not whole.startswith(_OPENING) or checksum != _checksum(whole):
         raise RecordingError(f"{path} is damaged, or not an episode of this library")
-    header, about, numbers = whole.removeprefix(_OPENING).split(b"\n", 2)
-    said = json.loads(about)
+    try:
+        header, stored = _parse(whole.removeprefix(_OPENING))
+    except ValueError as error:
+        raise RecordingError(f"{path} is not an episode of this library: {error}") from error
+    seed = stored.about["episode_seed"]
+    if seed != seed_of(path):
+        raise RecordingError(f"{path} is the episode of seed {seed}, under another's name")
+    return header, stored
+
+
+def checksum(attributes: Mapping[str, str], arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Return the checksum of an episode, whatever file it is in and in whatever order.
+
+    It covers `TEXTS` and `ARRAYS`; what others may have added is left out.
+    """
+    names = sorted(name for name in arrays if name.partition("/")[0] in ARRAYS)
+    about = [
+        [(name, attributes.get(name)) for name in TEXTS],
+        [(name, arrays[name].dtype.str, arrays[name].shape) for name in names],
+    ]
+    found = zlib.crc32(json.dumps(about).encode())
+    for name in names:
+        found = zlib.crc32(np.ascontiguousarray(arrays[name]).data, found)
+    return f"crc32 {found:08x}"
+
+
+def _parse(content: bytes) -> tuple[dict[str, Any], Stored]:
+    """Return what a part says after its opening.
+
+    Raises:
+        ValueError: If it is not as `PartWriter` writes it.
+    """
+    header, about, numbers = content.split(b"\n", 2)
+    described, listed = parse_json(header.decode()), parse_json(about.decode())
+    OBJECT.expect(described, "header")
+    _CONTENT.expect(listed, "")
     arrays: dict[str, NDArray[Any]] = {}
     start = 0
-    for name, kind, shape in said["arrays"]:
-        rows = np.frombuffer(numbers, kind, math.prod(shape), start)
-        arrays[name] = rows.reshape(shape).copy()  # which also aligns it
-        start += rows.nbytes
-    return header, Stored(said["attributes"], arrays)
+    for array in listed["arrays"]:
+        for value, kind in zip(array, _ARRAY, strict=True):
+            kind.expect(value, "arrays")
+        name, dtype, shape = array
+        count = min(math.prod(shape), MAX_BYTES)
+        arrays[name] = np.frombuffer(numbers, dtype, count, start).reshape(shape).copy()  # aligned
+        start += arrays[name].nbytes
+    about = parse_json(listed["attributes"]["episode"])
+    OWN_EPISODE.expect(about, "episode")
+    if start != len(numbers) or len(arrays.get("actions", ())) != about["elapsed_steps"]:
+        raise FieldError("its arrays are not those of its steps")
+    return described, Stored(listed["attributes"], arrays)
+
+
+def _is_part(path: Path) -> bool:
+    try:
+        seed_of(path)
+    except ValueError:
+        return False
+    return True
 
 
 def _arrays(episode: Episode) -> dict[str, NDArray[Any]]:
     arrays: dict[str, NDArray[Any]] = {"actions": episode.actions}
     for kind, entries in episode.states.items():
-        arrays.update({f"env_states/{kind}/{name}": rows for name, rows in entries.items()})
+        arrays.update({f"{STATES}{kind}/{name}": rows for name, rows in entries.items()})
     for name in ("rewards", "success", "terminated", "truncated"):
         arrays[name] = getattr(episode, name)
     return arrays

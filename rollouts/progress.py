@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from types import TracebackType
 
 from rich.console import Console
 from rich.progress import Progress, TaskID
+
+from robots.commands import is_watched, notice
 
 PATIENCE = 2.0  # s without any word
 PLAIN_INTERVAL = 10.0  # s between lines where stderr is no terminal
@@ -59,10 +60,10 @@ class LiveLine:
         if self._progress is not None:
             self._progress.console.print(text, highlight=False, markup=False, soft_wrap=True)
         else:
-            print(text, file=sys.stderr, flush=True)
+            notice(text)
 
     def _show(self, what: str) -> None:
-        if sys.stderr.isatty():
+        if is_watched():
             self._progress = progress = Progress(console=Console(stderr=True), transient=True)
             progress.start()
             self._bar = progress.add_task(what, total=self.total)

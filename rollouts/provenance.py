@@ -8,8 +8,42 @@ from dataclasses import asdict
 from typing import Any
 
 from layouts import Layout
+from robots.files import parse_json
 from robots.fingerprint import asset_fingerprint
+from rollouts.fields import (
+    NAME,
+    NUMBER,
+    OBJECT,
+    TEXT,
+    FieldError,
+    Kind,
+    by_name,
+    fields,
+    items,
+    maybe,
+    whole,
+)
 from tasks import MultiRobotTask
+
+_ACTION_NUMBERS = 10_000  # of all robots
+
+# What `describe_layout` and `describe_simulation` write, as far as it is read again.
+LAYOUT = maybe(
+    by_name(
+        fields(
+            {
+                "robot": NAME,
+                "position": items(NUMBER, 3),
+                "quaternion": items(NUMBER, 4),
+                "keyframe": maybe(NAME),
+                "qpos_noise": maybe(NUMBER),
+                "action": items(whole(0, _ACTION_NUMBERS), 2),
+            },
+            {"start_qpos": items(NUMBER), "joint_groups": OBJECT, "assets": TEXT},
+        )
+    )
+)
+SIMULATION = maybe(fields({}, {"physics": maybe(OBJECT), "control_frequency": NUMBER}))
 
 _SHOWN = 4  # differences that a message names
 _ABSENT = "nothing"
@@ -53,6 +87,40 @@ def describe_simulation(task: MultiRobotTask) -> dict[str, Any]:
         "physics": None if physics is None else asdict(physics),
         "control_frequency": task.made_from.control_frequency,
     }
+
+
+def read_described(texts: Mapping[str, str], name: str, kind: Kind) -> Any:
+    """Return what is written as json in one of several attributes; None if it is not there.
+
+    Raises:
+        ValueError: If it is not json, or of another kind.
+    """
+    if name not in texts:
+        return None
+    try:
+        described = parse_json(texts[name])
+    except ValueError as error:
+        raise FieldError(f"attribute {name}: {error}") from error
+    kind.expect(described, name)
+    return described
+
+
+def action_split(described: Mapping[str, Mapping[str, Any]]) -> dict[str, slice]:
+    """Return robot name → slice of the flat action, of a layout that was described.
+
+    Raises:
+        FieldError: If the slices do not follow one another.
+    """
+    split = {name: slice(*robot["action"]) for name, robot in described.items()}
+    stop = 0
+    for name, numbers in split.items():
+        if numbers.start != stop or numbers.stop < stop:
+            raise FieldError(
+                f"layout.{name}.action is {[numbers.start, numbers.stop]}; it must begin at {stop},"
+                " after the robots before it"
+            )
+        stop = numbers.stop
+    return split
 
 
 def differences(recorded: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:

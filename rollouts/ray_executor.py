@@ -3,45 +3,31 @@
 from __future__ import annotations
 
 import os
-import pickle
 import re
-import shutil
-import signal
-import socket
-import sysconfig
-import threading
 from collections.abc import Callable, Generator, Iterable, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
-from importlib.util import find_spec
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
-from robots import MissingPackageError, UnknownNameError
-from robots.manifest import load_manifest
-from rollouts.executor import (
+from rollouts.events import Event, Play, WorkerError
+from rollouts.ray_cluster import Cluster, check_address, import_ray, is_own, joined
+from rollouts.sending import loaded, portable, unsendable
+from rollouts.shift import (
     DEATHS_ALLOWED,
-    UNSENDABLE,
-    Event,
-    Play,
+    EPISODE_SECONDS,
+    Rules,
     Shift,
+    Sign,
     Worker,
-    WorkerError,
-    portable,
-    unsendable,
+    check_count,
 )
 from tasks.processes import Sendable
 
-ROOMS = ("robots", "layouts", "simulation", "tasks", "rollouts")
 PACKAGES = ("sapien", "torch", "numpy")  # which decide the bits of an episode
 
-_PATIENCE = 10.0  # s that the head of a cluster may take to answer
-_THIS_MACHINE = ("localhost", "127.0.0.1", "[::1]")  # for which Ray takes an address of its own
+_FETCH_SECONDS = 60.0  # that an answer may take from the node where it lies
 _NODE_DIED = "its node has died"  # in Ray's words
-_CACHES = shutil.ignore_patterns("__pycache__")
-_SILENCE = 30.0  # s without any worker at play, until that is told
 
 
 class RayExecutor:
@@ -62,6 +48,7 @@ class RayExecutor:
         modules: Sequence[str] = (),
         attempts: int = DEATHS_ALLOWED,
         fresh: bool = False,
+        episode_timeout: float | None = EPISODE_SECONDS,
     ) -> None:
         """Choose a cluster that this machine has joined.
 
@@ -73,162 +60,67 @@ class RayExecutor:
             attempts: How many workers may die of one episode before it is given up; those that are
                 out of reach do not count.
             fresh: Whether every episode gets a process of its own.
+            episode_timeout: Seconds that an episode may take until its worker is ended, which
+                counts as a death; None if it may take for ever.
 
         Raises:
             MissingPackageError: If Ray is not installed.
+            TaskError: If it cannot be an address, or a number makes no sense.
         """
         self._ray = import_ray()
+        check_address(address)
+        if workers is not None:
+            check_count("workers on a Ray cluster", workers, 1)
         self._address, self._workers, self._modules = address, workers, tuple(modules)
-        self._attempts, self._fresh = attempts, fresh
+        self._rules = Rules(attempts, fresh, episode_timeout)
 
     def run(self, prepare: Callable[[], Play], seeds: Iterable[int]) -> Generator[Event]:
         """Play the episode of every seed; see `rollouts.executor.Executor`."""
         seeds = list(seeds)
         if not seeds:
             return
-        modules = [*self._modules, *filter(_is_own, getattr(prepare, "modules", ()))]
-        with _joined(self._ray, self._address, modules):
-            crew = _Actors(self._ray, prepare)
-            count = self._workers or crew.cpus
-            shift = Shift(crew, seeds, count, attempts=self._attempts, fresh=self._fresh)
-            yield from shift.events()
-
-
-def import_ray() -> Any:
-    """Return the ray package.
-
-    Raises:
-        MissingPackageError: If it is not installed.
-    """
-    try:
-        import ray
-    except ImportError as error:
-        raise MissingPackageError(
-            "playing on many machines needs ray: pip install 'robot-layouts[ray]'"
-        ) from error
-    return ray
-
-
-@contextmanager
-def _joined(ray: Any, address: str, modules: Sequence[str]) -> Generator[None]:
-    """Be part of a cluster, whose workers have the code of this process.
-
-    Raises:
-        WorkerError: If that is impossible.
-    """
-    if ray.is_initialized():
-        yield
-        return
-    with TemporaryDirectory() as folder:
-        gather_code(Path(folder), modules)
-        with _own_stop_signal():
-            try:
-                _expect_somebody(address)
-                ray.init(
-                    address=address,
-                    runtime_env={"working_dir": folder},
-                    log_to_driver=False,
-                    logging_level="ERROR",
-                )
-            except (OSError, RuntimeError, ValueError) as error:
-                raise WorkerError(
-                    f"the Ray cluster at {address!r} cannot be joined: {error}"
-                ) from error
-    try:
-        yield
-    finally:
-        ray.shutdown()
-
-
-def _expect_somebody(address: str) -> None:
-    """Raise OSError if nobody listens at an address; Ray itself would try for minutes."""
-    host, _, port = address.rpartition(":")
-    if port.isdigit() and "/" not in host and host not in _THIS_MACHINE:
-        socket.create_connection((host.strip("[]"), int(port)), _PATIENCE).close()
-
-
-def gather_code(folder: Path, modules: Iterable[str] = ()) -> None:
-    """Copy the rooms, and the packages of other modules, into an empty folder.
-
-    Raises:
-        UnknownNameError: If there is no such module.
-    """
-    for name in dict.fromkeys([*ROOMS, *(module.partition(".")[0] for module in modules)]):
-        spec = find_spec(name)
-        if spec is None:
-            raise UnknownNameError("module", name, (), "It must be importable here.")
-        for path in spec.submodule_search_locations or ():
-            shutil.copytree(path, folder / name, ignore=_CACHES, dirs_exist_ok=True)
-        if not spec.submodule_search_locations and spec.origin is not None:
-            shutil.copy(spec.origin, folder)
-    (folder / "robots" / "manifest.json").write_text(load_manifest().to_json(), encoding="utf-8")
-
-
-def _is_own(module: str) -> bool:
-    """Tell whether a module is not installed, but the user's own; ``__main__`` is pickled."""
-    name = module.partition(".")[0]
-    spec = None if name == "__main__" else find_spec(name)
-    places = [] if spec is None else [*(spec.submodule_search_locations or [spec.origin or ""])]
-    return any(Path(place).is_absolute() and not _is_installed(Path(place)) for place in places)
-
-
-def _is_installed(path: Path) -> bool:
-    return any(path.is_relative_to(sysconfig.get_path(kind)) for kind in ("stdlib", "platlib"))
-
-
-@contextmanager
-def _own_stop_signal() -> Generator[None]:
-    """Keep what SIGTERM does here; Ray makes it an exit when it starts."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.getsignal(signal.SIGTERM)
-    try:
-        yield
-    except SystemExit as stop:
-        raise KeyboardInterrupt from stop
-    finally:
-        signal.signal(signal.SIGTERM, before)
+        modules = [*self._modules, *filter(is_own, getattr(prepare, "modules", ()))]
+        with joined(self._ray, self._address, modules):
+            cluster = Cluster(self._ray)
+            crew = _Actors(self._ray, cluster, prepare)
+            yield from Shift(crew, seeds, self._workers or cluster.cpus, self._rules).events()
 
 
 class _Actors:
     """Actors of a cluster."""
 
-    def __init__(self, ray: Any, prepare: Callable[[], Play]) -> None:
-        self._ray = ray
+    def __init__(self, ray: Any, cluster: Cluster, prepare: Callable[[], Play]) -> None:
+        self._ray, self._cluster = ray, cluster
         try:
             self._prepare: bytes = ray.cloudpickle.dumps(prepare)
-        except UNSENDABLE as error:
+        except Exception as error:  # whatever a class of the user's own raises
             raise unsendable(error) from error
         self._class = ray.remote(_Player).options(
             num_cpus=1, max_restarts=0, max_task_retries=0, scheduling_strategy="SPREAD"
         )
 
-    @property
-    def cpus(self) -> int:
-        """How many CPUs the cluster has."""
-        alive = [about["Resources"] for about in self._ray.nodes() if about["Alive"]]
-        cpus = sum(int(resources.get("CPU", 0)) for resources in alive)
-        if not cpus:
-            raise WorkerError("no node of the Ray cluster offers a CPU; add one with `ray start`")
-        return cpus
-
     def hire(self) -> _Actor:
         """Ask for an actor, which begins when a node has room for it."""
-        return _Actor(self._ray, self._class.remote(), self._prepare)
+        self._cluster.expect_head()
+        return _Actor(self._ray, self._cluster, self._class.remote(), self._prepare)
 
-    def wait(self, workers: Sequence[Worker]) -> list[Worker] | str:
-        """Return the actors whose answers are there; if none can begin for long, why."""
+    def wait(self, workers: Sequence[Worker], seconds: float) -> list[Worker]:
+        """Return the actors whose answers arrive within a while."""
+        self._cluster.look()
         waiting = {worker.answer: worker for worker in workers if isinstance(worker, _Actor)}
-        patience = None if any(worker.seed is not None for worker in workers) else _SILENCE
-        if not self._ray.wait(list(waiting), timeout=patience)[0]:
-            free = self._ray.available_resources().get("CPU", 0)
-            return (
-                f"no worker could begin for {_SILENCE:.0f} s: {free:.0f} CPUs of the Ray cluster"
-                " are free; still waiting"
-            )
+        if not self._ray.wait(list(waiting), timeout=seconds)[0]:
+            return []
         ready = self._ray.wait(list(waiting), num_returns=len(waiting), timeout=0)[0]
         return [waiting[answer] for answer in ready]
+
+    def remark(self) -> str:
+        """Return how much room there is.
+
+        Raises:
+            WorkerError: If the cluster is gone, or the node of this machine.
+        """
+        self._cluster.has(None)
+        return f"{self._cluster.free_cpus} CPUs of the Ray cluster are free"
 
 
 @dataclass(frozen=True)
@@ -255,33 +147,47 @@ class _Actor:
         answer: What it has been asked for last.
     """
 
-    def __init__(self, ray: Any, actor: Any, prepare: bytes) -> None:
+    def __init__(self, ray: Any, cluster: Cluster, actor: Any, prepare: bytes) -> None:
         self.seed: int | None = None
         self.name = "actor"
-        self._ray, self._actor = ray, actor
+        self._ray, self._cluster, self._actor, self._prepare = ray, cluster, actor, prepare
         self._home: _Home | None = None
-        self.answer: Any = actor.begin.remote(prepare)
+        self._ready = False
+        self.answer: Any = actor.home.remote()
 
     def send(self, seed: int) -> None:
         """Let it play a seed."""
         self.seed = seed
         self.answer = self._actor.play.remote(seed)
 
-    def receive(self) -> Event | None:
-        """Return what it says; None if it has just become ready.
+    def receive(self) -> Event | Sign:
+        """Return its next message.
 
         Raises:
             RobotLayoutsError: What it could not begin for.
         """
         try:
-            result, error = self._ray.get(self.answer)
+            result, error = self._ray.get(self.answer, timeout=_FETCH_SECONDS)
         except self._ray.exceptions.RayError as death:
             return self._died(death)
         if self._home is None:
-            self._settle(result, error)
-            return None
+            self._settle(result)
+            return Sign.BEGUN
+        if not self._ready:
+            if error is not None:
+                error.args = (f"{error} (on node {self._home.address})", *error.args[1:])
+                raise error
+            self._ready = True
+            return Sign.READY
         seed, self.seed = self.seed, None
         return Event(seed, result=result, error=error, worker=self.name)
+
+    def late(self, seconds: float) -> Event:
+        """Return how it dies if it is ended because it took longer than so many seconds."""
+        if self._home is None:
+            return self._death(f"was given no place within {seconds:g} s", excused=True)
+        what = "did not finish the episode" if self._ready else "was not ready"
+        return self._death(f"{what} within {seconds:g} s and was ended")
 
     def dismiss(self) -> None:
         """Let it go; it has nothing to do."""
@@ -292,29 +198,28 @@ class _Actor:
         with suppress(self._ray.exceptions.RayError, ValueError):
             self._ray.kill(self._actor, no_restart=True)
 
-    def _settle(self, home: _Home, error: Exception | None) -> None:
+    def _settle(self, home: _Home) -> None:
         self._home, self.name = home, f"process {home.process} on node {home.address}"
-        if error is not None:
-            error.args = (f"{error} (on node {home.address})", *error.args[1:])
-            raise error
         here = _versions()
         if home.packages != here:
             raise WorkerError(
                 f"node {home.address} has {_listing(home.packages)}, this machine {_listing(here)};"
                 " equal episodes need equal versions"
             )
+        self.answer = self._actor.begin.remote(self._prepare)
 
     def _died(self, error: Exception) -> Event:
         self.kill()  # it may only be out of reach
         how = _reason(error)
+        lives = self._cluster.has(None if self._home is None else self._home.node)
         lost = isinstance(error, self._ray.exceptions.ActorUnavailableError) or (
-            not self._node_lives(self._home.node) if self._home is not None else how == _NODE_DIED
+            not lives if self._home is not None else how == _NODE_DIED
         )
-        died = f"worker {self.name} was lost: {'out of reach' if lost else how}"
-        return Event(self.seed, died=died, excused=lost, worker=self.name)
+        return self._death(f"was lost: {'out of reach' if lost else how}", excused=lost)
 
-    def _node_lives(self, node: str) -> bool:
-        return any(about["NodeID"] == node and about["Alive"] for about in self._ray.nodes())
+    def _death(self, how: str, *, excused: bool = False) -> Event:
+        died = f"worker {self.name} {how}"
+        return Event(self.seed, died=died, excused=excused, worker=self.name)
 
 
 class _Player:
@@ -322,16 +227,19 @@ class _Player:
 
     _play: Play
 
-    def begin(self, prepare: bytes) -> tuple[_Home, Sendable | None]:
-        """Make what plays; returns where that is, and what went wrong."""
-        ray, error = import_ray(), None
-        try:
-            self._play = pickle.loads(prepare)()
-        except Exception as found:
-            error = portable(found)
+    def home(self) -> tuple[_Home, None]:
+        """Return where this is."""
+        ray = import_ray()
         node = ray.get_runtime_context().get_node_id()
-        home = _Home(node, ray.util.get_node_ip_address(), os.getpid(), _versions())
-        return home, error
+        return _Home(node, ray.util.get_node_ip_address(), os.getpid(), _versions()), None
+
+    def begin(self, prepare: bytes) -> tuple[None, Sendable | None]:
+        """Make what plays; returns what went wrong."""
+        try:
+            self._play = loaded(prepare)()
+        except Exception as error:
+            return None, portable(error)
+        return None, None
 
     def play(self, seed: int) -> tuple[Any, Sendable | None]:
         """Play an episode; returns its result, and what went wrong."""

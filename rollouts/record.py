@@ -1,4 +1,4 @@
-"""Records episodes that an expert plays, in worker processes, and goes on where it stopped."""
+"""Records episodes that an expert plays, and goes on where it stopped."""
 
 from __future__ import annotations
 
@@ -13,12 +13,21 @@ import tasks
 from robots import CONTROL_MODES, RecordingError
 from rollouts.conversion import Planner
 from rollouts.episode import play
-from rollouts.executor import Event, Executor, WorkersDied, modules_of
+from rollouts.executor import (
+    EPISODE_SECONDS,
+    Event,
+    Executor,
+    WorkersDied,
+    choose_executor,
+    modules_of,
+    play_all,
+)
 from rollouts.experts import find_expert
 from rollouts.experts.registry import Expert
 from rollouts.parts import PartWriter
 from rollouts.provenance import describe_layout, differences, listing
 from rollouts.recorder import Recorder
+from rollouts.seeds import checked_seeds
 from tasks import MultiRobotTask, Scenario
 
 FILE = "trajectory.h5"
@@ -65,18 +74,29 @@ class EpisodeJob:
             RecordingError: If the robot files of this machine are not those of the recording.
         """
         torch.set_num_threads(1)  # the tensors are small, and other workers want the cores
-        env = self.task(self.scenario)
-        self._expect_same_robots(env)
-        plan = Planner(env, self.expert)
+        return _Player(self)
 
-        def record(seed: int) -> tuple[Played, bytes]:
-            episode = play(env, seed, plan(seed))
-            return Played(episode.solved, len(episode.actions)), self.writer.encode(episode)
 
-        return record
+class _Player:
+    """Plays episodes in one world, which is built anew for each, and encodes them."""
 
-    def _expect_same_robots(self, env: MultiRobotTask) -> None:
-        found = differences(self.writer.header["layout"], describe_layout(env.layout))
+    def __init__(self, job: EpisodeJob) -> None:
+        self._env, self._writer = job.task(job.scenario), job.writer
+        self._expect_same_robots()
+        self._plan = Planner(self._env, job.expert)
+
+    def __call__(self, seed: int) -> tuple[Played, bytes]:
+        """Play and encode the episode of a seed."""
+        episode = play(self._env, seed, self._plan(seed))
+        return Played(episode.solved, len(episode.actions)), self._writer.encode(episode)
+
+    def close(self) -> None:
+        """Let the worlds go."""
+        self._env.close()
+        self._plan.close()
+
+    def _expect_same_robots(self) -> None:
+        found = differences(self._writer.header["layout"], describe_layout(self._env.layout))
         if found:
             raise RecordingError(
                 f"a worker would record something else than this recording is of ({listing(found)})"
@@ -90,6 +110,7 @@ class Summary:
     Attributes:
         recorded: Episodes in the file in the end.
         already: How many of those asked for were there before.
+        damaged: Episodes that were there before and are damaged, in words.
         played: Episodes played this time, by seed.
         failed: Why an episode could not be played, by seed.
         deaths: Workers that died, in words.
@@ -98,6 +119,7 @@ class Summary:
 
     recorded: int = 0
     already: int = 0
+    damaged: list[str] = field(default_factory=list[str])
     played: dict[int, Played] = field(default_factory=dict[int, Played])
     failed: dict[int, Exception] = field(default_factory=dict[int, Exception])
     deaths: list[str] = field(default_factory=list[str])
@@ -108,8 +130,10 @@ def record(
     task_id: str,
     seeds: Sequence[int],
     folder: Path,
-    executor: Executor,
+    executor: Executor | None = None,
     *,
+    workers: int | None = None,
+    episode_timeout: float | None = EPISODE_SECONDS,
     control_mode: str = CONTROL_MODES[0],
     on_event: Callable[[Summary, Event | None], None] = lambda summary, event: None,
 ) -> Summary:
@@ -119,19 +143,27 @@ def record(
         task_id: The task.
         seeds: Which episodes.
         folder: Where ``trajectory.h5`` and ``trajectory.json`` are written.
-        executor: Who plays.
+        executor: Who plays, such as `rollouts.ray_executor.RayExecutor`; None: processes of this
+            machine.
+        workers: How many processes; None: one for each core that this process may use; 0: none,
+            but this one.
+        episode_timeout: Seconds that an episode may take in a worker until that is ended and the
+            episode played again, three times in all; None if it may take for ever.
         control_mode: Control mode of the recorded actions.
         on_event: Called once at the start without an event, and after every event.
 
     Raises:
         UnknownNameError: If there is no such task.
-        TaskError: If the task has no expert.
+        TaskError: If the task has no expert, a number makes no sense, or a seed is there twice.
         RecordingError: If the folder cannot be written or holds a recording of something else;
             the finished episodes are kept.
-        WorkerError: If workers cannot be started or die again and again; they are kept, too.
+        WorkerError: If workers cannot be started, die again and again, or end before all is
+            played; they are kept, too.
         KeyboardInterrupt: If interrupted; they are kept, too.
     """
+    executor = choose_executor(workers, executor, episode_timeout)
     cls, expert = tasks.get_task_class(task_id), find_expert(task_id)
+    seeds = checked_seeds(seeds)
     scenario = cls.scenario
     scenario.control_mode = control_mode
     description = f"{getattr(expert, '__module__', '')}:{getattr(expert, '__qualname__', expert)}"
@@ -139,13 +171,13 @@ def record(
     summary = Summary()
     with Recorder(folder / FILE, env, resume=True, source_desc=description) as recorder:
         env.close()
-        there = recorder.seeds
+        summary.damaged, there = recorder.damaged, recorder.seeds
         missing = [seed for seed in seeds if seed not in there]
         summary.already, summary.recorded = len(seeds) - len(missing), len(there)
         on_event(summary, None)
         job = EpisodeJob(cls, scenario, expert, recorder.writer)
         try:
-            with closing(executor.run(job, missing)) as events:
+            with closing(play_all(executor, job, missing)) as events:
                 for event in events:
                     _note(summary, event, recorder.writer)
                     on_event(summary, event)

@@ -83,6 +83,9 @@ class _Status:
     def show(self, summary: Summary, event: Event | None) -> None:
         """Tell what has come of the episodes so far."""
         self._summary = summary
+        if event is None:
+            for what in summary.damaged:
+                self._line.say(f"{what} is damaged and does not count as recorded")
         if event is None and summary.already:
             total = self._line.total
             self._line.say(f"{summary.already} of {total} episodes were recorded before")

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import fcntl
 import glob
 import json
 import os
-import shutil
 import weakref
-from collections.abc import Container, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
 
-from robots import RecordingError
-from rollouts.disk import PARTIAL, disk_errors, write_text
+from robots import RecordingError, UnreadableFileError
+from robots.files import open_regular, read_text
+from rollouts.disk import PARTIAL, claim, disk_errors, write_text
 from rollouts.episode import Episode
 from rollouts.joined import join, read_joined
 from rollouts.parts import (
@@ -24,9 +23,11 @@ from rollouts.parts import (
     list_parts,
     part_path,
     read_part,
+    refuse_foreign,
     seed_of,
 )
 from rollouts.provenance import describe_layout, describe_simulation, differences, listing
+from rollouts.summary import MAX_JSON
 from tasks import MultiRobotTask
 from tasks.native_format import observation_keys
 
@@ -58,6 +59,8 @@ class Recorder:
         path: The h5 file.
         json_path: The json file beside it.
         parts: The folder of finished episodes that are not joined yet.
+        damaged: Episodes that were there and are damaged, by their files or groups, in words;
+            they do not count as recorded.
         writer: Writes one episode; may be handed to worker processes.
     """
 
@@ -90,10 +93,15 @@ class Recorder:
         self.path = Path(path)
         self.json_path = self.path.with_suffix(".json")
         self.parts = self.path.with_suffix(".parts")
+        self.damaged: list[str] = []
         self._header = _header(task, source, source_desc)
         with disk_errors(self.path):
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            lock = _lock(self.parts)
+            if os.path.lexists(self.parts) and not self.parts.is_dir():
+                raise RecordingError(f"{self.parts} is no folder; move it somewhere else")
+            lock = claim(self.parts)
+            if lock is None:
+                raise RecordingError(f"another process is recording into {self.parts}")
             try:
                 self._joined = self._begin(overwrite=overwrite, resume=resume)
             except BaseException:
@@ -160,6 +168,9 @@ class Recorder:
 
     def _begin(self, *, overwrite: bool, resume: bool) -> dict[int, _Entry]:
         """Check and tidy what is there; returns the episodes of the h5 file by seed."""
+        for path in (self.path, self.json_path):
+            _expect_file_or_nothing(path)
+        refuse_foreign(self.parts)
         earlier = list_earlier_parts(self.parts)
         there = [p for p in (self.path, *list_parts(self.parts), *earlier) if p.exists()]
         if there and not (overwrite or resume):
@@ -190,19 +201,23 @@ class Recorder:
     def _read_joined(self) -> dict[int, _Entry]:
         if not self.path.exists():
             return {}
-        header, groups = read_joined(self.path)
-        self._expect_same(self.path, header)
-        entries = {about["episode_seed"]: _Entry(name, about) for name, about in groups.items()}
+        joined = read_joined(self.path)
+        self._expect_same(self.path, joined.header)
+        self.damaged += [f"{name} of {self.path}" for name in joined.damaged]
+        entries = {
+            about["episode_seed"]: _Entry(name, about) for name, about in joined.episodes.items()
+        }
         return {seed: entries[seed] for seed in sorted(entries)}
 
-    def _check_part(self, part: Path, joined: Container[int]) -> None:
+    def _check_part(self, part: Path, joined: Mapping[int, _Entry]) -> None:
         """Refuse a part of another recording; remove one that is damaged or already joined."""
         try:
             header, _ = read_part(part)
         except RecordingError:  # by a power cut, say: its episode is recorded again
+            self.damaged.append(str(part))
             part.unlink()
             return
-        self._expect_same(part, json.loads(header))
+        self._expect_same(part, header)
         if seed_of(part) in joined:
             part.unlink()
 
@@ -220,7 +235,9 @@ class Recorder:
 
     def _join(self) -> None:
         parts = {seed_of(part): part for part in list_parts(self.parts)}
-        if parts or not self.path.exists():
+        numbered = [entry.group for entry in self._joined.values()]
+        in_order = numbered == [f"traj_{number}" for number in range(len(numbered))]
+        if parts or self.damaged or not in_order or not self.path.exists():
             places = {**{seed: entry.group for seed, entry in self._joined.items()}, **parts}
             seeds = sorted(places)
             joined = join(self.path, self._header, [places[seed] for seed in seeds])
@@ -232,12 +249,15 @@ class Recorder:
         text = json.dumps({**self._header, "episodes": episodes}, indent=1) + "\n"
         if not self._json_says(text):
             write_text(self.json_path, text)
-        shutil.rmtree(self.parts, ignore_errors=True)  # the next Recorder removes what is left
+        for part in parts.values():
+            part.unlink(missing_ok=True)
+        with suppress(OSError):  # something else was put there meanwhile, and is not ours to delete
+            self.parts.rmdir()
 
     def _json_says(self, text: str) -> bool:
         try:
-            return self.json_path.read_text() == text
-        except OSError:
+            return read_text(self.json_path, MAX_JSON) == text
+        except UnreadableFileError:
             return False
 
 
@@ -261,30 +281,17 @@ def _header(task: MultiRobotTask, source: str, source_desc: str | None) -> dict[
     }
 
 
+def _expect_file_or_nothing(path: Path) -> None:
+    """Refuse a path at which there is something that is no file, before anything is recorded."""
+    if os.path.lexists(path) and path.exists():
+        try:
+            open_regular(path).close()
+        except UnreadableFileError as error:
+            raise RecordingError(f"cannot write {path}: {error.strerror}") from error
+
+
 def _control_mode(task: MultiRobotTask) -> str | dict[str, str]:
     """Return the control mode as native writes it: by robot where there are several."""
     mode = task.made_from.control_mode
     keys = [key for key in observation_keys(task.layout).values() if key is not None]
     return dict.fromkeys(keys, mode) if keys else mode
-
-
-def _lock(folder: Path) -> int:
-    """Make a folder and take the only right to it; the open descriptor holds the right.
-
-    Raises:
-        RecordingError: If another process has it.
-    """
-    while True:
-        folder.mkdir(exist_ok=True)
-        descriptor = os.open(folder, os.O_RDONLY)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(descriptor)
-            raise RecordingError(f"another process is recording into {folder}") from None
-        except OSError:
-            return descriptor  # a file system without locks
-        with suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(descriptor), folder.stat()):
-                return descriptor
-        os.close(descriptor)  # its owner removed it meanwhile

@@ -28,16 +28,19 @@ class StateDifference:
         step: Control step; 0 is the state after the reset.
         entry: The first body or robot that differs there, by its key in the state dict.
         largest: Largest |Δ| over the whole episode (m, rad and their velocities).
+        largest_entry: The body or robot that has it, by its key in the state dict.
     """
 
     step: int
     entry: str
     largest: float
+    largest_entry: str
 
     def __str__(self) -> str:
         """Say it in words."""
         where = "at the start" if self.step == 0 else f"from step {self.step}"
-        return f"{where} in {self.entry}, max |Δ| {self.largest:.1e}"
+        also = "" if self.largest_entry == self.entry else f" in {self.largest_entry}"
+        return f"{where} in {self.entry}, max |Δ| {self.largest:.1e}{also}"
 
 
 @dataclass(frozen=True)
@@ -173,19 +176,18 @@ def first_difference(recorded: States, played: States) -> StateDifference | None
 
     An entry that only one of them has differs from the start.
     """
-    steps: list[tuple[int, str]] = []
-    largest = 0.0
+    steps: dict[str, int] = {}
+    sizes: dict[str, float] = {}
     for name, before, now in _pairs(recorded, played):
         if before is None or now is None or before.shape != now.shape:
-            steps.append((0, name))
-            largest = float("inf")
+            steps[name], sizes[name] = 0, float("inf")
         elif differing := np.flatnonzero((before != now).any(axis=1)).tolist():
-            steps.append((differing[0], name))
-            largest = max(largest, float(np.abs(before.astype(float) - now).max()))
+            steps[name] = differing[0]
+            sizes[name] = float(np.abs(before.astype(float) - now).max())
     if not steps:
         return None
-    step, name = min(steps, key=lambda found: found[0])
-    return StateDifference(step, name, largest)
+    first, most = min(steps, key=steps.__getitem__), max(sizes, key=sizes.__getitem__)
+    return StateDifference(steps[first], first, sizes[most], most)
 
 
 def _pairs(

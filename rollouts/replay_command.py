@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from robots.commands import printable
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -56,23 +58,26 @@ def run(options: argparse.Namespace) -> int:
     """
     import torch
     from rich.console import Console
-    from rich.progress import track
 
+    from rollouts.progress import LiveLine
     from rollouts.replay import open_recording, replay, task_for
 
     torch.set_num_threads(1)
     with open_recording(options.file, options.task) as file:
         task = task_for(file)
         count = len(file) if options.episodes is None else max(0, min(options.episodes, len(file)))
-        numbers = track(range(count), "replaying", console=Console(stderr=True), transient=True)
-        found = [replay(task, file[number], options.start) for number in numbers]
-        console = Console()
+        found: list[Replayed] = []
+        with LiveLine(count, "episodes") as line:
+            for number in range(count):
+                found.append(replay(task, file[number], options.start))
+                line.advance(1, "replaying")
+        console = Console(markup=False, highlight=False)
         console.print(
-            f"{file.path}: {file.task_id}, {file.control_mode}", highlight=False, soft_wrap=True
+            printable(f"{file.path}: {file.task_id}, {file.control_mode}"), soft_wrap=True
         )
     console.print(_table(found))
     for sentence in _sentences(found, options.start):
-        console.print(sentence, highlight=False, soft_wrap=True)
+        console.print(sentence, soft_wrap=True)
     return 0 if found and all(episode.agrees for episode in found) else 1
 
 
@@ -117,7 +122,7 @@ def _sentences(found: Sequence[Replayed], start: str) -> list[str]:
 def _states(episode: Replayed) -> str:
     if not episode.compared:
         return "not recorded"
-    return "equal" if episode.difference is None else f"differ {episode.difference}"
+    return "equal" if episode.difference is None else f"differ {printable(str(episode.difference))}"
 
 
 def _word(success: bool | None) -> str:

@@ -2,31 +2,43 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Generator, Mapping, Sequence
-from contextlib import contextmanager
+import os
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NoReturn, TypeVar, overload
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from robots import CONTROL_MODES, RobotLayoutsError, closest_match
+from robots import UnreadableFileError, closest_match
+from robots.files import open_regular
+from rollouts.damage import damage_errors
 from rollouts.episode import States
-from rollouts.provenance import describe_layout, describe_simulation, differences, listing
+from rollouts.hdf5_file import Hdf5File, Shapes
+from rollouts.parts import ARRAYS, CHECKSUM, STATES, TEXTS, checksum
+from rollouts.provenance import (
+    LAYOUT,
+    SIMULATION,
+    action_split,
+    describe_layout,
+    describe_simulation,
+    differences,
+    listing,
+    read_described,
+)
+from rollouts.summary import MAX_STEPS, OWN_EPISODE, Entry, TrajectoryError, read_summary
 from tasks import MultiRobotTask
 
+__all__ = ["Trajectory", "TrajectoryError", "TrajectoryFile", "expect_file"]
+
 _FLAGS = ("success", "terminated", "truncated")
+_COLUMNS = ("rewards", *_FLAGS)
 
 Number = TypeVar("Number", np.float32, np.bool_)
-
-
-class TrajectoryError(RobotLayoutsError, ValueError):
-    """A file of recorded episodes that cannot be read, or is for something else."""
 
 
 @dataclass(frozen=True)
@@ -94,25 +106,17 @@ class TrajectoryFile(Sequence[Trajectory]):
         self.path = Path(path)
         expect_file(self.path, (".h5",))
         summary = read_summary(self.path)
-        info = summary["env_info"]
-        self.task_id = str(info["env_id"])
-        self.env_kwargs: dict[str, Any] = dict(info.get("env_kwargs") or {})
-        self.max_episode_steps: int | None = info.get("max_episode_steps")
-        self.source_type: str | None = summary.get("source_type")
-        self._episodes: list[dict[str, Any]] = list(summary["episodes"])
-        self.seeds = tuple(_seed(episode) for episode in self._episodes)
-        self.control_mode = self._common_mode()
-        with _damage(self.path, "this h5 file"):
-            self._file = h5py.File(self.path, "r")
-            about: list[dict[str, Any] | None] = [
-                json.loads(self._file.attrs.get(name, "null")) for name in ("layout", "simulation")
-            ]
-        self.layout, self.simulation = about
-        self.action_split = (
-            {name: slice(*robot["action"]) for name, robot in self.layout.items()}
-            if self.layout
-            else None
-        )
+        self.task_id, self.env_kwargs = summary.task_id, summary.env_kwargs
+        self.control_mode = summary.control_mode
+        self.max_episode_steps, self.source_type = summary.max_episode_steps, summary.source_type
+        self._entries = summary.episodes
+        self.seeds = tuple(entry.seed for entry in self._entries)
+        with self._damage("this h5 file"):
+            self._file = Hdf5File(self.path)
+            described = self._file.texts(names=("layout", "simulation")) or {}
+            self.layout = read_described(described, "layout", LAYOUT)
+            self.simulation = read_described(described, "simulation", SIMULATION)
+            self.action_split = action_split(self.layout) if self.layout else None
 
     def __enter__(self) -> TrajectoryFile:
         """Return itself."""
@@ -133,7 +137,7 @@ class TrajectoryFile(Sequence[Trajectory]):
 
     def __len__(self) -> int:
         """Return the number of episodes."""
-        return len(self._episodes)
+        return len(self._entries)
 
     @overload
     def __getitem__(self, index: int) -> Trajectory: ...
@@ -149,8 +153,8 @@ class TrajectoryFile(Sequence[Trajectory]):
             TrajectoryError: If it is damaged or cannot be played.
         """
         if isinstance(index, slice):
-            return [self._read(episode) for episode in self._episodes[index]]
-        return self._read(self._episodes[index])
+            return [self._read(entry) for entry in self._entries[index]]
+        return self._read(self._entries[index])
 
     def expect(self, task_id: str, action_dim: int) -> None:
         """Refuse a file of another task, or of robots that take other actions.
@@ -164,13 +168,14 @@ class TrajectoryFile(Sequence[Trajectory]):
         """
         if self.task_id != task_id:
             raise TrajectoryError(f"{self.path} was recorded in {self.task_id}, not in {task_id}")
-        if not self._episodes:
+        if not self._entries:
             raise TrajectoryError(f"{self.path} holds no episodes")
-        for episode in self._episodes:
-            shape = self._actions(episode).shape
+        for entry in self._entries:
+            self._texts(entry)
+            shape = self._action_shape(entry, self._shapes(entry, ("actions",)))
             if shape[1] != action_dim:
                 self._refuse(
-                    episode,
+                    entry,
                     f"its actions have shape {shape}, not (T, {action_dim}): the robots are others",
                 )
 
@@ -196,110 +201,96 @@ class TrajectoryFile(Sequence[Trajectory]):
                 f" {listing(found)}"
             )
 
-    def _common_mode(self) -> str:
-        default = self.env_kwargs.get("control_mode")
-        found = {mode for episode in self._episodes for mode in _modes(episode, default)}
-        modes = sorted(found or _modes({}, default))
-        if len(modes) == 1 and modes[0] in CONTROL_MODES:
-            return modes[0]
-        listing = " and ".join(modes) or "no control mode that it names"
-        raise TrajectoryError(
-            f"{self.path} was recorded in {listing}; an episode can be played in one of"
-            f" {', '.join(CONTROL_MODES)}"
-        )
-
-    def _read(self, about: Mapping[str, Any]) -> Trajectory:
-        group, actions = self._group(about), self._actions(about)
-        with _damage(self.path, _name(about)):
-            numbers: NDArray[Any] = actions[()]
-            states = _read_states(group["env_states"]) if "env_states" in group else None
-            columns = {name: group[name][()] for name in ("rewards", *_FLAGS) if name in group}
-        if numbers.dtype.kind != "f" or not np.isfinite(numbers).all():
-            self._refuse(about, "its actions are not all finite floating-point numbers")
-        for name, column in columns.items():
-            if column.shape != (len(numbers),):
-                self._refuse(about, f"{name} has shape {column.shape}, not ({len(numbers)},)")
-        for name, rows in _entries(states):
-            if rows.ndim != 2 or len(rows) != len(numbers) + 1:
-                wanted = f"({len(numbers) + 1}, k)"
-                self._refuse(about, f"its states of {name} have shape {rows.shape}, not {wanted}")
-        return Trajectory(
-            episode_id=int(about["episode_id"]),
-            seed=_seed(about),
-            control_mode=self.control_mode,
-            actions=numbers.astype(np.float32),
-            states=states,
-            rewards=_column(columns, "rewards", np.float32),
-            **{flag: _column(columns, flag, np.bool_) for flag in _FLAGS},
-            rebuilt=bool((_reset(about).get("options") or {}).get("reconfigure")),
-        )
-
-    def _group(self, about: Mapping[str, Any]) -> Any:
-        name = _name(about)
-        with _damage(self.path, name):
-            group: Any = self._file.get(name)
-            own: Any = json.loads(getattr(group, "attrs", {}).get("episode", "null"))
-        if not isinstance(group, h5py.Group):
-            self._refuse(about, "the json beside it lists it, but it is not in the file")
-        if own is not None and own["episode_seed"] != about.get("episode_seed"):
+    def _read(self, entry: Entry) -> Trajectory:
+        texts = self._texts(entry)
+        self._expect_shapes(entry, self._shapes(entry, ARRAYS))
+        with self._damage(entry.group):
+            arrays = self._file.numbers(entry.group, ARRAYS)
+        self._expect_numbers(entry, arrays)
+        if texts.get(CHECKSUM) not in (None, checksum(texts, arrays)):
             self._refuse(
-                about,
-                f"the json beside it says seed {about.get('episode_seed')}, the file"
+                entry,
+                "it is damaged, or was changed after it was recorded: its checksum is another"
+                f" (after a change on purpose, delete its attribute {CHECKSUM!r})",
+            )
+        return Trajectory(
+            episode_id=entry.episode_id,
+            seed=entry.seed,
+            control_mode=self.control_mode,
+            actions=arrays["actions"].astype(np.float32),
+            states=_states(arrays),
+            rewards=_column(arrays, "rewards", np.float32),
+            **{flag: _column(arrays, flag, np.bool_) for flag in _FLAGS},
+            rebuilt=entry.rebuilt,
+        )
+
+    def _texts(self, entry: Entry) -> dict[str, str]:
+        """Return the attributes of an episode that say what it is, if it has any."""
+        with self._damage(entry.group):
+            texts = self._file.texts(entry.group, (*TEXTS, CHECKSUM))
+            if texts is None:
+                self._refuse(entry, "the json beside it lists it, but it is not in the file")
+            own = read_described(texts, "episode", OWN_EPISODE)
+        if own is not None and own["episode_seed"] != entry.episode_seed:
+            self._refuse(
+                entry,
+                f"the json beside it says seed {entry.episode_seed}, the file"
                 f" {own['episode_seed']}: the recording was killed as it ended; resume it once",
             )
-        return group
+        return texts
 
-    def _actions(self, about: Mapping[str, Any]) -> h5py.Dataset:
-        with _damage(self.path, _name(about)):
-            actions: Any = self._group(about).get("actions")
-        if isinstance(actions, h5py.Group):
+    def _shapes(self, entry: Entry, names: Collection[str]) -> Shapes:
+        """Return the shapes of an episode's arrays, whose numbers are not read."""
+        with self._damage(entry.group):
+            return self._file.shapes(entry.group, names)
+
+    def _action_shape(self, entry: Entry, shapes: Shapes) -> tuple[int, int]:
+        """Return (T, A), after a look whether T is what the json says."""
+        shape = shapes.get("actions")
+        if shape is None:
+            robots = [name.partition("/")[2] for name in shapes if name.startswith("actions/")]
+            by_robot = f"its actions are by robot ({', '.join(robots)}), not one flat array"
+            self._refuse(entry, by_robot if robots else "it has no actions")
+        if len(shape) != 2 or not shape[0]:
+            self._refuse(entry, f"its actions have shape {shape}, not (T, A)")
+        if shape[0] != (entry.steps or min(shape[0], MAX_STEPS)):
             self._refuse(
-                about,
-                f"its actions are by robot ({', '.join(actions)}), not one flat array",
+                entry,
+                f"its actions have shape {shape}; the json beside it says"
+                f" {entry.steps or f'nothing, and at most {MAX_STEPS}'} steps",
             )
-        if not isinstance(actions, h5py.Dataset):
-            self._refuse(about, "it has no actions")
-        if actions.ndim != 2 or not len(actions):
-            self._refuse(about, f"its actions have shape {actions.shape}, not (T, A)")
-        return actions
+        return shape
 
-    def _refuse(self, about: Mapping[str, Any], why: str) -> NoReturn:
-        raise TrajectoryError(f"{_name(about)} of {self.path} cannot be played: {why}")
+    def _expect_shapes(self, entry: Entry, shapes: Shapes) -> None:
+        steps, _ = self._action_shape(entry, shapes)
+        for name, shape in shapes.items():
+            if name in _COLUMNS and shape != (steps,):
+                self._refuse(entry, f"{name} has shape {shape}, not ({steps},)")
+            if not f"{name}/".startswith(STATES):
+                continue
+            if name.count("/") != 2:
+                self._refuse(entry, f"its states are not by kind and name ({name})")
+            if len(shape) != 2 or shape[0] != steps + 1:
+                what = f"its states of {name.rpartition('/')[2]} have shape {shape}"
+                self._refuse(entry, f"{what}, not ({steps + 1}, k)")
 
+    def _expect_numbers(self, entry: Entry, arrays: Mapping[str, NDArray[Any]]) -> None:
+        if arrays["actions"].dtype.kind != "f" or not np.isfinite(arrays["actions"]).all():
+            self._refuse(entry, "its actions are not all finite floating-point numbers")
+        for name, rows in arrays.items():
+            if not np.isfinite(rows).all():
+                self._refuse(entry, f"its {name} are not all finite")
 
-def read_summary(path: Path) -> Mapping[str, Any]:
-    """Return the json beside an h5 file; it has ``env_info`` with ``env_id``, and ``episodes``.
+    def _refuse(self, entry: Entry, why: str) -> NoReturn:
+        raise TrajectoryError(f"{entry.group} of {self.path} cannot be played: {why}")
 
-    Raises:
-        TrajectoryError: If it cannot be read, or is of another kind.
-    """
-    beside = path.with_suffix(".json")
-    try:
-        found: Any = json.loads(beside.read_text())
-        missing = {"env_info", "episodes"} - set(found) or {"env_id"} - set(found["env_info"])
-        listed: list[Any] = [] if missing else [_name(episode) for episode in found["episodes"]]
-    except OSError as error:
-        raise TrajectoryError(
-            f"cannot read {beside}, which belongs beside {path.name}: {error.strerror}"
-        ) from error
-    except (ValueError, TypeError, KeyError) as error:
-        raise TrajectoryError(f"{beside} is not a demonstration's json: {error!r}") from error
-    if missing:
-        raise TrajectoryError(
-            f"{beside} is not a demonstration's json: it has no {', '.join(sorted(missing))}"
+    def _damage(self, what: str) -> AbstractContextManager[None]:
+        return damage_errors(
+            lambda reason: TrajectoryError(
+                f"{self.path} holds no readable episodes: {what} is of another kind, truncated or"
+                f" damaged ({reason})"
+            )
         )
-    if len(set(listed)) != len(listed):
-        raise TrajectoryError(f"{beside} lists an episode twice")
-    return found
-
-
-def recorded_task(path: Path) -> str:
-    """Return the id of the task that a file was recorded in, from the json beside it.
-
-    Raises:
-        TrajectoryError: If the json cannot be read.
-    """
-    return str(read_summary(path)["env_info"]["env_id"])
 
 
 def expect_file(path: Path, suffixes: Sequence[str]) -> None:
@@ -308,6 +299,11 @@ def expect_file(path: Path, suffixes: Sequence[str]) -> None:
     Raises:
         TrajectoryError: If so; names the file in the folder that is most like it.
     """
+    if os.path.lexists(path) and not path.is_file():
+        try:
+            open_regular(path).close()
+        except UnreadableFileError as error:
+            raise TrajectoryError(str(error)) from error
     if not path.is_file():
         siblings = (p.name for p in path.parent.glob("*") if p.suffix in suffixes)
         match = closest_match(path.name, siblings)
@@ -319,54 +315,16 @@ def expect_file(path: Path, suffixes: Sequence[str]) -> None:
         )
 
 
-def _name(about: Mapping[str, Any]) -> str:
-    return f"traj_{about['episode_id']}"
-
-
-def _reset(about: Mapping[str, Any]) -> Mapping[str, Any]:
-    return about.get("reset_kwargs") or {}
-
-
-def _seed(about: Mapping[str, Any]) -> int | None:
-    seed = _reset(about).get("seed")
-    if isinstance(seed, list) and len(seed) == 1:
-        seed = seed[0]
-    return seed if isinstance(seed, int) else None
-
-
-def _modes(about: Mapping[str, Any], default: Any) -> set[str]:
-    mode = about.get("control_mode", default)
-    if mode is None:
-        return set()
-    return {str(m) for m in mode.values()} if isinstance(mode, dict) else {str(mode)}
-
-
-def _read_states(group: Any) -> States:
-    return {
-        kind: {name: np.asarray(rows[()], np.float32) for name, rows in entries.items()}
-        for kind, entries in group.items()
-    }
-
-
-def _entries(states: States | None) -> list[tuple[str, NDArray[np.float32]]]:
-    return [entry for entries in (states or {}).values() for entry in entries.items()]
+def _states(arrays: Mapping[str, NDArray[Any]]) -> States | None:
+    states: States = {}
+    for name, rows in arrays.items():
+        if name.startswith(STATES):
+            _, kind, entry = name.split("/")
+            states.setdefault(kind, {})[entry] = np.asarray(rows, np.float32)
+    return states or None
 
 
 def _column(
     columns: Mapping[str, NDArray[Any]], name: str, kind: type[Number]
 ) -> NDArray[Number] | None:
     return columns[name].astype(kind) if name in columns else None
-
-
-@contextmanager
-def _damage(path: Path, what: str) -> Generator[None]:
-    """Turn what h5py says about damaged or foreign files, in several ways, into our error."""
-    try:
-        yield
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
-        if isinstance(error, RobotLayoutsError):
-            raise
-        raise TrajectoryError(
-            f"{path} holds no readable episodes: {what} is of another kind, truncated or"
-            f" damaged ({error})"
-        ) from error

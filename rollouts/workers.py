@@ -8,6 +8,9 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn
 
+from robots import TaskError
+from rollouts.shift import EPISODE_SECONDS, check_timeout
+
 if TYPE_CHECKING:
     from rollouts.executor import Executor
 
@@ -19,9 +22,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add(
         "--workers",
-        type=one_or_more,
+        type=zero_or_more,
         metavar="W",
-        help="how many processes (1; with --ray, one for each CPU of the cluster)",
+        help="how many processes (1; with --ray, one for each CPU of the cluster); 0: this one",
+    )
+    add(
+        "--episode-timeout",
+        type=_timeout,
+        default=EPISODE_SECONDS,
+        metavar="SECONDS",
+        help="end a worker whose episode takes longer, and play that again; none: never (600)",
     )
     add(
         "--ray",
@@ -35,14 +45,17 @@ def chosen_executor(options: argparse.Namespace) -> Executor:
 
     Raises:
         MissingPackageError: If Ray is asked for and not installed.
+        RobotLayoutsError: If the options contradict each other.
     """
     if options.ray is not None:
         from rollouts.ray_executor import RayExecutor
 
-        return RayExecutor(options.ray, options.workers)
-    from rollouts.executor import ProcessExecutor
+        timeout = options.episode_timeout
+        return RayExecutor(options.ray, options.workers, episode_timeout=timeout)
+    from rollouts.executor import choose_executor
 
-    return ProcessExecutor(options.workers or 1)
+    workers = 1 if options.workers is None else options.workers
+    return choose_executor(workers, episode_timeout=options.episode_timeout)
 
 
 @contextmanager
@@ -69,8 +82,21 @@ def zero_or_more(text: str) -> int:
     return _at_least(0, text)
 
 
+def _timeout(text: str) -> float | None:
+    try:
+        seconds = None if text == "none" else float(text)
+        check_timeout(seconds)
+    except (ValueError, TaskError):
+        words = f"{text} is no limit; it must be seconds, more than 0, or none"
+        raise argparse.ArgumentTypeError(words) from None
+    return seconds
+
+
 def _at_least(least: int, text: str) -> int:
-    number = int(text)
+    try:
+        number = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no whole number") from None
     if number < least:
         raise argparse.ArgumentTypeError(f"{number} is too few; it must be {least} or more")
     return number

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from robots import SimulationError
+from robots.bounds import FAR, checked_number, checked_numbers, checked_whole, shown
 from robots.descriptor import CameraMount, Vector3
 
 TEXTURES = ("rgb", "depth", "segmentation", "position")
 """What a camera can tell of each pixel, in ManiSkill's words: colour, distance along the view (mm),
 number of the body or link, place in the camera's frame (mm)."""
+
+_MOST_PIXELS = 16384  # of a side; what graphics drivers draw at most
+_NARROW = 1e-3  # rad, between a field of view and none or a half-turn
+_NEAR = 1e-6  # m
 
 
 @dataclass(frozen=True)
@@ -43,18 +49,27 @@ class Camera:
         Raises:
             SimulationError: If it looks at where it is, or a size or angle makes no sense.
         """
-        if tuple(self.eye) == tuple(self.target):
+        if not isinstance(self.name, str):
+            raise SimulationError(f"a camera's name is {shown(self.name)}; it must be text")
+        for field in ("eye", "target"):
+            self._set(field, checked_numbers, 3, FAR, unit="m")
+        if self.eye == self.target:
             raise SimulationError(f"a camera at {self.eye} cannot look at the point where it is")
-        for name in ("width", "height"):
-            value = getattr(self, name)
-            if not (isinstance(value, int) and value >= 1):
-                raise SimulationError(f"{self.name}: {name} is {value!r}; it must be 1 or more")
-        if not 0 < self.fov < math.pi:
-            raise SimulationError(f"{self.name}: fov is {self.fov} rad; it must be below π")
-        if not 0 < self.near < self.far:
+        for field in ("width", "height"):
+            self._set(field, checked_whole, 1, _MOST_PIXELS)
+        self._set("fov", checked_number, _NARROW, math.pi - _NARROW, unit="rad")
+        for field in ("near", "far"):
+            self._set(field, checked_number, _NEAR, FAR, unit="m")
+        if not self.near < self.far:
             raise SimulationError(
                 f"{self.name}: near is {self.near} m, far {self.far} m; they must be 0 < near < far"
             )
+
+    def _set(self, field: str, checked: Callable[..., object], *bounds: float, **unit: str) -> None:
+        value = checked(
+            f"{self.name}: {field}", getattr(self, field), *bounds, error=SimulationError, **unit
+        )
+        object.__setattr__(self, field, value)
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from robots import SimulationError
 from robots.descriptor import Vector3
 from simulation.cameras import Camera, RobotCamera
+from simulation.render_device import expect_render_device
 from simulation.rotations import quaternion
 from simulation.simulation import Simulation
 from simulation.world import World
@@ -70,7 +71,12 @@ class Cameras:
         self._view = Camera(eye, target, "view", SIZE, SIZE, FIELD_OF_VIEW)
 
     def take(self) -> NDArray[np.uint8]:
-        """Return what every camera sees now, (N, 512, 512, 3)."""
+        """Return what every camera sees now, (N, 512, 512, 3).
+
+        Raises:
+            SimulationError: If this process is a fork of one that drew.
+        """
+        expect_render_device()
         pictures: list[Texture] = []
         for world in self._simulation.worlds:
             (view,) = _studio(world).look({"view": self._view}, ("rgb",), markers=True)
@@ -123,7 +129,12 @@ class Observers:
                 simulation.worlds[0].robots[camera.robot].link(camera.mount.link)
 
     def look(self, env: int) -> dict[str, View]:
-        """Return what every camera sees in one world now, by its name."""
+        """Return what every camera sees in one world now, by its name.
+
+        Raises:
+            SimulationError: If this process is a fork of one that drew.
+        """
+        expect_render_device()
         studio = _studio(self._simulation.worlds[env])
         views = studio.look(self._cameras, self._textures, markers=False)
         return dict(zip(self._cameras, views, strict=True))

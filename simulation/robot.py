@@ -2,41 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import sapien
-from sapien.wrapper.urdf_loader import URDFLoader
 
 from layouts import Placement
 from robots import DescriptorError, RobotDescriptor, UnknownNameError
-from robots.urdf_xml import resolve
-
-Blueprint = Any
-"""SAPIEN's builder of an articulation; it builds as often as it is asked to."""
-
-
-class _Loader(URDFLoader):
-    """A URDF loader that finds every mesh that a locator found.
-
-    SAPIEN's own drops meshes of a ``package://`` whose folder has another name, saying so only in
-    its log. Visuals are dropped while parsing, so that no render device is needed.
-    """
-
-    def __init__(self, *, visuals: bool) -> None:
-        super().__init__()
-        self._visuals = visuals
-
-    def _build_link(self, link: Any, link_builder: Any) -> None:
-        if not self._visuals:
-            link.visuals = []
-        for part in (*link.collisions, *link.visuals):
-            mesh = part.geometry.mesh
-            if mesh is not None and mesh.filename.startswith("package://"):
-                mesh.filename = resolve(mesh.filename, str(self.urdf_dir), os.path.isfile)
-        super()._build_link(link, link_builder)
+from simulation.blueprint import Blueprint
 
 
 class SimulatedRobot:
@@ -61,15 +35,16 @@ class SimulatedRobot:
             scene: SAPIEN's scene.
             name: Its name in the layout.
             placement: What it is and where it stands.
-            blueprint: What `read_blueprint` made of it.
+            blueprint: What `simulation.blueprint.read_blueprint` made of it.
 
         Raises:
+            AssetError: If SAPIEN left out a collision shape.
             DescriptorError: If the descriptor names joints or links that the URDF lacks.
         """
         descriptor = placement.robot
         self.name, self.descriptor = name, descriptor
         self.base_pose = sapien.Pose(list(placement.base_position), list(placement.base_quaternion))
-        self.articulation: Any = _build(scene, blueprint, self.base_pose)
+        self.articulation: Any = blueprint.build(scene, self.base_pose)
         self.links = {link.name: link for link in self.articulation.links}
         self.joints: list[Any] = list(self.articulation.active_joints)
         self.active_index = _active_index(descriptor, [joint.name for joint in self.joints])
@@ -132,38 +107,6 @@ class SimulatedRobot:
                 joint = next(joints)
                 joint.set_drive_properties(*drive, "force")
                 joint.set_friction(group.friction)
-
-
-def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
-    """Read a robot's URDF, once for any number of worlds with the same physics settings.
-
-    Args:
-        descriptor: The robot.
-        visuals: Whether to read what pictures need.
-
-    Raises:
-        AssetError: If its files cannot be found.
-    """
-    loader: Any = _Loader(visuals=visuals)
-    loader.set_scene(sapien.Scene([]))  # which hands out empty builders and is not built in
-    loader.fix_root_link = True
-    if material := descriptor.gripper_material:
-        friction = material.static_friction, material.dynamic_friction, material.restitution
-        for link in material.links:
-            loader.set_link_material(link, *friction)
-            loader.set_link_patch_radius(link, material.patch_radius)
-            loader.set_link_min_patch_radius(link, material.patch_radius)
-    urdf = descriptor.urdf.locate(pictures=visuals)
-    return loader.load_file_as_articulation_builder(str(urdf))
-
-
-def _build(scene: sapien.Scene, blueprint: Blueprint, pose: sapien.Pose) -> Any:
-    blueprint.set_scene(scene)
-    blueprint.set_initial_pose(pose)
-    articulation = blueprint.build()
-    blueprint.set_scene(None)  # else it would keep the scene alive
-    articulation.set_root_pose(pose)
-    return articulation
 
 
 def _active_index(descriptor: RobotDescriptor, active: list[str]) -> list[int]:

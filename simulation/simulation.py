@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from layouts import Layout
 from robots import RobotDescriptor
 from robots.descriptor import IDENTITY, Quaternion
+from simulation.blueprint import Blueprint
 from simulation.controller import JointPositionController
 from simulation.maths import Array
-from simulation.physics import PhysicsSettings
+from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, substeps
 from simulation.readout import ReadoutIndex
-from simulation.robot import Blueprint
 from simulation.state import State
 from simulation.world import World
 
@@ -50,19 +50,29 @@ class Simulation:
             physics: Solver settings; None keeps SAPIEN's own defaults.
             control_frequency: Control steps per second (Hz).
             visuals: Whether to build what pictures need.
+
+        Raises:
+            SimulationError: If a control step is not a whole number of physics steps.
+            AssetError: If robot files cannot be found.
         """
+        self.substeps = substeps(physics or SAPIEN_DEFAULTS, control_frequency)
         self.layout = layout
-        self._build, self._physics, self._visuals = build, physics, visuals
+        self._physics, self._visuals = physics, visuals
         self._blueprints: dict[str, Blueprint] = {}
         self.stamp = 0
-        self.worlds = [self._build_world(i) for i in range(num_envs)]
-        self.substeps = round(1 / (self.worlds[0].physics.timestep * control_frequency))
+        self.worlds = [self._build_world(i, build) for i in range(num_envs)]
         self._after_build()
 
-    def rebuild(self, env_ids: Sequence[int]) -> None:
-        """Build some worlds anew; what PhysX remembered of their past is gone."""
+    def rebuild(self, env_ids: Sequence[int], build: Callable[[World, int], None]) -> None:
+        """Build some worlds anew; what PhysX remembered of their past is gone.
+
+        Args:
+            env_ids: Which worlds.
+            build: As when the simulation was made. It is not kept from then: a task's own would
+                keep the task, and with it these worlds, until Python looks for circles.
+        """
         for i in env_ids:
-            self.worlds[i] = self._build_world(i)
+            self.worlds[i] = self._build_world(i, build)
         self._after_build()
 
     def descriptor(self, robot: str) -> RobotDescriptor:
@@ -145,11 +155,11 @@ class Simulation:
         """Note that a world was changed by hand, so that earlier states count as stale."""
         self.stamp += 1
 
-    def _build_world(self, index: int) -> World:
+    def _build_world(self, index: int, build: Callable[[World, int], None]) -> World:
         world = World(
             self.layout, self._physics, visuals=self._visuals, blueprints=self._blueprints
         )
-        self._build(world, index)
+        build(world, index)
         world.settle()
         return world
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from functools import wraps
+from functools import cache, wraps
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from robots import SimulationError
+from robots import Fingers, SimulationError
 from simulation.contacts import LinkTouch, grasped, link_touches, pairwise_forces
 from simulation.maths import Array, Flags, Floats, counted, full, like, norm
 from simulation.rotations import last_euler_angle, rotation_matrix
@@ -69,6 +69,7 @@ class State:
 
     Attributes:
         num_envs: Number of worlds N.
+        all_poses: Poses of all frames of `ReadoutIndex`, (F, N, 7).
         joint_positions: Joint positions of all robots, in layout order, (N, dof) (rad, m).
         joint_velocities: Their velocities, (N, dof) (rad/s, m/s).
         memo: What was computed from it already.
@@ -78,11 +79,11 @@ class State:
         "_distances",
         "_index",
         "_offsets",
-        "_poses",
         "_simulation",
         "_speeds",
         "_stamp",
         "_velocities",
+        "all_poses",
         "joint_positions",
         "joint_velocities",
         "memo",
@@ -103,7 +104,7 @@ class State:
         self.num_envs = count = len(worlds)
         packed = b"".join([world.scene.pack_poses() for world in worlds])
         entities = np.frombuffer(packed, np.float32).reshape(count, -1, 7).transpose(1, 0, 2)
-        self._poses = poses = np.empty((index.frames, count, 7), np.float32)
+        self.all_poses = poses = np.empty((index.frames, count, 7), np.float32)
         poses[: index.entities, :, :3] = entities[:, :, 4:]  # SAPIEN packs the quaternion first
         poses[: index.entities, :, 3:] = entities[:, :, :4]
         robots = [articulation for world in worlds for articulation in world.articulations]
@@ -112,6 +113,22 @@ class State:
         for frame, orientation, points in index.mean_frames:
             poses[frame, :, :3] = sum(poses[point, :, :3] for point in points) / len(points)
             poses[frame, :, 3:] = poses[orientation, :, 3:]
+
+    def lost(self) -> tuple[str, int] | None:
+        """Return the first robot or body with numbers that are not finite, and its world's number.
+
+        None if there is none; looks at poses and joints.
+        """
+        index = self._index
+        for robot, links in index.links.items():
+            parts = [self.all_poses[frame] for frame in links.values()]
+            parts += [self.qpos(robot), self.qvel(robot)]
+            if (env := _first_not_finite(np.concatenate(parts, 1))) is not None:
+                return f"robot {robot!r}", env
+        for body, frame in index.bodies.items():
+            if (env := _first_not_finite(self.all_poses[frame])) is not None:
+                return f"body {body!r}", env
+        return None
 
     # -- arrays of one's own -----------------------------------------------------------------
 
@@ -143,21 +160,21 @@ class State:
 
     def poses(self, frames: NDArray[np.intp]) -> Floats:
         """Return a copy of the poses of some frames of `ReadoutIndex`, shape (K, N, 7)."""
-        return self._poses.take(frames, 0)
+        return self.all_poses.take(frames, 0)
 
     # -- bodies ------------------------------------------------------------------------------
 
     def pose(self, body: str) -> Floats:
         """Pose of a body, shape (N, 7)."""
-        return self._poses[self._index.bodies[body]]
+        return self.all_poses[self._index.bodies[body]]
 
     def position(self, body: str) -> Floats:
         """Position of a body, shape (N, 3) (m)."""
-        return self._poses[self._index.bodies[body], :, :3]
+        return self.all_poses[self._index.bodies[body], :, :3]
 
     def quaternion(self, body: str) -> Floats:
         """Orientation of a body, wxyz, shape (N, 4)."""
-        return self._poses[self._index.bodies[body], :, 3:]
+        return self.all_poses[self._index.bodies[body], :, 3:]
 
     @_remembered
     def rotation(self, body: str) -> Floats:
@@ -201,30 +218,30 @@ class State:
 
     def link_pose(self, robot: str, link: str) -> Floats:
         """Pose of a link, shape (N, 7)."""
-        return self._poses[self._index.links[robot][link]]
+        return self.all_poses[self._index.links[robot][link]]
 
     def link_position(self, robot: str, link: str) -> Floats:
         """Position of a link, shape (N, 3) (m)."""
-        return self._poses[self._index.links[robot][link], :, :3]
+        return self.all_poses[self._index.links[robot][link], :, :3]
 
     def base_position(self, robot: str) -> Floats:
         """Position of a robot's root link, shape (N, 3) (m)."""
-        return self._poses[self._index.bases[robot], :, :3]
+        return self.all_poses[self._index.bases[robot], :, :3]
 
     def tcp_pose(self, robot: str) -> Floats:
         """Pose of a robot's tool centre point, shape (N, 7)."""
-        return self._poses[self._index.tcps[robot]]
+        return self.all_poses[self._index.tcps[robot]]
 
     def tcp_position(self, robot: str) -> Floats:
         """Position of a robot's tool centre point, shape (N, 3) (m)."""
-        return self._poses[self._index.tcps[robot], :, :3]
+        return self.all_poses[self._index.tcps[robot], :, :3]
 
     def finger_heights(self, robot: str) -> tuple[Floats, Floats] | None:
         """Height of a robot's two finger links, each (N,) (m), or None if it has none."""
         fingers = self._index.fingers[robot]
         if fingers is None:
             return None
-        first, second = (self._poses[self._index.links[robot][f], :, 2] for f in fingers.links)
+        first, second = (self.all_poses[self._index.links[robot][f], :, 2] for f in fingers.links)
         return first, second
 
     def finger_gap(self, robot: str) -> Floats:
@@ -283,7 +300,7 @@ class State:
         if forces is None:
             return np.zeros(self.num_envs, bool)
         if max_angle is not None:
-            fingers = replace(fingers, max_angle=max_angle)
+            fingers = _within(fingers, max_angle)
         return grasped(fingers, forces, [self.link_pose(robot, link) for link in fingers.links])
 
     # -- distances ---------------------------------------------------------------------------
@@ -324,7 +341,7 @@ class State:
         """Offsets of all pairs that were ever asked for, (K, N, 3), at least up to ``place``."""
         if place >= len(self._offsets):
             pairs = self._index.pairs
-            ways = self._poses.take(pairs.ends, 0) - self._poses.take(pairs.starts, 0)
+            ways = self.all_poses.take(pairs.ends, 0) - self.all_poses.take(pairs.starts, 0)
             ways[pairs.planar, :, 2] = 0.0  # exact: a zero adds nothing to a norm
             self._offsets = ways[:, :, :3]
         return self._offsets
@@ -382,3 +399,13 @@ class State:
 
 def _rows(parts: list[Floats], count: int) -> Floats:
     return np.concatenate(parts).reshape(count, -1)
+
+
+@cache  # making one checks it, which is too slow for every step
+def _within(fingers: Fingers, max_angle: float) -> Fingers:
+    return replace(fingers, max_angle=max_angle)
+
+
+def _first_not_finite(rows: Floats) -> int | None:
+    wrong = ~np.isfinite(rows).all(1)
+    return int(wrong.argmax()) if wrong.any() else None

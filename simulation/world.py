@@ -12,8 +12,10 @@ import sapien.physx as physx
 from layouts import Layout
 from robots import SimulationError, UnknownNameError
 from robots.descriptor import IDENTITY, Quaternion, Vector3
+from simulation.blueprint import Blueprint, read_blueprint
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, apply
-from simulation.robot import Blueprint, SimulatedRobot, read_blueprint
+from simulation.render_device import expect_render_device, outlive_forks
+from simulation.robot import SimulatedRobot
 from simulation.shapes import Shape, add_collision
 
 BodyKind = Literal["dynamic", "kinematic", "static"]
@@ -91,6 +93,7 @@ class World:
         systems: list[Any] = [self.system]
         if visuals:
             systems.append(_render_system())
+            outlive_forks(self)
         self.scene = sapien.Scene(systems)
         self.system.timestep = self.physics.timestep
         blueprints = {} if blueprints is None else blueprints
@@ -217,6 +220,7 @@ def _draw(entity: sapien.Entity, shapes: tuple[Shape, ...]) -> None:
 def _render_system() -> Any:
     from sapien.render import RenderSystem
 
+    expect_render_device()
     try:
         return RenderSystem()
     except RuntimeError as error:

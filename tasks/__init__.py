@@ -1,6 +1,22 @@
-"""What is to be achieved: one file per task, a registry, the batched task class, and its fronts.
+"""What is to be achieved: tasks for one robot or many, and the interfaces they are used by.
 
-Importing this tells Gymnasium the tasks. What needs torch or sapien is loaded when it is used.
+Making a task:
+    make: A task by its id, ``tasks.make("PickCube-v1", num_envs=4)``; stepped as a batch.
+    list_tasks, list_clones: The ids there are; those that clone one of ManiSkill's tasks.
+    get_task_class: The class behind an id.
+    Scenario: Everything a task is made with; ``cls.scenario`` is one to start from.
+
+Making an environment of it for other programs (each loads its package when it is called):
+    gymnasium.make, gymnasium.make_vec: ``"RobotLayouts/PickCube-v1"``, once this is imported.
+    parallel_env: PettingZoo, one agent per robot.
+    sb3_vec_env: Stable-Baselines3.
+
+Writing a task:
+    MultiRobotTask: What a task's class subclasses.
+    register_task: Gives it its names.
+    EpisodeRandom: The random streams that it draws from.
+
+``python -m tasks list`` prints a table of all tasks. Importing this loads neither torch nor sapien.
 """
 
 from importlib import import_module
@@ -45,6 +61,11 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = globals()[name] = getattr(import_module(_MODULES[name]), name)
     return value
+
+
+def __dir__() -> list[str]:
+    """List what is loaded only when it is asked for, too: `help` and completion go by this."""
+    return sorted({*globals(), *__all__})
 
 
 register()

@@ -10,15 +10,22 @@ from collections.abc import Sequence
 from rich.console import Console
 
 from layouts.view_command import add_page_options, page_words, show
-from robots import RobotLayoutsError, UnknownNameError
-from tasks.description import TaskFacts, describe, facts, list_table, parity_verdicts
+from robots.commands import exit_code, start
+from tasks.description import (
+    declared_facts,
+    describe,
+    list_table,
+    parity_verdicts,
+    recorded_sizes,
+)
 from tasks.registry import list_tasks, make
 from tasks.view import task_cell
 
 MIN_WIDTH = 120  # columns that a table may take; a narrower terminal wraps it
 LEGEND = (
     "norm is normalized_dense; the first reward mode is the default. parity: the last recorded"
-    " comparison with native ManiSkill, where there was one."
+    " comparison with native ManiSkill, where there was one; obs is the size recorded there."
+    " `describe TASK` counts the observation of any task, which takes its robots' files."
 )
 
 
@@ -32,39 +39,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Exit status: 0 if all went well, 1 after an error, 2 if there is no such task.
     """
     options = _parser().parse_args(arguments)
-    try:
-        if options.command == "list":
-            _list()
-        elif options.command == "describe":
-            _describe(options.task)
-        else:
-            return _view(options)
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2 if isinstance(error, UnknownNameError) else 1
-    return 0
+    return exit_code(lambda: options.run(options))
 
 
-def _list() -> None:
-    verdicts = parity_verdicts()
+def _list(options: argparse.Namespace) -> None:
+    verdicts, sizes = parity_verdicts(), recorded_sizes()
+    rows = [declared_facts(task_id, sizes.get(task_id)) for task_id in list_tasks()]
     console = _console()
-    console.print(list_table(_all_facts(), verdicts))
+    console.print(list_table(rows, verdicts))
     console.print(LEGEND)
 
 
-def _all_facts() -> list[TaskFacts]:
-    """Make every task once, which takes seconds, and say so where someone watches."""
-    found: list[TaskFacts] = []
-    task_ids = list_tasks()
-    with Console(stderr=True).status("") as status:
-        for number, task_id in enumerate(task_ids, start=1):
-            status.update(f"making {task_id} to count its numbers ({number} of {len(task_ids)})")
-            found.append(facts(task_id))
-    return found
-
-
-def _describe(name: str) -> None:
-    env = make(name)
+def _describe(options: argparse.Namespace) -> None:
+    env = make(options.task)
     console = _console()
     for part in describe(env):
         console.print(part, soft_wrap=isinstance(part, str))
@@ -93,10 +80,12 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m tasks", description="See which tasks there are, and what each is."
     )
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    commands.add_parser("list", help="print every task as a row of a table")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    every = commands.add_parser("list", help="print every task as a row of a table")
+    every.set_defaults(run=_list)
     one = commands.add_parser("describe", help="print everything about a task")
     one.add_argument("task", metavar="TASK", help="task id or another of its names")
+    one.set_defaults(run=_describe)
     view = commands.add_parser(
         "view",
         help="look at a task, or at a demonstration of it, in a browser",
@@ -107,8 +96,9 @@ def _parser() -> argparse.ArgumentParser:
     view.add_argument("--demo", metavar="FILE", help="an h5 file of recorded episodes")
     view.add_argument("--episode", type=int, default=0, metavar="N", help="the Nth of them (0)")
     add_page_options(view)
+    view.set_defaults(run=_view)
     return parser
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    start(main)

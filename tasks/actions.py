@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,8 @@ from numpy.typing import NDArray
 
 from layouts import Layout
 from robots import ActionError, UnknownNameError
+from simulation.maths import all_finite
+from tasks.arguments import array_of
 
 
 class ActionReader:
@@ -37,7 +38,7 @@ class ActionReader:
             flat = self._join(action)
         else:
             flat = self._array(action, self._width, "the action")
-        if not isfinite(np.add.reduce(flat, None, np.float64)):  # cannot overflow
+        if not all_finite(flat):
             self._refuse_number(flat)
         return flat
 
@@ -57,14 +58,8 @@ class ActionReader:
         return np.concatenate(parts, axis=1)
 
     def _array(self, value: Any, width: int, what: str) -> NDArray[np.float32]:
-        if isinstance(value, torch.Tensor):
-            array = value.numpy(force=value.requires_grad or value.device.type != "cpu")
-        else:
-            try:
-                array = np.asarray(value)
-            except ValueError as error:
-                raise ActionError(f"{what} is not an array of numbers: {error}") from None
-        if array.dtype != np.float32 and array.dtype.kind != "f":
+        array = array_of(value, what, ActionError)
+        if array.dtype.kind != "f":
             raise ActionError(f"{what} has dtype {array.dtype}; it must be floating (float32)")
         if array.ndim == 1 and self._num_envs == 1:
             array = array[None]
@@ -73,7 +68,10 @@ class ActionReader:
                 f"{what} has shape {array.shape}; it must be {(self._num_envs, width)}:"
                 f" {self._num_envs} environment(s), {self._describe(width)}"
             )
-        return array if array.dtype == np.float32 else array.astype(np.float32)
+        if array.dtype == np.float32:
+            return array
+        with np.errstate(over="ignore"):  # what is too large is refused as inf
+            return array.astype(np.float32)
 
     def _describe(self, width: int) -> str:
         if width != self._width or len(self._split) == 1:

@@ -6,7 +6,7 @@ import inspect
 import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import degrees
 from pathlib import Path
 from typing import Any
@@ -39,7 +39,7 @@ class TaskFacts:
         task_id: Its id.
         robots: The robots of its default layout, in words.
         action_size: Numbers of one action.
-        observation_size: Numbers of one flat observation.
+        observation_size: Numbers of one flat observation; None if that is not known.
         max_episode_steps: Control steps until an episode is truncated.
         reward_modes: Its reward modes, the default first.
     """
@@ -47,7 +47,7 @@ class TaskFacts:
     task_id: str
     robots: str
     action_size: int
-    observation_size: int
+    observation_size: int | None
     max_episode_steps: int
     reward_modes: tuple[str, ...]
 
@@ -74,19 +74,32 @@ def facts(task_id: str) -> TaskFacts:
         UnknownNameError: If there is no such task.
         AssetError: If robot files cannot be found.
     """
-    cls = get_task_class(task_id)
     env = make(task_id)
     try:
-        return TaskFacts(
-            cls.task_id,
-            robots_text(cls.layout),
-            cls.layout.action_dim,
-            observation_size(env),
-            cls.max_episode_steps,
-            cls.reward_modes,
-        )
+        return replace(declared_facts(task_id), observation_size=observation_size(env))
     finally:
         env.close()
+
+
+def declared_facts(task_id: str, observation_size: int | None = None) -> TaskFacts:
+    """Return what a task's class says by itself; needs no robot files.
+
+    Args:
+        task_id: Its id or another of its names.
+        observation_size: What is known about it from elsewhere.
+
+    Raises:
+        UnknownNameError: If there is no such task.
+    """
+    cls = get_task_class(task_id)
+    return TaskFacts(
+        cls.task_id,
+        robots_text(cls.layout),
+        cls.layout.action_dim,
+        observation_size,
+        cls.max_episode_steps,
+        cls.reward_modes,
+    )
 
 
 def robots_text(layout: Layout) -> str:
@@ -101,11 +114,25 @@ def parity_verdicts(path: Path = PARITY_RESULTS) -> dict[str, str]:
     Raises:
         TaskError: If the record cannot be read.
     """
+    equal = _recorded(path, "equal")
+    return {task: "bitwise" if same else "differs" for task, same in equal.items()}
+
+
+def recorded_sizes(path: Path = PARITY_RESULTS) -> dict[str, int]:
+    """Return task id → numbers of its observation, as they were last recorded; empty if never.
+
+    Raises:
+        TaskError: If the record cannot be read.
+    """
+    return _recorded(path, "observation_size")
+
+
+def _recorded(path: Path, key: str) -> dict[str, Any]:
     if not path.is_file():
         return {}
     try:
         entries: dict[str, Any] = json.loads(path.read_text())["tasks"]
-        return {task: "bitwise" if e["equal"] else "differs" for task, e in entries.items()}
+        return {task: entry[key] for task, entry in entries.items()}
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise TaskError(f"{path} is not a record of comparisons: {error!r}") from error
 
@@ -124,7 +151,9 @@ def list_table(tasks: Iterable[TaskFacts], verdicts: dict[str, str]) -> Table:
         rows.add_row(
             task.task_id,
             task.robots,
-            *map(str, (task.action_size, task.observation_size, task.max_episode_steps)),
+            str(task.action_size),
+            UNKNOWN if task.observation_size is None else str(task.observation_size),
+            str(task.max_episode_steps),
             short_modes(task.reward_modes),
             verdicts.get(task.task_id, UNKNOWN),
         )
@@ -163,7 +192,7 @@ def describe(env: MultiRobotTask) -> Iterator[RenderableType]:
     for name, value in (
         ("randomisation", said.randomisation),
         ("success", said.success),
-        ("episode", f"{cls.max_episode_steps} steps, {env.made_from.control_frequency:g} per s"),
+        ("episode", f"{env.max_episode_steps} steps, {env.made_from.control_frequency:g} per s"),
         ("reward modes", ", ".join([f"{cls.reward_modes[0]} (default)", *cls.reward_modes[1:]])),
         ("source", cls.source),
         ("other names", ", ".join(other_names(cls))),

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -12,11 +13,25 @@ from torch import Tensor
 
 from layouts import Layout
 from robots import TaskError, unknown_name_message
+from robots.bounds import FAR, shown
 from simulation import Simulation, State
 from simulation.maths import Floats
+from tasks.arguments import array_of
 
 StateDict = dict[str, dict[str, Tensor]]
 
+_UNIT_TOLERANCE = 0.01  # of quaternions: of two digits, say
+_BEYOND_LIMITS = 2 * math.pi  # rad, or m
+_POSE = tuple(
+    f"{what} {axis}"
+    for what, axes in (
+        ("position", "xyz"),
+        ("quaternion", "wxyz"),
+        ("linear velocity", "xyz"),
+        ("angular velocity", "xyz"),
+    )
+    for axis in axes
+)
 _MOMENTS = 128  # that a tape has room for at first: most episodes end before
 
 
@@ -147,15 +162,20 @@ def write_state_dict(
 
     Not exact even in native: PhysX's solver memory is no part of it.
 
+    Numbers must be finite and at most `robots.bounds.FAR`, quaternions within 1 % of unit length,
+    and joints within a full turn (rad; or 2π m) of their limits: joint noise and contacts push them
+    a little beyond.
+
     Args:
         simulation: The worlds.
         state: What `read_state_dict` returns, one row per entry of ``env_ids``.
         env_ids: Which worlds.
 
     Raises:
-        TaskError: If a key is unknown or a row has the wrong length; nothing is changed then.
+        TaskError: If a key is unknown, a row has the wrong length, or a number makes no sense; says
+            in which entry and environment. Nothing is changed then.
     """
-    rows = _checked_rows(simulation, state, len(env_ids))
+    rows = _checked_rows(simulation, state, env_ids)
     robots = {key: name for name, key in articulation_keys(simulation.layout).items()}
     for row, env in enumerate(env_ids):
         world = simulation.worlds[env]
@@ -169,33 +189,84 @@ def write_state_dict(
     simulation.touched()
 
 
+class _Entry(NamedTuple):
+    """What the numbers of one row are called, and their bounds, each (k,)."""
+
+    names: tuple[str, ...]
+    lowest: NDArray[np.float64]
+    highest: NDArray[np.float64]
+
+
 def _checked_rows(
-    simulation: Simulation, state: Mapping[str, Mapping[str, Any]], count: int
-) -> dict[str, dict[str, np.ndarray]]:
-    widths = {
-        "actors": {
-            name: 13 for name, body in simulation.worlds[0].bodies.items() if body.kind != "static"
-        },
-        "articulations": {
-            key: 13 + 2 * len(simulation.worlds[0].robots[name].joints)
-            for name, key in articulation_keys(simulation.layout).items()
-        },
-    }
-    unknown = [group for group in state if group not in widths]
-    if unknown:
-        raise TaskError(unknown_name_message("state group", unknown[0], widths))
-    rows: dict[str, dict[str, np.ndarray]] = {"actors": {}, "articulations": {}}
-    for group, entries in state.items():
-        for key, value in entries.items():
-            if key not in widths[group]:
-                raise TaskError(unknown_name_message(f"entry of {group}", key, widths[group]))
-            array = np.atleast_2d(np.asarray(value, np.float32))
-            if array.shape != (count, widths[group][key]):
-                raise TaskError(
-                    f"{group}/{key} has shape {array.shape}; it must be"
-                    f" {(count, widths[group][key])}"
-                )
-            if not np.isfinite(array).all():
-                raise TaskError(f"{group}/{key} holds numbers that are not finite")
+    simulation: Simulation, state: Mapping[str, Mapping[str, Any]], env_ids: Sequence[int]
+) -> dict[str, dict[str, Floats]]:
+    known = _entries(simulation)
+    rows: dict[str, dict[str, Floats]] = {group: {} for group in known}
+    for group, values in _items(state, "the state"):
+        if group not in known:
+            raise TaskError(unknown_name_message("state group", group, known))
+        for key, value in _items(values, group):
+            if key not in known[group]:
+                raise TaskError(unknown_name_message(f"entry of {group}", key, known[group]))
+            what, entry = f"{group}/{key}", known[group][key]
+            array = _checked_array(value, what, (len(env_ids), len(entry.names)))
+            _check_numbers(array, what, entry, env_ids)
             rows[group][key] = array
     return rows
+
+
+def _entries(simulation: Simulation) -> dict[str, dict[str, _Entry]]:
+    """Return what a state dict of these worlds holds."""
+    world = simulation.worlds[0]
+    pose = _Entry(_POSE, np.full(13, -FAR), np.full(13, FAR))
+    articulations: dict[str, _Entry] = {}
+    for name, key in articulation_keys(simulation.layout).items():
+        joints = world.robots[name].joints
+        low, high = np.concatenate([joint.limits for joint in joints]).T
+        fastest = np.full(len(joints), FAR)
+        articulations[key] = _Entry(
+            (*_POSE, *(f"{what} of {joint.name}" for what in ("qpos", "qvel") for joint in joints)),
+            np.concatenate([pose.lowest, np.maximum(low - _BEYOND_LIMITS, -FAR), -fastest]),
+            np.concatenate([pose.highest, np.minimum(high + _BEYOND_LIMITS, FAR), fastest]),
+        )
+    return {
+        "actors": {name: pose for name, body in world.bodies.items() if body.kind != "static"},
+        "articulations": articulations,
+    }
+
+
+def _items(entries: Any, what: str) -> Iterable[tuple[Any, Any]]:
+    if not isinstance(entries, Mapping):
+        raise TaskError(
+            f"{what} is {shown(entries)}; it must be a mapping, as get_state_dict() returns it"
+        )
+    return entries.items()
+
+
+def _checked_array(value: Any, what: str, shape: tuple[int, int]) -> Floats:
+    array = array_of(value, what, TaskError)
+    if array.dtype.kind not in "fiu":
+        raise TaskError(f"{what} has dtype {array.dtype}; it must hold numbers (float32)")
+    array = np.atleast_2d(array)
+    if array.shape != shape:
+        raise TaskError(f"{what} has shape {array.shape}; it must be {shape}")
+    with np.errstate(over="ignore"):  # what is too large is refused as inf
+        return array.astype(np.float32)
+
+
+def _check_numbers(array: Floats, what: str, entry: _Entry, env_ids: Sequence[int]) -> None:
+    wrong = np.argwhere(~((entry.lowest <= array) & (array <= entry.highest)))
+    if len(wrong):
+        row, place = (int(i) for i in wrong[0])
+        low, high = entry.lowest[place], entry.highest[place]
+        raise TaskError(
+            f"{what}: {entry.names[place]} is {array[row, place]:g} for environment {env_ids[row]};"
+            f" a number from {low:g} to {high:g} is needed"
+        )
+    lengths = np.linalg.norm(array[:, 3:7], axis=1)
+    for env, length in zip(env_ids, lengths, strict=True):
+        if abs(length - 1) > _UNIT_TOLERANCE:
+            raise TaskError(
+                f"{what}: the quaternion (numbers 3 to 6, wxyz) has length {length:.6g} for"
+                f" environment {env}; a rotation has length 1"
+            )

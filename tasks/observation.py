@@ -16,7 +16,8 @@ from layouts import Layout
 from robots import TaskError, unknown_name_message
 from simulation import Camera, Simulation, State
 from simulation.cameras import TEXTURES, RobotCamera
-from simulation.maths import Array
+from simulation.maths import Array, all_finite
+from tasks.finite import NotFinite
 from tasks.native_format import observation_keys
 
 if TYPE_CHECKING:
@@ -56,9 +57,11 @@ def read_mode(name: str) -> ObservationMode:
     Raises:
         TaskError: If there is no such mode.
     """
+    if not isinstance(name, str):
+        raise TaskError(unknown_name_message("obs_mode", name, OBS_MODES))
     if name in PLAIN_MODES:
         return ObservationMode(flat=name == "state", nothing=name == "none")
-    parts = str(SHORT_MODES.get(name, name)).split("+")
+    parts = SHORT_MODES.get(name, name).split("+")
     for part in parts:
         if part not in (*TEXTURES, *STATE_FORMS):
             wrong = unknown_name_message("obs_mode", name, OBS_MODES)
@@ -142,6 +145,7 @@ class Observer:
 
         Raises:
             TaskError: If something that robots sense is not observed at all.
+            NotFinite: If a number is not finite.
         """
         if self.mode.nothing:
             return {}
@@ -196,9 +200,14 @@ class Observer:
     def _flat(self, state: State, parts: Mapping[str, Array]) -> torch.Tensor:
         joined = [part for name in self._robots for part in (state.qpos(name), state.qvel(name))]
         joined.extend(part if part.ndim == 2 else part[:, None] for part in parts.values())
-        return _tensor(np.concatenate(joined, 1, dtype=np.float32))
+        flat = np.concatenate(joined, 1, dtype=np.float32)
+        if not all_finite(flat):
+            raise NotFinite
+        return _tensor(flat)
 
     def _named(self, state: State, parts: Mapping[str, Array]) -> dict[str, Any]:
+        if not all(map(all_finite, (state.joint_velocities, *parts.values()))):
+            raise NotFinite
         agent: dict[str, Any] = {}
         for name, key in self._keys.items():
             own = {

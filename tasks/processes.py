@@ -2,26 +2,45 @@
 
 from __future__ import annotations
 
-import ctypes
+import errno
 import functools
 import multiprocessing
+import multiprocessing.context
 import os
 import pickle
 import signal
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from concurrent.futures import Future
-from multiprocessing import resource_tracker
+from contextlib import contextmanager
 from multiprocessing.process import BaseProcess
 from queue import SimpleQueue
 from threading import Thread
 from typing import TypeAlias
 
 from robots import RobotLayoutsError
+from tasks.fork_server import ProcessError, end_with
+from tasks.forks import WorkerProcess, ending
 
-_PR_SET_PDEATHSIG = 1  # of Linux's prctl
+__all__ = [
+    "ProcessError",
+    "Sendable",
+    "WorkerTraceback",
+    "context",
+    "end_with_parent",
+    "ending",
+    "enough",
+    "start",
+]
 
-context = multiprocessing.get_context("spawn")  # SAPIEN does not survive a fork
+_WHAT_RAN_OUT = {
+    errno.EMFILE: "; each takes three file descriptors: raise `ulimit -n` or take fewer",
+    errno.ENFILE: "; this machine has too many files open",
+    errno.EAGAIN: "; this user may have no more processes: raise `ulimit -u` or take fewer",
+    errno.ENOMEM: "; there is too little memory: take fewer",
+    errno.EFBIG: "; what they share must fit a file: raise `ulimit -f` or take fewer environments",
+    errno.ENOSPC: "; there is too little memory to share: take fewer environments",
+}
 
 _Requests: TypeAlias = "SimpleQueue[tuple[BaseProcess, Future[None]]]"
 
@@ -34,29 +53,61 @@ class WorkerTraceback(Exception):
         return f"\n\n{self.args[0]}" if self.args else ""
 
 
+class _Context(multiprocessing.context.SpawnContext):
+    """Pipes, queues and processes of `multiprocessing`; the processes are forked by a server."""
+
+    Process = WorkerProcess  # type: ignore[assignment]
+
+
+context = _Context()
+
+
 def start(process: BaseProcess) -> None:
-    """Start a process that never sees Ctrl-C: a terminal sends it to all, one is to act on it.
+    """Start a process of `context` that ends with this one, however this one ends.
+
+    It never sees Ctrl-C: a terminal sends it to all, one is to act on it. A daemonic process may
+    start some as well, as they do not outlive it.
 
     Raises:
+        ProcessError: If descriptors, processes or memory run out, or the main module does not
+            guard what it runs.
         Exception: What pickling the process's target and arguments raises.
     """
     started: Future[None] = Future()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        _starter().put((process, started))
-        started.result()
+        with enough():
+            _starter().put((process, started))
+            started.result()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+@contextmanager
+def enough() -> Generator[None]:
+    """Say in one sentence what ran out while processes are started.
+
+    Raises:
+        ProcessError: In the place of an ``OSError`` or a ``MemoryError``.
+    """
+    try:
+        yield
+    except (OSError, MemoryError) as error:
+        if isinstance(error, RobotLayoutsError):
+            raise
+        number = error.errno if isinstance(error, OSError) else errno.ENOMEM
+        reason = _WHAT_RAN_OUT.get(number or 0, "")
+        raise ProcessError(f"worker processes cannot be started: {error}{reason}") from error
+
+
 def end_with_parent() -> None:
-    """Let this process be killed with the one that started it, whatever either is doing."""
+    """Let this process be killed with the one that started it, whatever either is doing.
+
+    A process of `context` is so from its start.
+    """
     parent = multiprocessing.parent_process()
-    if parent is None:
-        return
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent.pid:  # it was killed before
-        os._exit(1)
+    if parent is not None and not isinstance(multiprocessing.current_process(), WorkerProcess):
+        end_with(parent.pid or 0)
 
 
 class Sendable:
@@ -66,16 +117,16 @@ class Sendable:
     one line; the ``__cause__`` of what arrives is a `WorkerTraceback`.
     """
 
-    def __init__(self, error: Exception, otherwise: Callable[[str], RobotLayoutsError]) -> None:
+    def __init__(self, error: BaseException, otherwise: Callable[[str], RobotLayoutsError]) -> None:
         """Keep the error and its traceback, as text."""
         lines = traceback.format_exception(type(error), error, error.__traceback__)
         self._traceback = "".join(lines).rstrip()
-        self._error = error
-        if not (isinstance(error, RobotLayoutsError) and _survives_pickling(error)):
+        if isinstance(error, RobotLayoutsError) and _survives_pickling(error):
+            self._error = error
+        else:
             last = traceback.extract_tb(error.__traceback__)[-1]
-            self._error = otherwise(
-                f"{type(error).__name__}: {error} ({last.filename}:{last.lineno})"
-            )
+            what = "".join(traceback.format_exception_only(error)).strip()
+            self._error = otherwise(f"{what} ({last.filename}:{last.lineno})")
 
     def __reduce__(self) -> tuple[Callable[[Exception, str], Exception], tuple[Exception, str]]:
         """Pickle as the error."""
@@ -98,8 +149,8 @@ def _survives_pickling(error: Exception) -> bool:
 def _starter() -> _Requests:
     """Return where to ask for processes.
 
-    `end_with_parent` ends a process with the *thread* that started it, so that thread has to live
-    as long as this process.
+    Linux ends a process with the *thread* that started it, so that thread has to live as long as
+    this process.
     """
     requests: _Requests = SimpleQueue()
     Thread(target=_start_all, args=(requests,), name="process starter", daemon=True).start()
@@ -110,13 +161,24 @@ os.register_at_fork(after_in_child=_starter.cache_clear)  # threads do not survi
 
 
 def _start_all(requests: _Requests) -> None:
-    resource_tracker.ensure_running()  # else the first start runs it, which lets Ctrl-C through
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # inherited by what is started
     while True:
         process, started = requests.get()
         try:
-            process.start()
+            with _as_if_not_daemonic():
+                process.start()
         except BaseException as error:
             started.set_exception(error)
         else:
             started.set_result(None)
+        del process, started  # held by nobody while this waits
+
+
+@contextmanager
+def _as_if_not_daemonic() -> Generator[None]:
+    """Let a daemonic process have children, which `multiprocessing` fears would outlive it."""
+    this = multiprocessing.current_process()
+    daemonic, this.daemon = this.daemon, False
+    try:
+        yield
+    finally:
+        this.daemon = daemonic

@@ -2,12 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import secrets
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
+
+from layouts import Layout
+
+
+class FirstSeeds:
+    """Seeds for the first episodes of environments that nobody gives a seed.
+
+    They are drawn from the system's entropy, so that no two environments play the same episodes
+    unless someone wants that.
+    """
+
+    def __init__(self, num_envs: int) -> None:
+        """Wait for the first seed of each environment."""
+        self._num_envs = num_envs
+        self._seeded: set[int] = set()
+
+    def fill(self, seeds: Sequence[int | None], ids: Sequence[int]) -> list[int | None]:
+        """Return seeds in which those of environments that still wait for theirs are drawn.
+
+        As with one seed for all, environment i gets what was drawn plus i.
+
+        Args:
+            seeds: The seed of each environment in ``ids``, or None.
+            ids: Numbers of environments.
+        """
+        drawn = secrets.randbelow(2**32 - self._num_envs + 1)
+        return [
+            drawn + i if seed is None and i not in self._seeded else seed
+            for seed, i in zip(seeds, ids, strict=True)
+        ]
+
+    def given(self, ids: Iterable[int]) -> None:
+        """Note that environments began an episode with a seed."""
+        self._seeded.update(ids)
 
 
 class EpisodeRandom:
@@ -17,10 +52,12 @@ class EpisodeRandom:
     restarts both; without one they run on.
 
     Attributes:
+        seed: What both streams last began with.
         numpy: Stream for joint noise.
         torch: Stream for objects and goals.
     """
 
+    seed: int
     numpy: np.random.RandomState
     torch: torch.Generator
 
@@ -32,20 +69,20 @@ class EpisodeRandom:
     def restart(self, seed: int) -> None:
         """Start both streams anew, as an explicit seed does."""
         self._seeds = np.random.RandomState(seed)
-        self._seed = seed
+        self.seed = self._numpy_seed = seed
         self.restart_numpy()
         self.torch.manual_seed(seed)
 
     def restart_numpy(self) -> None:
         """Start the numpy stream anew, as native does after a build has drawn from it."""
-        self.numpy = np.random.RandomState(self._seed)
+        self.numpy = np.random.RandomState(self._numpy_seed)
 
     def reseed_for_rebuild(self) -> None:
         """Give the numpy stream the next seed of a third stream, as native does at a rebuild.
 
         The torch stream runs on.
         """
-        self._seed = int(self._seeds.randint(2**31))
+        self._numpy_seed = int(self._seeds.randint(2**31))
         self.restart_numpy()
 
     def uniform(self, *shape: int) -> Tensor:
@@ -64,6 +101,19 @@ class EpisodeRandom:
     def normal(self, std: float, count: int) -> NDArray[np.float64]:
         """Draw ``count`` numbers of mean 0 from the numpy stream (unit of ``std``)."""
         return self.numpy.normal(0, std, count)
+
+    def joint_noise(self, layout: Layout, shared: bool) -> dict[str, NDArray[np.float64]]:
+        """Draw the joint noise of each robot, (dof,) (rad, m), from the numpy stream.
+
+        Args:
+            layout: The robots, and how large the noise of each is.
+            shared: Whether all robots get the same numbers.
+        """
+        if not shared:
+            return {n: self.normal(p.qpos_noise, p.robot.dof) for n, p in layout.items()}
+        largest = max(placement.robot.dof for placement in layout.values())
+        noise = self.normal(max(p.qpos_noise for p in layout.values()), largest)
+        return {name: noise[: placement.robot.dof] for name, placement in layout.items()}
 
     def yaw_quaternion(self, low: float = 0.0, high: float = 2 * np.pi) -> Tensor:
         """Draw a rotation about z by an angle in [low, high), as a wxyz quaternion (4,), w ≥ 0.

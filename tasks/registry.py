@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from layouts import Layout, Placement
 from layouts.placement import RobotLike, load_robot
-from robots import TaskError, UnknownNameError
+from robots import RobotDescriptor, TaskError, UnknownNameError
+from robots.bounds import shown
 
 if TYPE_CHECKING:
     from tasks.scenario import Scenario
@@ -72,8 +73,11 @@ def register_task(*names: str) -> Callable[[TaskClass], TaskClass]:
     Raises:
         TaskError: If no name is given or a name is taken by another class.
     """
-    if not names:
-        raise TaskError("register_task needs at least one name, the task's id")
+    if not names or not all(isinstance(name, str) and name for name in names):
+        raise TaskError(
+            "register_task needs at least one name, the task's id, and takes nothing but names;"
+            f" given: {shown(names)}"
+        )
 
     def register(cls: TaskClass) -> TaskClass:
         for name in names:
@@ -175,6 +179,8 @@ def make_scenario(
     """
     scenario = cls.scenario
     if layout is not None:
+        if not isinstance(layout, Layout):
+            raise TaskError(f"layout is {shown(layout)}; a layouts.Layout is needed")
         scenario.layout = layout
     if robots is not None:
         scenario.layout = _replace_robots(scenario.layout, robots)
@@ -188,12 +194,15 @@ def _replace_robots(layout: Layout, robots: RobotLike | Mapping[str, RobotLike])
     if isinstance(robots, Mapping):
         changed = {place: _stand(layout[place], robot) for place, robot in robots.items()}
         return Layout({**layout, **changed}, layout.frames)
-    if len(layout) != 1:
-        raise TaskError(
-            f"robots={robots!r} does not say which place it takes; the places are {list(layout)},"
-            f" for example robots={{{next(iter(layout))!r}: {robots!r}}}"
-        )
-    return _replace_robots(layout, {next(iter(layout)): robots})
+    if len(layout) == 1 and isinstance(robots, (str, RobotDescriptor)):
+        return _replace_robots(layout, {next(iter(layout)): robots})
+    given = [robots] if isinstance(robots, (str, RobotDescriptor)) else robots
+    names = [name for name in given if isinstance(name, str)] if isinstance(given, list) else []
+    example = dict(zip(layout, names or ["panda"], strict=False))
+    raise TaskError(
+        f"robots={shown(robots)} does not say which place each robot takes; the places are"
+        f" {list(layout)}, for example robots={example}"
+    )
 
 
 def _stand(placement: Placement, robot: RobotLike) -> Placement:

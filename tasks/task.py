@@ -15,16 +15,24 @@ from torch import Tensor
 from layouts import Layout
 from robots import SimulationError, TaskError
 from simulation import Camera, PhysicsSettings, Simulation, State, World
-from simulation.maths import Array, Floats
+from simulation.maths import Array, Floats, all_finite
 from tasks.actions import ActionReader
-from tasks.arguments import check_places, checked_ids, checked_seeds, wants_rebuild
+from tasks.arguments import (
+    check_info,
+    check_places,
+    checked_ids,
+    checked_seeds,
+    wants_rebuild,
+)
 from tasks.bodies import Declared, Table, WideTable, declared_bodies
+from tasks.finite import NotFinite, refuse_observation, refuse_reward, refuse_state
 from tasks.layout_check import refuse_collisions
 from tasks.memory import Memory
 from tasks.native_format import StateDict, StateTape, read_state_dict, write_state_dict
 from tasks.observation import Observer, read_mode, space_of
 from tasks.randomness import EpisodeRandom
-from tasks.scenario import Scenario
+from tasks.remade import Remade
+from tasks.scenario import FreshScenario, Scenario
 
 FIRST_SEED = 2022  # native seeds environment i with 2022 + i when it is made
 DENSE_MODES = ("normalized_dense", "dense", "sparse", "none")
@@ -33,16 +41,7 @@ SPARSE_MODES = ("sparse", "none")
 Info = dict[str, Any]
 
 
-class _FreshScenario:
-    """``cls.scenario``: a new scenario at every access, made from the class's own attributes."""
-
-    def __get__(self, instance: MultiRobotTask | None, owner: type[MultiRobotTask]) -> Scenario:
-        if instance is not None:
-            return instance.made_from
-        return Scenario(layout=owner.layout, physics=owner.physics)
-
-
-class MultiRobotTask:
+class MultiRobotTask(Remade):
     """Something to achieve, for one robot or many; subclasses say what.
 
     A subclass sets ``layout`` and ``max_episode_steps``, declares its bodies as class attributes
@@ -86,13 +85,13 @@ class MultiRobotTask:
     task_id: ClassVar[str] = ""
     native_id: ClassVar[str | None] = None
     source: ClassVar[str] = ""
-    scenario: ClassVar[Any] = _FreshScenario()
+    scenario: ClassVar[Any] = FreshScenario()
     layout: Layout
     table: ClassVar[Table | WideTable] = Table()
     bodies: ClassVar[Mapping[str, Declared]] = {}
     robot_counts: ClassVar[range | None] = None
     physics: ClassVar[PhysicsSettings | None] = None
-    max_episode_steps: ClassVar[int]
+    max_episode_steps: int
     reward_modes: ClassVar[tuple[str, ...]] = ()
     max_reward: ClassVar[float] = 1.0
     shared_joint_noise: ClassVar[bool] = False
@@ -165,7 +164,8 @@ class MultiRobotTask:
 
     def reset_robots(self, world: World, rng: EpisodeRandom) -> None:
         """Stand every robot at its placement, with joint noise."""
-        draws = [self._joint_noise(world.layout, rng) for _ in range(self.joint_noise_draws)]
+        shared = self.shared_joint_noise
+        draws = [rng.joint_noise(world.layout, shared) for _ in range(self.joint_noise_draws)]
         for name, noise in draws[-1].items():
             self.stand(world, name, noise)
 
@@ -191,6 +191,7 @@ class MultiRobotTask:
 
         Raises:
             TaskError: If the scenario asks for what the task does not offer.
+            SimulationError: If a control step is no whole number of physics steps.
             LayoutError: If the robots of a layout other than the task's own collide.
             AssetError: If robot files cannot be found.
         """
@@ -204,6 +205,8 @@ class MultiRobotTask:
         self.num_envs = scenario.num_envs
         self.obs_mode = scenario.obs_mode
         self.reward_mode = scenario.reward_mode or self.reward_modes[0]
+        if scenario.max_episode_steps is not None:
+            self.max_episode_steps = scenario.max_episode_steps
         self.action_split = self.layout.action_split
         low, high = np.array(self.layout.action_bounds, np.float32).T
         rows = self.num_envs, 1
@@ -233,6 +236,11 @@ class MultiRobotTask:
         self._describe_observation()
 
     @property
+    def seeds(self) -> list[int]:
+        """What the random streams of each environment last began with."""
+        return [rng.seed for rng in self._rngs]
+
+    @property
     def simulation(self) -> Simulation:
         """The worlds.
 
@@ -247,13 +255,14 @@ class MultiRobotTask:
         """Let the worlds go; closing twice is allowed."""
         self._simulation = None
         self._camera = None
+        vars(self).pop("_state", None)  # it holds the worlds as well
         self.observer.close()
 
     # -- episodes ----------------------------------------------------------------------------
 
     def reset(
         self,
-        seed: int | Sequence[int] | None = None,
+        seed: int | Sequence[int | None] | None = None,
         options: Mapping[str, Any] | None = None,
         env_ids: Sequence[int] | None = None,
     ) -> tuple[Any, Info]:
@@ -261,7 +270,7 @@ class MultiRobotTask:
 
         Args:
             seed: ``k`` seeds environment i with k + i; a list gives each of ``env_ids`` its own;
-                None lets the random streams run on.
+                None, also in a list, lets the random streams run on.
             options: ``{"reconfigure": True}`` rebuilds the worlds, so that nothing of their
                 past is left in PhysX.
             env_ids: Which environments; all if None. The others go on as they are.
@@ -282,7 +291,7 @@ class MultiRobotTask:
             elif reconfigure:
                 self._rngs[i].reseed_for_rebuild()
         if reconfigure:
-            self.simulation.rebuild(ids)
+            self.simulation.rebuild(ids, self._build_world)
         return self._begin(ids, reconfigured=reconfigure)
 
     def step(
@@ -305,17 +314,18 @@ class MultiRobotTask:
 
         Raises:
             ActionError: If the action has a wrong shape, type or number; nothing moves then.
+            SimulationError: If physics diverged: a pose is not finite.
+            TaskError: If the task's reward or observation is not finite.
         """
         flat = self._reader.read(action)
         self.moving = self._everywhere if env_ids is None else checked_ids(env_ids, self.num_envs)
         self.simulation.step(flat, self._state.joint_positions, self.moving)
         self._elapsed[slice(None) if env_ids is None else self.moving] += 1
-        state = self.simulation.read()
+        state = self._read()
         if self._responds:
             self.respond(state)
             self.simulation.touched()
-            state = self.simulation.read()
-        self._state = state
+            state = self._read()
         info = self._info(state)
         self.observer.changed(self.moving)
         obs = self._observation(state, info)
@@ -346,12 +356,13 @@ class MultiRobotTask:
             env_ids: Which environments; all if None.
 
         Raises:
-            TaskError: If a key or a shape is wrong; nothing is changed then.
+            TaskError: If a key, a shape or a number is wrong, see `native_format`; nothing is
+                changed then.
         """
         ids = checked_ids(env_ids, self.num_envs)
         write_state_dict(self.simulation, state, ids)
         self.observer.changed(ids)
-        self._state = self.simulation.read()
+        self._read()
 
     def render(self) -> np.ndarray:
         """Return a picture of every environment, (N, 512, 512, 3) uint8.
@@ -369,13 +380,6 @@ class MultiRobotTask:
 
     # -- inside ------------------------------------------------------------------------------
 
-    def _joint_noise(self, layout: Layout, rng: EpisodeRandom) -> dict[str, NDArray[np.float64]]:
-        if not self.shared_joint_noise:
-            return {n: rng.normal(p.qpos_noise, p.robot.dof) for n, p in layout.items()}
-        largest = max(placement.robot.dof for placement in layout.values())
-        shared = rng.normal(max(p.qpos_noise for p in layout.values()), largest)
-        return {name: shared[: placement.robot.dof] for name, placement in layout.items()}
-
     def _build_world(self, world: World, index: int) -> None:
         rng = self._rngs[index]
         world.design = self.design(rng)
@@ -391,10 +395,11 @@ class MultiRobotTask:
         if reconfigured:
             self._camera = None
         self._elapsed[ids] = 0
-        state = self._state = self.simulation.read()
+        state = self._read()
         self.memory.renew(self.remember(state), ids)
         self.begin_episodes(state, ids)
         info = self._info(state)
+        check_info(type(self).__name__, info)
         self.observer.changed(ids)
         obs = self._observation(state, info)
         return obs, {**_tensors(info), "reconfigure": reconfigured}
@@ -408,13 +413,24 @@ class MultiRobotTask:
             self.single_observation_space = space_of(self.start[0], batched=True)
             self.observation_space = batch_space(self.single_observation_space, self.num_envs)
 
+    def _read(self) -> State:
+        state = self._state = self.simulation.read()
+        if not all_finite(state.all_poses):
+            refuse_state(state, self._elapsed)
+        return state
+
     def _info(self, state: State) -> Info:
         told = {key: np.asarray(value) for key, value in self.evaluate(state).items()}
         return {"elapsed_steps": self._elapsed.copy(), **told}
 
     def _observation(self, state: State, info: Info) -> Any:
-        parts = {} if self.observer.mode.nothing else self.observe(state, info)
-        return self.observer.observe(self.simulation, state, parts)
+        if self.observer.mode.nothing:
+            return {}
+        parts = self.observe(state, info)
+        try:
+            return self.observer.observe(self.simulation, state, parts)
+        except NotFinite:
+            refuse_observation(state, parts, self, self._elapsed)
 
     def _reward(self, state: State, action: Floats, info: Info) -> Floats:
         match self.reward_mode:
@@ -428,7 +444,10 @@ class MultiRobotTask:
                 return np.zeros(self.num_envs, np.float32)
 
     def _dense(self, state: State, action: Floats, info: Info) -> Floats:
-        return np.asarray(self.dense_reward(state, action, info), np.float32)
+        reward = np.asarray(self.dense_reward(state, action, info), np.float32)
+        if not all_finite(reward):
+            refuse_reward(reward, self, self._elapsed)
+        return reward
 
 
 _tensor = torch.from_numpy

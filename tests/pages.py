@@ -100,6 +100,14 @@ def browser_page() -> Iterator[tuple[Any, list[str]]]:
         yield page, asked
 
 
+def wait_until(holds: Callable[[], bool]) -> None:
+    """Wait until something holds."""
+    deadline = time.monotonic() + PATIENCE
+    while not holds():
+        assert time.monotonic() < deadline, "it never holds"
+        time.sleep(0.01)
+
+
 def picture(page: Any) -> np.ndarray:
     """Return what no panel covers, (560, 580, 3) int."""
     image = Image.open(io.BytesIO(page.screenshot())).convert("RGB")

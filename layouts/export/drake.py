@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import posixpath
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,7 +17,8 @@ from layouts.export.urdf import base_link, rpy
 from layouts.files import written_whole
 from layouts.visuals import Part, load_meshes, read_visuals, require_trimesh, simplified
 from robots import LayoutError, RobotDescriptor
-from robots.urdf_xml import parse_urdf, resolve
+from robots.urdf_paths import resolve
+from robots.urdf_xml import parse_urdf, read_urdf
 
 if TYPE_CHECKING:
     from layouts.layout import Layout
@@ -127,7 +127,7 @@ def _write_model(
 ) -> None:
     """Write a URDF whose meshes are Wavefront files beside it."""
     folder.mkdir(parents=True)
-    source = parse_urdf(urdf.read_bytes(), str(urdf))
+    source = parse_urdf(read_urdf(urdf), str(urdf))
     robot = Element("robot", source.attrib)
     for element in source:
         if element.tag not in COPIED:
@@ -159,10 +159,9 @@ def _convert_collisions(link: Element, urdf: Path, folder: Path) -> None:
 
     where = f"{urdf}, link {link.get('name')!r}"
     for number, mesh in enumerate(link.iterfind("collision/geometry/mesh")):
-        base = posixpath.dirname(urdf.as_posix())
-        path = resolve(mesh.get("filename", ""), base, os.path.isfile)
+        path = resolve(mesh.get("filename", ""), urdf.as_posix(), os.path.isfile)
         name = f"{link.get('name')}_collision_{number}.obj"
-        _save(trimesh.util.concatenate(load_meshes(path, where)), folder / name)
+        _save(trimesh.util.concatenate(load_meshes(path, where, urdf.as_posix())), folder / name)
         mesh.set("filename", name)
 
 

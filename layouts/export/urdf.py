@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import posixpath
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,8 +12,10 @@ from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 from layouts.files import written_whole
 from robots import LayoutError
 from robots.descriptor import Quaternion, Vector3
+from robots.srdf import srdf_beside
 from robots.urdf_model import read_model
-from robots.urdf_xml import parse_urdf, resolve
+from robots.urdf_paths import resolve
+from robots.urdf_xml import parse_urdf, read_urdf
 
 if TYPE_CHECKING:
     from layouts.layout import Layout
@@ -42,7 +43,7 @@ def write_urdf(
         file = placement.robot.urdf.locate(pictures=visuals)
         urdf.append(_fixed_to_world(place, placement, file))
         urdf.extend(_renamed(file, place, folder, visuals=visuals))
-        semantics.extend(_excuses(file.with_suffix(".srdf"), place))
+        semantics.extend(_excuses(srdf_beside(file), place))
     _write(urdf, target)
     beside = target.with_suffix(".srdf")
     if len(semantics):
@@ -54,7 +55,7 @@ def write_urdf(
 
 def base_link(file: Path) -> str:
     """Return the name of the link of a URDF that hangs on no joint."""
-    return read_model(file.read_bytes(), str(file)).root
+    return read_model(read_urdf(file), str(file)).root
 
 
 def rpy(quaternion: Quaternion) -> Vector3:
@@ -83,7 +84,7 @@ def _fixed_to_world(place: str, placement: Placement, file: Path) -> Element:
 
 def _renamed(file: Path, place: str, folder: Path | None, *, visuals: bool) -> Iterator[Element]:
     """Yield the elements of a robot with names behind its place, and files by their paths."""
-    for element in parse_urdf(file.read_bytes(), str(file)):
+    for element in parse_urdf(read_urdf(file), str(file)):
         if element.tag not in COPIED:
             continue
         for visual in [] if visuals else element.findall("visual"):
@@ -100,16 +101,16 @@ def _renamed(file: Path, place: str, folder: Path | None, *, visuals: bool) -> I
 
 
 def _file(reference: str, urdf: Path, folder: Path | None) -> str:
-    path = resolve(reference, posixpath.dirname(urdf.as_posix()), os.path.isfile)
+    path = resolve(reference, urdf.as_posix(), os.path.isfile)
     path = os.path.abspath(path)
     return path if folder is None else Path(os.path.relpath(path, folder)).as_posix()
 
 
-def _excuses(srdf: Path, place: str) -> Iterator[Element]:
+def _excuses(srdf: Path | None, place: str) -> Iterator[Element]:
     """Yield the pairs of links that a robot's SRDF excuses from collision checks, renamed."""
-    if not srdf.is_file():
+    if srdf is None:
         return
-    for pair in parse_urdf(srdf.read_bytes(), str(srdf)).iterfind("disable_collisions"):
+    for pair in parse_urdf(read_urdf(srdf), str(srdf)).iterfind("disable_collisions"):
         for key in ("link1", "link2"):
             pair.set(key, f"{place}/{pair.get(key)}")
         yield pair

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import os
-import posixpath
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
 from itertools import combinations
 from pathlib import Path
 from typing import Any
-from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from layouts.validation.kinematics import Floats, Kinematics, origin_matrix
 from robots import AssetError, MissingPackageError, RobotDescriptor
+from robots.mesh_files import has_volume, read_corners
+from robots.srdf import read_excluded_pairs
 from robots.urdf_model import read_model
-from robots.urdf_xml import numbers_of, parse_urdf, resolve
+from robots.urdf_paths import resolve
+from robots.urdf_shapes import UrdfShape
+from robots.urdf_xml import read_urdf
 
 SIDES = 32  # of the polygon that stands for a circle; 0.5 % of the radius is lost
 
@@ -102,14 +103,14 @@ def slab_hull(top: Floats, depth: float, name: str) -> Hull:
 
 @lru_cache(maxsize=64)
 def _load(urdf: Path, joints: tuple[str, ...], _modified: int) -> RobotModel:
-    xml = urdf.read_bytes()
-    kinematics = Kinematics(read_model(xml, str(urdf)), joints)
+    model = read_model(read_urdf(urdf), str(urdf))
+    kinematics = Kinematics(model, joints)
     hulls = tuple(
-        hull
-        for element in parse_urdf(xml, str(urdf)).iterfind("link")
-        for hull in _link_hulls(element, kinematics.link(element.get("name", "")), urdf)
+        _shape_hull(kinematics.link(link), shape, urdf)
+        for link in model.links
+        for shape in model.collisions.get(link, ())
     )
-    excused = _excused_by_srdf(urdf.with_suffix(".srdf"))
+    excused = {frozenset(pair.links) for pair in read_excluded_pairs(urdf)}
     pairs = tuple(
         (a, b)
         for a, b in combinations(range(len(hulls)), 2)
@@ -126,79 +127,42 @@ def _may_touch(kinematics: Kinematics, one: int, other: int, excused: set[frozen
     return first != second and not adjacent and names not in excused
 
 
-def _excused_by_srdf(srdf: Path) -> set[frozenset[str]]:
-    """Return the pairs of links that an SRDF excuses from collision checks, if there is one."""
-    if not srdf.is_file():
-        return set()
-    root = parse_urdf(srdf.read_bytes(), str(srdf))
-    pairs = root.iterfind("disable_collisions")
-    return {frozenset((pair.get("link1", ""), pair.get("link2", ""))) for pair in pairs}
+def _shape_hull(link: int, shape: UrdfShape, urdf: Path) -> Hull:
+    pose = origin_matrix(shape.xyz, shape.rpy)
+    corners = _corners(shape, urdf) @ pose[:3, :3].T + pose[:3, 3]
+    return _hull(link, corners, shape.where)
 
 
-def _link_hulls(link: Element, index: int, urdf: Path) -> Iterator[Hull]:
-    for collision in link.iterfind("collision"):
-        geometry = collision.find("geometry")
-        shape = None if geometry is None else next(iter(geometry), None)
-        where = f"{urdf}, link {link.get('name')!r}"
-        if shape is None:
-            raise AssetError(f"{where}: a collision without a shape")
-        xyz, rpy = (
-            numbers_of(collision.find("origin"), key, (0.0, 0.0, 0.0), where)
-            for key in ("xyz", "rpy")
-        )
-        pose = origin_matrix(xyz, rpy)
-        corners = _corners(shape, urdf, where)
-        yield _hull(index, corners @ pose[:3, :3].T + pose[:3, 3], where)
-
-
-def _corners(shape: Element, urdf: Path, where: str) -> Floats:
+def _corners(shape: UrdfShape, urdf: Path) -> Floats:
     """Return the corners of a collision shape in its own frame, (n, 3) (m)."""
     import trimesh
 
-    def size(key: str) -> float:
-        return numbers_of(shape, key, (0.0,), where)[0]
-
-    match shape.tag:
+    match shape.kind:
         case "mesh":
-            scale = numbers_of(shape, "scale", (1.0, 1.0, 1.0), where)
-            return _mesh_corners(shape.get("filename", ""), urdf, where) * scale
+            path = resolve(shape.file, urdf.as_posix(), os.path.isfile)
+            return read_corners(path, shape.sizes, shape.where, urdf.as_posix())
         case "box":
-            made = trimesh.creation.box(numbers_of(shape, "size", (0.0, 0.0, 0.0), where))
+            made = trimesh.creation.box(shape.sizes)
         case "sphere":
-            made = trimesh.creation.icosphere(subdivisions=3, radius=size("radius"))
+            made = trimesh.creation.icosphere(subdivisions=3, radius=shape.sizes[0])
         case "cylinder":
-            made = trimesh.creation.cylinder(size("radius"), size("length"), sections=SIDES)
-        case "capsule":
-            made = trimesh.creation.capsule(size("length"), size("radius"), count=[SIDES, SIDES])
-        case other:
-            raise AssetError(
-                f"{where}: a collision of shape {other!r}; choices: mesh, box, sphere, cylinder,"
-                " capsule"
-            )
+            made = trimesh.creation.cylinder(*shape.sizes, sections=SIDES)
+        case _:
+            radius, length = shape.sizes
+            made = trimesh.creation.capsule(length, radius, count=[SIDES, SIDES])
     return np.asarray(made.vertices, float)
-
-
-def _mesh_corners(reference: str, urdf: Path, where: str) -> Floats:
-    import trimesh
-
-    path = resolve(reference, posixpath.dirname(urdf.as_posix()), os.path.isfile)
-    if not os.path.isfile(path):
-        raise AssetError(f"{where} refers to a file that does not exist: {path}")
-    try:
-        mesh: Any = trimesh.load(path, force="mesh", process=False)
-    except Exception as error:  # a reader of many formats, which raises whatever it meets
-        raise AssetError(f"{where}: cannot read the mesh {path}: {error}") from error
-    return np.asarray(mesh.vertices, float)
 
 
 def _hull(link: int, corners: Floats, where: str) -> Hull:
     import fcl
     import trimesh
 
-    solid = len(corners) > 3 and np.isfinite(corners).all()
-    if not solid or np.linalg.matrix_rank(corners - corners.mean(axis=0), tol=1e-6) < 3:
+    if not (np.isfinite(corners).all() and has_volume(corners)):
         raise AssetError(f"{where}: a collision shape without a volume")
-    hull: Any = trimesh.convex.convex_hull(corners)
+    try:
+        hull: Any = trimesh.convex.convex_hull(corners)
+    except Exception as error:  # qhull's own, for what is all but flat
+        raise AssetError(f"{where}: a collision shape without a volume") from error
     vertices, triangles = np.asarray(hull.vertices, float), np.asarray(hull.faces, int)
     faces = np.concatenate([np.full((len(triangles), 1), 3), triangles], axis=1)
     return Hull(link, vertices, fcl.Convex(vertices, len(triangles), faces.flatten()))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
@@ -45,6 +44,7 @@ from layouts.validation.report import (
     reach_text,
 )
 from robots import LayoutError
+from robots.commands import notice
 
 Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)
 Targets = Mapping[str, Sequence[float]] | Sequence[Sequence[float]]
@@ -321,7 +321,7 @@ class _Progress:
         now = time.monotonic()
         if now - self._told > PATIENCE:
             self._told = now
-            print(f"checking the layout: {what}", file=sys.stderr, flush=True)
+            notice(f"checking the layout: {what}")
 
 
 def _table_tops(layout: Layout, table: Rectangle | None) -> dict[str, tuple[Point, ...]]:

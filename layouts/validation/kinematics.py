@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +39,7 @@ class Kinematics:
             DescriptorError: If a driven joint does not exist, or a joint that moves has no drive.
         """
         self.driven = tuple(driven)
-        self._order = tuple(_carried(model, model.root))
+        self._order = model.ordered
         self._origins = [origin_matrix(joint.xyz, joint.rpy) for joint in self._order]
         self.links = (model.root, *(joint.child for joint in self._order))
         self._index = {link: i for i, link in enumerate(self.links)}
@@ -179,13 +179,6 @@ def origin_matrix(xyz: Sequence[float], rpy: Sequence[float]) -> Floats:
     return pose
 
 
-def _carried(model: UrdfModel, link: str) -> Iterator[ModelJoint]:
-    """Yield all joints behind a link, each after the one that carries its parent link."""
-    for joint in model.joints_on(link):
-        yield joint
-        yield from _carried(model, joint.child)
-
-
 def _follow(model: UrdfModel, driven: Sequence[str]) -> dict[str, tuple[int, float, float]]:
     """Say for each joint that moves which driven joint it follows, times what, plus what."""
     moving = {joint.name: joint for joint in model.moving}
@@ -195,15 +188,21 @@ def _follow(model: UrdfModel, driven: Sequence[str]) -> dict[str, tuple[int, flo
             f"the URDF of {model.name!r} has no moving joints {missing}; it has {list(moving)}"
         )
 
-    def followed(joint: ModelJoint) -> tuple[int, float, float]:
-        if joint.name in driven:
-            return driven.index(joint.name), 1.0, 0.0
-        if joint.mimics is None:
-            raise DescriptorError(
-                f"joint {joint.name!r} of {model.name!r} moves, but is in no joint group and"
-                " mimics no joint of one"
-            )
-        index, multiplier, offset = followed(moving[joint.mimics])
-        return index, joint.multiplier * multiplier, joint.multiplier * offset + joint.offset
+    return {name: _followed(joint, moving, driven, model.name) for name, joint in moving.items()}
 
-    return {name: followed(joint) for name, joint in moving.items()}
+
+def _followed(
+    joint: ModelJoint, moving: Mapping[str, ModelJoint], driven: Sequence[str], robot: str
+) -> tuple[int, float, float]:
+    """Return which driven joint a joint follows, times what, plus what."""
+    multiplier, offset, at = 1.0, 0.0, joint
+    while at.name not in driven:
+        if at.mimics is None:
+            raise DescriptorError(
+                f"joint {at.name!r} of {robot!r} moves, but is in no joint group and mimics no"
+                " joint of one"
+            )
+        offset += multiplier * at.offset
+        multiplier *= at.multiplier
+        at = moving[at.mimics]
+    return driven.index(at.name), multiplier, offset

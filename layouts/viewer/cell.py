@@ -12,6 +12,7 @@ from layouts.layout import Layout
 from layouts.validation.bodies import RobotModel, load_model
 from layouts.validation.collisions import stand, touching
 from layouts.validation.kinematics import Floats
+from layouts.viewer.text import printable
 from layouts.visuals import Part, read_visuals
 from robots import AssetError, LayoutError
 
@@ -102,7 +103,7 @@ class Cell:
             DescriptorError: If a descriptor contradicts its URDF.
             MissingPackageError: If trimesh or python-fcl is not installed.
         """
-        self.title, self.layout = title, layout
+        self.title, self.layout = printable(title), layout
         self.things = dict(things or {})
         self.motion = motion
         self.models: dict[str, RobotModel] = {n: load_model(p.robot) for n, p in layout.items()}
@@ -113,7 +114,8 @@ class Cell:
                 self.visuals[name] = read_visuals(placement.robot.urdf.locate(pictures=True))
             except AssetError as error:
                 self.visuals[name] = {}
-                self.notes.append(f"{name} is shown by its collision shapes: {error}")
+                note = f"{name} is shown by its collision shapes: {error}"
+                self.notes.append(printable(note))
         if motion is not None:
             _check_motion(motion, layout, self.things)
         first = {} if motion is None else {n: rows[0] for n, rows in motion.qpos.items()}

@@ -1,25 +1,22 @@
-"""The panel of a page: sliders, what is shown, the timeline; and the page as one file."""
+"""The panel of a page: sliders, what is shown, the timeline."""
 
 from __future__ import annotations
 
-import html
-import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from threading import Event, RLock
 from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from layouts.files import written_whole
 from layouts.validation.kinematics import Floats
-from layouts.view_command import LOOPBACK
 from layouts.viewer.cell import Cell, Contact
+from layouts.viewer.guard import is_loopback
 from layouts.viewer.scene import OVERLAYS, Scene
-from layouts.viewer.server import ViewerError, address, serving
+from layouts.viewer.server import serving
+from layouts.viewer.text import Text, printable
 from robots import JointGroup
 
 PAUSE = 0.02  # s between looks at what has changed
@@ -70,7 +67,7 @@ class Page:
         self._qpos = {name: start.copy() for name, start in cell.start.items()}
         server.scene.set_up_direction("+z")
         self.scene = Scene(server.scene, cell)
-        _aim(server, cell)
+        self.scene.aim(server.initial_camera)
         self._sliders: dict[str, list[tuple[Any, _Driven]]] = {}
         self._timeline: Any = None
         self._playing: Any = None
@@ -95,7 +92,7 @@ class Page:
                 qpos = {name: positions.copy() for name, positions in self._qpos.items()}
             contacts = self._cell.contacts(qpos)
             self.scene.mark(contacts)
-            self._verdict.content = contacts_text(contacts)
+            self._verdict.text = contacts_text(contacts)
 
     def go_to(self, moment: int) -> None:
         """Show robots and things at a moment of the motion."""
@@ -106,7 +103,7 @@ class Page:
             self.scene.place(name, rows[moment])
         for name, rows in motion.qpos.items():
             self._take(name, np.asarray(rows[moment], float))
-        self._clock.content = (
+        self._clock.text = (
             f"step {moment} of {len(motion) - 1}, {moment * motion.step_seconds:.2f} s"
         )
 
@@ -114,11 +111,13 @@ class Page:
         # viser's own share button would put the page on the internet, at one click.
         gui.configure_theme(show_logo=False, show_share_button=False)
         gui.main_panel.dock_right()
-        gui.add_markdown("\n\n".join([f"**{self._cell.title}**", *self._cell.notes]))
+        Text(gui, self._cell.title, bold=True)
+        for note in self._cell.notes:
+            Text(gui, note)
         if self._cell.motion is not None:
             self._build_timeline(gui, len(self._cell.motion))
         with gui.add_folder("Collisions"):
-            self._verdict = gui.add_markdown("…")
+            self._verdict = Text(gui, "…")
         with gui.add_folder("Show"):
             for overlay, visible in OVERLAYS.items():
                 box = gui.add_checkbox(LABELS[overlay], visible)
@@ -131,7 +130,7 @@ class Page:
     def _build_timeline(self, gui: Any, moments: int) -> None:
         with gui.add_folder("Demonstration"):
             self._timeline = gui.add_slider("Step", 0, max(moments - 1, 1), 1, 0)
-            self._clock = gui.add_markdown("")
+            self._clock = Text(gui, "")
             self._playing = gui.add_checkbox("Play", False)
             self._speed = gui.add_dropdown("Speed", SPEEDS, initial_value="1 ×")
         self._timeline.on_update(lambda event: self._scrub(event.target.value))
@@ -166,7 +165,7 @@ class Page:
         low, high = max(low, -UNBOUNDED), min(high, UNBOUNDED)
         value = min(max(float(self._qpos[name][joint]), low), high)
         step = 0.0001 if group.unit == "m" else 0.001
-        return gui.add_slider(f"{label} ({group.unit})", low, high, step, value)
+        return gui.add_slider(f"{printable(label)} ({group.unit})", low, high, step, value)
 
     def _slide(self, event: Any, name: str, driven: _Driven) -> None:
         if event.client_id is None:  # set by this page, not by a person
@@ -199,11 +198,14 @@ def serve(cell: Cell, host: str, port: int, announce: Callable[[str], None]) -> 
         MissingPackageError: If viser is not installed.
         ViewerError: If the port is in use, or the address is none of this machine's.
     """
-    with serving(host, port, cell.title) as server:
+    with serving(host, port, cell.title) as (server, address):
         page = Page(server, cell)
-        if host not in (LOOPBACK, "localhost", "::1"):
-            announce(f"listening at {host}: others on this network can open and move it, too")
-        announce(f"{cell.title}: {address(host, server.get_port())} (Ctrl-C ends it)")
+        if not is_loopback(host):
+            announce(
+                f"listening at {host}: others on this network can open and move it, too, at this"
+                " machine's name or address and with the token; nothing is encrypted"
+            )
+        announce(f"{cell.title}: {address} (Ctrl-C ends it)")
         before = time.monotonic()
         while True:
             time.sleep(PAUSE)
@@ -212,63 +214,14 @@ def serve(cell: Cell, host: str, port: int, announce: Callable[[str], None]) -> 
             before = now
 
 
-def save_html(cell: Cell, path: str | os.PathLike[str]) -> Path:
-    """Save a page as one file that needs no server and fetches nothing.
-
-    It has no sliders: robots stand as they start, or play the motion. What is shown can be chosen
-    in its scene tree.
-
-    Args:
-        cell: What to show.
-        path: Where to save; must end in ``.html``.
-
-    Raises:
-        MissingPackageError: If viser is not installed.
-        ViewerError: If the path ends otherwise.
-    """
-    target = Path(path)
-    if target.suffix.lower() not in (".html", ".htm"):
-        raise ViewerError(f"cannot save a page as {target.name!r}; the name must end in .html")
-    with serving(LOOPBACK, 0, cell.title) as server:
-        server.scene.set_up_direction("+z")
-        scene = Scene(server.scene, cell)
-        _aim(server, cell)
-        scene.mark(cell.contacts(cell.start))
-        recording = server.get_scene_serializer()
-        if (motion := cell.motion) is not None:
-            for moment in range(len(motion)):
-                qpos = {name: np.asarray(rows[moment]) for name, rows in motion.qpos.items()}
-                for name, positions in qpos.items():
-                    scene.pose(name, positions)
-                for name, rows in motion.poses.items():
-                    scene.place(name, rows[moment])
-                scene.mark(cell.contacts(qpos))
-                recording.insert_sleep(motion.step_seconds)
-        page = recording.as_html()
-    title = f"<title>{html.escape(cell.title)}</title>"
-    with written_whole(target) as unfinished:
-        unfinished.write_text(page.replace("<title>Viser</title>", title, 1), encoding="utf-8")
-    return target
-
-
 def contacts_text(contacts: list[Contact]) -> str:
-    """Say in Markdown which links overlap."""
+    """Say which links overlap."""
     if not contacts:
         return "No robot touches another or itself."
     lines = [
-        f"- {c.robots[0]}.{c.links[0]} in {c.robots[1]}.{c.links[1]}, {c.depth * 100:.1f} cm"
+        printable(f"- {'.'.join(one)} in {'.'.join(other)}, {c.depth * 100:.1f} cm")
         for c in contacts[:SPOKEN]
+        for one, other in [zip(c.robots, c.links, strict=True)]
     ]
     rest = len(contacts) - len(lines)
     return "\n".join([*lines, *([f"- and {rest} more"] if rest else [])])
-
-
-def _aim(server: Any, cell: Cell) -> None:
-    """Let the camera look at all robots from the front right, from above."""
-    places = np.array([placement.base_position for placement in cell.layout.values()])
-    middle = (places.min(0) + places.max(0)) / 2 + (0.0, 0.0, 0.2)
-    span = float(np.linalg.norm(np.ptp(places, axis=0)))
-    reach = max(placement.robot.reach for placement in cell.layout.values())
-    distance = 0.55 * span + 1.35 * reach
-    server.initial_camera.look_at = tuple(middle)
-    server.initial_camera.position = tuple(middle + distance * np.array([0.9, -0.55, 0.6]))

@@ -12,6 +12,7 @@ from layouts.frames import table_outlines
 from layouts.preview import COLOURS
 from layouts.validation.kinematics import Floats
 from layouts.viewer.cell import Cell, Contact
+from layouts.viewer.text import node
 from layouts.visuals import Part, simplified
 
 # What can be shown and hidden, and whether it is shown at first.
@@ -33,7 +34,8 @@ LIFT = 0.002  # m, of what lies on the floor
 class Scene:
     """A cell drawn on a viser server.
 
-    Nodes are called ``/ROBOT/OVERLAY/…`` and ``/things/NAME``.
+    Nodes are called ``/ROBOT/OVERLAY/…``, ``/(things)/NAME`` and ``/(tables)/NAME``: no robot's
+    name has brackets.
     """
 
     def __init__(self, api: Any, cell: Cell) -> None:
@@ -54,7 +56,7 @@ class Scene:
             self._draw_robot(name, colour)
             self.pose(name, cell.start[name])
         for name, thing in cell.things.items():
-            self._things[name] = _add_parts(api, f"/things/{name}", thing.parts)
+            self._things[name] = _add_parts(api, node("(things)", name), thing.parts)
             self.place(name, thing.pose)
 
     def pose(self, name: str, qpos: Floats) -> None:
@@ -86,6 +88,20 @@ class Scene:
             if handle.visible != (end in red):
                 handle.visible = end in red
 
+    def aim(self, camera: Any) -> None:
+        """Let a camera look at all robots from the front right, from above.
+
+        Args:
+            camera: The ``initial_camera`` of a viser server.
+        """
+        places = np.array([placement.base_position for placement in self._cell.layout.values()])
+        middle = (places.min(0) + places.max(0)) / 2 + (0.0, 0.0, 0.2)
+        span = float(np.linalg.norm(np.ptp(places, axis=0)))
+        reach = max(placement.robot.reach for placement in self._cell.layout.values())
+        distance = 0.55 * span + 1.35 * reach
+        camera.look_at = tuple(middle)
+        camera.position = tuple(middle + distance * np.array([0.9, -0.55, 0.6]))
+
     def _draw_robot(self, name: str, colour: tuple[int, int, int]) -> None:
         api, placement = self._api, self._cell.layout[name]
         pose = placement.base_pose
@@ -109,8 +125,8 @@ class Scene:
     def _draw_meshes(self, name: str) -> None:
         kinematics = self._cell.models[name].kinematics
         for link, parts in self._cell.visuals[name].items():
-            node = f"/{name}/meshes/{link}"
-            self._moving[name].append((kinematics.link(link), _add_parts(self._api, node, parts)))
+            handle = _add_parts(self._api, node(name, "meshes", link), parts)
+            self._moving[name].append((kinematics.link(link), handle))
 
     def _draw_frames(self, name: str) -> None:
         kinematics = self._cell.models[name].kinematics
@@ -119,7 +135,7 @@ class Scene:
         for link in bodies:
             length = robot.reach * (BASE_FRAME_LENGTH if link == 0 else FRAME_LENGTH)
             handle = self._api.add_frame(
-                f"/{name}/frames/{kinematics.links[link]}",
+                node(name, "frames", kinematics.links[link]),
                 axes_length=length,
                 axes_radius=length / 25,
             )
@@ -134,7 +150,7 @@ class Scene:
             vertices, faces = _joined([h.corners for h in model.hulls if h.link == link])
             for overlay, rgb in (("collision", colour), ("touching", TOUCHING)):
                 handle = self._api.add_mesh_simple(
-                    f"/{name}/{overlay}/{name_of_link}", vertices, faces, color=rgb,
+                    node(name, overlay, name_of_link), vertices, faces, color=rgb,
                     opacity=0.45, flat_shading=True, side="double", cast_shadow=False,
                     receive_shadow=False, visible=overlay == "collision",
                 )  # fmt: skip
@@ -165,13 +181,13 @@ class Scene:
         if not self._cell.things:
             size = 2 * float(np.ceil(np.abs(places[:, :2]).max() + 2))
             self._api.add_grid(
-                "/floor", size, size, plane="xy", cell_size=0.1, section_size=1.0,
+                node("(floor)"), size, size, plane="xy", cell_size=0.1, section_size=1.0,
                 position=(0.0, 0.0, low - LIFT), cell_color=(232, 232, 232),
                 section_color=(200, 200, 200),
             )  # fmt: skip
         for name, corners in table_outlines(self._cell.layout.frame_poses).items():
             self._api.add_mesh_simple(
-                f"/tables/{name}",
+                node("(tables)", name),
                 np.array(corners),
                 np.array([[0, 1, 2], [0, 2, 3]]),
                 color=TABLE_COLOUR,
@@ -180,12 +196,12 @@ class Scene:
             )
 
 
-def _add_parts(api: Any, node: str, parts: Sequence[Part]) -> Any:
+def _add_parts(api: Any, path: str, parts: Sequence[Part]) -> Any:
     import trimesh
 
     scene = trimesh.Scene([simplified(part).mesh for part in parts])
     data: Any = scene.export(file_type="glb")
-    return api.add_glb(node, data)
+    return api.add_glb(path, data)
 
 
 def _joined(hulls: Sequence[Floats]) -> tuple[Any, Any]:

@@ -1,26 +1,48 @@
-"""The web server behind a page: where it listens, and how it ends."""
+"""The web server behind a page: where it listens, whom it lets in, and how it ends."""
 
 from __future__ import annotations
 
 import errno
+import http.client
 import io
+import logging
 import socket
-from collections.abc import Generator
+import threading
+from collections.abc import Callable, Generator
 from contextlib import contextmanager, redirect_stdout
-from typing import Any
+from typing import Any, NamedTuple
 
+from layouts.viewer.guard import Guard, is_wildcard
+from layouts.viewer.messages import MESSAGE_BYTES, fits
 from robots import MissingPackageError, RobotLayoutsError
 
 LAST_PORT = 65535
+PROBE_SECONDS = 10.0
+# What strangers send makes no lines on the terminal; who wants them adds a handler.
+LOG = logging.getLogger(__name__)
+LOG.addHandler(logging.NullHandler())
+_STARTING = threading.Lock()
 
 
 class ViewerError(RobotLayoutsError, OSError):
     """A page that cannot be served or saved as asked."""
 
 
+class Site(NamedTuple):
+    """A web server that runs.
+
+    Attributes:
+        server: The viser server.
+        address: What to open in a browser, with the token.
+    """
+
+    server: Any
+    address: str
+
+
 @contextmanager
-def serving(host: str, port: int, title: str) -> Generator[Any, None, None]:
-    """Start a viser server, and stop it at the end.
+def serving(host: str, port: int, title: str) -> Generator[Site, None, None]:
+    """Start a viser server that lets in only whoever has its token, and stop it at the end.
 
     Args:
         host: Address to listen at; ``0.0.0.0`` is every one of this machine's.
@@ -29,16 +51,21 @@ def serving(host: str, port: int, title: str) -> Generator[Any, None, None]:
 
     Raises:
         MissingPackageError: If viser is not installed.
-        ViewerError: If the port is in use, or the address is none of this machine's.
+        ViewerError: If the port is in use, the address is none of this machine's, or this version
+            of viser would let in anybody.
     """
     viser = import_viser()
     port = _free_port(host, port)
-    with redirect_stdout(io.StringIO()):  # of viser's own banner
+    guard = Guard.of(host, port)
+    started: list[Any] = []
+    with redirect_stdout(io.StringIO()), _guarded(guard, started):  # of viser's own banner
         server: Any = viser.ViserServer(host=host, port=port, label=title, verbose=False)
+    started.append(server)
     try:
         if server.get_port() != port:  # viser goes on to the next one without a word
             raise ViewerError(_in_use(host, port))
-        yield server
+        _check_guarded(server, host, port)
+        yield Site(server, guard.address(host))
     finally:
         with redirect_stdout(io.StringIO()):
             server.stop()
@@ -59,14 +86,96 @@ def import_viser() -> Any:
     return viser
 
 
-def address(host: str, port: int) -> str:
-    """Return what to open in a browser."""
-    if host in ("0.0.0.0", "::"):
-        host = "localhost"
-    return f"http://{f'[{host}]' if ':' in host else host}:{port}"
+@contextmanager
+def _guarded(guard: Guard, started: list[Any]) -> Generator[None, None, None]:
+    """Let the guard see what comes to the server that viser starts meanwhile, before viser does.
+
+    viser has no option for that, but the `websockets` package on which it stands has: viser's call
+    of its ``serve`` is completed with them.
+
+    Args:
+        guard: Answers every request.
+        started: Will hold the viser server; until then no message is taken.
+    """
+    from websockets.asyncio import server as websockets
+
+    serve = websockets.serve
+
+    def serve_guarded(handler: Callable[..., Any], *where: Any, **options: Any) -> Any:
+        if not handler.__module__.startswith("viser."):  # of another thread, and none of ours
+            return serve(handler, *where, **options)
+        page = options.get("process_request")
+
+        def answer(connection: Any, request: Any) -> Any:
+            return guard.answer(connection, request, page)
+
+        options |= {"process_request": answer, "max_size": MESSAGE_BYTES, "logger": LOG}
+        return serve(_sifted(handler, started), *where, **options)
+
+    with _STARTING:
+        websockets.serve = serve_guarded  # pyright: ignore[reportAttributeAccessIssue]
+        try:
+            yield
+        finally:
+            websockets.serve = serve
+
+
+def _sifted(handler: Callable[..., Any], started: list[Any]) -> Callable[..., Any]:
+    """Return a handler of connections that receives only messages which `fits` lets through."""
+
+    async def handle(connection: Any) -> None:
+        receive = connection.recv
+
+        async def receive_fitting() -> Any:
+            while True:
+                data = await receive()
+                if started and fits(started[0], data):
+                    return data
+
+        connection.recv = receive_fitting
+        await handler(connection)
+
+    return handle
+
+
+def _check_guarded(server: Any, host: str, port: int) -> None:
+    """Ask the server for the page and for a WebSocket as a stranger would.
+
+    Raises:
+        ViewerError: If it does not refuse both.
+    """
+    import viser
+
+    upgrade = {
+        "Connection": "Upgrade",
+        "Upgrade": "websocket",
+        "Sec-WebSocket-Version": "13",
+        "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
+    }
+    answers = {_status(host, port, headers) for headers in ({}, upgrade)}
+    if answers != {403} or not hasattr(server.gui, "_gui_input_handle_from_uuid"):
+        raise ViewerError(
+            f"viser {viser.__version__} would let in anybody who asks, so no page is served:"
+            " pip install 'viser>=1.1.1,<1.2'"
+        )
+
+
+def _status(host: str, port: int, headers: dict[str, str]) -> int:
+    if is_wildcard(host):
+        host = "::1" if ":" in host else "127.0.0.1"
+    connection = http.client.HTTPConnection(host, port, timeout=PROBE_SECONDS)
+    try:
+        connection.request("GET", "/", headers=headers)
+        return connection.getresponse().status
+    except (OSError, http.client.HTTPException) as error:
+        raise ViewerError(f"the page at {host}, port {port}, does not answer: {error}") from error
+    finally:
+        connection.close()
 
 
 def _free_port(host: str, port: int) -> int:
+    if not host:
+        raise ViewerError("--host is empty; 127.0.0.1 is this machine alone, 0.0.0.0 the network")
     if not 0 <= port <= LAST_PORT:
         raise ViewerError(f"port {port} is none; ports are 0 … {LAST_PORT}")
     try:
@@ -77,8 +186,9 @@ def _free_port(host: str, port: int) -> int:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind(place)
             return int(probe.getsockname()[1])
-    except socket.gaierror as error:
-        raise ViewerError(f"there is no address {host!r}: {error.strerror}") from error
+    except (socket.gaierror, UnicodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "not a name"
+        raise ViewerError(f"there is no address {host!r}: {reason}") from error
     except PermissionError as error:
         raise ViewerError(
             f"port {port} may not be used by this user; ports from 1024 on may"

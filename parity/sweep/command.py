@@ -14,7 +14,7 @@ from rich.progress import Progress, TimeElapsedColumn
 from parity.clip import SideBySide
 from parity.sweep.entries import SUMMARY, Entry, is_done, line, read_summary, write_summary
 from parity.sweep.plan import Plan, plan
-from parity.sweep.processes import Progressed, sweep
+from parity.sweep.processes import STAGE_SECONDS, Progressed, sweep
 from parity.sweep.stages import STAGES
 from rollouts.executor import Executor
 
@@ -84,7 +84,9 @@ def _cluster(args: argparse.Namespace) -> Executor | None:
         return None
     from rollouts.ray_executor import RayExecutor
 
-    return RayExecutor(args.ray, args.workers, attempts=1, fresh=True)
+    return RayExecutor(
+        args.ray, args.workers, attempts=1, fresh=True, episode_timeout=STAGE_SECONDS
+    )
 
 
 @contextmanager

@@ -18,9 +18,17 @@ from parity.sweep.entries import Entry, blank
 from parity.sweep.plan import Plan
 from parity.sweep.stages import sweep_task
 from robots import RecordingError, RobotLayoutsError
-from rollouts.executor import Executor, ProcessExecutor, WorkersDied, modules_of, report
+from rollouts.executor import (
+    Executor,
+    ProcessExecutor,
+    WorkersDied,
+    modules_of,
+    play_all,
+    report,
+)
 
 LOG = "sweep.log"
+STAGE_SECONDS = 86400.0  # that a process may take without a word
 
 Progressed = Callable[[str, str, float], None]  # task, stage, share of it that is done
 
@@ -45,13 +53,16 @@ def sweep(
 
     Raises:
         RecordingError: If a folder cannot be made.
+        TaskError: If ``workers`` is not a number of processes.
         WorkerError: If no process can be started.
     """
     plans = tuple(plans)
     for plan in plans:
         _make_folder(plan.folder)
-    executor = executor or ProcessExecutor(workers, attempts=1, fresh=True)
-    with closing(executor.run(SweepJob(plans), range(len(plans)))) as events:
+    executor = executor or ProcessExecutor(
+        workers, attempts=1, fresh=True, episode_timeout=STAGE_SECONDS
+    )
+    with closing(play_all(executor, SweepJob(plans), range(len(plans)))) as events:
         for event in events:
             if event.seed is None:
                 continue

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from contextlib import suppress
 from types import TracebackType
 from typing import TypeVar
 
@@ -23,9 +24,12 @@ class DatasetWriter(ABC):
         traceback: TracebackType | None,
     ) -> None:
         """Complete the dataset, unless there was an error, and let go of its files."""
+        if error is not None:
+            with suppress(OSError):  # of files that are incomplete anyway: the first error counts
+                self._let_go()
+            return
         try:
-            if error is None:
-                self._complete()
+            self._complete()
         finally:
             self._let_go()
 

@@ -29,12 +29,14 @@ def register() -> None:
     Importing `tasks` does this, and so does registering a task. Names that are no Gymnasium ids
     (those end with ``-v`` and a number) stay unknown to it.
     """
-    import gymnasium
+    from gymnasium import registry
+
+    from tasks.fronts.spec import TaskSpec
 
     for task_id in filter(_GYMNASIUM_NAME.fullmatch, list_tasks()):
-        if f"{NAMESPACE}/{task_id}" not in gymnasium.registry:
-            gymnasium.register(
-                f"{NAMESPACE}/{task_id}",
+        if (name := f"{NAMESPACE}/{task_id}") not in registry:
+            registry[name] = TaskSpec(
+                name,
                 entry_point="tasks.fronts.gymnasium:GymnasiumTask",
                 vector_entry_point="tasks.fronts.vector:VectorTask",
                 kwargs={"task_id": task_id},

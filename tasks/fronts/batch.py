@@ -11,12 +11,14 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from robots import TaskError
+from tasks.arguments import RECONFIGURE, SEED
 from tasks.fronts.board import Arrays, Shapes
 from tasks.observation import told_dtype
 from tasks.scenario import Scenario
 from tasks.task import FIRST_SEED, MultiRobotTask
 
 OBSERVATION, INFO = "obs", "info"  # what the names of their arrays begin with
+SEEDS = f"{INFO}/{SEED}"  # which only a reset changes
 FINAL = "final_"  # and those of episodes that ended in a step and began anew in it
 
 
@@ -86,6 +88,7 @@ class Batch:
             "truncated": ((), "bool"),
         }
         told = {name: (x.shape[1:], str(x.dtype)) for name, x in _told(*self._task.start)}
+        told[SEEDS] = ((), "int64")
         shapes.update(told)
         if self._part.autoreset is AutoresetMode.SAME_STEP:
             shapes["restarted"] = ((), "bool")
@@ -96,6 +99,7 @@ class Batch:
         """Take its rows of a board, and write what the environments look like into them."""
         self._rows = {name: x[self._part.start : self._part.stop] for name, x in board.items()}
         self._write(*self._task.start)
+        self._rows[SEEDS][:] = self._task.seeds
 
     def reset(self, beginning: Beginning) -> None:
         """Begin new episodes."""
@@ -107,6 +111,7 @@ class Batch:
             if some:
                 own = [s for s in seeds if s is not None] if some is seeded else None
                 self._write(*self._task.reset(own, options, some), some)
+        self._rows[SEEDS][:] = self._task.seeds
         self._clear_flags(ids)
 
     def step(self) -> None:
@@ -174,7 +179,7 @@ def _told(obs: Any, info: Mapping[str, Any]) -> Iterator[tuple[str, NDArray[Any]
     """Go through observation and info by the names of their arrays."""
     yield from _leaves(OBSERVATION, obs)
     for key, value in info.items():
-        if not isinstance(value, bool):  # "reconfigure" is not told of single environments
+        if key != RECONFIGURE:  # which is not told of single environments
             yield f"{INFO}/{key}", value.numpy()
 
 

@@ -37,9 +37,16 @@ def new_shared_memory(size: int) -> int:
     """Return the file descriptor of new memory that processes can share.
 
     It has no name: the kernel frees it with the last process that has it open, however that ends.
+
+    Raises:
+        OSError: If there is too little memory, now rather than when it is written to.
     """
     descriptor = os.memfd_create("robot-layouts")
-    os.ftruncate(descriptor, size)
+    try:
+        os.posix_fallocate(descriptor, 0, size)
+    except BaseException:
+        os.close(descriptor)
+        raise
     return descriptor
 
 

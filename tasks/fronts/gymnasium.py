@@ -9,19 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots import TaskError
+from tasks.arguments import checked_seeds
 from tasks.fronts.numbers import info_row, row
 from tasks.observation import space_of
+from tasks.randomness import FirstSeeds
 from tasks.registry import make
+from tasks.remade import Remade
 
 RENDER_MODES = ["rgb_array"]
 
 
-class GymnasiumTask(gymnasium.Env[Any, NDArray[np.float32]]):
+class GymnasiumTask(Remade, gymnasium.Env[Any, NDArray[np.float32]]):
     """What ``gymnasium.make("RobotLayouts/PickCube-v1")`` gives.
 
-    It truncates when the task does; a ``max_episode_steps`` given to ``gymnasium.make`` can only
-    end episodes earlier. ``reset`` without a seed lets the task's random streams run on, from
-    native's first seed.
+    The first ``reset`` without a seed draws one from the system's entropy; later ones let the
+    random streams run on. ``info["seed"]`` is what they began with: ``reset(seed=info["seed"])``
+    plays the same episodes again.
+
+    Gymnasium's time limit truncates episodes, as of all environments that ``gymnasium.make``
+    gives: after the task's steps, or the ``max_episode_steps`` that it was given.
 
     Attributes:
         task: The task, with one environment.
@@ -44,7 +50,11 @@ class GymnasiumTask(gymnasium.Env[Any, NDArray[np.float32]]):
         """
         if "num_envs" in fields:
             raise TaskError("gymnasium.make makes one environment; make_vec takes num_envs")
+        if "max_episode_steps" in fields:
+            raise TaskError("time limits are gymnasium.make's: gymnasium.make(max_episode_steps=…)")
         self.task = make(task_id, render_mode=render_mode, **fields)
+        self._first = FirstSeeds(1)
+        self._seed = self.task.seeds[0]
         self.render_mode = render_mode
         frames = round(self.task.made_from.control_frequency)
         self.metadata = {**self.metadata, "render_fps": frames}  # type: ignore[misc]
@@ -57,15 +67,21 @@ class GymnasiumTask(gymnasium.Env[Any, NDArray[np.float32]]):
         """Begin a new episode; see `tasks.MultiRobotTask.reset`.
 
         Args:
-            seed: Seed of the episode; None lets the random streams run on.
+            seed: Seed of the episode; None lets the random streams run on, from entropy.
             options: ``{"reconfigure": True}`` rebuilds the world.
 
         Returns:
             Observation and info.
+
+        Raises:
+            TaskError: If an argument makes no sense; nothing is reset then.
         """
-        super().reset(seed=seed)
-        obs, info = self.task.reset(seed, options)
-        return row(obs), info_row(info)
+        own = self._first.fill(checked_seeds(seed, (0,)), (0,))
+        obs, info = self.task.reset(own, options)
+        self._first.given((0,))
+        self._seed = self.task.seeds[0]
+        super().reset(seed=own[0])
+        return row(obs), info_row(info, self._seed)
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Advance by one control step.
@@ -74,11 +90,11 @@ class GymnasiumTask(gymnasium.Env[Any, NDArray[np.float32]]):
             action: Shape (A,), in the order of ``task.action_split``.
 
         Returns:
-            Observation, reward, terminated, truncated and info.
+            Observation, reward, terminated, truncated and info. It is never truncated by itself.
         """
-        obs, reward, terminated, truncated, info = self.task.step(action)
-        flags = bool(terminated[0]), bool(truncated[0])
-        return row(obs), reward[0].item(), *flags, info_row(info)
+        obs, reward, terminated, _, info = self.task.step(action)
+        ended = bool(terminated[0])
+        return row(obs), reward[0].item(), ended, False, info_row(info, self._seed)
 
     def render(self) -> NDArray[np.uint8]:  # type: ignore[override]
         """Return a picture, (512, 512, 3) uint8.

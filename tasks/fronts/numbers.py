@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from tasks.arguments import RECONFIGURE, SEED
 from tasks.observation import told_dtype
 
 
@@ -23,12 +24,19 @@ def row(observation: Any, env: int = 0) -> Any:
     return observation[env].numpy().astype(told_dtype(observation))
 
 
-def info_row(info: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the info of the only environment as Python numbers, and arrays where it has them."""
-    told: dict[str, Any] = {}
-    for key, value in info.items():
-        if isinstance(value, bool):  # "reconfigure" is said once for all environments
-            told[key] = value
-        else:
-            told[key] = value[0].item() if value.ndim == 1 else value[0].numpy().copy()
+def info_row(info: Mapping[str, Any], seed: int) -> dict[str, Any]:
+    """Return the info of the only environment as Python numbers, and arrays where it has them.
+
+    It has the same keys after a reset and after a step: "reconfigure" is left out.
+
+    Args:
+        info: What the task returned.
+        seed: What the environment's random streams began with.
+    """
+    told: dict[str, Any] = {
+        key: value[0].item() if value.ndim == 1 else value[0].numpy().copy()
+        for key, value in info.items()
+        if key != RECONFIGURE
+    }
+    told[SEED] = seed
     return told

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, TypeVar
 
@@ -11,10 +12,14 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from robots import TaskError, UnknownNameError
+from robots.bounds import shown
+from tasks.arguments import RECONFIGURE, checked_options, checked_seeds
 from tasks.fronts.numbers import info_row, row
 from tasks.native_format import observation_keys
 from tasks.observation import space_of
+from tasks.randomness import FirstSeeds
 from tasks.registry import make
+from tasks.remade import Remade
 
 Observation = Any
 """An array, or with images a mapping of them."""
@@ -24,7 +29,7 @@ RobotReward = Callable[[str, Observation, float, dict[str, Any]], float]
 _Space = TypeVar("_Space", bound=Space[Any])
 
 
-class ParallelTask(ParallelEnv[str, Observation, NDArray[np.float32]]):
+class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
     """What `tasks.parallel_env` gives: every robot observes and acts for itself.
 
     A robot observes its own joint positions and velocities, then all that the task observes
@@ -62,7 +67,11 @@ class ParallelTask(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self.render_mode = render_mode
         frames = round(self.task.made_from.control_frequency)
         self.metadata = {**self.metadata, "name": self.task.task_id, "render_fps": frames}  # type: ignore[misc]
+        if not (robot_reward is None or callable(robot_reward)):
+            raise TaskError(f"robot_reward is {shown(robot_reward)}; a function is needed, or None")
         self._robot_reward = robot_reward
+        self._first = FirstSeeds(1)
+        self._seed = self.task.seeds[0]
         self.possible_agents = list(self.task.layout)
         self.agents: list[str] = []
         self.observed = self._observed() if self.task.observation_slices else {}
@@ -88,17 +97,25 @@ class ParallelTask(ParallelEnv[str, Observation, NDArray[np.float32]]):
         """Begin a new episode.
 
         Args:
-            seed: Seed of the episode; None lets the random streams run on.
+            seed: Seed of the episode; None lets the random streams run on, the first time from one
+                that the system's entropy gives. ``info["seed"]`` is what they began with.
             options: ``{"reconfigure": True}`` rebuilds the world; as PettingZoo's checks demand,
                 other options are ignored.
 
         Returns:
             Observation and info of every robot.
+
+        Raises:
+            TaskError: If an argument makes no sense; nothing is reset then.
         """
-        reconfigure = bool((options or {}).get("reconfigure", False))
-        obs, info = self.task.reset(seed, {"reconfigure": reconfigure})
+        known = checked_options(options, options or ())
+        rebuilt = {key: value for key, value in known.items() if key == RECONFIGURE}
+        own = self._first.fill(checked_seeds(seed, (0,)), (0,))
+        obs, info = self.task.reset(own, rebuilt)
+        self._first.given((0,))
+        self._seed = self.task.seeds[0]
         self.agents = list(self.possible_agents)
-        return self._observations(obs), self._infos(info_row(info))
+        return self._observations(obs), self._infos(info_row(info, self._seed))
 
     def step(
         self, actions: Mapping[str, NDArray[np.float32]]
@@ -119,12 +136,13 @@ class ParallelTask(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
         Raises:
             ActionError: If a robot's action is missing or wrong; nothing moves then.
-            TaskError: If the episode is over.
+            TaskError: If the episode is over, or a reward is not finite.
         """
         if not self.agents:
             raise TaskError("no episode is being played; call reset() first")
         obs, reward, terminated, truncated, info = self.task.step(actions)
-        observations, told, shared = self._observations(obs), info_row(info), reward[0].item()
+        observations, shared = self._observations(obs), reward[0].item()
+        told = info_row(info, self._seed)
         over, late = bool(terminated[0]), bool(truncated[0])
         agents = self.agents
         if over or late:
@@ -187,7 +205,17 @@ class ParallelTask(ParallelEnv[str, Observation, NDArray[np.float32]]):
     def _reward(self, name: str, observation: Observation, shared: float, info: Any) -> float:
         if self._robot_reward is None:
             return shared
-        return float(self._robot_reward(name, observation, shared, info))
+        earned = self._robot_reward(name, observation, shared, info)
+        try:
+            reward = float(earned)
+        except (TypeError, ValueError, RuntimeError):
+            reward = math.nan
+        if not math.isfinite(reward):
+            raise TaskError(
+                f"robot_reward returned {shown(earned)} for {name!r} at step"
+                f" {info['elapsed_steps']}; it must be a finite number"
+            )
+        return reward
 
 
 def _look_up(spaces: Mapping[str, _Space], agent: str) -> _Space:

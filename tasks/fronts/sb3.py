@@ -16,15 +16,17 @@ from stable_baselines3.common.vec_env.base_vec_env import (
     VecEnvObs,
 )
 
-from robots import TaskError, UnknownNameError, unknown_name_message
+from robots import TaskError, UnknownNameError
+from tasks.arguments import RECONFIGURE, checked_options
 from tasks.fronts import NAMESPACE
 from tasks.fronts.vector import RESET_OPTIONS, VectorTask
 from tasks.registry import get_task_class
+from tasks.remade import Remade
 
 _OPTIONS = tuple(option for option in RESET_OPTIONS if option != "reset_mask")
 
 
-class SB3Task(VecEnv):
+class SB3Task(Remade, VecEnv):
     """What `tasks.sb3_vec_env` gives: a `VectorTask` that speaks Stable-Baselines3's language.
 
     An environment whose episode ends begins the next one in the same step. What it said then is
@@ -53,7 +55,7 @@ class SB3Task(VecEnv):
         self._shared: dict[str, Any] = {
             "action_space": self.vector.single_action_space,
             "action_split": self.vector.action_split,
-            "max_episode_steps": task.max_episode_steps,
+            "max_episode_steps": fields.get("max_episode_steps") or task.max_episode_steps,
             "metadata": self.vector.metadata,
             "observation_space": observation,
             "render_mode": self.vector.render_mode,
@@ -76,7 +78,7 @@ class SB3Task(VecEnv):
             TaskError: If a seed or an option makes no sense; nothing is reset then.
             WorkerError: If workers die, hang or fail.
         """
-        rebuilt = np.array([_reconfigures(options) for options in self._options])
+        rebuilt = np.array([_rebuilds(options) for options in self._options])
         obs: Any = None
         for mask, rebuild in ((rebuilt, True), (~rebuilt, False)):
             if mask.any():
@@ -184,11 +186,8 @@ class UnknownAttributeError(UnknownNameError, AttributeError):
     """An attribute that environments do not have (also an ``AttributeError``)."""
 
 
-def _reconfigures(options: Mapping[str, Any]) -> bool:
-    for key in options:
-        if key not in _OPTIONS:
-            raise TaskError(unknown_name_message("reset option", key, _OPTIONS))
-    return bool(options.get("reconfigure", False))
+def _rebuilds(options: Mapping[str, Any]) -> bool:
+    return bool(checked_options(options, _OPTIONS).get(RECONFIGURE, False))
 
 
 def _rows(info: Mapping[str, Any], num_envs: int) -> list[dict[str, Any]]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import operator
 import os
 import weakref
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar
+from functools import wraps
+from threading import Lock
+from typing import Any, ClassVar, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 from gymnasium.spaces import Box
@@ -16,19 +17,44 @@ from numpy.typing import NDArray
 
 from robots import SimulationError, TaskError, unknown_name_message
 from tasks.actions import ActionReader
+from tasks.arguments import RECONFIGURE, checked_options, checked_seeds
 from tasks.fronts.batch import FINAL, INFO, OBSERVATION, Beginning, Part
 from tasks.fronts.gymnasium import RENDER_MODES
 from tasks.fronts.workers import Failure, InProcess, WorkerError, Workers, WorkersFailed
 from tasks.observation import space_of
+from tasks.randomness import FirstSeeds
 from tasks.registry import get_task_class, make_scenario
+from tasks.remade import Remade
 from tasks.task import FIRST_SEED
 
-RESET_OPTIONS = ("reconfigure", "reset_mask")
+RESET_OPTIONS = (RECONFIGURE, "reset_mask")
 
 _Flags = NDArray[np.bool_]
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result")
 
 
-class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
+def _alone(
+    method: Callable[Concatenate[VectorTask, _Arguments], _Result],
+) -> Callable[Concatenate[VectorTask, _Arguments], _Result]:
+    """Let one thread at a time call a vector: a second would read the first one's answers."""
+
+    @wraps(method)
+    def call(self: VectorTask, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
+        if not self.busy.acquire(blocking=False):
+            raise SimulationError(
+                "this vector is in the middle of another call; give each thread a vector of its"
+                " own, or let them take turns"
+            )
+        try:
+            return method(self, *args, **kwargs)
+        finally:
+            self.busy.release()
+
+    return call
+
+
+class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
     """What ``gymnasium.make_vec("RobotLayouts/PickCube-v1", num_envs=64)`` gives.
 
     Environment i of N is environment i of ``tasks.make(task_id, num_envs=N)``, bit for bit,
@@ -39,10 +65,14 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
     their seeds. The others are as if nothing had happened, and `restart` replaces it. If Ctrl-C
     interrupts a call, some environments may have taken the step and others not.
 
+    One thread at a time may call it, in the process that made it: a fork needs one of its own. It
+    is copied and pickled by how it was made; copies have worlds and workers of their own.
+
     Attributes:
         num_envs: Number of environments N.
         num_workers: Number of worker processes; 0 if the environments are in this one.
         action_split: Robot name → slice of one environment's action.
+        busy: Locked while a thread calls it.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": RENDER_MODES, "render_fps": 20}
@@ -81,6 +111,7 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             AssetError: If robot files cannot be found.
             WorkerError: If a worker ends before it is ready.
         """
+        self.busy = Lock()
         mode = _checked_mode(autoreset_mode)
         cls = get_task_class(task_id)
         scenario = make_scenario(cls, num_envs, render_mode=render_mode, **fields)
@@ -93,6 +124,7 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         self.action_split = layout.action_split
         self._reader = ActionReader(layout, num_envs)
         self._seeds = [FIRST_SEED + i for i in range(num_envs)]
+        self._first = FirstSeeds(num_envs)
         self._everywhere = np.ones(num_envs, bool)
         bounds = [(i * num_envs) // max(workers, 1) for i in range(max(workers, 1) + 1)]
         parts = [
@@ -104,7 +136,7 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         try:
             self._crew = Workers(parts, timeout) if workers else InProcess(parts[0])
         except WorkersFailed as failed:
-            raise self._error(failed.failures, None) from None
+            raise self._error(failed.failures, None) from failed.where
         self._close = weakref.finalize(self, self._crew.close)
         low, high = np.array(layout.action_bounds, np.float32).T
         self.single_action_space = Box(low, high, dtype=np.float32)
@@ -112,6 +144,7 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         self.single_observation_space = space_of(self._observation(), batched=True)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
 
+    @_alone
     def reset(
         self,
         *,
@@ -122,26 +155,30 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
 
         Args:
             seed: ``k`` seeds environment i with k + i; a list gives each its own; None lets the
-                random streams run on.
+                random streams run on, the first time from a seed that the system's entropy gives.
             options: ``{"reset_mask": mask}`` resets only where the mask, (N,) bool, is true;
                 ``{"reconfigure": True}`` rebuilds the worlds.
 
         Returns:
-            Observation of all environments and info, which tells of those that were reset.
+            Observation of all environments and info, which tells of those that were reset:
+            ``info["seed"]`` is what their random streams began with, (N,) int64.
 
         Raises:
             TaskError: If an argument makes no sense; nothing is reset then.
             WorkerError: If workers die, hang or fail.
         """
         mask, reconfigure = self._checked_options(options)
-        seeds = self._checked_seeds(seed)
+        everyone = range(self.num_envs)
+        seeds = self._first.fill(checked_seeds(seed, everyone), everyone)
         if seed is None or isinstance(seed, int):
             super().reset(seed=seed)
         ids = np.flatnonzero(mask).tolist()
         self._call("reset", self._beginnings(ids, seeds, reconfigure), lambda: self._begun(mask))
+        self._first.given(ids)
         self._note(ids, seeds)
         return self._begun(mask)
 
+    @_alone
     def step(self, actions: Any) -> tuple[Any, NDArray[np.float32], _Flags, _Flags, dict[str, Any]]:
         """Advance every environment by one control step.
 
@@ -161,6 +198,7 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         self._call("step", {i: () for i in range(len(self._crew.parts))}, self._results)
         return self._results()
 
+    @_alone
     def restart(self, seed: Mapping[int, int] | None = None) -> tuple[Any, dict[str, Any]]:
         """Replace the workers that are gone; their environments begin new episodes.
 
@@ -182,16 +220,17 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         if wrong := [i for i in given if i not in ids]:
             raise TaskError(f"environments {wrong} are not gone; those that are: {ids}")
         wanted = [given.get(i, own) for i, own in enumerate(self._seeds)]
-        seeds = self._checked_seeds(wanted)
+        seeds = checked_seeds(wanted, range(self.num_envs))
         try:
             if gone:
                 self._crew.start(gone)
             self._crew.call("reset", self._beginnings(ids, seeds, reconfigure=False))
         except WorkersFailed as failed:
-            raise self._error(failed.failures, None) from None
+            raise self._error(failed.failures, None) from failed.where
         self._note(ids, seeds)
         return self._begun(self._everywhere)
 
+    @_alone
     def render(self) -> tuple[NDArray[np.uint8], ...]:  # type: ignore[override]
         """Return a picture of every environment, (512, 512, 3) uint8 each.
 
@@ -205,6 +244,7 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         pictures = self._call("render", everyone, lambda: None)
         return tuple(picture for i in everyone for picture in pictures[i])
 
+    @_alone
     def close_extras(self, **kwargs: Any) -> None:
         """End the workers and let the shared memory go."""
         self._close()
@@ -221,11 +261,12 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         try:
             return self._crew.call(method, arguments)
         except WorkersFailed as failed:
-            raise self._error(failed.failures, results()) from None
+            raise self._error(failed.failures, results()) from failed.where
 
     def _expect_open(self) -> None:
         if self.closed:
             raise SimulationError("this vector is closed; make a new one")
+        self._crew.expect_owner()
 
     def _expect_workers(self) -> None:
         self._expect_open()
@@ -242,12 +283,10 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
                 f" {failure.reason}"
             )
             seeds.extend(own)
-        hint = "restart() replaces what is gone; the other environments are untouched"
-        if not hasattr(self, "_crew"):
-            hint = (
-                "nothing was started; a script that makes a vector needs"
-                " `if __name__ == '__main__':` around what it runs, or num_workers=0"
-            )
+        if hasattr(self, "_crew"):
+            hint = "restart() replaces what is gone; the other environments are untouched"
+        else:
+            hint = "no vector was made"
         return WorkerError("; ".join([*lines, hint]), failures, seeds, results)
 
     def _beginnings(
@@ -322,10 +361,7 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
     # -- checks ------------------------------------------------------------------------------
 
     def _checked_options(self, options: Mapping[str, Any] | None) -> tuple[_Flags, bool]:
-        options = options or {}
-        for key in options:
-            if key not in RESET_OPTIONS:
-                raise TaskError(unknown_name_message("reset option", key, RESET_OPTIONS))
+        options = checked_options(options, RESET_OPTIONS)
         mask = options.get("reset_mask")
         if mask is None:
             mask = self._everywhere
@@ -337,23 +373,7 @@ class VectorTask(VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             )
         elif not mask.any():
             raise TaskError("reset_mask is false everywhere; it must be true somewhere")
-        return mask, bool(options.get("reconfigure", False))
-
-    def _checked_seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
-        if seed is None:
-            return [None] * self.num_envs
-        try:
-            if isinstance(seed, Sequence | np.ndarray):
-                seeds = [None if s is None else operator.index(s) for s in seed]
-            else:
-                seeds = [operator.index(seed) + i for i in range(self.num_envs)]
-        except TypeError:
-            raise TaskError(f"seed is {seed!r}; it takes an integer or a list of them") from None
-        if len(seeds) != self.num_envs:
-            raise TaskError(f"{len(seeds)} seeds for {self.num_envs} environments")
-        if not all(s is None or 0 <= s < 2**32 for s in seeds):
-            raise TaskError(f"seeds {seeds} must lie from 0 to 2**32 - 1")
-        return list(seeds)
+        return mask, bool(options.get(RECONFIGURE, False))
 
 
 def _checked_mode(mode: AutoresetMode | str) -> AutoresetMode:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import pickle
 import select
-import signal
 import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -13,7 +12,7 @@ from dataclasses import dataclass
 from multiprocessing import reduction
 from typing import Any
 
-from robots import RobotLayoutsError
+from robots import SimulationError
 from tasks import processes
 from tasks.fronts.batch import Part
 from tasks.fronts.board import (
@@ -24,7 +23,8 @@ from tasks.fronts.board import (
     map_shared_memory,
     new_shared_memory,
 )
-from tasks.fronts.work import work
+from tasks.fronts.work import CallFailed, work
+from tasks.processes import ProcessError, WorkerTraceback, enough
 
 START_SECONDS = 300.0  # until all workers have built their worlds
 _FAREWELL_SECONDS = 2.0  # that workers may take to end by themselves
@@ -38,15 +38,19 @@ class Failure:
         worker: Its number.
         env_ids: The environments that are gone with it.
         reason: What happened to it, in words.
+        traceback: Where an error came up in it; empty if there was none.
     """
 
     worker: int
     env_ids: range
     reason: str
+    traceback: str = ""
 
 
-class WorkerError(RobotLayoutsError, RuntimeError):
+class WorkerError(ProcessError):
     """Workers of a vector that died, hung or failed; the others have done what they were asked.
+
+    If tasks raised something in them, the ``__cause__`` says where.
 
     Attributes:
         failures: The workers that are gone.
@@ -79,6 +83,12 @@ class WorkersFailed(Exception):
         super().__init__(failures)
         self.failures = failures
 
+    @property
+    def where(self) -> WorkerTraceback | None:
+        """Where the errors came up; None if there were none."""
+        texts = dict.fromkeys(failure.traceback for failure in self.failures if failure.traceback)
+        return WorkerTraceback("\n\n".join(texts)) if texts else None
+
 
 class Workers:
     """Processes that hold one part of a vector each and write to one shared board.
@@ -98,7 +108,7 @@ class Workers:
 
         Raises:
             WorkersFailed: If a worker ends before it is ready.
-            RobotLayoutsError: What a worker could not make its task for.
+            RobotLayoutsError: What a worker could not make its task for, or what ran out.
         """
         self.parts, self._timeout = parts, timeout
         self.arrays: Arrays = {}
@@ -106,6 +116,7 @@ class Workers:
         self._crew: dict[int, _Worker] = {}
         self._shapes: Shapes = {}
         self._descriptor = -1
+        self._owner = os.getpid()
         try:
             self.start(range(len(parts)))
         except BaseException:
@@ -117,19 +128,20 @@ class Workers:
 
         Raises:
             WorkersFailed: If one ends before it is ready.
-            RobotLayoutsError: What a worker could not make its task for.
+            RobotLayoutsError: What a worker could not make its task for, or what ran out.
         """
         numbers = list(numbers)
         try:
-            for i in numbers:
-                self._crew[i] = _Worker(self.parts[i])
-            shapes = self._collect(numbers, START_SECONDS)
-            if self._descriptor < 0:
-                self._make_board(shapes[numbers[0]])
-            for i in numbers:
-                self._crew[i].send("attach", (self._shapes, self.parts[-1].stop))
-                self._crew[i].send_memory(self._descriptor)
-            self._collect(numbers, START_SECONDS)
+            with enough():
+                for i in numbers:
+                    self._crew[i] = _Worker(self.parts[i])
+                shapes = self._collect(numbers, START_SECONDS)
+                if self._descriptor < 0:
+                    self._make_board(shapes[numbers[0]])
+                for i in numbers:
+                    self._crew[i].send("attach", (self._shapes, self.parts[-1].stop))
+                    self._crew[i].send_memory(self._descriptor)
+                self._collect(numbers, START_SECONDS)
         except BaseException:
             for i in numbers:
                 if i in self._crew:
@@ -153,8 +165,23 @@ class Workers:
             self._crew[i].send(method, own)
         return self._collect(list(arguments), self._timeout)
 
+    def expect_owner(self) -> None:
+        """Refuse to go on in a fork, which would talk to the same processes.
+
+        Raises:
+            SimulationError: If this process is a fork of the one that started them.
+        """
+        if os.getpid() != self._owner:
+            raise SimulationError(
+                f"this vector belongs to process {self._owner}, of which this one is a fork; make"
+                " one of its own here"
+            )
+
     def close(self) -> None:
-        """End all processes and let the memory go; closing twice is allowed."""
+        """End all processes and let the memory go; closing twice is allowed.
+
+        A fork only lets go of what it shares with the process that started them.
+        """
         crew, self._crew = self._crew, {}
         for worker in crew.values():
             worker.connection.close()
@@ -192,7 +219,7 @@ class Workers:
                 try:
                     answers[i] = self._crew[i].receive()
                 except _Gone as gone:
-                    failures.append(self._lose(i, str(gone)))
+                    failures.append(self._lose(i, gone.reason, gone.traceback))
             if not ready:
                 failures.extend(
                     self._lose(i, f"did not answer within {timeout:g} s and was ended")
@@ -203,10 +230,11 @@ class Workers:
             raise WorkersFailed(sorted(failures, key=lambda failure: failure.worker))
         return answers
 
-    def _lose(self, number: int, reason: str) -> Failure:
+    def _lose(self, number: int, reason: str, where: str = "") -> Failure:
         worker = self._crew.pop(number)
         worker.end(0.0)
-        failure = Failure(number, self.parts[number].env_ids, f"process {worker.pid} {reason}")
+        reason = f"process {worker.pid} {reason}"
+        failure = Failure(number, self.parts[number].env_ids, reason, where)
         self.failures[number] = failure
         return failure
 
@@ -239,6 +267,9 @@ class InProcess:
     def start(self, numbers: Iterable[int]) -> None:
         """Do nothing: nothing is ever gone."""
 
+    def expect_owner(self) -> None:
+        """Do nothing: a fork has worlds of its own."""
+
     def call(self, method: str, arguments: Mapping[int, tuple[Any, ...]]) -> dict[int, Any]:
         """Call a method of the batch; see `Workers.call`."""
         return {i: getattr(self._batch, method)(*own) for i, own in arguments.items()}
@@ -250,7 +281,11 @@ class InProcess:
 
 
 class _Gone(Exception):
-    """A worker that can answer no more; says why."""
+    """A worker that can answer no more; says why, and where if it was an error."""
+
+    def __init__(self, reason: str, traceback: str = "") -> None:
+        super().__init__(reason)
+        self.reason, self.traceback = reason, traceback
 
 
 class _Worker:
@@ -258,25 +293,23 @@ class _Worker:
 
     def __init__(self, part: Part) -> None:
         self.connection, theirs = processes.context.Pipe()
-        self.busy = True  # until it has told the shapes
+        self._asked = "__init__"  # until it has told the shapes
+        self.busy = True
         self._process = processes.context.Process(target=work, args=(theirs,), daemon=True)
-        processes.start(self._process)
-        theirs.close()
-        self.pid = self._process.pid
         try:
-            with suppress(OSError):  # it died: that is read from the connection
-                self.connection.send_bytes(pickle.dumps(part))
-        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            with theirs:
+                packed = _packed(part)
+                processes.start(self._process)
+        except BaseException:
             self.connection.close()
-            self.end(0.0)
-            raise WorkerError(
-                f"the task cannot be sent to worker processes: {error}; define its class in a"
-                " module that they can import, or take num_workers=0"
-            ) from error
+            raise
+        self.pid = self._process.pid
+        with suppress(OSError):  # it died: that is read from the connection
+            self.connection.send_bytes(packed)
 
     def send(self, method: str, arguments: tuple[Any, ...]) -> None:
         """Let it do something."""
-        self.busy = True
+        self._asked, self.busy = method, True
         with suppress(OSError):
             self.connection.send_bytes(pickle.dumps((method, arguments)))
 
@@ -296,22 +329,34 @@ class _Worker:
         except (EOFError, OSError):
             raise _Gone(self._death()) from None
         self.busy = False
-        if isinstance(error, RobotLayoutsError):
+        if error is None:
+            return answer
+        if self._asked == "__init__" and not isinstance(error, CallFailed):
             raise error
-        if error is not None:
-            raise _Gone(error)
-        return answer
+        what = str(error) if isinstance(error, CallFailed) else f"{type(error).__name__}: {error}"
+        call = "making its task" if self._asked == "__init__" else f"{self._asked}()"
+        where = error.__cause__.args if error.__cause__ else ()
+        raise _Gone(f"failed in {call} with {what}", *where)
 
     def end(self, patience: float) -> None:
         """End it, after a while in which it may do so by itself (s)."""
         self.connection.close()
-        self._process.join(patience)
-        self._process.kill()
-        self._process.join()
+        if self._process.exitcode is None:
+            self._process.join(patience)
+            self._process.kill()
+            self._process.join()
+        self._process.close()
 
     def _death(self) -> str:
         self._process.join(_FAREWELL_SECONDS)
-        code = self._process.exitcode
-        if code is None:
-            return "closed its connection"
-        return f"died by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
+        return processes.ending(self._process.exitcode)
+
+
+def _packed(part: Part) -> bytes:
+    try:
+        return pickle.dumps(part)
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise WorkerError(
+            f"the task cannot be sent to worker processes: {error}; define its class in a module"
+            " that they can import, or take num_workers=0"
+        ) from error

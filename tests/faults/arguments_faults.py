@@ -1,21 +1,183 @@
-"""Wrong arguments of tasks: numbers that are none, names that do not exist."""
+"""Wrong arguments of tasks: numbers that are none, names that do not exist, settings of physics."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from dataclasses import fields, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
 
-from tests.faults.fault import Fault
+import numpy as np
+
+from tests.faults.fault import GOES_ON, Fault
 
 AREA = "arguments"
+TASK = "PickCube-v1"
+HUGE, NAN, INF = 1e300, math.nan, math.inf
+UNHASHABLE: list[int] = [1]
+
+NO_NUMBERS = (None, True, "1", b"1", (1,), {}, 1j, NAN, INF, -INF, HUGE, 10**400)
+NO_NAMES = (5, 2.5, True, b"state", ["state"], {"a": 1}, "", "stat", np.array(["state", "rgb"]))
+WRONG_FIELDS: dict[str, tuple[Any, ...]] = {
+    "num_envs": (0, -1, 2.5, "4", None, True, NAN, 2**31, 10**30, [2], np.array([2, 3])),
+    "obs_mode": (*NO_NAMES, "rgb+", "state+rgb+rgb", None, "rgb\0"),
+    "reward_mode": (*NO_NAMES, "DENSE"),
+    "control_mode": (*NO_NAMES, None, "pd_joint_delta"),
+    "simulator": (*NO_NAMES, None, "mujoco"),
+    "render_mode": (*NO_NAMES, "human"),
+    "headless": (False, None, 0, 1, "yes", []),
+    "check_layout": (None, 0, 1, "no", [True]),
+    "cameras": (5, None, "base_camera", ["base_camera"], {1: 2}, [None], 2.5),
+    "physics": (5, "fast", {"timestep": 0.01}, [], True),
+    "layout": (5, "ring", {"arm": "panda"}, [], True),
+    "robots": (5, ["panda"], ("panda",), {"panda"}, {"arm": 5}, {"arm": None}, {"hand": "panda"})
+    + ({"arm": ["panda"]}, {5: "panda"}, "pandda", b"panda", True, {"arm": "pandda"}),
+    "max_episode_steps": (0, -1, 2.5, "50", True, NAN, 2**31, [50]),
+    "control_frequency": (0, 0.0, -20, *NO_NUMBERS, 500, 150, 1e9, 100.1, 30, 19, 1e-9, [20]),
+    "num_env": (2,),
+    "seed": (0,),
+    "": (1,),
+}
+
+WRONG_PHYSICS: dict[str, tuple[Any, ...]] = {
+    "timestep": (0, -0.01, 1, 1e-9, *NO_NUMBERS),
+    "gravity": (None, 9.81, "down", (0, 0), (0, 0, NAN), (0, 0, -HUGE), (0, 0, "1"), {0, 1, 2}),
+    "contact_offset": (-0.01, 0, 100, *NO_NUMBERS),
+    "rest_offset": (0.02, 1, -5, *NO_NUMBERS),
+    "position_iterations": (0, -1, 256, 2.5, None, True, "4", NAN),
+    "velocity_iterations": (-1, 256, 1.0, None, True, "1"),
+    "sleep_threshold": (-1, *NO_NUMBERS),
+    "bounce_threshold": (0, -1, *NO_NUMBERS),
+    "persistent_contacts": (None, 0, 1, "yes", [True]),
+    "temporal_gauss_seidel": (None, 0, 1, "no"),
+    "continuous_collision": (None, 0, 2.5, ""),
+    "enhanced_determinism": (None, 0, 1, "on"),
+    "friction_every_iteration": (None, 0, 1, "on"),
+    "friction": (None, 0.5, (0.3, 0.3, 0.0), {"static": 0.3}, "rough"),
+}
+WRONG_FRICTION: dict[str, tuple[Any, ...]] = {
+    name: (-0.1, 1e4, *NO_NUMBERS) for name in ("static", "dynamic", "restitution")
+}
+WRONG_CAMERA: dict[str, tuple[Any, ...]] = {
+    "eye": (None, 1, (0, 0), (0, 0, NAN), (1e308, 0, 0), "abc", (0.0, 0.0, 0.1)),
+    "target": (None, (0, 0, 0, 0), (INF, 0, 0), ("0", "0", "0")),
+    "width": (0, -1, 2.5, None, True, 10**9),
+    "height": (0, "128", NAN),
+    "fov": (0, -1, math.pi, 100, NAN, None, "wide"),
+    "near": (0, -0.1, 1000.0, NAN, None),
+    "far": (0, 1e-3, INF, None, 1e308),
+    "name": (None, 5, b"eye"),
+}
+POSSIBLE_FREQUENCIES = {100: 1, 50: 2, 100 / 3: 3, 33.333333: 3, 25: 4, 20: 5, 12.5: 8, 1: 100}
+ALLOWED_PHYSICS: dict[str, tuple[Any, ...]] = {
+    "gravity": ((0, 0, 0), [0.0, 0.0, -1e3], np.array([0.0, 1.0, -9.81])),
+    "contact_offset": (1.0, 0.001, np.float32(0.01)),
+    "rest_offset": (-1.0, 0.01),
+    "position_iterations": (1, 255, np.int64(4)),
+    "velocity_iterations": (0, 255),
+    "sleep_threshold": (0, 1e6),
+    "bounce_threshold": (1e-6, 1e6),
+    "continuous_collision": (True, np.True_),
+    "timestep": (0.0025, 0.05, 1e-2),
+}
 
 
 def faults() -> Iterator[Fault]:
     """Go through this area's faults."""
-    for value in (0, -1, 2.5, "4", None):
-        yield Fault(AREA, f"num_envs={value!r}", lambda folder, value=value: _make(num_envs=value))
+    for name, values in WRONG_FIELDS.items():
+        for value in values:
+            yield Fault(AREA, f"make({_call(name, value)})", partial(_make, {name: value}))
+    for task_id in (None, 5, "", "PickCub-v1", b"PickCube-v1", ["PickCube-v1"], "\0", "../x:Y"):
+        yield Fault(AREA, f"make: task {task_id!r}", partial(_make, {"task_id": task_id}))
+    yield Fault(AREA, "make: two robots without places", _make_two)
+    for kind, wrong in (("PhysicsSettings", WRONG_PHYSICS), ("Friction", WRONG_FRICTION)):
+        for name, values in wrong.items():
+            for value in values:
+                yield Fault(
+                    AREA, f"{kind}({_call(name, value)})", partial(_declare, kind, name, value)
+                )
+    for name, values in WRONG_CAMERA.items():
+        for value in values:
+            yield Fault(
+                AREA, f"Camera({_call(name, value)})", partial(_declare, "Camera", name, value)
+            )
+    for name, values in ALLOWED_PHYSICS.items():
+        for value in values:
+            yield Fault(
+                AREA,
+                f"physics at its bounds: {_call(name, value)}",
+                partial(_drop, name, value),
+                GOES_ON,
+            )
+    for frequency, steps in POSSIBLE_FREQUENCIES.items():
+        yield Fault(
+            AREA, f"control_frequency={frequency:.9g}", partial(_moves, frequency, steps), GOES_ON
+        )
+    for names in ((), (5,), ("",), ("PickCube-v1",), (None,), ("Mine-v1", 5), (["Mine-v1"],)):
+        yield Fault(AREA, f"register_task{names!r}", partial(_register, names))
 
 
-def _make(**arguments: object) -> None:
+def _call(name: str, value: Any) -> str:
+    text = repr(value).replace(repr(10**400), "10**400")
+    return f"{name}={text if len(text) < 40 else text[:40] + '…'}"
+
+
+def _make(arguments: dict[str, Any], folder: Path) -> None:
     import tasks
 
-    tasks.make("PickCube-v1", **arguments).close()
+    tasks.make(**{"task_id": TASK, **arguments}).close()
+
+
+def _make_two(folder: Path) -> None:
+    import tasks
+
+    tasks.make("TwoRobotPickCube-v1", robots="panda").close()
+
+
+def _declare(kind: str, name: str, value: Any, folder: Path) -> None:
+    import simulation
+
+    needed = {"eye": (0.0, 0.0, 0.1), "target": (0.0, 0.0, 0.0)} if kind == "Camera" else {}
+    if (kind, name, value) == ("Camera", "eye", needed.get("eye")):
+        needed["target"] = value
+    made = getattr(simulation, kind)(**{**needed, name: value})
+    assert fields(made)
+
+
+def _drop(name: str, value: Any, folder: Path) -> str:
+    """Play a few steps: the world must stay finite."""
+    import tasks
+
+    physics = replace(tasks.get_task_class(TASK).physics, **{name: value})
+    env = tasks.make(TASK, physics=physics)
+    env.reset(seed=0)
+    for _ in range(5):
+        obs, *_ = env.step(np.ones((1, 8), np.float32))
+    assert obs.isfinite().all()
+    env.close()
+    return "the robot moves"
+
+
+def _moves(frequency: float, steps: int, folder: Path) -> str:
+    import tasks
+
+    env = tasks.make(TASK, control_frequency=frequency)
+    env.reset(seed=0)
+    before = env.simulation.read().joint_positions
+    env.step(np.ones((1, 8), np.float32))
+    moved = float(np.abs(env.simulation.read().joint_positions - before).max())
+    assert env.simulation.substeps == steps
+    assert moved > 1e-4
+    env.close()
+    return f"{steps} physics steps, the robot moves"
+
+
+def _register(names: tuple[Any, ...], folder: Path) -> None:
+    import tasks
+
+    class Mine(tasks.MultiRobotTask):
+        """A task of one's own."""
+
+    tasks.register_task(*names)(Mine)

@@ -425,7 +425,7 @@ class TestGrid:
 
     @pytest.mark.parametrize("columns", [0, -1, 1.5, "2", True])
     def test_columns_that_are_no_count(self, columns):
-        with pytest.raises(LayoutError, match="columns is .*; it must be 1 or a larger whole"):
+        with pytest.raises(LayoutError, match="columns is .*; it must be an integer of 1 or more"):
             grid({"a": "panda"}, columns=columns)
 
 
@@ -436,3 +436,28 @@ def test_yaw_survives_the_quaternion(degrees):
 
 def test_a_tilted_frame_has_no_yaw():
     assert yaw_degrees((math.cos(0.1), math.sin(0.1), 0.0, 0.0)) is None
+
+
+DISTANCES = [(side_by_side, "spacing"), (face_to_face, "spacing"), (ring, "radius")]
+DISTANCES += [(grid, "spacing"), (around_table, "inset")]
+
+
+@pytest.mark.parametrize(("preset", "name"), DISTANCES)
+@pytest.mark.parametrize("value", [None, True, (1,), 1j, 1e7, 1e308, 10**400])
+def test_a_distance_that_is_none(preset, name, value):
+    with pytest.raises(LayoutError, match=f"{name} is .* m; it must be finite and greater than 0"):
+        preset({"a": "panda", "b": "panda"}, **{name: value})
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("robots", [None, ["panda", "panda"], "panda", 2])
+def test_robots_that_are_no_mapping(preset, robots):
+    spacing = {"spacing": 1.5} if preset in ("side_by_side", "face_to_face") else {}
+    with pytest.raises(LayoutError, match="robots is .*; it takes a mapping .*'left': 'panda'"):
+        PRESETS[preset](robots, **spacing)
+
+
+@pytest.mark.parametrize("options", [{"edges": 5}, {"edges": ["north", 5]}, {"table": 5}])
+def test_tables_that_are_none(options):
+    with pytest.raises((LayoutError, UnknownNameError), match="edge|width and depth"):
+        around_table({"a": "panda", "b": "panda"}, **options)

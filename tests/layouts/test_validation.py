@@ -577,7 +577,7 @@ class TestBadRobots:
             ),
             (
                 urdf(link("base", "<cone/>"), link("top"), joint("turn", "base", "top")),
-                "a collision of shape 'cone'; choices: mesh, box",
+                "a collision of shape 'cone'; choices: box, sphere",
             ),
             (
                 urdf(

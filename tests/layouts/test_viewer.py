@@ -4,6 +4,7 @@ import socket
 import subprocess
 import sys
 import urllib.request
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from layouts import side_by_side, single
 from layouts.__main__ import main
 from layouts.viewer import Cell, Motion, Thing, ViewerError
 from layouts.viewer.cell import Contact
-from layouts.viewer.page import Page, contacts_text, save_html
+from layouts.viewer.page import Page, contacts_text
+from layouts.viewer.saved import NO_SLIDERS, save_html
 from layouts.viewer.server import serving
 from layouts.visuals import coloured, read_visuals
 from robots import LayoutError, MissingPackageError, RobotRegistry
@@ -42,14 +44,14 @@ def test_the_page_is_served_to_this_machine_alone_until_ctrl_c():
         assert view.url.startswith("http://127.0.0.1:")
         with urllib.request.urlopen(view.url) as answer:
             assert b"<title>" in answer.read()
-        port = int(view.url.rpartition(":")[2])
+        port = urlsplit(view.url).port
         assert listening_at(view.process.pid, port) == {"0100007F"}  # 127.0.0.1
         assert view.interrupt() == (0, "ended\n")
 
 
 def test_the_network_sees_it_only_if_asked():
     with served("layouts", "view", *ARM, "--port", "0", "--host", "0.0.0.0") as view:
-        port = int(view.url.rpartition(":")[2])
+        port = urlsplit(view.url).port
         assert listening_at(view.process.pid, port) == {"00000000"}
         assert view.url.startswith("http://localhost:")
         assert view.lines[-2].startswith("listening at 0.0.0.0: others on this network")
@@ -122,14 +124,14 @@ def test_links_stand_where_yourdfpy_puts_them():
 
 def test_the_page_shows_every_robot_and_overlay_at_the_posed_joints():
     layout = side_by_side({"a": "so100", "b": "so100"}, spacing=0.6)
-    with serving("127.0.0.1", 0, "cell") as server:
+    with serving("127.0.0.1", 0, "cell") as (server, _):
         cell = Cell("cell", layout)
         page = Page(server, cell)
         page.tick(0.0)
         nodes = server.scene._handle_from_node_name
         for overlay in ("meshes", "frames", "collision", "touching"):
             assert f"/b/{overlay}/Lower_Arm" in nodes
-        assert {"/a/reach/level/circle", "/a/reach sphere/ball", "/floor"} <= set(nodes)
+        assert {"/a/reach/level/circle", "/a/reach sphere/ball", "/(floor)"} <= set(nodes)
         qpos = np.array(layout["b"].start_qpos) + 0.1
         page.scene.pose("b", qpos)
         kinematics = cell.models["b"].kinematics
@@ -152,7 +154,7 @@ def test_overlaps_are_named_and_marked():
     assert text.splitlines()[0] == (
         f"- a.{contacts[0].links[0]} in b.{contacts[0].links[1]}, {contacts[0].depth * 100:.1f} cm"
     )
-    with serving("127.0.0.1", 0, "close") as server:
+    with serving("127.0.0.1", 0, "close") as (server, _):
         page = Page(server, cell)
         page.tick(0.0)
         nodes = server.scene._handle_from_node_name
@@ -172,15 +174,15 @@ def test_many_overlaps_are_counted():
 
 def test_the_timeline_moves_robots_and_things():
     cell = make_cell(moments=5)
-    with serving("127.0.0.1", 0, "arm") as server:
+    with serving("127.0.0.1", 0, "arm") as (server, _):
         page = Page(server, cell)
         nodes = server.scene._handle_from_node_name
         page.go_to(3)
-        assert nodes["/things/ball"].position[0] == pytest.approx(3)
+        assert nodes["/(things)/ball"].position[0] == pytest.approx(3)
         expected = cell.link_poses("arm", cell.motion.qpos["arm"][3])
         link = cell.models["arm"].kinematics.link("Lower_Arm")
         np.testing.assert_allclose(nodes["/arm/meshes/Lower_Arm"].position, expected[link][:3, 3])
-        assert page._clock.content == "step 3 of 4, 0.15 s"
+        assert page._clock.text == "step 3 of 4, 0.15 s"
         page._playing.value = True
         page.tick(0.07)  # more than one step of 0.05 s
         assert page._timeline.value == 1
@@ -229,11 +231,11 @@ def test_a_robot_without_visual_meshes_is_shown_by_its_collision_shapes(capsys, 
     cell = Cell("pinch", single({"arm": "panda_pinch"}))
     assert len(cell.notes) == 1
     assert cell.notes[0].startswith("arm is shown by its collision shapes: ")
-    with serving("127.0.0.1", 0, "pinch") as server:
+    with serving("127.0.0.1", 0, "pinch") as (server, _):
         Page(server, cell)
         nodes = server.scene._handle_from_node_name
         assert nodes["/arm/collision"].visible
         assert "/arm/meshes/panda_link0" not in nodes
     path = tmp_path / "pinch.html"
     assert main(["view", "single", "arm=panda_pinch", "--html", str(path)]) == 0
-    assert capsys.readouterr().out == f"{cell.notes[0]}\npage: {path}\n"
+    assert capsys.readouterr().out == f"{cell.notes[0]}\npage: {path}\n{NO_SLIDERS}\n"

@@ -3,12 +3,30 @@
 from urllib.parse import urlsplit
 
 import pytest
+import viser
 
 from layouts.__main__ import main
-from tests.pages import browser_page, changed, coloured, served, settled
+from layouts.viewer.saved import save_html
+from layouts.viewer.text import printable
+from tests.layouts.guests import site, small_cell
+from tests.layouts.hostile_names import HOSTILE_NAMES
+from tests.layouts.hostile_site import ATTACK, NOTHING, hostile_site
+from tests.pages import (
+    PATIENCE,
+    SOFTWARE_WEBGL,
+    browser_page,
+    changed,
+    coloured,
+    running_browser,
+    served,
+    settled,
+)
 
 pytestmark = pytest.mark.browser
 
+EVIL = "evil.example"
+VALUES = "() => `${[...document.querySelectorAll('[role=slider]')].map((s) => s.ariaValueNow)}`"
+SMALL = {"width": 640, "height": 120}  # pixels; quickly drawn
 BLUE, ORANGE = (0, 114, 178), (213, 94, 0)  # of left and right
 DARK = (30, 30, 30)  # of so100's motors
 BELOW_NOTICE = slice(190, 420)  # pixels; the browser says above that it has no graphics card
@@ -56,7 +74,7 @@ def test_robots_are_shown_moved_and_checked(tmp_path):
         page.get_by_text("No robot touches another or itself.").wait_for()
         assert changed(settled(page), start) < 50
 
-        at = view.url.removeprefix("http://")
+        at = urlsplit(view.url).netloc
         assert {urlsplit(address.removeprefix("blob:")).netloc for address in asked} <= {at, ""}
         status, rest = view.interrupt()
         assert status == 0
@@ -79,3 +97,79 @@ def test_a_saved_page_shows_the_robots_and_asks_for_nothing(tmp_path):
         both, one = (coloured(shown[BELOW_NOTICE], DARK) for shown in (start, alone))
         assert both > one + 40 > 140
         assert asked == [file.as_uri()]
+
+
+@pytest.mark.parametrize(
+    "names",
+    [("127.0.0.1",), pytest.param(("127.0.0.1", "localhost", EVIL), marks=pytest.mark.long)],
+)
+def test_only_the_page_with_the_token_steers(names):
+    rebound = f"--host-resolver-rules=MAP {EVIL} 127.0.0.1"
+    with (
+        served("layouts", "view", "single", "arm=so100", "--port", "0") as view,
+        hostile_site() as (hostile_port, received),
+        running_browser(*SOFTWARE_WEBGL, rebound) as browser,
+    ):
+        context = browser.new_context(viewport=SMALL)
+        context.set_default_timeout(1000 * PATIENCE)
+        steers = context.new_page()
+        steers.goto(view.url)
+        steers.get_by_text("No robot touches another or itself.").wait_for()
+        before = slider_values(steers)
+        port, token = urlsplit(view.url).port, view.url.partition("token=")[2]
+        protocol = f"viser-v{viser.__version__}"
+        for host in names:
+            hostile = context.new_page()
+            hostile.goto(f"http://{host}:{hostile_port}/")
+            for named in names:
+                for query in ("", f"?token={token}"):
+                    there = f"{named}:{port}/{query}"
+                    addresses = [f"http://{there}", f"ws://{there}", protocol]
+                    outcome = hostile.evaluate(ATTACK, addresses)
+                    assert set(outcome.values()) <= set(NOTHING), (host, there, outcome)
+            hostile.close()
+        assert token not in "".join(received)
+        rebound_page = context.new_page()
+        for query in ("", f"?token={token}"):
+            rebound_page.goto(f"http://{EVIL}:{port}/{query}")
+            assert rebound_page.inner_text("body").startswith("This page opens only at the address")
+        assert slider_values(steers) == before
+
+        steers.get_by_role("slider").nth(1).press("End")
+        moved = slider_values(steers)
+        assert moved != before
+        steers.goto("about:blank")  # draws no more, which is slow
+        second = context.new_page()
+        second.goto(view.url)
+        second.wait_for_function(f"values => ({VALUES})() == values", arg=moved)
+        second.reload()
+        second.wait_for_function(f"values => ({VALUES})() == values", arg=moved)
+        assert view.interrupt() == (0, "ended\n")
+
+
+def slider_values(page):
+    return page.evaluate(VALUES)
+
+
+@pytest.mark.long
+def test_names_are_no_markup(tmp_path):
+    link, tip, joint = HOSTILE_NAMES[:3]
+    cell = small_cell(tmp_path, HOSTILE_NAMES[6], upper=link, lower=tip, elbow=joint)
+    cell.notes += map(printable, HOSTILE_NAMES)
+    saved = save_html(cell, tmp_path / "cell.html").as_uri()
+    with site(cell) as running, browser_page() as (page, asked):
+        dialogs = []
+        page.on("dialog", lambda dialog: (dialogs.append(dialog.message), dialog.dismiss()))
+        for address in (running.address, saved):
+            page.goto(address)
+            page.get_by_text("arm.base in arm.").first.wait_for()
+            text = page.inner_text("body")
+            assert address == saved or f"{joint} (rad)" in text
+            assert f"arm.base in arm.{tip}, " in text
+            for name in map(printable, HOSTILE_NAMES):
+                assert name in text
+            assert page.locator("iframe, img[src*='127.0.0.1:9'], a[href*=evil]").count() == 0
+        assert page.title() == HOSTILE_NAMES[6]
+        assert not dialogs
+        ours = f":{running.port}/"
+        assert [a for a in asked if ours not in a and a != saved and "blob:" not in a] == []

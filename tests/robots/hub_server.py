@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import json
 import re
@@ -9,9 +10,10 @@ import socket
 import struct
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from itertools import chain, repeat
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
@@ -42,6 +44,7 @@ class HubServer:
 
     def __post_init__(self) -> None:
         self.dead = False
+        self.sent = 0  # bytes of bodies without end
         self._rules: list[Rule] = []
         self._lock = threading.Lock()
         self._server = _Server(("127.0.0.1", 0), _Handler)
@@ -157,6 +160,20 @@ class _Handler(BaseHTTPRequestHandler):
             self.wfile.flush()
             time.sleep(pause)
 
+    def send_without_length(self, pieces: Iterable[bytes], headers: dict[str, str]) -> None:
+        """Send pieces until there are no more or the client goes away."""
+        self.send_response(200)
+        for name, value in headers.items():
+            self.send_header(name, value)
+        self.end_headers()
+        self.close_connection = True
+        for piece in pieces:
+            self.wfile.write(piece)
+            self.server.hub.sent += len(piece)
+
+    def send_page(self, status: int, text: str, headers: dict[str, str]) -> None:
+        self._send(status, text.encode(), {"Content-Type": "text/html", **headers})
+
     def reset(self) -> None:
         """Drop the connection without a goodbye."""
         linger = struct.pack("ii", 1, 0)
@@ -171,7 +188,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _send_head(self, status: int, length: int, headers: dict[str, str]) -> None:
         self.send_response(status)
-        for name, value in {**headers, "Content-Length": str(length)}.items():
+        for name, value in {"Content-Length": str(length), **headers}.items():
             self.send_header(name, value)
         self.end_headers()
 
@@ -216,6 +233,50 @@ def stall(reached: threading.Event) -> Fault:
         handler.rfile.read(1)  # returns when the client goes away
 
     return fault
+
+
+def endless(handler: _Handler, body: bytes) -> None:
+    """Send the file, and then zeros up to a gigabyte, without saying how much it will be."""
+    zeros = bytes(2**16)
+    handler.send_without_length(chain([body], repeat(zeros, 2**14)), _file_headers(body))
+
+
+def without_length(handler: _Handler, body: bytes) -> None:
+    """Send the file, and only by closing the connection tell where it ends."""
+    handler.send_without_length([body], _file_headers(body))
+
+
+def inflated(handler: _Handler, body: bytes) -> None:
+    """Send a few kilobytes that unpack to a hundred megabytes."""
+    bomb = gzip.compress(body + bytes(10**8))
+    handler.send_without_length([bomb], {**_file_headers(body), "Content-Encoding": "gzip"})
+
+
+def compressed(handler: _Handler, body: bytes) -> None:
+    """Send the file compressed, as proxies do."""
+    headers = {**_file_headers(body), "Content-Encoding": "gzip"}
+    handler.send_without_length([gzip.compress(body)], headers)
+
+
+def login_page(handler: _Handler, body: bytes) -> None:
+    """Answer as a hotel's network does before one has paid."""
+    handler.send_page(200, "<html><form>Welcome! Your room number?</form></html>", {})
+
+
+def redirect(address: str) -> Fault:
+    """Send the client somewhere else."""
+    return lambda handler, body: handler.send_page(302, "", {"Location": address})
+
+
+def headers(**changes: str) -> Fault:
+    """Send the file with other headers than it should have."""
+    changed = {name.replace("_", "-"): value for name, value in changes.items()}
+    return lambda handler, body: handler._send(200, body, {**_file_headers(body), **changed})
+
+
+def page(status: int, text: str) -> Fault:
+    """Answer with some text, which an API is not to do."""
+    return lambda handler, body: handler.send_page(status, text, {})
 
 
 def _file_headers(body: bytes) -> dict[str, str]:

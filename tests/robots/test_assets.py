@@ -13,6 +13,7 @@ from robots import AssetError, RobotRegistry, UnknownNameError, UrdfLocator, ass
 from robots.asset_sources import InstalledManiSkill, LocalCopy, SourceError
 from robots.asset_store import AssetStore, FileState, default_root
 from robots.assets import ensure
+from robots.fetch_assets import main
 from robots.manifest import load_manifest
 from robots.urdf_xml import read_references
 from tests.robots.conftest import PANDA, contents
@@ -28,7 +29,7 @@ class FakeSource:
     def __init__(self, given: dict[str, bytes], error: str = "") -> None:
         self.given, self.error, self.asked = given, error, []
 
-    def fetch(self, files, scratch, *, again):
+    def fetch(self, files, scratch, *, again, trust):
         self.asked.append(([file.path for file in files], again))
         yield from ((file, self.given[file.path]) for file in files if file.path in self.given)
         if self.error:
@@ -221,13 +222,68 @@ def test_a_complete_read_only_copy_is_enough(store, physics, fill, monkeypatch):
     ensure(physics, store, [])
 
 
-def test_a_damaged_record_is_named(store, physics, fill):
+DAMAGED_RECORDS = {
+    "half": "{",
+    "null": "null",
+    "a list": "[]",
+    "nested deeply": "[" * 100_000,
+    "an entry that is a string": '{"a/b.stl": "mesh"}',
+    "an entry without sha256": '{"a/b.stl": {"source": "x", "trusted": true}}',
+    "a key twice": '{"a": {}, "a": {}}',
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGED_RECORDS)
+def test_a_damaged_record_is_set_aside_and_loses_nothing(store, physics, fill, capfd, damage):
     fill(store, physics)
-    (store.root / "fetched.json").write_text("{")
+    record = store.root / "fetched.json"
+    record.write_text(DAMAGED_RECORDS[damage])
     assert store.unusable(physics) == []
     store.path(physics[0]).write_bytes(b"damaged")
-    with pytest.raises(AssetError, match=r"cannot read .*fetched\.json.*delete it"):
-        store.unusable(physics)
+    assert store.unusable(physics) == [physics[0]]
+    ensure(physics, store, [FakeSource(right(physics))])
+    assert store.unusable(physics) == []
+    said = capfd.readouterr().err
+    assert said.count(f"{record} is damaged: ") == 1
+    assert list(json.loads(record.read_text())) == [str(physics[0])]
+    assert Path(f"{record}.damaged").read_text() == DAMAGED_RECORDS[damage]
+
+
+def test_what_of_a_damaged_record_is_right_is_kept(store, physics, fill):
+    mesh = physics[0]
+    ensure(physics, store, [FakeSource({**right(physics), mesh.path: b"my own"})], trust=True)
+    record = store.root / "fetched.json"
+    entries = json.loads(record.read_text())
+    record.write_text(json.dumps({**entries, str(physics[1]): 5}))
+    assert store.state(mesh) is FileState.TRUSTED
+    store.path(physics[2]).unlink()
+    ensure(physics, store, [FakeSource(right(physics))])
+    assert store.state(mesh) is FileState.TRUSTED
+    assert json.loads(record.read_text()).keys() == entries.keys() - {str(physics[1])}
+
+
+def test_what_stands_in_place_of_a_file_is_exchanged_and_never_waited_for(store, physics, fill):
+    fill(store, physics)
+    fifo, link, device, sparse = (store.path(file) for file in physics[:4])
+    for path in (fifo, link, device):
+        path.unlink()
+    os.mkfifo(fifo)
+    link.symlink_to(link)
+    device.symlink_to("/dev/zero")
+    os.truncate(sparse, 10**13)
+    assert store.unusable(physics) == list(physics[:4])
+    ensure(physics, store, [FakeSource(right(physics))])
+    assert store.unusable(physics) == []
+    assert all(path.is_file() and not path.is_symlink() for path in (fifo, link, device, sparse))
+
+
+def test_a_home_of_nobody_is_named(monkeypatch, capsys):
+    monkeypatch.setenv("ROBOT_LAYOUTS_ASSETS", "~nobody_here/files")
+    with pytest.raises(AssetError, match="ROBOT_LAYOUTS_ASSETS is .*'~nobody_here' has no home"):
+        default_root()
+    monkeypatch.setenv("ROBOT_LAYOUTS_ASSETS", "/tmp")
+    assert main(["panda", "--dest", "~nobody_here"]) == 1
+    assert "--dest is '~nobody_here'" in capsys.readouterr().err
 
 
 def test_the_local_copy_is_where_it_is_said_to_be(monkeypatch, tmp_path):

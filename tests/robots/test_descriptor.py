@@ -5,9 +5,20 @@ from __future__ import annotations
 import math
 from dataclasses import FrozenInstanceError, replace
 
+import numpy as np
 import pytest
 
-from robots import ActionSplit, DescriptorError, JointGroup, RobotRegistry, UnknownNameError
+from robots import (
+    ActionSplit,
+    CameraMount,
+    DescriptorError,
+    Fingers,
+    GripperMaterial,
+    Home,
+    JointGroup,
+    RobotRegistry,
+    UnknownNameError,
+)
 
 PANDA = RobotRegistry.load("panda")
 ARM = PANDA.action_split.groups["arm"]
@@ -24,19 +35,22 @@ def group(**changes) -> JointGroup:
         ({"joints": ()}, "a joint group needs at least one joint"),
         ({"joints": ("a", "a")}, "names a joint twice: ('a', 'a')"),
         ({"unit": "deg"}, "unit is 'deg'; it must be 'rad' or 'm'"),
-        ({"stiffness": -1.0}, "stiffness is -1.0; it must be finite and not negative"),
-        ({"damping": math.nan}, "damping is nan; it must be finite and not negative"),
-        ({"force_limit": math.inf}, "force_limit is inf; it must be finite"),
-        ({"friction": -0.1}, "friction is -0.1; it must be finite"),
+        ({"stiffness": -1.0}, "stiffness is -1.0; it must not be negative"),
+        ({"damping": math.nan}, "JointGroup: damping is nan; it must be a finite number"),
+        ({"force_limit": math.inf}, "JointGroup: force_limit is inf; it must be a finite number"),
+        ({"friction": -0.1}, "friction is -0.1; it must not be negative"),
         ({"stiffness": (1.0,)}, "stiffness has 1 numbers; the group has joints ('a', 'b')"),
-        ({"damping": (1.0, -2.0)}, "damping is -2.0; it must be finite and not negative"),
+        ({"damping": (1.0, -2.0)}, "damping is -2.0; it must not be negative"),
         ({"multipliers": (1.0, -1.0)}, "only a mimic group has multipliers; ('a', 'b') is none"),
         ({"mimic": True, "offsets": (0.0,)}, "offsets has 1 numbers; the group has joints"),
-        ({"mimic": True, "offsets": (0.0, math.nan)}, "offsets of ('a', 'b') are not finite"),
+        (
+            {"mimic": True, "offsets": (0.0, math.nan)},
+            "offsets[1] is nan; it must be a finite",
+        ),
         ({"lower": (-1.0,)}, "lower has 1 numbers; the group ('a', 'b') takes 2"),
         ({"upper": (1.0, 2.0), "mimic": True}, "upper has 2 numbers; the group ('a', 'b') takes 1"),
         ({"upper": -1.0}, "range [-1.0, -1.0] of ('a', 'b') is not increasing"),
-        ({"lower": math.nan}, "range [nan, 1.0] of ('a', 'b') is not increasing"),
+        ({"lower": math.nan}, "JointGroup: lower is nan; it must be a finite number"),
     ],
 )
 def test_a_joint_group_refuses_nonsense(changes, message):
@@ -71,15 +85,66 @@ def test_a_mimic_group_takes_one_number():
         ({"name": "7dof"}, "robot name '7dof' must be a letter followed by letters, digits and _"),
         ({"name": "a-b"}, "robot name 'a-b' must be a letter"),
         ({"reach": 0.0}, "panda: reach is 0.0 m; it must be positive"),
-        ({"reach": math.nan}, "panda: reach is nan m; it must be positive"),
+        ({"reach": math.nan}, "panda: reach is nan; it must be a finite number"),
         ({"keyframes": {"rest": (0.0,)}}, "keyframe 'rest' has 1 numbers; the robot has 9 joints"),
-        ({"keyframes": {"rest": (math.nan,) * 9}}, "panda: keyframe 'rest' is not finite"),
+        (
+            {"keyframes": {"rest": (math.nan,) * 9}},
+            "panda: keyframes['rest'][0] is nan; it must",
+        ),
     ],
 )
 def test_a_descriptor_refuses_nonsense(changes, message):
     with pytest.raises(DescriptorError) as error:
         replace(PANDA, **changes)
     assert message in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: group(joints="ab"), "JointGroup: joints is 'ab'; it must be a tuple, each a text"),
+        (lambda: group(joints=("a", 5)), "JointGroup: joints[1] is 5; it must be a text"),
+        (lambda: group(lower="0"), "JointGroup: lower is '0'; it must be a finite number"),
+        (lambda: group(delta=1), "JointGroup: delta is 1; it must be True or False"),
+        (lambda: group(stiffness=1e300), "stiffness is 1e+300; it must be a finite number"),
+        (lambda: group(limits=((0, 1, 2), (0, 1))), "limits[0] has 3 entries; it must be a tuple"),
+        (lambda: ActionSplit(arm=None), "ActionSplit['arm'] is None; it must be a JointGroup"),
+        (lambda: GripperMaterial((), 1.0, 1.0), "GripperMaterial: links is empty"),
+        (lambda: GripperMaterial(("a",), -1.0, 1.0), "static_friction is -1.0; it must not be"),
+        (lambda: GripperMaterial(("a",), 1.0, 1.0, 2.0), "restitution is 2.0; it must be between"),
+        (lambda: Fingers(("a",)), "Fingers: links has 1 entries; it must be a tuple of 2"),
+        (lambda: Fingers(("a", "b"), (0, 1)), "opening_signs is (0, 1); each must be 1 or -1"),
+        (lambda: Fingers(("a", "b"), max_angle=-1.0), "max_angle is -1.0 degrees; it must be"),
+        (lambda: CameraMount("", "hand"), "CameraMount: name is ''; it must be a text"),
+        (lambda: CameraMount("eye", "hand", width=0), "camera 'eye': width is 0 pixels"),
+        (lambda: CameraMount("eye", "hand", fov=4.0), "camera 'eye': fov is 4.0 rad; it must be"),
+        (lambda: CameraMount("eye", "hand", near=200.0), "it must be 0 < near < far"),
+        (lambda: Home(quaternion=(0, 0, 0, 0)), "Home: quaternion (0, 0, 0, 0) has length 0"),
+        (lambda: replace(PANDA, urdf="x.urdf"), "panda: urdf is 'x.urdf'; it must be a UrdfSource"),
+        (lambda: replace(PANDA, keyframes=[]), "panda: keyframes is []; it must map names"),
+        (lambda: replace(PANDA, home=None), "panda: home is None; it must be a Home"),
+        (lambda: replace(PANDA, name=5), "RobotDescriptor: name is 5; it must be a text"),
+        (
+            lambda: replace(PANDA, cameras=(CameraMount("eye", "a"), CameraMount("eye", "b"))),
+            "panda: cameras has eye more than once",
+        ),
+    ],
+)
+def test_what_is_declared_wrongly_is_said_in_words(make, message):
+    with pytest.raises(DescriptorError) as error:
+        make()
+    assert message in str(error.value)
+
+
+def test_lists_and_numbers_of_numpy_are_taken_as_what_they_mean():
+    same = replace(
+        PANDA,
+        reach=np.float64(PANDA.reach),
+        keyframes={key: np.array(qpos) for key, qpos in PANDA.keyframes.items()},
+        gripper_material=replace(PANDA.gripper_material, links=list(PANDA.gripper_material.links)),
+    )
+    assert same == PANDA
+    assert hash(same) == hash(PANDA)
 
 
 def test_a_home_at_an_unknown_keyframe_is_refused():

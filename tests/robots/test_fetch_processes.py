@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from robots import AssetError, UrdfLocator, asset_sources
-from robots.asset_sources import ManiSkillWheel
+from robots import AssetError, UrdfLocator, wheel_source
 from robots.asset_store import FileState
 from robots.assets import ensure
+from robots.wheel_source import ManiSkillWheel
 from tests.robots.conftest import contents
 from tests.robots.hub_server import HubServer, stall
 
@@ -173,7 +173,7 @@ def test_what_pip_says_is_passed_on(wheel_index, store, physics):
 
 
 def test_a_python_without_pip_is_named(store, physics, monkeypatch):
-    monkeypatch.setattr(asset_sources, "find_spec", lambda name: None)
+    monkeypatch.setattr(wheel_source, "find_spec", lambda name: None)
     monkeypatch.setenv("PATH", "")
     with pytest.raises(AssetError, match="this Python has no pip.*and there is no uv"):
         ensure(physics, store, [ManiSkillWheel()])
@@ -186,6 +186,6 @@ def test_uv_runs_pip_where_python_has_none(wheel_index, store, physics, monkeypa
     uv.write_text(f'#!/bin/sh\n{shift}\n"{sys.executable}" -m pip "$@"\n')
     uv.chmod(0o755)
     monkeypatch.setenv("PATH", f"{uv.parent}:{os.environ['PATH']}")
-    monkeypatch.setattr(asset_sources, "find_spec", lambda name: None)
+    monkeypatch.setattr(wheel_source, "find_spec", lambda name: None)
     ensure(physics, store, [ManiSkillWheel()])
     assert store.unusable(physics) == []

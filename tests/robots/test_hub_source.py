@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import socket
+import subprocess
+import sys
+import threading
 import time
 from pathlib import Path
 
@@ -14,8 +19,24 @@ from robots.asset_store import FileState
 from robots.assets import ensure
 from robots.hub_source import HubSource
 from tests.robots.conftest import PANDA, contents
-from tests.robots.hub_server import COMMIT, HubServer, corrupt, die, drip, status, truncate
+from tests.robots.hub_server import (
+    COMMIT,
+    HubServer,
+    compressed,
+    corrupt,
+    die,
+    drip,
+    endless,
+    headers,
+    inflated,
+    stall,
+    status,
+    truncate,
+    without_length,
+)
+from tests.robots.processes import children_of, is_alive, wait_until
 
+CHECKOUT = Path(__file__).parents[2]
 HAND = "franka_description/meshes/collision/hand.stl"
 
 
@@ -116,6 +137,60 @@ def test_a_slow_download_that_goes_on_is_not_given_up(hub: HubServer, store):
     fetch_from_hub(store, [large], patience=4.0)
     assert_all_verified(store, [large])
     assert len(hub.downloads()) == 1
+
+
+@pytest.mark.parametrize("fault", [endless, inflated])
+def test_a_body_without_end_is_read_no_further_than_the_manifest_says(
+    hub: HubServer, store, physics, fault
+):
+    hub.fail("GET", HAND, fault)
+    size = next(file for file in physics if file.path == HAND).bytes
+    expected = rf"differ from the manifest, twice: .*{HAND} \(more than {size:,} bytes\)"
+    with pytest.raises(AssetError, match=expected):
+        fetch_from_hub(store, physics)
+    assert hub.sent < 64 * 2**20  # mostly what fits into the buffers of two connections
+    assert [file.path for file in store.unusable(physics)] == [HAND]
+
+
+@pytest.mark.parametrize("fault", [without_length, compressed])
+def test_a_body_whose_length_is_not_said_arrives(hub: HubServer, store, physics, fault):
+    hub.fail("GET", HAND, fault)
+    fetch_from_hub(store, physics)
+    assert_all_verified(store, physics)
+
+
+def test_a_download_that_drips_is_given_up(hub: HubServer, store):
+    large = next(file for file in PANDA.files if file.path.endswith("visual/link0.glb"))
+    hub.files[f"{large.origin.hub_folder}/{large.path}"] = contents(large)
+    hub.fail("GET", large.path, drip(pieces=large.bytes // 100, pause=0.2))  # 500 bytes per second
+    with pytest.raises(AssetError, match="nothing arrived for 2 s"):
+        fetch_from_hub(store, [large], patience=2.0)
+
+
+@pytest.mark.parametrize(
+    ("header", "path"), [("ETag", "{tmp}/evil"), ("X-Linked-Etag", "../../../../../evil")]
+)
+def test_a_server_cannot_choose_where_files_are_written(
+    hub: HubServer, store, physics, tmp_path, header, path
+):
+    (tmp_path / "hf_home").mkdir()
+    hub.fail("HEAD", HAND, headers(**{header: f'"{path.format(tmp=tmp_path)}"'}))
+    with pytest.raises(AssetError, match=rf"the server sends {header.lower()}: .*evil"):
+        fetch_from_hub(store, physics)
+    assert not list(tmp_path.rglob("evil*"))
+
+
+def test_a_client_ends_with_the_process_that_fetches(hub: HubServer, store, physics):
+    reached = threading.Event()
+    hub.fail("GET", HAND, stall(reached))
+    fetching = [sys.executable, "-m", "robots.fetch_assets", "panda", "--source", "hf"]
+    command = [*fetching, "--physics-only"]
+    with subprocess.Popen(command, cwd=CHECKOUT, stderr=subprocess.DEVNULL) as process:
+        assert reached.wait(timeout=60)
+        (client,) = children_of(process.pid)
+        os.kill(client, signal.SIGSTOP)  # it cannot notice anything by itself
+        process.kill()
+    wait_until(lambda: not is_alive(client))
 
 
 def test_a_server_dying_midway_leaves_the_rest_to_the_next_source(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import shutil
 from pathlib import Path
 
@@ -108,7 +110,9 @@ def test_a_urdf_that_reaches_outside_its_folder_is_refused(tmp_path):
     folder.mkdir(parents=True)
     mesh = "<collision><geometry><mesh filename='../other/x.stl'/></geometry></collision>"
     (folder / "toy.urdf").write_text(f"<robot name='toy'><link name='a'>{mesh}</link></robot>")
-    with pytest.raises(AssetError, match=r"toy\.urdf refers to \.\./other/x\.stl, which is not"):
+    with pytest.raises(
+        AssetError, match=r"toy\.urdf refers to '\.\./other/x\.stl', which leads out"
+    ):
         build_package("maniskill_toy", tmp_path, {"toy.urdf"})
 
 
@@ -127,3 +131,44 @@ def test_an_installation_reads_the_manifest_of_its_package(tmp_path, monkeypatch
         load_manifest()
     shutil.copy(CHECKOUT_CACHE / "manifest.json", installed)
     assert "maniskill_panda" in load_manifest().packages
+
+
+@pytest.mark.usefixtures("_fresh_manifest")
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[", "it is not json"),
+        ("[]", "manifest is []; it must map names to values"),
+        ("{}", "manifest has no 'packages'"),
+        ('{"packages": []}', "manifest.packages is []; it must map names to values"),
+        ("[" * 100_000, "its json nests deeper than"),
+        (None, r"files\['fetch.srdf'\] has no 'sha256'"),
+    ],
+)
+def test_a_damaged_manifest_is_one_error(tmp_path, monkeypatch, text, message):
+    monkeypatch.setattr(manifest, "CHECKOUT_CACHE", tmp_path)
+    if text is None:
+        right = (CHECKOUT_CACHE / "manifest.json").read_text()
+        text = right.replace('"sha256"', '"sha"', 1)
+    (tmp_path / "manifest.json").write_text(text)
+    expected = rf"^the manifest of robot files {tmp_path}/manifest.json is damaged: .*"
+    with pytest.raises(AssetError, match=expected) as error:
+        load_manifest()
+    assert re.search(message if "\\" in message else re.escape(message), str(error.value))
+
+
+@pytest.mark.parametrize("path", ["../x.stl", "/etc/passwd", "a//b", "a/./b", "", "a\\b", "a\nb"])
+def test_a_path_that_leads_elsewhere_is_refused(path):
+    text = (CHECKOUT_CACHE / "manifest.json").read_text()
+    text = text.replace('"fetch.srdf": {', f"{json.dumps(path)}: {{", 1)
+    with pytest.raises(AssetError, match="must be a path inside its folder|a text"):
+        Manifest.from_json(text)
+
+
+def test_a_manifest_that_cannot_be_written_stays_as_it_was(tmp_path, monkeypatch, capsys):
+    (tmp_path / "manifest.json").write_text("the one before")
+    (tmp_path / "manifest.partial").mkdir()
+    monkeypatch.setattr(write_manifest, "CHECKOUT_CACHE", tmp_path)
+    assert write_manifest.main([]) == 1
+    assert (tmp_path / "manifest.json").read_text() == "the one before"
+    assert capsys.readouterr().err.startswith(f"error: cannot write {tmp_path}/manifest.json")

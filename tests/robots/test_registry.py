@@ -60,7 +60,7 @@ def test_a_second_robot_of_the_same_name_is_refused(name):
 
 
 def test_only_descriptors_are_registered():
-    with pytest.raises(DescriptorError, match="register gave a str; a RobotDescriptor is needed"):
+    with pytest.raises(DescriptorError, match="register gave 'panda', of type str; a Robot"):
         RobotRegistry.register("panda")  # type: ignore[arg-type]
 
 
@@ -106,5 +106,66 @@ def test_another_packages_nonsense_is_named(other_package):
     )
     said = run_with(other_package, code)
     assert said == (
-        "DescriptorError entry point 'acme:NONSENSE' gave a int; a RobotDescriptor is needed\n"
+        "DescriptorError entry point 'acme:NONSENSE' of acme 1.0 gave 42, of type int;"
+        " a RobotDescriptor is needed\n"
     )
+
+
+def add_to(other_package: Path, entry_point: str, module: str = "") -> None:
+    """Let the other package bring one robot more."""
+    with (other_package / "acme-1.0.dist-info" / "entry_points.txt").open("a") as lines:
+        lines.write(f"{entry_point}\n")
+    (other_package / "broken.py").write_text(module)
+
+
+@pytest.mark.parametrize(
+    ("entry_point", "module", "reason"),
+    [
+        ("bad = broken:ARM", "raise RuntimeError('no GPU')", "RuntimeError: no GPU"),
+        ("bad = broken:ARM", "raise SystemExit(3)", "SystemExit: 3"),
+        ("bad = broken:ARM", "", "AttributeError: module 'broken' has no attribute 'ARM'"),
+        ("bad = missing:ARM", "", "ModuleNotFoundError: No module named 'missing'"),
+        ("bad = acme:ARM", "", "is listed as 'bad', but its robot is 'acme_arm'"),
+        ("bad = acme:ARM\nbad = broken:ARM", "", "'bad' is brought more than once, by entry"),
+    ],
+)
+def test_a_robot_that_cannot_be_loaded_is_named_and_leaves_the_others_alone(
+    other_package, entry_point, module, reason
+):
+    add_to(other_package, entry_point, module)
+    printed = run_with(
+        other_package,
+        "from robots import DescriptorError\n"
+        "assert RobotRegistry.load('acme_arm').source == 'acme'\n"
+        "assert 'bad' in RobotRegistry.names()\n"
+        "try: RobotRegistry.load('bad')\n"
+        "except DescriptorError as error: print(error)\n"
+        "robots, failures = RobotRegistry.load_all()\n"
+        "print(len(robots), len(failures))\n",
+    )
+    error, counts = printed.splitlines()
+    assert reason in error
+    assert counts == f"{len(CATALOGUE) + 1} 2"  # acme_nonsense, too
+
+
+@pytest.mark.parametrize("command", ["inspect", "fetch_assets --check"])
+def test_commands_for_all_robots_name_those_that_cannot_be_loaded(other_package, command):
+    module, *words = command.split()
+    done = subprocess.run(
+        [sys.executable, "-m", f"robots.{module}", *words],
+        env={**os.environ, "PYTHONPATH": f"{other_package}{os.pathsep}{CHECKOUT}"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert "acme_arm" in done.stdout
+    assert "panda_stick" in done.stdout
+    assert done.stderr.startswith("error: entry point 'acme:NONSENSE' of acme 1.0 gave 42")
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", [None, 5, ["panda"], {}])
+def test_a_name_that_is_no_text_is_unknown(name):
+    with pytest.raises(UnknownNameError, match=f"of type {type(name).__name__}"):
+        RobotRegistry.load(name)

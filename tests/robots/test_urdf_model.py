@@ -124,6 +124,53 @@ BAD = {
         robot(GOOD.replace('izz="0.1"', 'izz="0"')),
         "link 'upper' moves, but has mass 1 kg and moments of inertia 0.1, 0.1, 0 kg·m²",
     ),
+    "too many links": (
+        robot(
+            LINKS
+            + "".join(
+                f'<link name="l{i}"/>' + joint(f"j{i}", f"l{i - 1}" if i else "base", f"l{i}")
+                for i in range(1_000)
+            )
+        ),
+        "has 1003 links; PhysX joins 255 at most",
+    ),
+    "a limit beyond all measure": (
+        robot(GOOD.replace('upper="1"', 'upper="1e300"')),
+        "upper='1e300' in <limit>; 1e+18 is the largest amount that makes sense",
+    ),
+    "a number as Python alone writes it": (
+        robot(GOOD.replace('upper="1"', 'upper="1_0"')),
+        "upper='1_0' in <limit>; 1 finite number is needed",
+    ),
+    "an effort below 0": (
+        robot(GOOD.replace('effort="10"', 'effort="-10"')),
+        "joint 'shoulder' has effort=-10 in <limit>, below 0",
+    ),
+    "a box without a size": (robot(GOOD.replace("size='0.1 0.1 0.1'", "")), "has no size in <box>"),
+    "an unknown shape": (
+        robot(GOOD.replace("<box size='0.1 0.1 0.1'/>", "<cone/>")),
+        "link 'upper': a collision of shape 'cone'; choices: box, sphere, cylinder, capsule, mesh",
+    ),
+    "no shape": (
+        robot(GOOD.replace("<box size='0.1 0.1 0.1'/>", "")),
+        "a collision without a shape",
+    ),
+    "an inertia of no body": (
+        robot(GOOD.replace('ixy="0"', 'ixy="5"')),
+        "which no body has: around some axis it is not positive",
+    ),
+    "an incomplete inertia": (
+        robot(GOOD.replace('ixy="0"', "")),
+        "link 'upper' has no ixy in <inertia>",
+    ),
+    "a name with a newline": (
+        robot(GOOD.replace('link name="lower"', 'link name="lo&#10;wer"')),
+        "has a link called 'lo\\nwer'; names have at most 200 characters, all of them printable",
+    ),
+    "mimic without a joint": (
+        robot(LINKS + SHOULDER + joint("elbow", "upper", "lower", LIMIT + "<mimic/>")),
+        "joint 'elbow' mimics '', which is no joint that moves",
+    ),
     "missing mesh": (
         robot(
             GOOD.replace(
@@ -141,7 +188,7 @@ BAD = {
                 ),
             )
         ),
-        "refers to files that do not exist: ",
+        "toy.urdf refers to 'http://127.0.0.1:9/a.stl'; only paths, package:// and file://",
     ),
 }
 
@@ -232,3 +279,27 @@ def test_a_mesh_of_a_ros_package_is_found_above_the_urdf(tmp_path):
     mesh = "<mesh filename='package://toy_description/meshes/arm.stl'/>"
     path.write_text(robot(GOOD.replace("<box size='0.1 0.1 0.1'/>", mesh)))
     assert LocalUrdf(path).locate() == path
+
+
+def test_a_chain_as_long_as_physx_allows_is_read_at_once():
+    links = [f'<link name="l{i}"/>' for i in range(255)]
+    joints = [joint(f"j{i}", f"l{i}", f"l{i + 1}") for i in range(254)]
+    model = read_model(robot("".join(links + joints)).encode(), "toy")
+    assert [at.name for at in model.ordered] == [f"j{i}" for i in range(254)]
+    assert model.depths["j0"] == 254
+    assert model.depths["j253"] == 1
+
+
+@pytest.mark.parametrize("kind", ["FIFO", "/dev/zero", "folder"])
+def test_what_is_no_file_is_refused_at_once(kind, tmp_path):
+    path = tmp_path / "toy.urdf"
+    if kind == "FIFO":
+        os.mkfifo(path)
+    elif kind == "folder":
+        path.mkdir()
+    else:
+        path.symlink_to(kind)
+    with pytest.raises(
+        AssetError, match=rf"cannot read the URDF {path}: it is a .*, not a regular"
+    ):
+        LocalUrdf(path).locate()

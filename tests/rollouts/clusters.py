@@ -49,6 +49,12 @@ class Nodes:
     def kill_at(self, address: str) -> None:
         self.kill(next(node for node in self.workers if node.node_ip_address == address))
 
+    def signal_head(self, what: str, how: int) -> int:
+        """Send a signal to a process of the node without CPU, which this process is part of."""
+        pid = self._cluster.head_node.all_processes[what][0].process.pid
+        os.kill(pid, how)
+        return pid
+
     def players(self) -> list[int]:
         """Return the processes of actors; Ray calls them by their class."""
         return [pid for pid, words in commands() if words.startswith("ray::_Player")]

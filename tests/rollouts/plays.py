@@ -2,13 +2,17 @@
 
 import os
 import signal
+import struct
+import sys
 import time
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 
 from robots import TaskError
+from rollouts import local_workers
 from rollouts.executor import Event, report
 
 TASK = "PushT-v1"
@@ -44,6 +48,8 @@ class Play:
     always: bool = False
     fails_at: int = -1
     breaks_at: int = -1
+    hangs_at: int = -1
+    leaves_at: int = -1
     lasts: float = 0.0  # s
     says: str = ""
 
@@ -57,6 +63,11 @@ class Play:
         if seed == self.dies_at and (self.always or not (self.folder / "died").exists()):
             (self.folder / "died").touch()
             os.kill(os.getpid(), signal.SIGKILL)
+        if seed == self.hangs_at and (self.always or not (self.folder / "hung").exists()):
+            (self.folder / "hung").touch()
+            os.kill(os.getpid(), signal.SIGSTOP)
+        if seed == self.leaves_at:
+            sys.exit("enough")
         if seed == self.fails_at:
             raise TaskError(f"no plan for {seed}")
         if seed == self.breaks_at:
@@ -76,6 +87,63 @@ class DiesOnce:
         except FileExistsError:
             return Play().play
         os._exit(7)
+
+
+class HangsOnce(DiesOnce):
+    """The first worker to begin is stopped; the others play."""
+
+    def __call__(self):
+        try:
+            (self.folder / "hung").touch(exist_ok=False)
+        except FileExistsError:
+            return Play().play
+        os.kill(os.getpid(), signal.SIGSTOP)
+
+
+@dataclass(frozen=True)
+class StopsHalfWay:
+    """The first worker is stopped while its answer is on the way."""
+
+    folder: Path
+
+    def __call__(self):
+        return self.play
+
+    def play(self, seed: int):
+        if not (self.folder / "hung").exists():
+            (self.folder / "hung").touch()
+            (connection,) = (cell.cell_contents for cell in local_workers._tell.__closure__)
+            os.write(connection.fileno(), struct.pack("!i", 1000) + b"half of an answer")
+            os.kill(os.getpid(), signal.SIGSTOP)
+        return os.getpid(), seed**2
+
+
+class CannotBeLoaded:
+    """Makes plays where it was made, and cannot be unpickled anywhere else."""
+
+    def __reduce__(self):
+        return import_module, ("no_such_module_of_mine",)
+
+
+@dataclass(frozen=True)
+class SaysAndRests:
+    """Says a word again and again, with pauses (s) in between."""
+
+    words: int
+    pause: float
+
+    def __call__(self):
+        return self.play
+
+    def play(self, seed: int):
+        for word in range(self.words):
+            report(word)
+            time.sleep(self.pause)
+        return os.getpid(), seed**2
+
+
+def makes_what_cannot_be_pickled():
+    return lambda seed: lambda: seed
 
 
 def cannot_prepare():

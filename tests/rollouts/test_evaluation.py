@@ -1,6 +1,12 @@
 """`rollouts.evaluate`: the same whoever plays, and what one can read off it."""
 
+import random
 import re
+import subprocess
+import sys
+import textwrap
+import traceback
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +22,8 @@ from rollouts.experts import find_expert, registry
 from tests.rollouts.plays import NO_PLAN, Here, at_random
 from tests.rollouts.policies import TASK, Wanders, fails, still
 
+ROOT = Path(__file__).parents[2]
+
 
 def test_who_plays_makes_no_difference():
     here = evaluate(Wanders(0.5), TASK, range(4), executor=Here())
@@ -23,6 +31,62 @@ def test_who_plays_makes_no_difference():
     assert len(set(here.returns.values())) == 4
     other = evaluate(Wanders(0.6), TASK, [2], executor=Here())
     assert other.returns[2] != here.returns[2]
+
+
+def test_this_process_plays_the_same():
+    """Policies that no other process could load included; nothing of theirs stays behind."""
+    torch.manual_seed(5)
+    random.seed(5)
+    before = torch.get_rng_state(), random.getstate(), torch.get_num_threads()
+    policy = Wanders(0.5)
+    here = evaluate(policy, TASK, range(3), workers=0)
+    assert policy == Wanders(0.5)
+    assert here.scores == evaluate(lambda obs: policy(obs), TASK, [0], workers=0).scores | {
+        seed: here.scores[seed] for seed in (1, 2)
+    }
+    assert here.scores == evaluate(Wanders(0.5), TASK, range(3), executor=Here()).scores
+    after = torch.get_rng_state(), random.getstate(), torch.get_num_threads()
+    assert torch.equal(before[0], after[0])
+    assert before[1:] == after[1:]
+
+
+def test_a_policy_of_a_notebook():
+    program = """
+        from rollouts import evaluate
+
+        def policy(obs):
+            return [0.0] * 7
+
+        try:
+            evaluate(policy, "PushT-v1", [1], workers=2)
+        except RuntimeError as error:
+            print(error)
+        print(evaluate(policy, "PushT-v1", [1], workers=0).lengths)
+    """
+    words = [sys.executable, "-c", textwrap.dedent(program)]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
+    refused, played = done.stdout.splitlines()
+    assert refused.startswith(
+        "policy is defined in this notebook or interactive session, where wor"
+    )
+    assert "workers=0" in refused
+    assert played == "{1: 100}"
+
+
+@pytest.mark.parametrize("workers", [-1, -10, True, 2.5, "2"])
+def test_no_number_of_workers(workers):
+    with pytest.raises(TaskError, match="workers is .*; it must be a whole number, 0 or more"):
+        evaluate(still, TASK, [0], workers=workers)
+
+
+@pytest.mark.parametrize("workers", [0, 1])
+def test_an_error_of_a_policy_comes_whole(workers):
+    with pytest.raises(
+        WorkerError, match=r"seed 7: KeyError: .* \(.*policies.py:\d+, in fails\)"
+    ) as e:
+        evaluate(fails, TASK, [7], workers=workers)
+    lines = "".join(traceback.format_exception(e.value))
+    assert 'return {}["no such key"]' in lines
 
 
 def test_it_is_what_one_sees_by_hand():
@@ -73,11 +137,21 @@ def test_how_it_reads():
         (still, "PushX-v1", [0], {}, UnknownNameError, "Did you mean 'PushT-v1'?"),
         (still, TASK, [0], {"obs_mod": "x"}, UnknownNameError, "Did you mean 'obs_mode'?"),
         (still, TASK, [0], {"num_envs": 2}, TaskError, "num_envs is 2; an evaluation plays 1"),
-        (still, TASK, [], {}, TaskError, "0 seeds were given; each .* at least one"),
-        (still, TASK, [1, 2, 1], {}, TaskError, "3 seeds were given; each must be there once"),
+        (still, TASK, [], {}, TaskError, "no seeds were given; an evaluation plays one or m"),
+        (still, TASK, [1, 2, 1], {}, TaskError, "seed 1 is there twice; each episode is played o"),
+        (still, TASK, 5, {}, TaskError, "seeds is 5; it takes a sequence of integers"),
+        (still, TASK, [0.5], {}, TaskError, r"seeds is \[0.5\]; it takes a sequence of integers"),
+        (still, TASK, [-1], {}, TaskError, r"seed -1 must lie from 0 to 2\*\*32 - 1"),
         ("exprt", TASK, [0], {}, TaskError, "policy is 'exprt'; it must be callable, obs → acti"),
         (fails, TASK, [7], {}, WorkerError, "seed 7: KeyError: 'no such key' .*policies.py:"),
-        (lambda obs: obs, TASK, [7], {}, WorkerError, "cannot be sent .*a policy must be defined"),
+        (
+            lambda obs: obs,
+            TASK,
+            [7],
+            {},
+            WorkerError,
+            "cannot be sent .*a policy must be def.* workers=0",
+        ),
     ],
 )
 def test_what_cannot_be_evaluated(policy, task, seeds, making, error, complaint):

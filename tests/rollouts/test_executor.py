@@ -3,18 +3,41 @@
 import multiprocessing
 import os
 import pickle
+import random
 import re
 import signal
 import subprocess
 import sys
 import textwrap
+import time
 from pathlib import Path
 
+import numpy as np
 import pytest
+import torch
 
+import rollouts.shift
 from robots import TaskError
-from rollouts.executor import Event, ProcessExecutor, WorkerError, WorkersDied
-from tests.rollouts.plays import DiesOnce, Play, cannot_prepare, dies_before_it_is_ready
+from rollouts.executor import (
+    Event,
+    ProcessExecutor,
+    WorkerError,
+    WorkersDied,
+    choose_executor,
+    play_all,
+)
+from rollouts.in_process import InProcessExecutor
+from tests.rollouts.plays import (
+    CannotBeLoaded,
+    DiesOnce,
+    HangsOnce,
+    Play,
+    SaysAndRests,
+    StopsHalfWay,
+    cannot_prepare,
+    dies_before_it_is_ready,
+    makes_what_cannot_be_pickled,
+)
 
 ROOT = Path(__file__).parents[2]
 
@@ -117,7 +140,7 @@ def test_workers_that_cannot_begin():
 
 
 def test_a_worker_that_dies_before_it_is_ready_is_replaced(tmp_path):
-    events = run(DiesOnce(tmp_path), range(4))
+    events = run(DiesOnce(tmp_path), range(4), workers=1)  # with 2, the other may play all
     (death,) = [event for event in events if event.died is not None]
     assert death.seed is None
     assert squares(events) == {seed: seed**2 for seed in range(4)}
@@ -138,3 +161,249 @@ def test_stopping_early_leaves_no_process():
 def test_errors_come_home_whole():
     error = WorkerError("words")
     assert str(pickle.loads(pickle.dumps(error))) == "words"
+
+
+# -- deadlines -----------------------------------------------------------------------------------
+
+
+def test_an_episode_that_hangs_is_played_again(tmp_path):
+    executor = ProcessExecutor(2, episode_timeout=1.5)
+    events = list(executor.run(Play(tmp_path, hangs_at=1), range(6)))
+    (death,) = [event for event in events if event.died is not None]
+    assert death.seed == 1
+    assert death.died.endswith("did not finish the episode within 1.5 s and was ended")
+    assert sorted(event.seed for event in events if event.result) == list(range(6))
+    assert squares(events) == {seed: seed**2 for seed in range(6)}
+
+
+def test_an_episode_that_hangs_again_and_again_is_given_up(tmp_path):
+    executor = ProcessExecutor(1, attempts=2, episode_timeout=0.5)
+    events = list(executor.run(Play(tmp_path, hangs_at=1, always=True), range(3)))
+    (given_up,) = [event for event in events if event.error]
+    assert isinstance(given_up.error, WorkersDied)
+    assert re.fullmatch(
+        r"the episode of seed 1 ended 2 worker processes; the last: worker process \d+ did not"
+        r" finish the episode within 0\.5 s and was ended",
+        str(given_up.error),
+    )
+    assert sorted(squares(events)) == [0, 2]
+
+
+def test_a_worker_that_is_stopped_while_it_answers(tmp_path):
+    events = list(ProcessExecutor(1, episode_timeout=1.0).run(StopsHalfWay(tmp_path), range(3)))
+    assert [event.seed for event in events if event.died] == [0]
+    assert squares(events) == {seed: seed**2 for seed in range(3)}
+
+
+@pytest.mark.long
+def test_a_worker_that_hangs_before_it_is_ready(tmp_path, monkeypatch):
+    monkeypatch.setattr(rollouts.shift, "START_SECONDS", 15.0)
+    events = run(HangsOnce(tmp_path), range(3), workers=1)
+    (death,) = [event for event in events if event.died is not None]
+    assert death.seed is None
+    assert death.died.endswith("was not ready within 15 s and was ended")
+    assert len(squares(events)) == 3
+
+
+@pytest.mark.long
+def test_a_word_shows_that_an_episode_goes_on():
+    executor = ProcessExecutor(1, episode_timeout=3.0)
+    events = list(executor.run(SaysAndRests(words=5, pause=1.0), [2]))
+    assert [event.died for event in events] == [None] * 6
+    assert squares(events) == {2: 4}
+
+
+def test_long_silence_is_said(monkeypatch):
+    monkeypatch.setattr(rollouts.shift, "QUIET_SECONDS", 1.0)
+    said = [event.said for event in run(Play(lasts=2.5), [3]) if event.said]
+    patterns = [
+        r"no message for \d s: process \d+ has been getting ready for \d s",
+        r"no message for \d s: process \d+ has been playing seed 3 for \d s",
+    ]
+    assert re.fullmatch(patterns[1], said[-1])
+    assert all(re.fullmatch("|".join(patterns), line) for line in said)
+
+
+@pytest.mark.long
+def test_the_time_in_which_this_process_is_stopped_makes_nobody_late():
+    program = """
+        from rollouts.executor import ProcessExecutor
+        from tests.rollouts.plays import Play
+
+        if __name__ == "__main__":
+            for event in ProcessExecutor(1, episode_timeout=6).run(Play(lasts=2.0), range(3)):
+                print(event.died or event.seed, flush=True)
+    """
+    words = [sys.executable, "-c", textwrap.dedent(program)]
+    process = subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    first = process.stdout.readline()
+    (worker,) = children(process.pid)
+    for pid in (process.pid, worker):
+        os.kill(pid, signal.SIGSTOP)
+    time.sleep(8)
+    for pid in (process.pid, worker):
+        os.kill(pid, signal.SIGCONT)
+    rest, _ = process.communicate(timeout=60)
+    assert (first + rest).split() == ["0", "1", "2"]
+
+
+def children(pid):
+    folder = Path(f"/proc/{pid}/task")
+    found = [int(c) for task in folder.iterdir() for c in (task / "children").read_text().split()]
+    return [c for c in found if "spawn_main" in Path(f"/proc/{c}/cmdline").read_text()]
+
+
+# -- what cannot be sent, loaded or understood ---------------------------------------------------
+
+
+def test_what_no_worker_can_load_is_said_at_once():
+    with pytest.raises(WorkerError, match="a worker cannot load .*: ModuleNotFoundError: .*mine"):
+        run(CannotBeLoaded(), range(3), workers=1)
+
+
+def test_a_session_without_a_file():
+    """As in a notebook: what a cell defines is refused before anything is started."""
+    program = """
+        import multiprocessing
+        from rollouts.executor import ProcessExecutor, WorkerError
+
+        def cell():
+            return str
+
+        class Cell:
+            def __call__(self):
+                return str
+
+        for prepare in (cell, Cell(), Cell):
+            try:
+                next(ProcessExecutor(1).run(prepare, [0]))
+            except WorkerError as error:
+                print(error, len(multiprocessing.active_children()))
+    """
+    words = [sys.executable, "-c", textwrap.dedent(program)]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == [
+        f"{name} is defined in this notebook or interactive session, where worker processes cannot"
+        " load it: put it into a module that they can import, or pass workers=0, which plays in"
+        " this process 0"
+        for name in ("cell", "Cell", "Cell")
+    ]
+    assert done.stderr == ""
+
+
+def test_a_program_without_a_guard(tmp_path):
+    (tmp_path / "program.py").write_text(
+        "from rollouts.executor import ProcessExecutor\n"
+        "from tests.rollouts.plays import Play\n"
+        "list(ProcessExecutor(2).run(Play(), range(3)))\n"
+    )
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    words = [sys.executable, str(tmp_path / "program.py")]
+    done = subprocess.run(words, env=env, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1
+    last = done.stderr.splitlines()[-1]
+    assert "ended with exit code 1 before it could begin" in last
+    assert last.endswith("belongs below `if __name__ == '__main__':`")
+
+
+def test_results_that_cannot_be_sent():
+    (event,) = run(makes_what_cannot_be_pickled, [0])
+    assert "pickle" in str(event.error)
+    assert isinstance(event.error, WorkerError)
+
+
+def test_an_episode_that_leaves_the_process():
+    events = {event.seed: event for event in run(Play(leaves_at=1), range(3), workers=1)}
+    assert re.match(r"SystemExit: enough \(.*plays.py:\d+, in play\)", str(events[1].error))
+    assert sorted(squares(events.values())) == [0, 2]
+
+
+def test_an_error_brings_its_traceback():
+    (event,) = run(Play(breaks_at=2), [2])
+    assert "in play\n    return 1 / 0" in str(event.error.__cause__)
+    assert re.fullmatch(
+        r"ZeroDivisionError: division by zero \(.*plays\.py:\d+, in play\)", str(event.error)
+    )
+
+
+# -- who plays -----------------------------------------------------------------------------------
+
+
+def test_this_process_plays_what_cannot_be_pickled():
+    played = []
+    events = list(
+        InProcessExecutor().run(lambda: lambda seed: played.append(seed) or -seed, [3, 1])
+    )
+    assert played == [3, 1]
+    assert [(event.seed, event.result) for event in events] == [(3, -3), (1, -1)]
+    (failed,) = InProcessExecutor().run(lambda: lambda seed: 1 / 0, [5])
+    assert isinstance(failed.error, WorkerError)
+    assert isinstance(failed.error.__cause__, ZeroDivisionError)
+    assert "test_executor.py:" in str(failed.error)
+
+
+def test_this_process_keeps_its_own_settings():
+    def prepare():
+        torch.set_num_threads(1)
+        torch.manual_seed(1)
+        return play
+
+    def play(seed):
+        return torch.get_num_threads(), random.random(), np.random.rand(), float(torch.rand(1))
+
+    def draws():
+        random.seed(2)
+        np.random.seed(2)
+        torch.manual_seed(2)
+        numbers = [(random.random(), np.random.rand(), float(torch.rand(1)))]
+        for event in InProcessExecutor().run(prepare, [0, 1]) if playing else [None, None]:
+            assert event is None or event.result[0] == 1
+            numbers.append((random.random(), np.random.rand(), float(torch.rand(1))))
+        return numbers
+
+    threads = torch.get_num_threads()
+    torch.set_num_threads(2)
+    try:
+        playing = False
+        undisturbed = draws()
+        playing = True
+        assert draws() == undisturbed
+        assert torch.get_num_threads() == 2
+    finally:
+        torch.set_num_threads(threads)
+
+
+@pytest.mark.parametrize("workers", [-1, True, 2.5, "2", float("nan"), [1]])
+def test_no_number_of_workers(workers):
+    with pytest.raises(TaskError, match="workers is .*; it must be a whole number, 0 or more"):
+        choose_executor(workers)
+    with pytest.raises(TaskError, match="workers is .*; it must be a whole number, 1 or more"):
+        ProcessExecutor(workers)
+
+
+@pytest.mark.parametrize("seconds", [0, -1, True, "5", float("nan"), float("inf"), [1]])
+def test_no_limit(seconds):
+    with pytest.raises(TaskError, match="episode_timeout is .*; it must be seconds, more than 0"):
+        ProcessExecutor(1, episode_timeout=seconds)
+
+
+def test_who_is_chosen():
+    assert isinstance(choose_executor(0), InProcessExecutor)
+    assert choose_executor().workers == len(os.sched_getaffinity(0))
+    assert choose_executor(3).workers == 3
+    own = ProcessExecutor(2)
+    assert choose_executor(executor=own) is own
+    for contradiction in ({"workers": 1}, {"episode_timeout": 5.0}):
+        with pytest.raises(TaskError, match="an executor knows its own workers and episode"):
+            choose_executor(executor=own, **contradiction)
+    with pytest.raises(TaskError, match="with workers=0 this process plays, and nobody could end"):
+        choose_executor(0, episode_timeout=5.0)
+
+
+def test_an_executor_that_forgets_episodes():
+    class Forgets:
+        def run(self, prepare, seeds):
+            yield from (Event(seed, result=seed) for seed in seeds if seed != 2)
+
+    with pytest.raises(WorkerError, match="Forgets ended before 1 of 4 episodes were played"):
+        list(play_all(Forgets(), Play(), range(4)))

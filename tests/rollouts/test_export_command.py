@@ -2,11 +2,13 @@
 
 import dataclasses
 import json
+import shutil
+import signal
+import subprocess
 import sys
 from pathlib import Path
 
 import duckdb
-import h5py
 import numpy as np
 import pytest
 
@@ -14,7 +16,7 @@ import rollouts.export.pictures as pictures
 import rollouts.progress as progress
 import tasks
 from layouts import Layout, Placement
-from robots import RecordingError, RobotRegistry
+from robots import RecordingError, RobotRegistry, TaskError
 from robots.descriptor import ActionSplit
 from rollouts.__main__ import main
 from rollouts.episode import play
@@ -22,7 +24,7 @@ from rollouts.export.columns import ColumnReader
 from rollouts.export.dataset import Export, export
 from rollouts.recorder import Recorder
 from rollouts.trajectory import Trajectory, TrajectoryError, TrajectoryFile
-from tests.rollouts.recordings import record, succeed
+from tests.rollouts.recordings import edited, record, succeed
 
 TASK = "PushT-v1"
 
@@ -67,7 +69,7 @@ def test_failures_can_be_left_out(recording, tmp_path, capsys):
 
 
 def test_a_recording_without_a_layout_is_of_the_tasks_own_robots(recording, tmp_path):
-    with h5py.File(recording, "r+") as file:
+    with edited(recording) as file:
         del file.attrs["layout"]  # as in native's files
     assert run(recording, "--format", "lerobot", "--out", tmp_path / "out") == 0
     info = json.loads((tmp_path / "out/meta/info.json").read_text())
@@ -83,7 +85,7 @@ def test_a_rate_of_the_task_is_the_datasets(tmp_path):
 
 
 def test_a_recording_of_other_robots_is_refused(recording, tmp_path, capsys):
-    with h5py.File(recording, "r+") as file:
+    with edited(recording) as file:
         layout = json.loads(file.attrs["layout"])
         layout["arm"]["joint_groups"]["arm"]["stiffness"] = 1.0
         file.attrs["layout"] = json.dumps(layout)
@@ -105,7 +107,7 @@ def test_joint_positions_as_actions_are_exported_too(tmp_path):
 
 
 def test_what_was_not_recorded_is_left_out(recording, tmp_path):
-    with h5py.File(recording, "r+") as file:
+    with edited(recording) as file:
         for episode in file.values():
             del episode["rewards"], episode["success"]
     assert run(recording, "--format", "lerobot", "--out", tmp_path / "out") == 0
@@ -181,7 +183,7 @@ def nothing_was_left(folder: Path) -> bool:
 def test_an_episode_that_lacks_something_ends_the_export(
     recording, tmp_path, capsys, form, entry, complaint
 ):
-    with h5py.File(recording, "r+") as file:
+    with edited(recording) as file:
         del file[f"traj_1/{entry}"]
     assert run(recording, "--format", form, "--out", tmp_path / "out") == 1
     assert complaint in capsys.readouterr().err
@@ -247,7 +249,7 @@ class Blind:
 
 def test_pictures_follow_the_recorded_states(recording, monkeypatch):
     monkeypatch.setattr(pictures, "Cameras", Blind)
-    with h5py.File(recording, "r+") as file:
+    with edited(recording) as file:
         file["traj_2/env_states/actors/Tee"][1:, 0] += 0.05  # no replay ends there
     with TrajectoryFile(recording) as file:
         task = tasks.make(TASK)
@@ -268,6 +270,55 @@ def test_pictures_of_an_exact_replay_need_no_help(recording, monkeypatch):
         task = tasks.make(TASK)
         monkeypatch.setattr(task, "set_state_dict", lambda state: pytest.fail("put into a state"))
         assert len(list(pictures.draw(task, ColumnReader(task).read(file[2])))) == 4
+
+
+UNFINISHED = """
+import sys, time
+from robots.commands import start
+from rollouts.export.dataset import Export, export
+def main():
+    def wait(done, total):
+        print("writing", flush=True)
+        time.sleep(600)
+    export(Export(sys.argv[1], "robomimic", sys.argv[2]), wait)
+start(main)
+"""
+
+
+def partials(folder: Path) -> list[str]:
+    return [path.name for path in folder.iterdir() if path.name.endswith(".partial")]
+
+
+def test_what_a_killed_export_leaves_is_removed_by_the_next(recording, tmp_path):
+    out = tmp_path / "out"
+    words = [sys.executable, "-c", UNFINISHED, str(recording), str(out)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as killed:
+        assert killed.stdout is not None
+        assert killed.stdout.readline() == "writing\n"
+        with pytest.raises(TaskError):  # refused before anything is removed
+            export(Export(recording, "robomimic", out, fps=3))
+        export(Export(recording, "robomimic", tmp_path / "other"))
+        assert len(partials(tmp_path)) == 1
+        export(Export(recording, "robomimic", out))
+        assert len(partials(tmp_path)) == 1  # of one that lives
+        killed.kill()
+    shutil.rmtree(out)
+    (tmp_path / ".out.mine.partial").mkdir()  # whoever it is of
+    export(Export(recording, "robomimic", out))
+    assert partials(tmp_path) == [".out.mine.partial"]
+
+
+def test_ctrl_c_ends_an_export_without_a_traceback(recording, tmp_path):
+    words = [sys.executable, "-c", UNFINISHED, str(recording), str(tmp_path / "out")]
+    with subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as export_:
+        assert export_.stdout is not None
+        assert export_.stdout.readline() == "writing\n"
+        export_.send_signal(signal.SIGINT)
+        _, said = export_.communicate(timeout=60)
+    assert (export_.returncode, said) == (130, "interrupted\n")
+    assert partials(tmp_path) == []
 
 
 def test_joints_are_in_the_order_of_their_names():

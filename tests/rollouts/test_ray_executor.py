@@ -1,6 +1,7 @@
 """Episodes on a Ray cluster of several nodes, some of which are killed."""
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -10,12 +11,14 @@ from pathlib import Path
 import pytest
 
 import rollouts.ray_executor
+import rollouts.shift
 from robots import MissingPackageError, TaskError, UnknownNameError
 from rollouts import evaluate
 from rollouts.__main__ import main
 from rollouts.executor import WorkerError, WorkersDied
 from rollouts.experts import registry
-from rollouts.ray_executor import ROOMS, RayExecutor, gather_code
+from rollouts.ray_cluster import ROOMS, gather_code
+from rollouts.ray_executor import RayExecutor
 from rollouts.record import FILE, record
 from rollouts.trajectory import TrajectoryFile
 from tests.rollouts.clusters import Nodes, running_cluster
@@ -64,9 +67,14 @@ def test_a_cluster_without_room(cluster, monkeypatch):
     cluster.shrink()
     with pytest.raises(WorkerError, match="no node of the Ray cluster offers a CPU"):
         run(cluster, Play(), range(3))
-    monkeypatch.setattr(rollouts.ray_executor, "_SILENCE", 1.0)
+    monkeypatch.setattr(rollouts.shift, "QUIET_SECONDS", 3.0)
     events = RayExecutor(cluster.address, 1, modules=MODULES).run(Play(), range(3))
-    assert "no worker could begin for 1 s: 0 CPUs of the Ray cluster are free" in next(events).said
+    said = next(events).said
+    assert re.fullmatch(
+        r"no message for \d s: actor has been getting ready for \d s;"
+        r" 0 CPUs of the Ray cluster are free",
+        said,
+    )
     cluster.grow(1)
     assert len(squares(list(events))) == 3
 

@@ -14,7 +14,10 @@ import pytest
 import tasks
 from rollouts.__main__ import main
 from rollouts.episode import play
+from rollouts.executor import WorkerError
 from rollouts.experts import registry
+from rollouts.in_process import InProcessExecutor
+from rollouts.record import record
 from rollouts.recorder import Recorder
 from rollouts.trajectory import TrajectoryFile
 from tests.rollouts.plays import NO_PLAN, TASK, at_random
@@ -62,6 +65,12 @@ def wait_until_nobody_is_left(process: subprocess.Popen[str]) -> None:
             return
         assert time.monotonic() < deadline, "a process is left"
         time.sleep(0.05)
+
+
+def workers_of(process: subprocess.Popen[str]) -> list[int]:
+    tasks_ = Path(f"/proc/{process.pid}/task").iterdir()
+    children = [int(pid) for task in tasks_ for pid in (task / "children").read_text().split()]
+    return [p for p in children if "spawn_main" in Path(f"/proc/{p}/cmdline").read_text()]
 
 
 def recorded_directly(path: Path, seeds: range) -> Path:
@@ -118,6 +127,38 @@ def test_joint_positions_are_recorded_from_an_expert_that_speaks_deltas(tmp_path
                     np.testing.assert_array_equal(rows, other.states[kind][name])
 
 
+def test_this_process_records_the_same(tmp_path, capsys):
+    assert main(arguments(tmp_path, 3, workers=0, seed=4)) == 0
+    assert "recorded now 3" in capsys.readouterr().out
+    direct = recorded_directly(tmp_path / "direct" / FILE, range(4, 7))
+    assert same_files(tmp_path / FILE, direct)
+
+
+def test_an_executor_that_forgets_episodes(tmp_path):
+    class Forgets(InProcessExecutor):
+        def run(self, prepare, seeds):
+            yield from super().run(prepare, seeds[1:])
+
+    with pytest.raises(WorkerError, match="Forgets ended before 1 of 3 episodes were played"):
+        record(TASK, range(3), tmp_path, Forgets())
+    with TrajectoryFile(tmp_path / FILE) as file:
+        assert file.seeds == (1, 2)
+
+
+@pytest.mark.long
+def test_a_worker_that_is_stopped(tmp_path):
+    process = start(*arguments(tmp_path, 40, episode_timeout=10))
+    wait_for_parts(tmp_path, 2)
+    (stopped,) = workers_of(process)
+    os.kill(stopped, signal.SIGSTOP)
+    printed, said = process.communicate(timeout=180)
+    assert process.returncode == 0, said
+    assert f"worker process {stopped} did not finish the episode within 10 s and was ended" in said
+    assert f"made good: worker process {stopped} did not" in printed
+    assert same_files(tmp_path / FILE, recorded_directly(tmp_path / "direct" / FILE, range(40)))
+    wait_until_nobody_is_left(process)
+
+
 @pytest.mark.long
 def test_a_seed_without_a_plan_is_told_and_tried_again(tmp_path, capsys):
     for _ in range(2):
@@ -144,6 +185,14 @@ def test_another_recording_is_not_gone_on_with(tmp_path, capsys):
     [
         (["--task=PushX-v1"], 2, "unknown task 'PushX-v1'. Did you mean 'PushT-v1'?"),
         (["--episodes=0"], 2, "0 is too few; it must be 1 or more"),
+        (["--workers=-1"], 2, "-1 is too few; it must be 0 or more"),
+        (["--episode-timeout=0"], 2, "0 is no limit; it must be seconds, more than 0, or none"),
+        (["--episode-timeout=nan"], 2, "nan is no limit; it must be seconds, more than 0, or none"),
+        (["--episode-timeout=ten"], 2, "ten is no limit; it must be seconds, more than 0, or none"),
+        (["--workers=0", "--episode-timeout=5"], 1, "with workers=0 this process plays, and nobod"),
+        (["--ray=local"], 1, "'local' is no address of a Ray cluster; it must be"),
+        (["--ray="], 1, "'' is no address of a Ray cluster; it must be"),
+        (["--ray=auto", "--workers=0"], 1, "workers on a Ray cluster is 0; it must be a whole nu"),
         (["--seed=-1"], 2, "-1 is too few; it must be 0 or more"),
         (["--control-mode=pd_ee_pose"], 2, "invalid choice: 'pd_ee_pose'"),
     ],
@@ -168,9 +217,8 @@ def test_a_folder_that_cannot_be_written(tmp_path, capsys):
 def test_a_worker_that_is_killed(tmp_path):
     process = start(*arguments(tmp_path, 60, 2))
     wait_for_parts(tmp_path, 2)
-    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-    workers = [p for p in children if "spawn_main" in Path(f"/proc/{p}/cmdline").read_text()]
-    os.kill(int(workers[0]), signal.SIGKILL)
+    workers = workers_of(process)
+    os.kill(workers[0], signal.SIGKILL)
     printed, said = process.communicate(timeout=180)
     assert process.returncode == 0, said
     assert f"worker process {workers[0]} died by SIGKILL " in said

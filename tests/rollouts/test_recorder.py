@@ -22,6 +22,7 @@ from rollouts.parts import part_path, read_part
 from rollouts.recorder import Recorder
 from rollouts.trajectory import TrajectoryFile
 from tests.rollouts.hand_overs import TASK, plan, task
+from tests.rollouts.recordings import edited
 
 SEEDS = (0, 3)
 FIRST_ROBOT, SECOND_ROBOT = "panda_wristcam-agent-0", "panda_wristcam-agent-1"
@@ -191,7 +192,7 @@ def test_a_part_says_what_it_is(tmp_path, push_t):
         recorder.add(episodes[3])
         (part,) = recorder.parts.iterdir()
         header, stored = read_part(part)
-        assert json.loads(header)["layout"]["arm"]["robot"] == "panda_stick"
+        assert header["layout"]["arm"]["robot"] == "panda_stick"
         assert stored.about["episode_seed"] == 3
         np.testing.assert_array_equal(stored.arrays["actions"], episodes[3].actions)
         tee = stored.arrays["env_states/actors/Tee"]
@@ -211,7 +212,13 @@ def test_a_recording_goes_on_whatever_moment_it_was_killed_at(tmp_path, push_t, 
     """Stop at every change of the disk that closing makes, as a kill would, and go on."""
     env, episodes = push_t
     whole = write(tmp_path / "whole.h5", env, episodes)
-    calls = [(os, "replace"), (Path, "write_text"), (shutil, "rmtree"), (os, "fsync")]
+    calls = [
+        (os, "replace"),
+        (Path, "write_text"),
+        (Path, "unlink"),
+        (Path, "rmdir"),
+        (os, "fsync"),
+    ]
 
     class Killed(BaseException):
         pass
@@ -291,6 +298,96 @@ def test_a_part_that_is_torn_or_changed_is_recorded_again(tmp_path, push_t, dama
         assert again.seeds == {0}
         again.add(episodes[1])
     assert same_files(path, write(tmp_path / "whole.h5", env, episodes[:2]))
+
+
+@pytest.mark.parametrize("put", [os.mkfifo, Path.mkdir, lambda path: path.write_text("mine")])
+@pytest.mark.parametrize("name", ["seed-0000000001.part", "seed-0000000xyz.part", "notes"])
+def test_what_is_no_part_is_refused_and_stays(tmp_path, push_t, put, name):
+    env, episodes = push_t
+    path = write(tmp_path / "joined.h5", env, episodes[:1])
+    parts = path.with_suffix(".parts")
+    parts.mkdir()
+    put(parts / name)
+    if name == "seed-0000000001.part" and (parts / name).is_file():
+        return  # a damaged part
+    with pytest.raises(RecordingError, match=f"{name} is no episode of this library, in a folder"):
+        Recorder(path, env, resume=True)
+    assert [p.name for p in parts.iterdir()] == [name]
+
+
+def test_a_folder_of_parts_with_something_else_in_it_stays(tmp_path, push_t):
+    env, episodes = push_t
+    path = tmp_path / "recording.h5"
+    with Recorder(path, env) as recorder:
+        recorder.add(episodes[0])
+        (recorder.parts / "notes").write_text("mine")
+    assert [p.name for p in recorder.parts.iterdir()] == ["notes"]
+
+
+def test_parts_with_each_others_name_are_recorded_again(tmp_path, push_t):
+    env, episodes = push_t
+    path = tmp_path / "swapped.h5"
+    recorder = Recorder(path, env)
+    for episode in episodes[:3]:
+        recorder.add(episode)
+    one, other, between = (part_path(recorder.parts, seed) for seed in (0, 1, 99))
+    one.rename(between)
+    other.rename(one)
+    between.rename(other)
+    del recorder
+    with Recorder(path, env, resume=True) as again:
+        assert again.seeds == {2}
+        assert again.damaged == [str(one), str(other)]
+        for episode in episodes[:2]:
+            again.add(episode)
+    assert same_files(path, write(tmp_path / "whole.h5", env, episodes[:3]))
+
+
+@pytest.mark.parametrize("array", ["actions", "rewards", "env_states/actors/Tee"])
+def test_an_episode_with_a_bit_that_flipped_is_recorded_again(tmp_path, push_t, array):
+    env, episodes = push_t
+    path, whole = (write(tmp_path / f"{name}.h5", env, episodes[:3]) for name in ("one", "two"))
+    with h5py.File(path) as file:
+        place = file[f"traj_1/{array}"].id.get_offset()
+    content = bytearray(path.read_bytes())
+    content[place] ^= 1
+    path.write_bytes(content)
+    with Recorder(path, env, resume=True) as again:
+        assert again.seeds == {0, 2}
+        assert again.damaged == [f"traj_1 of {path}"]
+        again.add(episodes[1])
+    assert same_files(path, whole)
+
+
+def test_a_recording_of_an_earlier_version_gets_its_checksums(tmp_path, push_t):
+    env, episodes = push_t
+    whole = write(tmp_path / "whole.h5", env, episodes[:3])
+    path = write(tmp_path / "earlier.h5", env, episodes[:2])
+    with edited(path):
+        pass
+    with Recorder(path, env, resume=True) as again:
+        assert again.damaged == []
+        again.add(episodes[2])
+    assert same_files(path, whole)
+
+
+def test_episodes_in_another_order_are_put_in_theirs(tmp_path, push_t):
+    env, episodes = push_t
+    path, whole = (write(tmp_path / f"{name}.h5", env, episodes[:2]) for name in ("one", "two"))
+    with h5py.File(path, "r+") as file:
+        for old, new in (("traj_0", "x"), ("traj_1", "traj_0"), ("x", "traj_1")):
+            file.move(old, new)
+    Recorder(path, env, resume=True).close()
+    assert same_files(path, whole)
+
+
+@pytest.mark.parametrize("suffix", [".h5", ".json", ".parts"])
+def test_a_fifo_in_the_place_of_a_recording_is_not_waited_for(tmp_path, push_t, suffix):
+    env, _ = push_t
+    path = tmp_path / "recording.h5"
+    os.mkfifo(path.with_suffix(suffix))
+    with pytest.raises(RecordingError, match=f"recording{suffix}"):
+        Recorder(path, env, resume=True)
 
 
 def test_parts_of_an_earlier_version_are_refused_not_lost(tmp_path, push_t):

@@ -4,7 +4,6 @@ import json
 import shutil
 from dataclasses import replace
 
-import h5py
 import numpy as np
 import pytest
 
@@ -17,6 +16,7 @@ from rollouts.recorder import Recorder
 from rollouts.replay import find_official, open_recording, replay, task_for
 from rollouts.trajectory import TrajectoryError, TrajectoryFile
 from tests.rollouts.plays import at_random
+from tests.rollouts.recordings import edited
 
 TASK = "PushT-v1"
 SEEDS = (3, 5)
@@ -50,7 +50,7 @@ def run(capsys, *words):
 
 
 def change(path, entry, edit):
-    with h5py.File(path, "a") as file:
+    with edited(path) as file:
         values = file[entry][()]
         edit(values)
         file[entry][...] = values
@@ -68,6 +68,29 @@ def test_the_same_again(capsys, recording):
 def test_the_first_episodes_only(capsys, recording):
     _, printed, _ = run(capsys, recording, "--episodes", 1)
     assert "1 of 1 episodes end as recorded" in printed
+
+
+def test_the_body_with_the_largest_difference_is_named(capsys, path):
+    def push(amount):
+        def edit(rows):
+            rows[7, 2] += np.float32(amount)
+
+        return edit
+
+    change(path, "traj_0/env_states/actors/Tee", push(0.001))
+    change(path, "traj_0/env_states/actors/goal_Tee", push(0.25))
+    _, printed, _ = run(capsys, path)
+    assert "from step 7 in Tee, max |Δ| 2.5e-01 in goal_Tee" in printed
+
+
+def test_a_path_with_brackets_is_printed_as_it_is(capsys, path):
+    folder = path.parent / "[red][" / "b]"
+    folder.mkdir(parents=True)
+    for suffix in (".h5", ".json"):
+        path.with_suffix(suffix).rename((folder / path.name).with_suffix(suffix))
+    code, printed, _ = run(capsys, folder)
+    assert code == 0
+    assert f"{folder}/{path.name}: PushT-v1" in printed
 
 
 def test_states_that_differ_are_found(capsys, path):
@@ -109,7 +132,7 @@ def test_from_a_state(capsys, path):
 
 
 def test_a_file_without_states(capsys, path):
-    with h5py.File(path, "a") as file:
+    with edited(path) as file:
         del file["traj_0/env_states"]
     code, printed, _ = run(capsys, path)
     assert code == 0
@@ -129,7 +152,7 @@ def test_a_replay_from_the_wrong_state_is_seen(recording):
 
 
 def test_another_world_is_refused(capsys, path):
-    with h5py.File(path, "a") as file:
+    with edited(path) as file:
         layout = json.loads(file.attrs["layout"])
         layout["arm"]["position"][2] = 0.1
         file.attrs["layout"] = json.dumps(layout)

@@ -14,6 +14,7 @@ from robots import LocalUrdf, RobotRegistry
 from rollouts.episode import play
 from rollouts.recorder import Recorder
 from rollouts.trajectory import TrajectoryError, TrajectoryFile
+from tests.rollouts.recordings import edited
 
 TASK = "PushT-v1"
 
@@ -77,7 +78,7 @@ def test_what_was_recorded_is_read(episodes, path):
 
 
 def test_what_a_file_lacks_is_none(path):
-    with h5py.File(path, "a") as file:
+    with edited(path) as file:
         for name in ("env_states", "rewards", "success", "terminated", "truncated"):
             del file[f"traj_0/{name}"]
         del file.attrs["layout"], file.attrs["simulation"]
@@ -117,7 +118,7 @@ def test_a_foreign_h5(path):
 
 def change(name, value, episode=0):
     def edit(path):
-        with h5py.File(path, "a") as file:
+        with edited(path) as file:
             del file[f"traj_{episode}/{name}"]
             if isinstance(value, dict):
                 for key, array in value.items():
@@ -174,7 +175,7 @@ def mix_modes(summary):
         (set_mode({"a-0": "pd_joint_pos", "b-1": "pd_ee_pose"}), "pd_ee_pose and pd_joint_pos"),
         (mix_modes, "recorded in pd_joint_delta_pos and pd_joint_pos"),
         (lambda summary: summary.pop("episodes"), "has no episodes"),
-        (lambda summary: summary["env_info"].pop("env_id"), "has no env_id"),
+        (lambda summary: summary["env_info"].pop("env_id"), "has no env_info.env_id;"),
         (lambda summary: summary["episodes"].append({"seed": 1}), "not a demonstration's json"),
         (lambda summary: summary["episodes"].append({"episode_id": 1}), "lists an episode twice"),
         (lambda summary: summary["episodes"].append({"episode_id": 9}), "traj_9 .* not in the"),

@@ -3,7 +3,6 @@
 import subprocess
 import sys
 
-import h5py
 import numpy as np
 import pytest
 
@@ -11,7 +10,7 @@ from rollouts.__main__ import main
 from rollouts.trajectory import TrajectoryError, TrajectoryFile
 from rollouts.view_command import episode_cell
 from tests.pages import browser_page, changed, served, settled
-from tests.rollouts.recordings import LEFT_KEY, TWO_ROBOTS, read, record
+from tests.rollouts.recordings import LEFT_KEY, TWO_ROBOTS, edited, read, record
 
 STEPS = 6
 
@@ -39,7 +38,7 @@ def test_a_file_without_states_is_played_again(recording, tmp_path):
     path = tmp_path / "trajectory.h5"
     for suffix in (".h5", ".json"):
         path.with_suffix(suffix).write_bytes(recording.with_suffix(suffix).read_bytes())
-    with h5py.File(path, "r+") as file:
+    with edited(path) as file:
         for episode in file.values():
             del episode["env_states"]
     with TrajectoryFile(path) as bare, TrajectoryFile(recording) as whole:

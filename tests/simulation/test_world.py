@@ -15,8 +15,8 @@ from robots import (
 )
 from robots.descriptor import ActionSplit
 from simulation import Box, PhysicsSettings, Simulation, Sphere, World, add_table
+from simulation.blueprint import read_blueprint
 from simulation.controller import JointPositionController
-from simulation.robot import read_blueprint
 from simulation.shapes import Capsule, Cylinder
 
 HALF = 0.02
@@ -189,7 +189,7 @@ def test_a_rebuilt_world_has_no_past():
     simulation.step(np.zeros((2, 8), np.float32), simulation.read().joint_positions)
     assert simulation.worlds[1].system.get_contacts()
     kept = simulation.worlds[0]
-    simulation.rebuild([1])
+    simulation.rebuild([1], with_cube)
     assert simulation.worlds[0] is kept
     assert not simulation.worlds[1].system.get_contacts()
 
@@ -201,7 +201,7 @@ def test_a_rebuilt_world_is_the_same_to_the_last_bit():
     def motion(rebuilt: bool) -> np.ndarray:
         simulation = Simulation(layout, with_cube, 1, PhysicsSettings())
         if rebuilt:
-            simulation.rebuild([0])
+            simulation.rebuild([0], with_cube)
         stand(simulation)
         for _ in range(20):
             simulation.step(action, simulation.read().joint_positions)
@@ -221,9 +221,9 @@ def test_a_urdf_is_read_once_for_all_worlds_and_keeps_none_of_them_alive(monkeyp
     monkeypatch.setattr("simulation.world.read_blueprint", reading)
     layout = side_by_side({"left": "panda", "right": "panda_stick"}, spacing=1.0)
     simulation = Simulation(layout, with_cube, 3)
-    simulation.rebuild([1, 2])
+    simulation.rebuild([1, 2], with_cube)
     assert [name for name, _ in read] == ["panda", "panda_stick"]
-    assert [blueprint.scene for _, blueprint in read] == [None, None]
+    assert [blueprint.builder.scene for _, blueprint in read] == [None, None]
 
 
 def test_anchored_bodies_return_and_velocities_vanish():

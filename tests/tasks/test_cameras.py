@@ -189,7 +189,7 @@ def test_what_cannot_be_seen_is_said(monkeypatch: pytest.MonkeyPatch):
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"fov": 0.0}, "fov is 0.0 rad"),
+        ({"fov": 0.0}, "fov is 0.0; it must be a number from 0.001 to 3.14059 rad"),
         ({"near": 2.0, "far": 1.0}, "near is 2.0 m, far 1.0 m"),
         ({"width": 0}, "width is 0"),
         ({"target": (0.3, 0.0, 0.6)}, "cannot look at the point where it is"),

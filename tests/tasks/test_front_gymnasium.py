@@ -1,5 +1,6 @@
 """Tasks behind Gymnasium's interface."""
 
+import copy
 import subprocess
 import sys
 import warnings
@@ -13,6 +14,7 @@ import tasks
 from robots import TaskError, UnknownNameError
 from simulation.rendering import vulkan_problem
 from tasks import fronts
+from tasks.fronts.gymnasium import GymnasiumTask
 from tasks.registry import CATALOGUE
 
 CONTACT = 8  # steps
@@ -59,8 +61,9 @@ def test_observing_nothing():
 def expect_same(theirs, ours):
     (obs, info), (batch, batch_info) = theirs, ours
     assert leaves(obs) == leaves(batch, 0)
-    assert set(info) == set(batch_info)
-    assert all(info[k] == np.asarray(v).reshape(-1)[0] for k, v in batch_info.items())
+    own = {key: value for key, value in batch_info.items() if key != "reconfigure"}
+    assert set(info) == {*own, "seed"}
+    assert all(info[k] == np.asarray(v).reshape(-1)[0] for k, v in own.items())
 
 
 def leaves(tree, row=None):
@@ -69,12 +72,45 @@ def leaves(tree, row=None):
     return np.asarray(tree if row is None else tree[row], np.float32).tolist()
 
 
-def test_an_episode_is_truncated_as_the_tasks_is():
-    env = gymnasium.make("RobotLayouts/PushCube-v1")
+@pytest.mark.parametrize(
+    ("how", "steps"),
+    [
+        ({}, 50),
+        ({"max_episode_steps": 20}, 20),
+        ({"max_episode_steps": 60}, 60),
+        ({"max_episode_steps": -1}, None),
+    ],
+)
+def test_an_episode_is_truncated_when_its_spec_says(how, steps):
+    env = gymnasium.make("RobotLayouts/PushCube-v1", **how)
+    assert env.spec.max_episode_steps == steps
     env.reset(seed=0)
     still = np.zeros(env.action_space.shape, np.float32)
-    ends = [env.step(still)[3] for _ in range(50)]
-    assert ends == [False] * 49 + [True]
+    ends = [env.step(still)[3] for _ in range(61)]
+    assert ends.index(True) + 1 == steps if steps else not any(ends)
+
+
+@pytest.mark.parametrize("vector", [{"num_workers": 0}, {"vectorization_mode": "sync"}])
+@pytest.mark.parametrize(("how", "steps"), [({}, 50), ({"max_episode_steps": 60}, 60)])
+def test_so_is_one_of_a_vector(vector, how, steps):
+    env = gymnasium.make_vec("RobotLayouts/PushCube-v1", num_envs=2, **vector, **how)
+    assert env.spec.max_episode_steps == steps
+    env.reset(seed=0)
+    still = np.zeros(env.action_space.shape, np.float32)
+    ends = [env.step(still)[3].tolist() for _ in range(steps)]
+    assert ends == [[False] * 2] * (steps - 1) + [[True] * 2]
+
+
+def test_every_spec_says_how_long_episodes_are():
+    for task_id in tasks.list_tasks():
+        spec = gymnasium.spec(f"RobotLayouts/{task_id}")
+        assert spec.max_episode_steps == tasks.get_task_class(task_id).max_episode_steps
+        assert copy.deepcopy(spec) == spec
+
+
+def test_the_time_limit_is_gymnasiums():
+    with pytest.raises(TaskError, match="time limits are gymnasium.make's"):
+        GymnasiumTask("PickCube-v1", max_episode_steps=20)
 
 
 def test_ids_follow_the_list_of_tasks():

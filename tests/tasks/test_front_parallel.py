@@ -66,6 +66,19 @@ def test_a_reward_for_each_robot():
     assert rewards == {"left": common + 4 + 1, "right": common + 5 + 1}
 
 
+@pytest.mark.parametrize("earned", [np.nan, np.float32(np.inf), None, "much", [1.0, 2.0]])
+def test_a_robots_reward_is_a_finite_number(earned):
+    env = tasks.parallel_env("PushCube-v1", robot_reward=lambda *_: earned)
+    env.reset(seed=0)
+    with pytest.raises(TaskError, match="robot_reward returned .* for 'arm' at step 1"):
+        env.step({"arm": np.zeros(8, np.float32)})
+
+
+def test_a_robots_reward_comes_from_a_function():
+    with pytest.raises(TaskError, match="robot_reward is 'dense'; a function is needed"):
+        tasks.parallel_env(TWO, robot_reward="dense")
+
+
 def test_all_robots_end_together(env):
     still = {name: np.zeros(8, np.float32) for name in env.possible_agents}
     with pytest.raises(TaskError, match="reset"):

@@ -156,7 +156,9 @@ def test_worlds_are_rebuilt_where_asked(monkeypatch):
     env = make()
     simulation = env.vector._crew._batch._task.simulation
     rebuilt, rebuild = [], simulation.rebuild
-    monkeypatch.setattr(simulation, "rebuild", lambda ids: (rebuilt.append(ids), rebuild(ids)))
+    monkeypatch.setattr(
+        simulation, "rebuild", lambda ids, build: (rebuilt.append(ids), rebuild(ids, build))
+    )
     env.seed(5)
     first = env.reset()
     env.seed(5)

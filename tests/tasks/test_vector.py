@@ -116,15 +116,17 @@ def test_workers_change_nothing_in_any_task(task_id, num_workers):
         assert differences(play(env, mode, 12), together) == []
 
 
-def test_without_seeds_it_begins_as_the_batched_task_does():
-    """PegInsertionSide draws its geometry when it is made, from the first seeds."""
+def test_it_begins_and_goes_on_as_the_batched_task_does():
+    """PegInsertionSide draws its geometry at every reset."""
     task_id = "PegInsertionSide-v1"
     task = tasks.make(task_id, num_envs=NUM_ENVS)
     action = np.zeros((NUM_ENVS, 8), np.float32)
     with closing(make(task_id, num_workers=WORKERS)) as env:
-        for _ in range(2):
-            np.testing.assert_array_equal(env.reset()[0], task.reset()[0].numpy())
+        for seed in (2022, None):
+            obs, info = env.reset(seed=seed)
+            np.testing.assert_array_equal(obs, task.reset(seed)[0].numpy())
             np.testing.assert_array_equal(env.step(action)[0], task.step(action)[0].numpy())
+            assert info["seed"].tolist() == [2022, 2023, 2024]
 
 
 def test_a_difference_is_noticed():

@@ -6,7 +6,7 @@ import pytest
 import tasks
 from layouts import single
 from layouts.validation.kinematics import pose_matrix
-from layouts.viewer.page import save_html
+from layouts.viewer.saved import NO_SLIDERS, save_html
 from simulation import Box, Capsule, Cylinder, Sphere, World
 from tasks.__main__ import main
 from tasks.view import body_parts, task_cell
@@ -69,7 +69,7 @@ def test_a_task_is_served_until_ctrl_c():
 def test_a_task_is_saved(tmp_path, capsys):
     path = tmp_path / "task.html"
     assert main(["view", "PushCube-v1", "--html", str(path)]) == 0
-    assert capsys.readouterr().out == f"page: {path}\n"
+    assert capsys.readouterr().out == f"page: {path}\n{NO_SLIDERS}\n"
     assert "<title>PushCube-v1, seed 0</title>" in path.read_text()
 
 

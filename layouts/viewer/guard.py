@@ -1,0 +1,183 @@
+"""Who may open a page, and what a browser may do with it: asked before anything is served."""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+import secrets
+import socket
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from http import HTTPStatus
+from typing import Any
+from urllib.parse import parse_qs, quote
+
+MOST_CLIENTS = 32  # tabs that show a page at the same time
+HTTP_PORT = 80  # which browsers leave out of an address
+TOKEN_BYTES = 32
+REFUSAL = (
+    "This page opens only at the address that the command printed: open that one, token and all.\n"
+    "If it reaches you through a tunnel, forward it to the same port number of localhost.\n"
+)
+CROWDED = f"{MOST_CLIENTS} tabs show this page already; close one of them.\n"
+# A browser loads nothing from elsewhere, shows the page in no frame, and passes its address on to
+# nobody. viser's page is one file: a script that unpacks workers, WebAssembly, fonts and pictures.
+POLICY = {
+    "default-src": "'none'",
+    "script-src": "'unsafe-inline' 'unsafe-eval' blob:",
+    "worker-src": "blob:",
+    "style-src": "'unsafe-inline'",
+    "img-src": "data: blob:",
+    "font-src": "data:",
+    "connect-src": "data: blob:",
+    "base-uri": "'none'",
+    "form-action": "'none'",
+}
+
+
+@dataclass(frozen=True)
+class Guard:
+    """Lets in whoever has the token, from the page itself and under a name of this machine's.
+
+    A page of another origin can make a browser ask for this one, or connect to it: it does not have
+    the token, and the browser says in ``Origin`` where it comes from. A name on the internet can be
+    made to lead to this machine (DNS rebinding): the browser says in ``Host`` what it was. The
+    token is never a cookie, which browsers would send to servers at every port of this machine.
+
+    Attributes:
+        port: Where the server listens.
+        names: Names of this machine, in lower case, that may stand in ``Host``. So may the address
+            at which a request arrives and, if that is a loopback address, ``localhost``.
+        token: What every request must hold as ``?token=…``.
+    """
+
+    port: int
+    names: frozenset[str] = frozenset()
+    token: str = field(default_factory=lambda: secrets.token_urlsafe(TOKEN_BYTES), repr=False)
+
+    @classmethod
+    def of(cls, host: str, port: int) -> Guard:
+        """Make the guard of a server.
+
+        Args:
+            host: Address or name at which it listens. If the network can reach it there, this
+                machine's own host name leads to it, too.
+            port: Its port.
+        """
+        names = {host.lower()} if _literal(host) is None else set[str]()
+        if not is_loopback(host):
+            own = socket.gethostname().lower()
+            names |= {own, f"{own}.local"}
+        return cls(port, frozenset(names))
+
+    def address(self, host: str) -> str:
+        """Return what to open in a browser.
+
+        Args:
+            host: Address or name at which the server listens.
+        """
+        name = host
+        if is_wildcard(host):
+            name = "::1" if ":" in host else "localhost"
+        return f"http://{f'[{name}]' if ':' in name else name}:{self.port}/?token={self.token}"
+
+    def answer(
+        self, connection: Any, request: Any, page: Callable[[Any, Any], Any] | None
+    ) -> Any | None:
+        """Answer a request, or let a WebSocket open by answering None.
+
+        Args:
+            connection: The connection of the `websockets` package.
+            request: Its request.
+            page: Answers requests that are let in and are of no WebSocket.
+        """
+        path, _, query = request.path.partition("?")
+        words = parse_qs(query, keep_blank_values=True)
+        if not self._admits(request.headers, words, connection.local_address[0]):
+            return _plain(connection, HTTPStatus.FORBIDDEN, REFUSAL)
+        if path != "/":
+            return _plain(connection, HTTPStatus.NOT_FOUND, "There is one page here, at /.\n")
+        if "websocket" in map(str.lower, request.headers.get_all("Upgrade")):
+            full = len(connection.server.connections) >= MOST_CLIENTS
+            return _plain(connection, HTTPStatus.SERVICE_UNAVAILABLE, CROWDED) if full else None
+        host = request.headers["Host"]
+        stream = f"ws://{host}/?token={self.token}"
+        if words.get("websocket") != [stream]:
+            return self._redirect(connection, stream)
+        response = page(connection, request) if page is not None else None
+        return response and _secured(response, f"ws://{host}")
+
+    def _admits(self, headers: Any, words: Mapping[str, list[str]], arrived_at: str) -> bool:
+        hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
+        given = words.get("token", [])
+        return (
+            len(hosts) == len(given) == 1
+            and self._names_us(hosts[0].lower(), arrived_at)
+            and {origin.lower() for origin in origins} <= {f"http://{hosts[0].lower()}"}
+            and hmac.compare_digest(given[0].encode(errors="replace"), self.token.encode())
+        )
+
+    def _names_us(self, host: str, arrived_at: str) -> bool:
+        name, colon, port = host.rpartition(":")
+        if not colon or port.endswith("]"):  # no port, though perhaps an IPv6 address
+            name, port = host, str(HTTP_PORT)
+        if port != str(self.port):
+            return False
+        here = ipaddress.ip_address(arrived_at.partition("%")[0])
+        if name == "localhost":
+            return here.is_loopback
+        return name in self.names or name == (f"[{here}]" if here.version == 6 else str(here))
+
+    def _redirect(self, connection: Any, stream: str) -> Any:
+        """Lead a browser to the address that says where viser's client finds its WebSocket.
+
+        By itself it would connect to the page's address without the token.
+        """
+        response = _plain(connection, HTTPStatus.FOUND, "")
+        response.headers["Location"] = f"/?token={self.token}&websocket={quote(stream, safe='')}"
+        return response
+
+
+def is_wildcard(host: str) -> bool:
+    """Return whether a host stands for every address of this machine."""
+    address = _literal(host)
+    return address is not None and address.is_unspecified
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether a host can be reached from this machine alone."""
+    address = _literal(host)
+    return host.lower() == "localhost" or (address is not None and address.is_loopback)
+
+
+def policy(sources: str = "") -> str:
+    """Return the ``Content-Security-Policy`` of a page.
+
+    Args:
+        sources: What it may connect to besides itself.
+    """
+    rules = {**POLICY, "connect-src": f"{POLICY['connect-src']} {sources}".strip()}
+    return "; ".join(f"{name} {value}" for name, value in rules.items())
+
+
+def _literal(host: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
+    try:
+        return ipaddress.ip_address(host.partition("%")[0])
+    except ValueError:
+        return None
+
+
+def _plain(connection: Any, status: HTTPStatus, text: str) -> Any:
+    return _secured(connection.respond(status, text))
+
+
+def _secured(response: Any, sources: str = "") -> Any:
+    """Add what a browser must observe to a response."""
+    response.headers["Content-Security-Policy"] = f"{policy(sources)}; frame-ancestors 'none'"
+    response.headers["X-Frame-Options"] = "DENY"
+    response.headers["X-Content-Type-Options"] = "nosniff"
+    response.headers["Referrer-Policy"] = "no-referrer"
+    response.headers["Cross-Origin-Opener-Policy"] = "same-origin"
+    response.headers["Cross-Origin-Resource-Policy"] = "same-origin"
+    response.headers["Cache-Control"] = "no-store"
+    return response

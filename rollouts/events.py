@@ -1,0 +1,44 @@
+"""What an executor reports of the episodes that it plays, and how it fails."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from robots import RobotLayoutsError
+
+Play = Callable[[int], Any]
+"""Plays the episode of a seed and returns what is to be known of it (it can be pickled)."""
+
+
+class WorkerError(RobotLayoutsError, RuntimeError):
+    """Worker processes that cannot be started, or die again and again."""
+
+
+class WorkersDied(WorkerError):
+    """Workers that died at one episode, as often as is allowed."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """What happened to the episode of a seed.
+
+    Attributes:
+        seed: Its seed; None if it is about a worker that was not playing yet, or about none.
+        result: What was returned when it was played to the end, else None.
+        error: Why it could not be played, else None; `WorkersDied` if workers died of it.
+        died: How its worker died, in words, else None; the episode will be played again.
+        excused: Whether it is out of reach, with its machine perhaps: not the episode's fault.
+        said: What was told meanwhile: by `report` if there is a seed, else by the executor, in
+            words.
+        worker: Who played it, in words.
+    """
+
+    seed: int | None
+    result: Any = None
+    error: Exception | None = None
+    died: str | None = None
+    excused: bool = False
+    said: Any = None
+    worker: str = ""

@@ -1,0 +1,213 @@
+"""What is read of a robot's URDF once, for any number of worlds: SAPIEN's builder, and its check.
+
+SAPIEN leaves out what it cannot read and says so only in its log. So it is given only what a URDF's
+model has let through, and what it built is compared with that model.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import sapien
+import sapien.physx as physx
+from sapien.wrapper.urdf_loader import URDFLoader
+
+from robots import AssetError, RobotDescriptor
+from robots.mesh_files import load_scene, read_corners
+from robots.srdf import ExcludedPair, read_excluded_pairs
+from robots.urdf_model import UrdfModel, read_model
+from robots.urdf_paths import resolve
+from robots.urdf_shapes import UrdfShape
+from robots.urdf_xml import parse_urdf, read_urdf
+
+MOST_PAIRS = 31  # that SAPIEN's loader can keep apart: a bit each
+
+# What physics and pictures need of a URDF; SAPIEN stumbles over some of the rest.
+ELEMENTS = ("link", "joint", "material")
+JOINT_PARTS = ("parent", "child", "origin", "axis")
+MOVING_PARTS = (*JOINT_PARTS, "limit", "dynamics", "mimic")
+DEFAULTS = {"limit": ("lower", "upper"), "dynamics": ("damping", "friction")}  # 0, if left out
+
+
+@dataclass
+class Blueprint:
+    """A robot as its files describe it; it builds as often as it is asked to.
+
+    Attributes:
+        urdf: Its URDF.
+        model: What that describes.
+        builder: SAPIEN's builder of an articulation.
+        checked: Whether an articulation that it built was compared with the model.
+    """
+
+    urdf: Path
+    model: UrdfModel
+    builder: Any
+    checked: bool = False
+
+    def build(self, scene: sapien.Scene, pose: sapien.Pose) -> Any:
+        """Build an articulation in a scene and return it.
+
+        Args:
+            scene: SAPIEN's scene.
+            pose: Of its base.
+
+        Raises:
+            AssetError: If SAPIEN left out a collision shape.
+        """
+        self.builder.set_scene(scene)
+        self.builder.set_initial_pose(pose)
+        articulation = self.builder.build()
+        self.builder.set_scene(None)  # else it would keep the scene alive
+        articulation.set_root_pose(pose)
+        if not self.checked:
+            _expect_all_shapes(articulation, self.model, self.urdf)
+            self.checked = True
+        return articulation
+
+
+def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
+    """Read a robot's files, once for any number of worlds with the same physics settings.
+
+    Args:
+        descriptor: The robot.
+        visuals: Whether to read what pictures need.
+
+    Raises:
+        AssetError: If its files cannot be found, or make no sense.
+        MissingPackageError: If a mesh cannot be read for want of a package.
+    """
+    urdf = descriptor.urdf.locate(pictures=visuals)
+    contents = read_urdf(urdf)
+    model = read_model(contents, urdf.as_posix())
+    _expect_meshes(model, urdf, visuals=visuals)
+    loader: Any = _Loader()
+    loader.set_scene(sapien.Scene([]))  # which hands out empty builders and is not built in
+    loader.fix_root_link = True
+    if material := descriptor.gripper_material:
+        friction = material.static_friction, material.dynamic_friction, material.restitution
+        for link in material.links:
+            loader.set_link_material(link, *friction)
+            loader.set_link_patch_radius(link, material.patch_radius)
+            loader.set_link_min_patch_radius(link, material.patch_radius)
+    text = _for_sapien(parse_urdf(contents, urdf.as_posix()), visuals=visuals)
+    pairs = _pairs(read_excluded_pairs(urdf), model, urdf)
+    try:
+        builder = loader.load_text(text, urdf, pairs)
+    except Exception as error:  # SAPIEN's parser raises whatever it meets
+        raise AssetError(
+            f"SAPIEN cannot read {urdf}: {str(error) or type(error).__name__}"
+        ) from error
+    return Blueprint(urdf, model, builder)
+
+
+class _Loader(URDFLoader):
+    """A URDF loader that takes text, and finds every mesh that a locator found.
+
+    SAPIEN's own drops meshes of a ``package://`` whose folder has another name, saying so only in
+    its log.
+    """
+
+    def load_text(self, text: str, urdf: Path, pairs: list[set[str]]) -> Any:
+        """Return a builder for the one articulation of a URDF.
+
+        Args:
+            text: The URDF's XML.
+            urdf: Its path, for what it refers to.
+            pairs: Links that may overlap.
+        """
+        self.package_dir = None
+        self.urdf, self.urdf_dir = urdf.as_posix(), str(urdf.parent)
+        self.ignore_pairs = pairs
+        builders, actors, _ = self._parse_urdf(text)
+        if len(builders) != 1 or actors:
+            raise AssetError(f"{urdf} describes no single robot with joints")
+        return builders[0]
+
+    def _build_link(self, link: Any, link_builder: Any) -> None:
+        for part in (*link.collisions, *link.visuals):
+            mesh = part.geometry.mesh
+            if mesh is not None:
+                mesh.filename = resolve(mesh.filename, self.urdf, os.path.isfile)
+        super()._build_link(link, link_builder)
+
+
+def _for_sapien(root: ElementTree.Element, *, visuals: bool) -> str:
+    """Return a URDF's XML without what neither physics nor pictures use, and with defaults."""
+    for element in list(root):
+        if element.tag not in ELEMENTS or (element.tag == "material" and not visuals):
+            root.remove(element)
+    for joint in root.iterfind("joint"):
+        used = JOINT_PARTS if joint.get("type") == "fixed" else MOVING_PARTS
+        for part in list(joint):
+            if part.tag not in used:
+                joint.remove(part)
+            for key in DEFAULTS.get(part.tag, ()):
+                part.set(key, part.get(key, "0"))
+    for link in root.iterfind("link") if not visuals else ():
+        for visual in link.findall("visual"):
+            link.remove(visual)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _pairs(excluded: Iterable[ExcludedPair], model: UrdfModel, urdf: Path) -> list[set[str]]:
+    """Return the pairs of an SRDF that physics leaves out, which SAPIEN takes by their reason."""
+    known = set(model.links)
+    pairs = [
+        set(pair.links)
+        for pair in excluded
+        if pair.reason.lower() == "default" and len(known & set(pair.links)) == 2
+    ]
+    joined = [{joint.parent, joint.child} for joint in model.joints]
+    apart = sum(pair not in joined for pair in pairs)
+    if apart > MOST_PAIRS:
+        raise AssetError(
+            f"the SRDF beside {urdf} leaves {apart} pairs of links out of collisions; SAPIEN can do"
+            f" so with {MOST_PAIRS} at most"
+        )
+    return pairs
+
+
+def _expect_meshes(model: UrdfModel, urdf: Path, *, visuals: bool) -> None:
+    """Refuse meshes that the checks of a layout and its pictures would refuse."""
+    for shape in _meshes(model.collisions.values()):
+        read_corners(_path(shape, urdf), shape.sizes, shape.where, urdf.as_posix())
+    for shape in _meshes(model.visuals.values()) if visuals else ():
+        load_scene(_path(shape, urdf), shape.where, urdf.as_posix())
+
+
+def _path(mesh: UrdfShape, urdf: Path) -> str:
+    return resolve(mesh.file, urdf.as_posix(), os.path.isfile)
+
+
+def _meshes(links: Iterable[tuple[UrdfShape, ...]]) -> Iterable[UrdfShape]:
+    return (shape for shapes in links for shape in shapes if shape.kind == "mesh")
+
+
+def _expect_all_shapes(articulation: Any, model: UrdfModel, urdf: Path) -> None:
+    """Refuse an articulation that lacks a shape of its URDF; SAPIEN makes one of each."""
+    for link in articulation.links:
+        shapes = model.collisions.get(link.name, ())
+        made = len(link.collision_shapes)
+        if made != len(shapes):
+            files = [f"{shape.file!r}" for shape in shapes if _cannot_cook(shape, urdf)]
+            raise AssetError(
+                f"{urdf}, link {link.name!r}: SAPIEN made {made} of its {len(shapes)} collision"
+                f" shapes; it cannot make a convex body of {', '.join(files) or 'the others'}"
+            )
+
+
+def _cannot_cook(shape: UrdfShape, urdf: Path) -> bool:
+    if shape.kind != "mesh":
+        return False
+    scale, material = list(shape.sizes), physx.get_default_material()
+    try:
+        physx.PhysxCollisionShapeConvexMesh(_path(shape, urdf), scale, material)
+    except RuntimeError:
+        return True
+    return False

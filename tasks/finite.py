@@ -1,0 +1,80 @@
+"""What is said when something that comes out of a step is not finite: a body, a number observed.
+
+NaN spreads without a word: through observations into a policy's weights, through rewards into its
+returns. So everything is looked at, which takes about a microsecond a step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NoReturn
+
+import numpy as np
+
+from robots import SimulationError, TaskError
+from simulation import State
+from simulation.maths import Array, all_finite
+
+
+class NotFinite(Exception):
+    """An observation has numbers that are not finite; the task says which."""
+
+
+def refuse_state(state: State, elapsed: Array) -> NoReturn:
+    """Refuse a state in which something is nowhere.
+
+    Args:
+        state: What the worlds look like.
+        elapsed: Steps of each environment's episode, (N,).
+
+    Raises:
+        SimulationError: Always; names robot or body, environment and step.
+    """
+    what, env = state.lost() or ("a frame", 0)
+    raise SimulationError(
+        f"physics diverged: {what} has numbers that are not finite in environment {env} at step"
+        f" {elapsed[env]}; reset(options={{'reconfigure': True}}) builds its world anew"
+    )
+
+
+def refuse_reward(reward: Array, task: object, elapsed: Array) -> NoReturn:
+    """Refuse rewards that are not finite.
+
+    Args:
+        reward: (N,).
+        task: The task.
+        elapsed: Steps of each environment's episode, (N,).
+
+    Raises:
+        TaskError: Always; names environment and step.
+    """
+    _refuse(f"{type(task).__name__}.dense_reward() returned", reward, elapsed)
+
+
+def refuse_observation(
+    state: State, parts: Mapping[str, Array], task: object, elapsed: Array
+) -> NoReturn:
+    """Refuse observations that are not finite.
+
+    Args:
+        state: What the worlds look like.
+        parts: What the task observes of them.
+        task: The task.
+        elapsed: Steps of each environment's episode, (N,).
+
+    Raises:
+        TaskError: If a part of the task's is not; names it, environment and step.
+        SimulationError: If it is the robots' own.
+    """
+    for name, part in parts.items():
+        if not all_finite(part):
+            _refuse(f"{type(task).__name__}.observe(): {name!r} is", part, elapsed)
+    refuse_state(state, elapsed)
+
+
+def _refuse(what: str, values: Array, elapsed: Array) -> NoReturn:
+    env = int(np.argwhere(~np.isfinite(values))[0][0])
+    wrong = values[env][~np.isfinite(values[env])].ravel()[0]
+    raise TaskError(
+        f"{what} {wrong} in environment {env} at step {elapsed[env]}; it must be finite"
+    )

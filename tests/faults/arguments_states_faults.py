@@ -1,0 +1,317 @@
+"""States that make no sense, and tasks whose numbers are not finite."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from robots import RobotLayoutsError
+from tests.faults.fault import GOES_ON, Fault
+
+AREA = "arguments"
+ONE, TWO = "PickCube-v1", "TwoRobotPickCube-v1"
+ENTRIES = {
+    ONE: {"actors": ("cube", "goal_site"), "articulations": ("panda",)},
+    TWO: {"actors": ("cube",), "articulations": ("panda_wristcam-agent-1",)},
+}
+PLACES = {"a position": 1, "a quaternion": 4, "a velocity": 8, "a spin": 12}
+JOINTS = {"qpos": 15, "a finger's qpos": 21, "qvel": 23}
+NOT_FINITE = (math.nan, math.inf, -math.inf)
+
+# What an entry may not be: from the entry as it is, (2, k).
+SPOILT: dict[str, Callable[[Any], Any]] = {
+    "a list of zeros": lambda x: [[0.0] * x.shape[1]] * 2,
+    "integers that are zero": lambda x: np.zeros(x.shape, int),
+    "one row too few": lambda x: x[:1],
+    "one row too many": lambda x: np.concatenate([x, x[:1]]),
+    "one number too few": lambda x: x[:, :-1],
+    "one number too many": lambda x: np.concatenate([x, x[:, :1]], 1),
+    "another dimension": lambda x: x[None],
+    "a single row": lambda x: x[0],
+    "nothing": lambda x: None,
+    "a number": lambda x: 5,
+    "a text": lambda x: "home",
+    "texts": lambda x: x.astype(str),
+    "truth values": lambda x: x.astype(bool),
+    "complex numbers": lambda x: x.astype(complex),
+    "objects": lambda x: x.astype(object),
+    "bytes": lambda x: x.tobytes(),
+    "a ragged list": lambda x: [x[0].tolist(), [0.0]],
+    "a dict": lambda x: {"pose": x},
+    "an empty list": lambda x: [],
+    "a zero quaternion": lambda x: _with(x, slice(3, 7), 0.0),
+    "a short quaternion": lambda x: _with(x, slice(3, 7), (0.5, 0.0, 0.0, 0.0)),
+    "a long quaternion": lambda x: _with(x, slice(3, 7), (2.0, 0.0, 0.0, 0.0)),
+    "a quaternion of 1e30": lambda x: _with(x, slice(3, 7), (1e30, 0.0, 0.0, 0.0)),
+    "a position of 1e30 m": lambda x: _with(x, 0, 1e30),
+    "a position of 1e300 m": lambda x: _with(x.astype(float), 0, 1e300),
+    "a velocity of 1e30 m/s": lambda x: _with(x, 7, 1e30),
+}
+SPOILT_JOINTS: dict[str, Callable[[Any], Any]] = {
+    "joints at 1e30": lambda x: _with(x, slice(13, 22), 1e30),
+    "a joint at 1e9": lambda x: _with(x, 14, 1e9),
+    "joints in degrees": lambda x: _with(x, slice(13, 20), 90.0),
+    "fingers at 100 m": lambda x: _with(x, 21, 100.0),
+    "joint speeds of 1e30": lambda x: _with(x, slice(22, 31), 1e30),
+}
+SPOILT_STATES: dict[str, Callable[[Any], Any]] = {
+    "None": lambda s: None,
+    "a list": lambda s: [s],
+    "a number": lambda s: 5,
+    "a text": lambda s: "start",
+    "a list of groups": lambda s: list(s),
+    "an unknown group": lambda s: {**s, "actor": {}},
+    "a group that is a number": lambda s: {1: {}},
+    "a group of nothing": lambda s: {**s, "actors": None},
+    "a group that is a list": lambda s: {**s, "actors": [1, 2]},
+    "an entry as the group": lambda s: {"actors": s["actors"]["cube"]},
+    "an unknown body": lambda s: {"actors": {"cub": s["actors"]["cube"]}},
+    "a body that is a number": lambda s: {"actors": {5: s["actors"]["cube"]}},
+    "a body among the robots": lambda s: {"articulations": {"cube": s["actors"]["cube"]}},
+    "a good body before an unknown one": lambda s: {
+        "actors": {"cube": s["actors"]["cube"] * 1, "nobody": s["actors"]["cube"]}
+    },
+}
+# What is a state all the same.
+GOOD: dict[str, Callable[[Any], Any]] = {
+    "as it is": lambda s: s,
+    "twice as exact": lambda s: _each(s, lambda x: x.double()),
+    "as lists": lambda s: _each(s, lambda x: x.tolist()),
+    "as arrays": lambda s: _each(s, lambda x: x.numpy()),
+    "in another order": lambda s: {g: dict(reversed(e.items())) for g, e in reversed(s.items())},
+    "only a part": lambda s: {"actors": {"cube": s["actors"]["cube"]}},
+    "with gradients": lambda s: _each(s, lambda x: x.clone().requires_grad_()),
+    "nothing at all": lambda s: {},
+    "quaternions of four digits": lambda s: _each(s, lambda x: _rounded(x)),
+    "joints a little beyond their limits": lambda s: _beyond(s),
+}
+
+
+def faults() -> Iterator[Fault]:
+    """Go through this area's faults."""
+    for task_id, groups in ENTRIES.items():
+        for group, keys in groups.items():
+            places = {**PLACES, **JOINTS} if group == "articulations" else PLACES
+            spoilt = {**SPOILT, **SPOILT_JOINTS} if group == "articulations" else SPOILT
+            for key in keys:
+                for name, place in places.items():
+                    for value in NOT_FINITE:
+                        what = f"state: {name} of {task_id}'s {key} is {value}"
+                        spoil = partial(_with, place=place, value=value)
+                        yield Fault(AREA, what, partial(_set, task_id, group, key, spoil))
+                for name, spoil in spoilt.items():
+                    what = f"state: {name} for {task_id}'s {key}"
+                    yield Fault(AREA, what, partial(_set, task_id, group, key, spoil))
+    for name, spoil in SPOILT_STATES.items():
+        yield Fault(AREA, f"state: {name}", partial(_set_all, spoil))
+    for name, change in GOOD.items():
+        yield Fault(AREA, f"state: {name}", partial(_goes_back, change), GOES_ON)
+    for mode in ("normalized_dense", "dense"):
+        for value in NOT_FINITE:
+            for env in (0, 1):
+                what = f"a {mode} reward of {value} in environment {env}"
+                yield Fault(AREA, what, partial(_bad_reward, mode, value, env))
+    for name, earned in {"nan": math.nan, "inf": math.inf, "None": None, "a text": "1,5"}.items():
+        yield Fault(AREA, f"a robot's own reward of {name}", partial(_robot_reward, earned))
+    for obs_mode in ("state", "state_dict"):
+        for value in NOT_FINITE:
+            for call in ("reset", "step"):
+                what = f"an observation of {value} at a {call}, {obs_mode}"
+                yield Fault(AREA, what, partial(_bad_observation, obs_mode, value, call))
+    for obs_mode in ("state", "state_dict", "none"):
+        what = f"a body that physics loses, {obs_mode}"
+        yield Fault(AREA, what, partial(_lost, obs_mode))
+    yield Fault(AREA, "a reward of 1e30, which is finite", _large_reward, GOES_ON)
+    yield Fault(AREA, "a world that physics lost is rebuilt", _found_again, GOES_ON)
+    for key in ("seed", "reconfigure"):
+        yield Fault(AREA, f"evaluate() returns {key!r}", partial(_taken, key))
+
+
+@functools.cache
+def _task(task_id: str) -> Any:
+    import tasks
+
+    return tasks.make(task_id, num_envs=2)
+
+
+def _state(env: Any) -> Any:
+    return {g: {k: x.clone() for k, x in e.items()} for g, e in env.get_state_dict().items()}
+
+
+def _with(array: Any, place: Any, value: Any) -> Any:
+    """Return the entry with some numbers of the second environment replaced."""
+    changed = np.array(array)
+    changed[1, place] = value
+    return changed
+
+
+def _each(state: Any, change: Callable[[Any], Any]) -> Any:
+    return {g: {k: change(x) for k, x in entries.items()} for g, entries in state.items()}
+
+
+def _rounded(entry: Any) -> Any:
+    entry[:, 3:7] = (entry[:, 3:7] * 1e4).round() / 1e4
+    return entry
+
+
+def _beyond(state: Any) -> Any:
+    state["articulations"]["panda"][:, 20:22] = -0.002  # fingers (m)
+    state["articulations"]["panda"][:, 16] = 0.1  # rad; the fourth joint ends at -0.07
+    return state
+
+
+def _set(task_id: str, group: str, key: str, spoil: Callable[[Any], Any], folder: Path) -> None:
+    env = _task(task_id)
+    env.reset(seed=0)
+    state = _state(env)
+    for entry in state["actors"].values():
+        entry[:, 0] += 0.01  # if anything is set, it is seen
+    state[group][key] = spoil(state[group][key].numpy())
+    _refused_whole(env, state)
+
+
+def _set_all(spoil: Callable[[Any], Any], folder: Path) -> None:
+    env = _task(ONE)
+    env.reset(seed=0)
+    state = _state(env)
+    state["actors"]["cube"][:, 0] += 0.01
+    _refused_whole(env, spoil(state))
+
+
+def _refused_whole(env: Any, state: Any) -> None:
+    before = _state(env)
+    try:
+        env.set_state_dict(state)
+    except RobotLayoutsError:
+        after = env.get_state_dict()
+        for group, entries in before.items():
+            for key, rows in entries.items():
+                assert (rows == after[group][key]).all(), f"{key} was set"
+        raise
+
+
+def _goes_back(change: Callable[[Any], Any], folder: Path) -> str:
+    env = _task(ONE)
+    env.reset(seed=0)
+    env.step(np.ones((2, 8), np.float32))
+    state = _state(env)
+    wanted = change(state)
+    env.reset(seed=1)
+    env.set_state_dict(wanted)
+    got = env.get_state_dict()
+    for group, entries in wanted.items():
+        for key, rows in entries.items():
+            given = rows.detach().numpy() if hasattr(rows, "detach") else rows
+            np.testing.assert_allclose(got[group][key], np.asarray(given), atol=1e-4)
+    obs, *_ = env.step(np.zeros((2, 8), np.float32))
+    assert obs.isfinite().all()
+    return "set, and the next step is finite"
+
+
+def _spoilt_task(**methods: Any) -> Any:
+    """Make PickCube with other methods, two environments."""
+    from tasks.pick_cube import PickCube
+
+    return type("Mine", (PickCube,), methods)
+
+
+def _bad_reward(mode: str, value: float, env: int, folder: Path) -> None:
+    def dense_reward(self: Any, state: Any, action: Any, info: Any) -> Any:
+        reward = np.zeros(self.num_envs, np.float32)
+        reward[env] = value if info["elapsed_steps"][env] == 3 else 1.0
+        return reward
+
+    task = _made(_spoilt_task(dense_reward=dense_reward), reward_mode=mode)
+    _expect_step(task, 3, rf"dense_reward\(\) returned .* in environment {env} at step 3")
+
+
+def _bad_observation(obs_mode: str, value: float, call: str, folder: Path) -> None:
+    def observe(self: Any, state: Any, info: Any) -> Any:
+        goal = np.zeros((self.num_envs, 3), np.float32)
+        if info["elapsed_steps"][1] == (0 if call == "reset" else 2):
+            goal[1, 2] = value
+        return {"goal": goal}
+
+    cls = _spoilt_task(observe=observe)
+    if call == "reset":
+        _made(cls, obs_mode=obs_mode)
+    _expect_step(_made(cls, obs_mode=obs_mode), 2, "'goal' is .* in environment 1 at step 2")
+
+
+def _robot_reward(earned: Any, folder: Path) -> None:
+    import tasks
+
+    env = tasks.parallel_env(ONE, robot_reward=lambda *_: earned)
+    env.reset(seed=0)
+    env.step({"arm": np.zeros(8, np.float32)})
+
+
+def _lost(obs_mode: str, folder: Path) -> None:
+    from tasks.pick_cube import PickCube
+
+    task = _made(PickCube, obs_mode=obs_mode)
+    task.step(np.zeros((2, 8), np.float32))
+    _lose(task)
+    _expect_step(task, 1, "body 'cube' has numbers that are not finite in environment 1 at step 2")
+
+
+def _lose(task: Any) -> None:
+    """Push a body so that physics cannot follow."""
+    cube = task.simulation.worlds[1].bodies["cube"].component
+    cube.set_linear_velocity([math.inf, 0.0, 0.0])
+
+
+def _found_again(folder: Path) -> str:
+    from tasks.pick_cube import PickCube
+
+    task, other = _made(PickCube), _made(PickCube)
+    _lose(task)
+    with pytest.raises(RobotLayoutsError, match="physics diverged"):
+        task.step(np.zeros((2, 8), np.float32))
+    rebuilt = {"reconfigure": True}
+    assert (task.reset(seed=4, options=rebuilt)[0] == other.reset(seed=4, options=rebuilt)[0]).all()
+    action = np.ones((2, 8), np.float32)
+    for _ in range(5):
+        assert (task.step(action)[0] == other.step(action)[0]).all()
+    return "as if nothing had happened, to the last bit"
+
+
+def _large_reward(folder: Path) -> str:
+    def dense_reward(self: Any, state: Any, action: Any, info: Any) -> Any:
+        return np.full(self.num_envs, 1e30, np.float32)
+
+    task = _made(_spoilt_task(dense_reward=dense_reward), reward_mode="dense")
+    assert task.step(np.zeros((2, 8), np.float32))[1].tolist() == [np.float32(1e30)] * 2
+    return "a reward of 1e30"
+
+
+def _taken(key: str, folder: Path) -> None:
+    from tasks.pick_cube import PickCube
+
+    def evaluate(self: Any, state: Any) -> Any:
+        return {**PickCube.evaluate(self, state), key: np.zeros(self.num_envs)}
+
+    _made(_spoilt_task(evaluate=evaluate))
+
+
+def _made(cls: Any, **fields: Any) -> Any:
+    scenario = cls.scenario
+    for name, value in {"num_envs": 2, **fields}.items():
+        setattr(scenario, name, value)
+    return cls(scenario)
+
+
+def _expect_step(task: Any, steps: int, message: str) -> None:
+    """Play until the last of some steps, which is refused with a message."""
+    for _ in range(steps - 1):
+        task.step(np.zeros((2, 8), np.float32))
+    with pytest.raises(RobotLayoutsError, match=message) as caught:
+        task.step(np.zeros((2, 8), np.float32))
+    raise caught.value

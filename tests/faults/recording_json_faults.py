@@ -1,0 +1,262 @@
+"""Hostile json beside a recording: every field with every wrong value, and files that are none."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tests.faults.fault import GOES_ON, Fault
+from tests.faults.recording_files import (
+    AREA,
+    contents,
+    edit_json,
+    expect_whole,
+    read,
+    recording,
+)
+
+NOT_NUMBERS = ("seven", 3.5, -1, True, [], {}, float("nan"), 10**30)
+NOT_OBJECTS = ("text", 3, [], ["a", "b"], True)
+NOT_TEXTS = (3, True, ["a"], {"a": "b"})
+
+# Where a field is, and what it must not be.
+FIELDS: dict[tuple[str | int, ...], tuple[Any, ...]] = {
+    ("env_info",): (*NOT_OBJECTS, None),
+    ("env_info", "env_id"): (*NOT_TEXTS, None, "", "x" * 10**6, "No-Such-Task-v1"),
+    ("env_info", "env_kwargs"): NOT_OBJECTS,
+    ("env_info", "env_kwargs", "control_mode"): NOT_TEXTS[:3],
+    ("env_info", "env_kwargs", "sim_backend"): NOT_TEXTS,
+    ("env_info", "max_episode_steps"): (*NOT_NUMBERS, 0),
+    ("source_type",): NOT_TEXTS,
+    ("source_desc",): NOT_TEXTS,
+    ("episodes",): ("text", 3, {}, None, ["a"], [3], [None], [[]]),
+    ("episodes", 1): ("text", 3, [], None, {}),
+    ("episodes", 1, "episode_id"): (*NOT_NUMBERS, None, 0, 99),
+    ("episodes", 1, "episode_seed"): ("seven", 3.5, -1, True, {}, 10**30, ["a"], [-1], 13),
+    ("episodes", 1, "control_mode"): (*NOT_TEXTS, "", {"arm": 3}, "pd_ee_pose", "pd_joint_pos"),
+    ("episodes", 1, "elapsed_steps"): (*NOT_NUMBERS, 0, 3, 5, 10**6, 10**6 + 1),
+    ("episodes", 1, "reset_kwargs"): NOT_OBJECTS,
+    ("episodes", 1, "reset_kwargs", "seed"): ("seven", 3.5, -1, True, {}, 10**30, 2**32, ["a"]),
+    ("episodes", 1, "reset_kwargs", "options"): NOT_OBJECTS,
+    ("episodes", 1, "success"): ("yes", [], {}, [True]),
+}
+
+_ABSENT = (("env_info",), ("episodes",), ("env_info", "env_id"), ("episodes", 1, "episode_id"))
+
+
+def faults() -> Iterator[Fault]:
+    """Go through them."""
+    for place, values in FIELDS.items():
+        name = ".".join(map(str, place))
+        for value in values:
+            yield Fault(
+                AREA,
+                f"json: {name} is {value!r:.40}",
+                lambda folder, p=place, v=value: _change(folder, p, v),
+            )
+    for place in _ABSENT:
+        yield Fault(
+            AREA,
+            f"json: no {'.'.join(map(str, place))}",
+            lambda folder, p=place: _remove(folder, p),
+        )
+    for what, make in _FILES.items():
+        yield Fault(AREA, f"json: the file is {what}", lambda folder, m=make: _put(folder, m))
+    for what, edit in _HARMLESS.items():
+        yield Fault(AREA, f"json: {what}", lambda folder, e=edit: _harmless(folder, e), GOES_ON)
+    for what, make in _NPZ.items():
+        yield Fault(AREA, f"npz: {what}", lambda folder, m=make: _npz(folder, m))
+
+
+def _inside(summary: Any, place: tuple[str | int, ...]) -> Any:
+    for key in place[:-1]:
+        summary = summary[key]
+    return summary
+
+
+def _change(folder: Path, place: tuple[str | int, ...], value: Any) -> None:
+    path = recording(folder)
+    edit_json(path, lambda summary: _inside(summary, place).__setitem__(place[-1], value))
+    _play(path)
+
+
+def _remove(folder: Path, place: tuple[str | int, ...]) -> None:
+    path = recording(folder)
+    edit_json(path, lambda summary: _inside(summary, place).pop(place[-1]))
+    _play(path)
+
+
+def _play(path: Path) -> None:
+    """Do with a recording what a replay does before it plays."""
+    from rollouts.replay import open_recording, task_for
+
+    with open_recording(path, None) as file:
+        task_for(file).close()
+    read(path)
+
+
+def _put(folder: Path, make: Callable[[Path], Any]) -> None:
+    path = recording(folder)
+    path.with_suffix(".json").unlink()
+    make(path.with_suffix(".json"))
+    read(path)
+
+
+def _bytes(make: Callable[[bytes], bytes]) -> Callable[[Path], Any]:
+    return lambda path: path.write_bytes(make(contents()[1]))
+
+
+def _socket(path: Path) -> None:
+    folder = os.open(path.parent, os.O_RDONLY)  # whose own name may be too long for a socket
+    with socket.socket(socket.AF_UNIX) as made:
+        made.bind(f"/proc/self/fd/{folder}/{path.name}")
+    os.close(folder)
+
+
+def _large(path: Path) -> None:
+    with path.open("wb") as file:
+        file.truncate(2**40)  # a terabyte of nothing
+
+
+_FILES: dict[str, Callable[[Path], Any]] = {
+    "missing": lambda path: None,
+    "a directory": lambda path: path.mkdir(),
+    "a FIFO": os.mkfifo,
+    "a socket": _socket,
+    "/dev/zero": lambda path: path.symlink_to("/dev/zero"),
+    "/dev/stdin": lambda path: path.symlink_to("/dev/tty"),
+    "a link to itself": lambda path: path.symlink_to(path.name),
+    "a terabyte": _large,
+    "empty": _bytes(lambda content: b""),
+    "zeros": _bytes(lambda content: bytes(100)),
+    "cut in half": _bytes(lambda content: content[: len(content) // 2]),
+    "followed by more": _bytes(lambda content: content + b"x"),
+    "UTF-16": _bytes(lambda content: content.decode().encode("utf-16")),
+    "Latin-1": _bytes(lambda content: content.replace(b"scripted", b"scr\xefpted")),
+    "100,000 lists deep": _bytes(lambda content: b"[" * 100_000),
+    "65 objects deep": _bytes(lambda content: b'{"a":' * 65 + content + b"}" * 65),
+    "deep where nobody looks": _bytes(
+        lambda content: content.replace(b"{", b'{"x": ' + b"[" * 500 + b"]" * 500 + b",", 1)
+    ),
+    "of a key twice": _bytes(lambda content: content.replace(b"{", b'{"episodes": [],', 1)),
+    "of a number of 5,000 digits": _bytes(
+        lambda content: content.replace(b'": 10,', b'": ' + b"9" * 5000 + b",")
+    ),
+    "a list": _bytes(lambda content: b"[1, 2]"),
+    "a number": _bytes(lambda content: b"3"),
+    "null": _bytes(lambda content: b"null"),
+    "a pickle": _bytes(lambda content: b"\x80\x04\x95\x01"),
+}
+
+
+def _harmless(folder: Path, edit: Callable[[Path], None]) -> None:
+    path = recording(folder)
+    edit(path)
+    expect_whole(path)
+
+
+def _edit(edit: Callable[[dict[str, Any]], Any]) -> Callable[[Path], None]:
+    return lambda path: edit_json(path, edit)
+
+
+def _each(edit: Callable[[dict[str, Any]], Any]) -> Callable[[Path], None]:
+    return _edit(lambda summary: [edit(episode) for episode in summary["episodes"]])
+
+
+_HARMLESS: dict[str, Callable[[Path], None]] = {
+    "begins with a byte order mark": lambda path: (
+        path.with_suffix(".json").write_bytes(b"\xef\xbb\xbf" + contents()[1]),
+        None,
+    )[1],
+    "has fields that nobody knows": _edit(lambda s: s.update(more={"x": [1, {"y": None}]})),
+    "has no source": _edit(lambda s: (s.pop("source_type"), s.pop("source_desc"))),
+    "has no limit of steps": _edit(lambda s: s["env_info"].pop("max_episode_steps")),
+    "seeds are lists of one": _each(lambda e: e["reset_kwargs"].update(seed=[e["episode_seed"]])),
+    "options are null": _each(lambda e: e["reset_kwargs"].update(options=None)),
+    "success is null": _each(lambda e: e.update(success=None)),
+    "success is 1": _each(lambda e: e.update(success=1)),
+    "does not say the steps": _each(lambda e: e.pop("elapsed_steps")),
+    "control modes are by robot": _each(lambda e: e.update(control_mode={"a": e["control_mode"]})),
+    "control modes are those of the environment": _each(lambda e: e.pop("control_mode")),
+    "is one line": lambda path: (
+        path.with_suffix(".json").write_text(json.dumps(json.loads(contents()[1]))),
+        None,
+    )[1],
+}
+
+
+def _npz(folder: Path, make: Callable[[Path], None]) -> None:
+    from parity.episodes import load_episodes
+
+    make(folder / "actions.npz")
+    load_episodes(folder / "actions.npz", "PushT-v1", 7)
+
+
+def _arrays(**arrays: Any) -> Callable[[Path], None]:
+    return lambda path: np.savez(path, **arrays)
+
+
+def _large_header(path: Path) -> None:
+    import io
+    import zipfile
+
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        header, {"descr": "<f4", "fortran_order": False, "shape": (10**12, 7)}
+    )
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("seeds.npy", _npy(np.zeros(1, int)))
+        archive.writestr("a0.npy", header.getvalue())
+
+
+def _npy(rows: np.ndarray) -> bytes:
+    import io
+
+    stream = io.BytesIO()
+    np.save(stream, rows)
+    return stream.getvalue()
+
+
+def _bomb(path: Path) -> None:
+    import zipfile
+
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        archive.writestr("seeds.npy", _npy(np.zeros(1, int)))
+        with archive.open("a0.npy", "w", force_zip64=True) as stream:
+            for _ in range(1100):
+                stream.write(bytes(2**20))
+
+
+_ROWS = np.zeros((3, 7), np.float32)
+
+_NPZ: dict[str, Callable[[Path], None]] = {
+    "a FIFO": os.mkfifo,
+    "a directory": lambda path: path.mkdir(),
+    "empty": lambda path: path.touch(),
+    "a text": lambda path: (path.write_text("text"), None)[1],
+    "half a zip": lambda path: (path.write_bytes(b"PK\x03\x04" + bytes(50)), None)[1],
+    "one array": lambda path: (path.write_bytes(_npy(_ROWS)), None)[1],
+    "no seeds": _arrays(a0=_ROWS),
+    "no actions": _arrays(seeds=[0]),
+    "actions of one episode lack": _arrays(seeds=[0, 1], a0=_ROWS),
+    "seeds are texts": _arrays(seeds=["zero"], a0=_ROWS),
+    "a seed is not a number": _arrays(seeds=[np.nan], a0=_ROWS),
+    "a seed is infinite": _arrays(seeds=[np.inf], a0=_ROWS),
+    "a seed is negative": _arrays(seeds=[-1], a0=_ROWS),
+    "a seed is 10^30": _arrays(seeds=[1e30], a0=_ROWS),
+    "actions are objects": _arrays(seeds=[0], a0=np.array([None, {}], object)),
+    "actions are whole numbers": _arrays(seeds=[0], a0=np.zeros((3, 7), int)),
+    "actions are not a number": _arrays(seeds=[0], a0=np.full((3, 7), np.nan, np.float32)),
+    "actions of other robots": _arrays(seeds=[0], a0=np.zeros((3, 8), np.float32)),
+    "actions are one row": _arrays(seeds=[0], a0=np.zeros(7, np.float32)),
+    "no steps": _arrays(seeds=[0], a0=np.zeros((0, 7), np.float32)),
+    "no episodes": _arrays(seeds=np.zeros(0, int)),
+    "a header of 10^12 rows": _large_header,
+    "a zip bomb": _bomb,
+}

@@ -1,0 +1,425 @@
+"""Recordings that stopped halfway: what lies among their parts, and which bits have changed."""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import tempfile
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+
+from tests.faults.fault import GOES_ON, Fault
+from tests.faults.recording_files import (
+    AREA,
+    BODY,
+    SECRET,
+    SEEDS,
+    contents,
+    edit_json,
+    episodes,
+    expect_whole,
+    go_on,
+    recorder,
+    recording,
+)
+
+FIRST, SECOND = "seed-0000000010.part", "seed-0000000011.part"
+
+
+def faults() -> Iterator[Fault]:
+    """Go through them."""
+    for what, put in _FOREIGN.items():
+        yield Fault(AREA, f"parts: {what}", lambda folder, p=put: _foreign(folder, p))
+    for what, damage in _DAMAGES.items():
+        yield Fault(
+            AREA, f"parts: a part is {what}", lambda folder, d=damage: _damaged(folder, d), GOES_ON
+        )
+    for what, edit in _CRAFTED.items():
+        yield Fault(
+            AREA,
+            f"parts: a part with a right checksum has {what}",
+            lambda folder, e=edit: _crafted(folder, e),
+            GOES_ON,
+        )
+    yield Fault(AREA, "parts: two parts have each other's name", _swapped, GOES_ON)
+    yield Fault(AREA, "parts: a part has the name of another seed", _renamed, GOES_ON)
+    yield Fault(AREA, "parts: a part of another task", _other_task)
+    for what, put in _PLACES.items():
+        yield Fault(AREA, f"recording: {what}", lambda folder, p=put: _place(folder, p))
+    for where in ("actions", "rewards", "success", BODY, "episode"):
+        yield Fault(
+            AREA,
+            f"recording: a bit of {where} flips before it goes on",
+            lambda folder, w=where: _flip_and_go_on(folder, w),
+            GOES_ON,
+        )
+        for use in (_replay, _export_lerobot, _export_robomimic, _view):
+            yield Fault(
+                AREA,
+                f"recording: a bit of {where} flips before the {use.__name__.lstrip('_')}",
+                lambda folder, w=where, u=use: _flip_and_use(folder, w, u),
+            )
+    for what, change in _JOINED.items():
+        yield Fault(
+            AREA, f"recording: {what}", lambda folder, c=change: _joined(folder, c), GOES_ON
+        )
+    yield Fault(AREA, "recording: somebody added an array of their own", _added, GOES_ON)
+    yield Fault(AREA, "recording: a group of somebody else is there", _group)
+
+
+def _stopped(folder: Path) -> Path:
+    """Leave a recording as a kill would: three parts and no h5 file; return its path."""
+    path = folder / "trajectory.h5"
+    path.with_suffix(".parts").mkdir()
+    for name, part in _parts().items():
+        (path.with_suffix(".parts") / name).write_bytes(part)
+    return path
+
+
+@functools.cache
+def _parts() -> dict[str, bytes]:
+    with tempfile.TemporaryDirectory() as folder, recorder(Path(folder) / "x.h5") as recording:
+        for episode in episodes():
+            recording.add(episode)
+        return {part.name: part.read_bytes() for part in recording.parts.iterdir()}
+
+
+def _foreign(folder: Path, put: Callable[[Path], Any]) -> None:
+    path = _stopped(folder)
+    put(path.with_suffix(".parts"))
+    before = sorted(path.with_suffix(".parts").iterdir())
+    try:
+        recorder(path, resume=True)
+    finally:
+        assert sorted(path.with_suffix(".parts").iterdir()) == before, "something was deleted"
+
+
+def _fifo(name: str) -> Callable[[Path], None]:
+    return lambda parts: ((parts / name).unlink(missing_ok=True), os.mkfifo(parts / name))[1]
+
+
+def _folder(name: str) -> Callable[[Path], None]:
+    return lambda parts: ((parts / name).unlink(missing_ok=True), (parts / name).mkdir())[1]
+
+
+def _link(name: str, target: str) -> Callable[[Path], None]:
+    def put(parts: Path) -> None:
+        (parts / name).unlink(missing_ok=True)
+        (parts / name).symlink_to(target)
+
+    return put
+
+
+def _file(name: str) -> Callable[[Path], None]:
+    return lambda parts: ((parts / name).write_bytes(SECRET), None)[1]
+
+
+_FOREIGN: dict[str, Callable[[Path], Any]] = {
+    "a part is a FIFO": _fifo(SECOND),
+    "a part is a directory": _folder(SECOND),
+    "a part is a link to another file": _link(SECOND, "/etc/passwd"),
+    "a part is a link to another part": _link(SECOND, FIRST),
+    "a part is a link to itself": _link(SECOND, SECOND),
+    "a part is a link to /dev/zero": _link(SECOND, "/dev/zero"),
+    "a FIFO lies there": _fifo("something"),
+    "a directory lies there": _folder("something"),
+    "a directory as if half written": _folder("seed-0000000013.part.7.partial"),
+    "a FIFO as if half written": _fifo("seed-0000000013.part.7.partial"),
+    "somebody's notes lie there": _file("notes.txt"),
+    "a seed of letters": _file("seed-0000000xyz.part"),
+    "no seed": _file("seed-.part"),
+    "a negative seed": _file("seed--000000001.part"),
+    "a seed of too few digits": _file("seed-12.part"),
+    "a seed of too many digits": _file("seed-00000000012.part"),
+    "a seed beyond all": _file("seed-99999999999.part"),
+    "a seed of Arabic digits": _file(f"seed-{chr(0x661) * 10}.part"),
+    "a seed with a sign": _file("seed-+000000012.part"),
+    "a copy of a part": _file("seed-0000000010.part~"),
+    "a part in capitals": _file("SEED-0000000010.PART"),
+    "a part of an earlier version": _file("seed-0000000009.h5"),
+}
+
+
+def _damaged(folder: Path, damage: Callable[[bytes], bytes]) -> str:
+    path = _stopped(folder)
+    part = path.with_suffix(".parts") / SECOND
+    part.write_bytes(damage(part.read_bytes()))
+    return go_on(path)
+
+
+def _flipped(place: float) -> Callable[[bytes], bytes]:
+    def damage(content: bytes) -> bytes:
+        index = int(place * (len(content) - 1))
+        return content[:index] + bytes([content[index] ^ 4]) + content[index + 1 :]
+
+    return damage
+
+
+_DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "empty": lambda content: b"",
+    "one byte": lambda content: content[:1],
+    "zeros": lambda content: bytes(len(content)),
+    "a text": lambda content: SECRET,
+    "an h5 file": lambda content: contents()[0],
+    "cut in half": lambda content: content[: len(content) // 2],
+    "short of a byte": lambda content: content[:-1],
+    "followed by a byte": lambda content: content + b"\0",
+    "twice itself": lambda content: content * 2,
+    "of another version": lambda content: content.replace(b"episode 1", b"episode 2", 1),
+    **{f"changed in a bit at {place:.0%}": _flipped(place) for place in (0, 0.1, 0.3, 0.5, 0.9, 1)},
+}
+
+
+def _crafted(folder: Path, edit: Callable[[list[Any], bytes], list[Any]]) -> str:
+    """Change a part's content and write the checksum that belongs to it."""
+    path = _stopped(folder)
+    part = path.with_suffix(".parts") / SECOND
+    opening, header, about, numbers = part.read_bytes()[:-4].split(b"\n", 3)
+    lines = edit([json.loads(header), json.loads(about)], numbers)
+    texts = [line if isinstance(line, bytes) else json.dumps(line).encode() for line in lines]
+    content = b"\n".join([opening, *texts[:2], texts[2] if len(texts) > 2 else numbers])
+    part.write_bytes(content + zlib.crc32(content).to_bytes(4, "little"))
+    return go_on(path)
+
+
+def _about(**values: Any) -> Callable[[list[Any], bytes], list[Any]]:
+    return lambda lines, numbers: [lines[0], {**lines[1], **values}]
+
+
+def _episode(**values: Any) -> Callable[[list[Any], bytes], list[Any]]:
+    def edit(lines: list[Any], numbers: bytes) -> list[Any]:
+        header, about = lines
+        episode = {**json.loads(about["attributes"]["episode"]), **values}
+        about["attributes"]["episode"] = json.dumps(episode)
+        return [header, about]
+
+    return edit
+
+
+def _array(index: int, value: Any) -> Callable[[list[Any], bytes], list[Any]]:
+    def edit(lines: list[Any], numbers: bytes) -> list[Any]:
+        lines[1]["arrays"][0][index] = value
+        return lines
+
+    return edit
+
+
+_CRAFTED: dict[str, Callable[[list[Any], bytes], list[Any]]] = {
+    "a header that is not json": lambda lines, numbers: [b"{", lines[1]],
+    "a header that is a list": lambda lines, numbers: [[1], lines[1]],
+    "a header 100,000 deep": lambda lines, numbers: [b"[" * 100_000, lines[1]],
+    "no json of its arrays": lambda lines, numbers: [lines[0], b"nothing"],
+    "a list for its arrays' json": lambda lines, numbers: [lines[0], []],
+    "bytes that are no text": lambda lines, numbers: [lines[0], b"\xff\xfe"],
+    "no arrays": _about(arrays=[]),
+    "arrays that are a number": _about(arrays=3),
+    "arrays that are texts": _about(arrays=["a", "b"]),
+    "arrays of two words": _about(arrays=[["actions", "<f4"]]),
+    "attributes that are a list": _about(attributes=[]),
+    "attributes without an episode": _about(attributes={}),
+    "an attribute that is a number": _about(attributes={"episode": 3}),
+    "an episode that is not json": _about(attributes={"episode": "{"}),
+    **{f"an array called {name!r}": _array(0, name) for name in ("../x", "/x", ".", "", "a\0b", 3)},
+    **{f"an array of kind {kind!r}": _array(1, kind) for kind in ("O", "<U9", "|V8", "x", None)},
+    **{
+        f"an array of shape {shape!r}": _array(2, shape)
+        for shape in ([-1, 7], [2**40, 7], ["4", 7], [4.0, 7], 28, [4, 7] * 40, [10**30], None)
+    },
+    "numbers too few": lambda lines, numbers: [*lines, numbers[:-4]],
+    "numbers too many": lambda lines, numbers: [*lines, numbers + bytes(4)],
+    **{
+        f"an episode with {name} = {value!r}": _episode(**{name: value})
+        for name, value in (
+            *(("episode_seed", value) for value in (12, -1, "11", None, 11.0, [11], True)),
+            *(("elapsed_steps", value) for value in (5, 0, "4", None)),
+            *(("reset_kwargs", value) for value in ("x", [1])),
+            ("control_mode", 3),
+        )
+    },
+}
+
+
+def _swapped(folder: Path) -> str:
+    path = _stopped(folder)
+    parts = path.with_suffix(".parts")
+    (parts / FIRST).write_bytes(_parts()[SECOND])
+    (parts / SECOND).write_bytes(_parts()[FIRST])
+    return go_on(path)
+
+
+def _renamed(folder: Path) -> str:
+    path = _stopped(folder)
+    parts = path.with_suffix(".parts")
+    (parts / SECOND).rename(parts / "seed-0000000099.part")
+    return go_on(path)
+
+
+def _other_task(folder: Path) -> None:
+    import tasks
+    from rollouts.recorder import Recorder
+
+    path = _stopped(folder)
+    Recorder(path, tasks.make("PullCube-v1"), resume=True)
+
+
+def _place(folder: Path, put: Callable[[Path], Any]) -> None:
+    path = folder / "trajectory.h5"
+    put(path)
+    recorder(path, resume=True)
+
+
+def _at(suffix: str, put: Callable[[Path], Any]) -> Callable[[Path], Any]:
+    return lambda path: put(path.with_suffix(suffix))
+
+
+_KINDS: dict[str, Callable[[Path], Any]] = {
+    "a directory": lambda path: path.mkdir(),
+    "a FIFO": os.mkfifo,
+    "/dev/zero": lambda path: path.symlink_to("/dev/zero"),
+    "a file": lambda path: (path.write_bytes(SECRET), None)[1],
+}
+_PLACES: dict[str, Callable[[Path], Any]] = {
+    f"where its {what} belongs is {kind}": _at(suffix, put)
+    for what, suffix in {"h5 file": ".h5", "json": ".json", "folder of parts": ".parts"}.items()
+    for kind, put in _KINDS.items()
+    if (what, kind) not in (("json", "a file"), ("folder of parts", "a directory"))
+}
+
+
+def _flip(path: Path, where: str) -> None:
+    """Change one bit where an array or the text of an attribute is stored."""
+    content = bytearray(path.read_bytes())
+    if where == "episode":
+        place = content.index(b'"elapsed_steps": 4') + 17
+    else:
+        with h5py.File(path) as file:
+            place = file[f"traj_1/{where}"].id.get_offset()
+    content[place] ^= 1
+    path.write_bytes(content)
+
+
+def _flip_and_go_on(folder: Path, where: str) -> str:
+    path = recording(folder)
+    _flip(path, where)
+    return go_on(path)
+
+
+def _flip_and_use(folder: Path, where: str, use: Callable[[Path], Any]) -> None:
+    path = recording(folder)
+    _flip(path, where)
+    use(path)
+
+
+def _replay(path: Path) -> None:
+    from rollouts.replay import open_recording, replay, task_for
+
+    with open_recording(path, None) as file:
+        task = task_for(file)
+        for episode in file:
+            replay(task, episode)
+
+
+def _export_lerobot(path: Path) -> None:
+    _export(path, "lerobot")
+
+
+def _export_robomimic(path: Path) -> None:
+    _export(path, "robomimic")
+
+
+def _export(path: Path, format_name: str) -> None:
+    from rollouts.export.dataset import Export, export
+
+    try:
+        export(Export(path, format_name, path.parent / "out"))
+    finally:
+        assert sorted(p.name for p in path.parent.iterdir()) == [path.name, "trajectory.json"]
+
+
+def _view(path: Path) -> None:
+    from rollouts.replay import open_recording
+    from rollouts.view_command import episode_cell
+
+    with open_recording(path, None) as file:
+        episode_cell(file, 1)
+
+
+def _joined(folder: Path, change: Callable[[Path], None]) -> str:
+    path = recording(folder)
+    change(path)
+    return go_on(path)
+
+
+def _added(folder: Path) -> str:
+    path = recording(folder)
+    _h5(lambda file: file.__setitem__("traj_0/more", [1.0, 2.0]))(path)
+    _h5(lambda file: file["traj_0"].attrs.__setitem__("note", "text"))(path)
+    _h5(lambda file: file.__delitem__("traj_2"))(path)
+    with recorder(path, resume=True) as again:
+        assert again.damaged == []
+        again.add(episodes()[2])
+    expect_whole(path)
+    with h5py.File(path) as file:
+        assert file["traj_0/more"][()].tolist() == [1.0, 2.0]
+        assert file["traj_0"].attrs["note"] == "text"
+    return "it is kept"
+
+
+def _group(folder: Path) -> None:
+    path = recording(folder)
+    _h5(lambda file: file.create_group("mine"))(path)
+    recorder(path, resume=True)
+
+
+def _h5(edit: Callable[[h5py.File], Any]) -> Callable[[Path], None]:
+    def change(path: Path) -> None:
+        with h5py.File(path, "r+") as file:
+            edit(file)
+
+    return change
+
+
+def _swap_groups(file: h5py.File) -> None:
+    file.move("traj_0", "x")
+    file.move("traj_1", "traj_0")
+    file.move("x", "traj_1")
+
+
+_JOINED: dict[str, Callable[[Path], None]] = {
+    "an episode is deleted": _h5(lambda file: file.__delitem__("traj_1")),
+    "an array is deleted": _h5(lambda file: file.__delitem__("traj_1/rewards")),
+    "an array is renamed": _h5(lambda file: file["traj_1"].move("success", "failure")),
+    "an attribute is deleted": _h5(lambda file: file["traj_1"].attrs.__delitem__("action_split")),
+    "an attribute is a number": _h5(lambda file: file["traj_1"].attrs.__setitem__("episode", 3)),
+    "an episode is a link to another file": _h5(
+        lambda file: (
+            file.__delitem__("traj_1"),
+            file.__setitem__("traj_1", h5py.ExternalLink("/etc/passwd", "/")),
+        )
+    ),
+    "an array is in another file": _h5(
+        lambda file: (
+            file.__delitem__("traj_1/rewards"),
+            file["traj_1"].create_dataset("rewards", (4,), "f4", external="/etc/passwd"),
+        )
+    ),
+    "all episodes are deleted": _h5(lambda file: [file.__delitem__(name) for name in list(file)]),
+    "two episodes have each other's group": _h5(_swap_groups),
+    "the checksum is another's": _h5(
+        lambda file: file["traj_1"].attrs.__setitem__("checksum", file["traj_0"].attrs["checksum"])
+    ),
+    "the json is missing": lambda path: path.with_suffix(".json").unlink(),
+    "the json is empty": lambda path: (path.with_suffix(".json").write_text(""), None)[1],
+    "the json lists other seeds": lambda path: edit_json(
+        path, lambda summary: summary["episodes"][0].update(episode_seed=SEEDS[1])
+    ),
+    "the json is 100,000 deep": lambda path: (
+        path.with_suffix(".json").write_text("[" * 100_000),
+        None,
+    )[1],
+}

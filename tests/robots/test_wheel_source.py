@@ -1,0 +1,157 @@
+"""The wheel of mani_skill: the user's own pip against a local index that misbehaves."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from robots import AssetError
+from robots.asset_store import AssetStore, FileState
+from robots.assets import ensure
+from robots.manifest import load_manifest
+from robots.wheel_source import ManiSkillWheel
+from tests.robots.conftest import PANDA, contents
+from tests.robots.processes import children_of, is_alive, wait_until
+from tests.robots.wheel_index import WheelIndex, build_wheel, members, without_pip_settings
+
+CHECKOUT = Path(__file__).parents[2]
+SMALL = [f for package in load_manifest().packages.values() for f in package.files]
+SMALL = [file for file in SMALL if file.bytes < 50_000]
+FETCH = [sys.executable, "-m", "robots.fetch_assets", "panda", "--physics-only", "--source"]
+
+
+@pytest.fixture(scope="module")
+def wheel() -> bytes:
+    """A wheel with all robot files but the large ones."""
+    return build_wheel(members(SMALL, contents))
+
+
+@pytest.fixture
+def index(wheel, monkeypatch):
+    with without_pip_settings(), WheelIndex(wheel) as server:
+        for name, value in server.settings().items():
+            monkeypatch.setenv(name, value)
+        yield server
+
+
+def start_fetch() -> subprocess.Popen[str]:
+    return subprocess.Popen([*FETCH, "wheel"], cwd=CHECKOUT, stderr=subprocess.PIPE, text=True)
+
+
+def test_one_download_brings_the_files_of_all_robots_with_their_licences(
+    index, store, physics, capfd
+):
+    ensure(physics, store, [ManiSkillWheel()])
+    assert index.downloads == 1
+    assert store.unusable(SMALL) == []
+    said = capfd.readouterr().err
+    assert "keeping what came along of maniskill_so100\n" in said
+    assert "licence Apache-2.0" in said
+    index.requests.clear()
+    for package in load_manifest().packages.values():  # as a demonstration does, group by group
+        small = [file for file in package.files if file in set(SMALL)]
+        ensure(small, store, [ManiSkillWheel()])
+    assert index.requests == []
+
+
+@pytest.mark.long
+def test_what_comes_along_replaces_nothing_that_is_there(index, store, physics):
+    mine = next(f for f in SMALL if f.origin.name == "maniskill_koch")
+    store.path(mine).parent.mkdir(parents=True)
+    store.path(mine).write_text("my own")
+    ensure(physics, store, [ManiSkillWheel()])
+    assert store.path(mine).read_text() == "my own"
+
+
+def test_two_processes_at_once_download_once(index, store, physics):
+    fetches = [start_fetch(), start_fetch()]
+    said = [fetch.communicate(timeout=120)[1] for fetch in fetches]
+    assert [fetch.returncode for fetch in fetches] == [0, 0], said
+    assert index.downloads == 1
+    assert store.unusable(physics) == []
+
+
+def test_a_fetch_killed_while_pip_downloads_leaves_nothing_behind(index, store, physics):
+    reached, end = threading.Event(), threading.Event()
+
+    def hang(handler, body):
+        reached.set()
+        end.wait(120)
+
+    index.wheel_fault = hang
+    with start_fetch() as process:
+        assert reached.wait(60)
+        (pip,) = children_of(process.pid)
+        os.kill(pip, signal.SIGSTOP)
+        process.kill()
+    wait_until(lambda: not is_alive(pip))
+    end.set()
+    index.wheel_fault = None
+    with start_fetch() as process:
+        said = process.communicate(timeout=120)[1]
+    assert process.returncode == 0, said
+    assert store.unusable(physics) == []
+    assert not (store.root / ".partial").exists()
+
+
+@pytest.mark.long
+def test_pip_that_drips_is_given_up(index, store, physics):
+    end = threading.Event()
+
+    def drip(handler, body):
+        handler.send_response(200)
+        handler.send_header("Content-Length", str(len(body)))
+        handler.end_headers()
+        for byte in body:
+            handler.wfile.write(bytes([byte]))
+            if end.wait(0.05):
+                return
+
+    index.wheel_fault = drip
+    with pytest.raises(AssetError, match="next to nothing arrived through pip for 4 s"):
+        ensure(physics, store, [ManiSkillWheel(patience=4.0)])
+    end.set()
+
+
+@pytest.mark.long
+def test_a_member_that_unpacks_to_more_than_it_may_is_not_unpacked(index, store, physics):
+    bomb = physics[0]
+    packed = members(physics, contents)
+    packed[f"mani_skill/{bomb.origin.mani_skill}/{bomb.path}"] = bytes(3 * 10**7)
+    index.wheel = build_wheel(packed)
+    expected = rf"twice: {bomb} \(more than {bomb.bytes:,} bytes\)"
+    with pytest.raises(AssetError, match=expected):
+        ensure(physics, store, [ManiSkillWheel()])
+    assert store.unusable(physics) == [bomb]
+
+
+@pytest.mark.long
+def test_what_comes_along_and_is_wrong_is_no_reason_to_fail(index, store, physics):
+    wrong = next(file for file in PANDA.files if file not in physics)
+    packed = members(physics, contents)
+    packed[f"mani_skill/{wrong.origin.mani_skill}/{wrong.path}"] = b"something else"
+    index.wheel = build_wheel(packed)
+    ensure(physics, store, [ManiSkillWheel()])
+    assert store.unusable(physics) == []
+    assert store.state(wrong) is FileState.MISSING
+    assert index.downloads == 1
+
+
+@pytest.mark.long
+def test_no_room_for_what_comes_along_is_no_reason_to_fail(index, physics, tmp_path, capfd):
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1M", "none", tmp_path]).returncode:
+        pytest.skip("may not mount a small disk")
+    try:
+        store = AssetStore(tmp_path / "assets")
+        index.wheel = build_wheel(members(SMALL, contents))
+        ensure(physics, store, [ManiSkillWheel()])
+        assert store.unusable(physics) == []
+    finally:
+        subprocess.run(["umount", tmp_path], check=True)
+    assert "What came along is not kept" in capfd.readouterr().err

@@ -1,0 +1,136 @@
+"""Tasks that break, each in one place and one way; worker processes import this module."""
+
+import ctypes
+import os
+import sys
+import time
+
+from robots import TaskError
+from tasks.push_cube import PushCube
+from tasks.registry import register_task
+from tasks.task import FIRST_SEED
+
+HOOKS = ("build", "sample", "evaluate", "observe", "dense_reward", "begin_episodes", "respond")
+
+
+class NeedsTwo(Exception):
+    """An error that cannot be pickled."""
+
+    def __init__(self, first, second):
+        super().__init__("needs two")
+
+
+class Wordless(Exception):
+    """An error that cannot even be printed."""
+
+    def __str__(self):
+        raise ValueError("no words")
+
+
+def _recurse():
+    return _recurse()
+
+
+def _raise(error):
+    raise error
+
+
+WAYS = {
+    "ValueError": lambda: _raise(ValueError("on purpose")),
+    "an error in many lines": lambda: _raise(ValueError("on\npurpose\n" * 3)),
+    "an error that cannot be pickled": lambda: _raise(NeedsTwo(1, 2)),
+    "an error that cannot be printed": lambda: _raise(Wordless()),
+    "an OSError": lambda: open("/nowhere"),
+    "an EOFError": lambda: _raise(EOFError("on purpose")),
+    "a BrokenPipeError": lambda: _raise(BrokenPipeError("on purpose")),
+    "endless recursion": _recurse,
+    "a MemoryError": lambda: bytearray(2**62),
+    "KeyboardInterrupt": lambda: _raise(KeyboardInterrupt),
+    "sys.exit": lambda: sys.exit("on purpose"),
+    "os._exit": lambda: os._exit(3),
+    "os.abort": os.abort,
+    "a segmentation fault": lambda: ctypes.string_at(0),
+}
+
+
+class Breaks(PushCube):
+    """Breaks in one of its hooks, at once or after the first step, in the first worker."""
+
+    hook, way, late = "", "ValueError", False
+
+    def __init__(self, scenario, *, first_seed=FIRST_SEED):
+        self._first = first_seed == FIRST_SEED
+        super().__init__(scenario, first_seed=first_seed)
+
+    def meets(self, hook):
+        """Break if this is the place and the time."""
+        if hook == self.hook and self._first and (not self.late or self._elapsed.any()):
+            WAYS[self.way]()
+
+
+def _in_hook(name):
+    inherited = getattr(PushCube, name)
+
+    def hook(self, *args):
+        self.meets(name)
+        return inherited(self, *args)
+
+    return hook
+
+
+def _offer(name, **attributes):
+    hooks = {attributes["hook"]: _in_hook(attributes["hook"])}
+    cls = type(name, (Breaks,), {**attributes, **hooks, "__module__": __name__})
+    globals()[name] = register_task(f"{name}-v1")(cls)
+
+
+for _hook in HOOKS:
+    for _late in (False, True):
+        _offer(f"Breaks_{_hook}_{'late' if _late else 'soon'}", hook=_hook, late=_late)
+for _i, _way in enumerate(WAYS):
+    _offer(f"BreaksBy_{_i}", hook="evaluate", way=_way, late=True)
+
+
+class SlowSteps(PushCube):
+    """Takes its time over every step, in C code that holds no lock."""
+
+    def evaluate(self, state):
+        time.sleep(0.2 if self._elapsed.any() else 0.0)
+        return super().evaluate(state)
+
+
+class BusySteps(PushCube):
+    """Never returns from its first step, in C code that lets no other thread run."""
+
+    def evaluate(self, state):
+        if self._elapsed.any():
+            sum(range(10**12))
+        return super().evaluate(state)
+
+
+class SlowBuild(PushCube):
+    """Takes its time to build a world."""
+
+    def build(self, world):
+        time.sleep(0.5)
+        super().build(world)
+
+
+class Grows(PushCube):
+    """Has other keys after its first reset."""
+
+    def evaluate(self, state):
+        more = {"more": self._elapsed > 0} if self._elapsed.any() else {}
+        return {**super().evaluate(state), **more}
+
+
+for _cls in (SlowSteps, BusySteps, SlowBuild, Grows):
+    register_task(f"{_cls.__name__}-v1")(_cls)
+
+
+@register_task("Refuses-v1")
+class Refuses(PushCube):
+    """Cannot be built, for a reason of ours."""
+
+    def build(self, world):
+        raise TaskError("no such goal")

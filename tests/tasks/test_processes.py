@@ -1,0 +1,352 @@
+"""Worker processes: how they start, what forks and threads may do, what copies and ends leave."""
+
+import copy
+import gc
+import multiprocessing
+import os
+import pickle
+import resource
+import sys
+import threading
+import weakref
+from contextlib import closing, contextmanager, suppress
+from multiprocessing import util
+
+import gymnasium
+import numpy as np
+import pytest
+
+import tasks
+from robots import SimulationError, TaskError
+from rollouts.levels import read_level
+from simulation.rendering import vulkan_problem
+from tasks import processes
+from tasks.fork_server import LOADED
+from tasks.fronts.vector import VectorTask
+from tasks.fronts.workers import WorkerError
+from tests.fresh_process import in_fresh_process
+from tests.tasks import breaking
+
+TASK = "PushCube-v1"
+ACTION = np.full((2, 8), 0.2, np.float32)
+
+
+def vector(workers, task_id=TASK, **fields):
+    return closing(VectorTask(task_id, 2, num_workers=workers, **fields))
+
+
+FRONTS = {
+    "task": lambda: tasks.make(TASK, num_envs=2),
+    "gymnasium": lambda: gymnasium.make(f"RobotLayouts/{TASK}"),
+    "pettingzoo": lambda: tasks.parallel_env(TASK),
+    "sb3": lambda: tasks.sb3_vec_env(TASK, 2, num_workers=0),
+    "vector": lambda: VectorTask(TASK, 2, num_workers=0),
+}
+
+
+def task_of(env):
+    """Return the task behind a front."""
+    env = getattr(env, "unwrapped", env)
+    env = getattr(env, "vector", env)
+    return env._crew._batch._task if hasattr(env, "_crew") else getattr(env, "task", env)
+
+
+# -- what is left ---------------------------------------------------------------------------------
+
+
+@contextmanager
+def no_collector():
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+
+
+@pytest.mark.parametrize("front", FRONTS)
+def test_closing_frees_the_worlds_at_once(front):
+    with no_collector():
+        env = FRONTS[front]()
+        world = weakref.ref(task_of(env).simulation.worlds[0])
+        env.reset()
+        env.close()
+        assert world() is None
+
+
+@pytest.mark.parametrize("front", FRONTS)
+def test_what_nobody_holds_is_freed_unclosed(front):
+    with no_collector():
+        env = FRONTS[front]()
+        world = weakref.ref(task_of(env).simulation.worlds[0])
+        del env
+        assert world() is None
+
+
+def growth(front, cycles):
+    """Return how many MB some cycles of make and close add, after the first 100."""
+    for _ in range(100):
+        FRONTS[front]().close()
+    before = read_level().memory
+    for _ in range(cycles):
+        FRONTS[front]().close()
+    return read_level().memory - before
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("front", ["task", "gymnasium", "vector"])
+def test_memory_is_flat_over_two_thousand_environments(front):
+    assert in_fresh_process(growth, front, 1900) < 5.0
+
+
+def levels(cycles):
+    """Return what this process holds after 20 cycles with two workers, and after all."""
+    found = []
+    for i in range(cycles):
+        with vector(2) as env:
+            env.step(ACTION)
+        if i in (19, cycles - 1):
+            found.append(read_level())
+    return found
+
+
+@pytest.mark.long
+def test_nothing_grows_over_five_hundred_vectors_with_workers():
+    first, last = in_fresh_process(levels, 500)
+    assert last.memory - first.memory < 5.0
+    for quantity in ("descriptors", "threads", "processes", "shared"):
+        assert getattr(last, quantity) == getattr(first, quantity)
+
+
+# -- how they start -------------------------------------------------------------------------------
+
+
+def look_around(connection):
+    loaded = [module in sys.modules for module in LOADED]
+    seen = os.environ.get("ROBOT_LAYOUTS_SEEN"), os.getcwd(), np.random.random()
+    print("printed by a worker", flush=True)
+    connection.send((loaded, seen, os.sched_getaffinity(0)))
+
+
+def in_worker(target):
+    ours, theirs = processes.context.Pipe()
+    process = processes.context.Process(target=target, args=(theirs,), daemon=True)
+    processes.start(process)
+    theirs.close()
+    answer = ours.recv()
+    process.join()
+    assert process.exitcode == 0
+    return answer
+
+
+def test_a_worker_finds_the_libraries_loaded_and_everything_else_as_it_is_now(
+    monkeypatch, tmp_path, capfd
+):
+    _, (_, _, first), _ = in_worker(look_around)
+    monkeypatch.setenv("ROBOT_LAYOUTS_SEEN", "now")
+    monkeypatch.chdir(tmp_path)
+    loaded, (seen, folder, drawn), cores = in_worker(look_around)
+    assert all(loaded)
+    assert (seen, folder) == ("now", str(tmp_path))
+    assert cores == os.sched_getaffinity(0)
+    assert drawn != first  # forks of one process draw different numbers all the same
+    assert capfd.readouterr().out.count("printed by a worker") == 2
+
+
+def test_a_daemonic_process_may_have_a_vector():
+    this = multiprocessing.current_process()
+    this.daemon = True
+    try:
+        with vector(2) as env:
+            assert env.step(ACTION)[0].shape == (2, env.single_observation_space.shape[0])
+        assert this.daemon
+    finally:
+        this.daemon = False
+
+
+@contextmanager
+def descriptors(more):
+    """Allow so many file descriptors more than there are."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    few = len(os.listdir("/proc/self/fd")) - 1 + more
+    resource.setrlimit(resource.RLIMIT_NOFILE, (few, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+@pytest.mark.parametrize("more", [0, 3, 8])
+def test_too_few_descriptors_are_one_error_and_nothing_is_left(more):
+    in_worker(look_around)  # the server is there already
+    before, open_before = multiprocessing.active_children(), len(os.listdir("/proc/self/fd"))
+    with (
+        descriptors(more),
+        pytest.raises(processes.ProcessError, match="Too many open files.*`ulimit -n`"),
+    ):
+        VectorTask(TASK, 8, num_workers=8)
+    assert multiprocessing.active_children() == before
+    assert len(os.listdir("/proc/self/fd")) == open_before
+
+
+# -- errors ---------------------------------------------------------------------------------------
+
+
+def test_an_error_of_a_task_arrives_with_its_traceback_and_no_hint_that_leads_nowhere():
+    with vector(2, "Breaks_evaluate_late-v1") as env:
+        env.reset(seed=30)
+        with pytest.raises(WorkerError) as caught:
+            env.step(ACTION)
+    message, cause = str(caught.value), str(caught.value.__cause__)
+    assert "worker 0 with environments [0] of seeds [30]: process " in message
+    assert "failed in step() with ValueError: on purpose" in message
+    assert "__main__" not in message
+    assert "Traceback (most recent call last)" in cause
+    assert "breaking.py" in cause
+    assert "in step" in cause
+
+
+def test_a_task_that_cannot_be_built_says_where_and_that_there_is_no_vector():
+    with pytest.raises(WorkerError) as caught:
+        VectorTask("Breaks_build_soon-v1", 2, num_workers=2)
+    message, cause = str(caught.value), str(caught.value.__cause__)
+    assert "failed in making its task with ValueError: on purpose" in message
+    assert message.endswith("no vector was made")
+    assert "breaking.py" in cause
+
+
+def test_an_error_of_ours_keeps_its_type_and_says_where_it_came_from():
+    with pytest.raises(TaskError, match="no such goal") as caught:
+        VectorTask("Refuses-v1", 2, num_workers=1)
+    assert "in build" in str(caught.value.__cause__)
+
+
+# -- threads --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("workers", [0, 2])
+def test_a_second_thread_is_refused_at_once_and_the_first_goes_on(workers):
+    with vector(workers, "SlowSteps-v1") as env:
+        env.step(ACTION)
+        results = []
+        thread = threading.Thread(target=lambda: results.append(env.step(ACTION)))
+        thread.start()
+        while not env.busy.locked():
+            pass
+        for call in (lambda: env.step(ACTION), env.reset, env.restart, env.close):
+            with pytest.raises(SimulationError, match="in the middle of another call; give each"):
+                call()
+        thread.join()
+        assert results[0][4]["elapsed_steps"].tolist() == [2, 2]
+        assert env.step(ACTION)[4]["elapsed_steps"].tolist() == [3, 3]
+
+
+# -- forks ----------------------------------------------------------------------------------------
+
+
+def in_fork(call):
+    """Return what a fork says of a call: its result, or its error."""
+    read, write = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        try:
+            answer = call()
+        except Exception as error:
+            answer = error
+        os.write(write, pickle.dumps(answer))
+        os._exit(0)
+    os.close(write)
+    with open(read, "rb") as pipe:
+        answer = pickle.loads(pipe.read())
+    os.waitpid(pid, 0)
+    return answer
+
+
+def test_a_fork_neither_uses_nor_ends_the_workers_of_a_vector():
+    with vector(2) as env:
+        env.reset(seed=1)
+        for call in (lambda: env.step(ACTION), env.reset, env.restart):
+            error = in_fork(call)
+            assert isinstance(error, SimulationError)
+            assert f"belongs to process {os.getpid()}, of which this one is a fork" in str(error)
+        in_fork(lambda: env.close())
+        in_fork(lambda: vars(env).clear())  # as when the collector comes by
+        in_fork(lambda: util._exit_function())  # what multiprocessing does when Python ends
+        assert in_fork(multiprocessing.active_children) == []
+        assert env.step(ACTION)[4]["elapsed_steps"].tolist() == [1, 1]
+
+
+def test_a_task_is_the_same_in_a_fork():
+    with closing(tasks.make(TASK, num_envs=2)) as env:
+        env.reset(seed=1)
+        forked = in_fork(lambda: env.step(ACTION)[0].numpy().tobytes())
+        assert forked == env.step(ACTION)[0].numpy().tobytes()
+
+
+def test_pictures_in_a_fork_are_refused_in_the_place_of_a_hang():
+    if problem := vulkan_problem():
+        pytest.skip(problem)
+    with closing(tasks.make(TASK, render_mode="rgb_array")) as env:
+        picture = env.render()
+        rebuild = {"reconfigure": True}
+        for call in (
+            env.render,
+            lambda: env.reset(options=rebuild),
+            lambda: tasks.make(TASK, render_mode="rgb_array"),
+        ):
+            error = in_fork(call)
+            assert isinstance(error, SimulationError)
+            assert "use spawn in the place of fork" in str(error)
+        assert in_fork(lambda: env.close()) is None  # freeing what draws would hang as well
+        np.testing.assert_array_equal(env.render(), picture)
+
+
+# -- copies ---------------------------------------------------------------------------------------
+
+
+def through_pickle(env):
+    return pickle.loads(pickle.dumps(env))
+
+
+@pytest.mark.parametrize("front", [*FRONTS, "workers"])
+@pytest.mark.parametrize(
+    "make_copy",
+    [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))],
+    ids=["copy", "pickle"],
+)
+def test_a_copy_is_made_alike_and_is_another(front, make_copy):
+    makers = {**FRONTS, "workers": lambda: VectorTask(TASK, 2, num_workers=2)}
+    with closing(makers[front]()) as env:
+        with closing(make_copy(env)) as other:
+            assert type(other) is type(env)
+            theirs = pickle.dumps(begin(other))
+        assert pickle.dumps(begin(env)) == theirs
+
+
+def begin(env):
+    """Begin an episode of one seed and return what is observed, as lists."""
+    if hasattr(env, "env_is_wrapped"):
+        env.seed(5)
+        return env.reset().tolist()
+    obs, _ = env.reset(seed=5)
+    return {k: x.tolist() for k, x in obs.items()} if isinstance(obs, dict) else obs.tolist()
+
+
+def test_a_copy_that_fails_leaves_the_vector_alone():
+    with vector(2) as env:
+        env.reset(seed=1)
+        with descriptors(2), pytest.raises(processes.ProcessError):
+            copy.deepcopy(env)
+        assert env.step(ACTION)[4]["elapsed_steps"].tolist() == [1, 1]
+
+
+def test_a_closed_vector_can_be_pickled():
+    with vector(0) as env:
+        env.close()
+        with closing(through_pickle(env)) as other:
+            other.reset()
+    with suppress(SimulationError):
+        env.reset()
+        raise AssertionError("the closed one is open again")
+
+
+assert breaking  # whose tasks are registered
