@@ -14,6 +14,7 @@ import re
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -224,8 +225,7 @@ def _parse(content: bytes) -> tuple[dict[str, Any], Stored]:
         ValueError: If it is not as `PartWriter` writes it.
     """
     header, about, numbers = content.split(b"\n", 2)
-    described, listed = parse_json(header.decode()), parse_json(about.decode())
-    OBJECT.expect(described, "header")
+    described, listed = _parse_header(header), parse_json(about.decode())
     _CONTENT.expect(listed, "")
     arrays: dict[str, NDArray[Any]] = {}
     start = 0
@@ -241,6 +241,13 @@ def _parse(content: bytes) -> tuple[dict[str, Any], Stored]:
     if start != len(numbers) or len(arrays.get("actions", ())) != about["elapsed_steps"]:
         raise FieldError("its arrays are not those of its steps")
     return described, Stored(listed["attributes"], arrays)
+
+
+@lru_cache(maxsize=1)  # all parts of a recording have the same
+def _parse_header(content: bytes) -> dict[str, Any]:
+    header = parse_json(content.decode())
+    OBJECT.expect(header, "header")
+    return header
 
 
 def _is_part(path: Path) -> bool:

@@ -44,10 +44,10 @@ def test_this_process_plays_the_same():
     assert here.scores == evaluate(lambda obs: policy(obs), TASK, [0], workers=0).scores | {
         seed: here.scores[seed] for seed in (1, 2)
     }
-    assert here.scores == evaluate(Wanders(0.5), TASK, range(3), executor=Here()).scores
     after = torch.get_rng_state(), random.getstate(), torch.get_num_threads()
     assert torch.equal(before[0], after[0])
     assert before[1:] == after[1:]
+    assert here.scores == evaluate(Wanders(0.5), TASK, range(3), executor=Here()).scores
 
 
 def test_a_policy_of_a_notebook():
