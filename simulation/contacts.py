@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from robots import Fingers
-from simulation.arrays import Flags, Floats
+from simulation.maths import Flags, Floats
 from simulation.rotations import rotation_matrix
 from simulation.world import World
 

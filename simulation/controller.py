@@ -9,7 +9,7 @@ import numpy as np
 
 from layouts import Layout
 from robots import JointGroup
-from simulation.arrays import Floats
+from simulation.maths import Floats
 from simulation.world import World
 
 

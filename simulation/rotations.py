@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from simulation.arrays import Floats, arctan2
+from simulation.maths import Floats, arctan2
 
 # Products of quaternion entries (w = 0, x = 1, y = 2, z = 3) that each of the nine matrix entries,
 # row by row, is the sum or difference of.

@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from layouts import Layout
 from robots import RobotDescriptor
+from robots.descriptor import IDENTITY, Quaternion
 from simulation.blueprint import Blueprint
 from simulation.controller import JointPositionController
+from simulation.maths import Array
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, substeps
 from simulation.readout import ReadoutIndex
 from simulation.state import State
@@ -121,6 +123,29 @@ class Simulation:
             seconds += clock() - start
         self.stamp += 1
         return seconds
+
+    def place(
+        self,
+        bodies: str | Sequence[str],
+        positions: Array,
+        quaternion: Quaternion = IDENTITY,
+        *,
+        where: Array,
+    ) -> None:
+        """Move a body in some worlds; `read` sees it.
+
+        Args:
+            bodies: Its name, or one name for each world.
+            positions: Shape (N, 3) (m, world).
+            quaternion: How it is turned, wxyz.
+            where: In which worlds, (N,) bool.
+        """
+        names = [bodies] * len(self.worlds) if isinstance(bodies, str) else bodies
+        rows = zip(self.worlds, names, positions.tolist(), where.tolist(), strict=True)
+        for world, name, position, moved in rows:
+            if moved:
+                world.set_pose(name, position, quaternion)
+        self.stamp += 1
 
     def read(self) -> State:
         """Return what all worlds look like now."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import cache, wraps
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots import Fingers, SimulationError
-from simulation.arrays import Flags, Floats, norm
 from simulation.contacts import LinkTouch, grasped, link_touches, pairwise_forces
+from simulation.maths import Array, Flags, Floats, counted, full, like, norm
 from simulation.rotations import last_euler_angle, rotation_matrix
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 _NOTHING = np.empty(0, np.float32)
 _STILL = np.zeros(3, np.float32)
 _Arguments = ParamSpec("_Arguments")
+_Owner = TypeVar("_Owner")
 _Value = TypeVar("_Value")
 
 
@@ -40,6 +41,21 @@ def _remembered(
         if found is None:
             found = self.memo[key] = compute(self, *args, **kwargs)
         return found
+
+    return look_up
+
+
+def once_per_state(
+    compute: Callable[[_Owner, State], _Value],
+) -> Callable[[_Owner, State], _Value]:
+    """Compute a method of a task once per state: rewards need what success was judged by."""
+
+    @wraps(compute)
+    def look_up(self: _Owner, state: State) -> _Value:
+        value = state.memo.get(compute)
+        if value is None:
+            value = state.memo[compute] = compute(self, state)
+        return value
 
     return look_up
 
@@ -113,6 +129,34 @@ class State:
             if (env := _first_not_finite(self.all_poses[frame])) is not None:
                 return f"body {body!r}", env
         return None
+
+    # -- arrays of one's own -----------------------------------------------------------------
+
+    def array(self, values: Any) -> Floats:
+        """Return numbers as the state's arrays are: float32, where those are.
+
+        Args:
+            values: Nested tuples of numbers, or lists; the array of tuples is kept, and must not
+                be changed.
+        """
+        return like(self.joint_positions, values)
+
+    def full(self, value: float) -> Array:
+        """Return a number or a flag for every environment, shape (N,)."""
+        return full(self.joint_positions, self.num_envs, value)
+
+    def among(self, env_ids: Iterable[int]) -> Flags:
+        """Tell which environments some numbers are, shape (N,) bool."""
+        flags = self.full(False)
+        flags[list(env_ids)] = True
+        return flags
+
+    @property
+    def env_ids(self) -> Array:
+        """The environments' numbers, shape (N,) int64."""
+        return counted(self.joint_positions, self.num_envs)
+
+    # -- frames ------------------------------------------------------------------------------
 
     def poses(self, frames: NDArray[np.intp]) -> Floats:
         """Return a copy of the poses of some frames of `ReadoutIndex`, shape (K, N, 7)."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from layouts import Layout
 from robots import ActionError, UnknownNameError
-from simulation.arrays import all_finite
+from simulation.maths import all_finite
 from tasks.arguments import array_of
 
 

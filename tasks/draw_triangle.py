@@ -6,16 +6,13 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-import torch
-from torch import Tensor
-
 from layouts import Layout, Placement
 from robots import RobotRegistry, SimulationError
 from robots.descriptor import Quaternion
 from simulation import Box, Camera, Cylinder, PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, Floats
+from simulation.maths import Array, concatenate, where, zeros
 from simulation.shapes import Color
+from tasks.outline import near, placed_corners, points_along, side_middles
 from tasks.props import WHITE
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -28,12 +25,12 @@ DOT_THICKNESS = 0.003
 CANVAS_HALF_SIZE = (0.4, 0.6, 0.02 / 2)
 CANVAS_X = -0.1
 CANVAS_TOP = 0.02
+DOT_HEIGHT = DOT_THICKNESS / 2 + CANVAS_TOP
 REACH = CANVAS_TOP + DOT_THICKNESS + 0.005  # a stick below this height draws
 THRESHOLD = 0.025  # between a dot and a point of the outline
 SIDE = 0.3
 BAR_HALF_SIZE = (SIDE / 2, 0.01 / 2, 0.001 / 2)
 BAR_HEIGHT = 0.01
-POINTS_PER_SIDE = 51  # of the outline, a corner and what follows it
 SPAWN_SIZE, SPAWN_OFFSET = 0.02, -0.1
 BRUSH: Color = (0.8, 0.2, 0.2, 1.0)
 INK: Color = (10 / 255, 10 / 255, 10 / 255, 1.0)
@@ -41,7 +38,6 @@ INK: Color = (10 / 255, 10 / 255, 10 / 255, 1.0)
 _FLAT: Quaternion = (math.cos(math.pi / 4), 0.0, math.sin(math.pi / 4), 0.0)  # axis upright
 _DOTS = [f"dot_{i}" for i in range(MAX_DOTS)]
 _HIDDEN = (0.0, 0.0, -DOT_THICKNESS)  # inside the table
-_REACH = torch.tensor(REACH)
 
 
 def bars() -> list[Box]:
@@ -54,49 +50,10 @@ def bars() -> list[Box]:
             color=INK,
             collides=False,
         )
-        for (x, y, z), yaw in zip(_bar_centres(), (0.0, -math.pi / 3, math.pi / 3), strict=True)
+        for (x, y, z), yaw in zip(
+            side_middles(SIDE, BAR_HEIGHT), (0.0, -math.pi / 3, math.pi / 3), strict=True
+        )
     ]
-
-
-def _bar_centres() -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Middles of the sides in the triangle's frame, (3, 3) (m)."""
-    radius = (SIDE / 2) / math.sqrt(3)
-    angles = (math.pi / 2 + turn for turn in (0.0, 2 * math.pi / 3, 4 * math.pi / 3))
-    return np.array([(radius * math.cos(a), radius * math.sin(a), BAR_HEIGHT) for a in angles])
-
-
-def _corners() -> Tensor:
-    """Corners in the triangle's frame, as columns (3, 3), float64 as in native (m)."""
-    a, b, c = _bar_centres()
-    return torch.from_numpy(np.array([(a + c) - b, (a + b) - c, (b + c) - a])).T
-
-
-def _placed_corners(pose: Floats) -> Tensor:
-    """Corners of a triangle at ``pose`` (7,), (3, 3) float64 (m, world).
-
-    The rotation is a float32 matrix and multiplies float64 corners, as in native.
-    """
-    position, quaternion = torch.from_numpy(pose).split((3, 4))
-    w, x, y, z = quaternion.unbind()
-    scale = 2.0 / (quaternion * quaternion).sum()
-    rows = (
-        (1 - scale * (y * y + z * z), scale * (x * y - z * w), scale * (x * z + y * w)),
-        (scale * (x * y + z * w), 1 - scale * (x * x + z * z), scale * (y * z - x * w)),
-        (scale * (x * z - y * w), scale * (y * z + x * w), 1 - scale * (x * x + y * y)),
-    )
-    matrix = torch.stack([torch.stack(row) for row in rows])
-    return (matrix.double()[None] @ _CORNERS[None])[0].T + position
-
-
-def _points_between(corners: Tensor) -> Tensor:
-    """Points along the sides of a triangle, corners (3, 3) in order, (153, 2) float64 (m)."""
-    share = torch.linspace(0, 1, POINTS_PER_SIDE + 1)[:-1, None]
-    starts = corners[:, None, :2]
-    ends = corners.roll(-1, 0)[:, None, :2]
-    return (starts * (1 - share) + ends * share).reshape(-1, 2)
-
-
-_CORNERS = _corners()
 
 
 @register_task("DrawTriangle-v1", "maniskill.draw_triangle_native")
@@ -134,35 +91,32 @@ class DrawTriangle(MultiRobotTask):
         world.set_pose("goal_tri", (x, y, BAR_HEIGHT), rng.yaw_quaternion())
         world.set_poses(_DOTS, _HIDDEN, _FLAT)
 
-    def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
-        """Forget what was drawn and remember where the outline is.
+    def remember(self, state: State) -> dict[str, Array]:
+        """Where the outline is, and what was drawn.
 
         As in native, none of this is part of the state dict, though the dots themselves are.
         """
-        if len(env_ids) == self.num_envs:
-            self._corners = torch.empty(self.num_envs, 3, 3, dtype=torch.float64)
-            self._outline = torch.empty(self.num_envs, 3 * POINTS_PER_SIDE, 2, dtype=torch.float64)
-            self._covered = torch.empty(self.num_envs, 3 * POINTS_PER_SIDE, dtype=torch.bool)
-            self._strayed = torch.empty(self.num_envs, dtype=torch.bool)
-            self._used = [0] * self.num_envs  # dots
-        poses = state.pose("goal_tri")
-        for i in env_ids:
-            self._corners[i] = _placed_corners(poses[i])
-            self._outline[i] = _points_between(self._corners[i])
-            self._covered[i] = self._strayed[i] = False
-            self._used[i] = 0
+        corners = placed_corners(state.pose("goal_tri"), SIDE, BAR_HEIGHT)
+        outline = points_along(corners)
+        return {
+            "corners": corners,
+            "outline": outline,
+            "covered": zeros(outline[:, :, 0]) > 0.0,
+            "strayed": state.full(False),
+            "dots_used": state.full(0),
+        }
 
     def step(
         self, action: Any, env_ids: Sequence[int] | None = None
-    ) -> tuple[Any, Tensor, Tensor, Tensor, Info]:
+    ) -> tuple[Any, Any, Any, Any, Info]:
         """Advance by one control step; see `MultiRobotTask.step`.
 
         Raises:
             SimulationError: If an environment has used all its dots up; nothing moves then.
         """
         moving = range(self.num_envs) if env_ids is None else env_ids
-        empty = [i for i in moving if self._used[i] >= MAX_DOTS]
-        if empty:
+        used = self.memory.dots_used.tolist()
+        if empty := [i for i in moving if used[i] >= MAX_DOTS]:
             raise SimulationError(
                 f"environments {empty} have used up their {MAX_DOTS} dots, one per step;"
                 f" reset them: reset(env_ids={empty})"
@@ -171,27 +125,26 @@ class DrawTriangle(MultiRobotTask):
 
     def respond(self, state: State) -> None:
         """Leave a dot under every stick that is low enough, and hide a dot for every other."""
-        tips = torch.from_numpy(state.tcp_position("arm"))
-        drawing = torch.zeros(self.num_envs, dtype=torch.bool)
-        for i in self.moving:
-            drawing[i] = draws = bool(tips[i, 2] < _REACH)
-            dot = _DOTS[self._used[i]]
-            self._used[i] += 1
-            place = (*tips[i, :2].tolist(), DOT_THICKNESS / 2 + CANVAS_TOP) if draws else _HIDDEN
-            self.simulation.worlds[i].set_pose(dot, place, _FLAT)
+        tips, memory = state.tcp_position("arm"), self.memory
+        moving = state.among(self.moving)
+        drawing = moving & (tips[:, 2] < REACH)
+        on_canvas = concatenate((tips[:, :2], state.full(DOT_HEIGHT)[:, None]), 1)
+        place = where(drawing[:, None], on_canvas, state.array(_HIDDEN))
+        dots = [_DOTS[used] if used < MAX_DOTS else "" for used in memory.dots_used.tolist()]
+        self.simulation.place(dots, place, _FLAT, where=moving)
+        memory.dots_used += moving
         if drawing.any():
-            ways = tips[:, None, :2] - self._outline
-            near = ways.square().sum(2).sqrt() < THRESHOLD
-            self._covered |= near & drawing[:, None]
-            self._strayed |= ~near.any(1) & drawing
+            nearby = near(memory.outline, tips[:, :2], THRESHOLD)
+            memory.covered |= nearby & drawing[:, None]
+            memory.strayed |= ~nearby.any(1) & drawing
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: all of the outline is covered, and nothing else."""
-        return {"success": (self._covered.all(1) & ~self._strayed).numpy()}
+        return {"success": self.memory.covered.all(1) & ~self.memory.strayed}
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP, triangle, and its corners: from the TCP and in the world (float64)."""
-        corners = self._corners.numpy()
+        corners = self.memory.corners
         ways = corners - state.tcp_position("arm")[:, None]
         return {
             "tcp_pose": state.tcp_pose("arm"),

@@ -13,7 +13,7 @@ import numpy as np
 
 from robots import SimulationError, TaskError
 from simulation import State
-from simulation.arrays import Array, all_finite
+from simulation.maths import Array, all_finite
 
 
 class NotFinite(Exception):

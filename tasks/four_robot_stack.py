@@ -2,23 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from layouts import around_table
-from robots.descriptor import Vector3
 from simulation import Camera, PhysicsSettings, State, World
-from simulation.arrays import Array, Flags, Floats, constants, norm
+from simulation.maths import Array, Flags, Floats, norm, stack, where
 from simulation.shapes import Color
-from tasks.props import (
-    BLUE,
-    FACE_UP,
-    GREEN,
-    RED,
-    TARGET_HEIGHT,
-    add_cube,
-    add_target,
-    add_wide_table,
-)
+from tasks.bodies import Cube, Target, WideTable
+from tasks.props import BLUE, FACE_UP, GREEN, RED, TARGET_HEIGHT
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness
@@ -33,12 +22,7 @@ TOLERANCE = 0.005  # beyond half a cube's diagonal
 
 YELLOW: Color = (1.0, 0.8, 0.0, 1.0)
 # Who puts which cube, from the bottom up: the way from the middle to its side of the table.
-ORDER: dict[str, tuple[Vector3, Color]] = {
-    "south": ((0.0, -1.0, 0.0), RED),
-    "east": ((1.0, 0.0, 0.0), GREEN),
-    "north": ((0.0, 1.0, 0.0), BLUE),
-    "west": ((-1.0, 0.0, 0.0), YELLOW),
-}
+ORDER = {"south": (0.0, -1.0), "east": (1.0, 0.0), "north": (0.0, 1.0), "west": (-1.0, 0.0)}
 
 
 @register_task("FourRobotStack-v1")
@@ -58,36 +42,35 @@ class FourRobotStack(MultiRobotTask):
     viewpoint = ((1.3, 1.0, 1.0), (0.0, 0.0, 0.1))
     cameras = (Camera((0.6, 0.6, 0.8), (0.0, 0.0, 0.1)),)
 
-    def build(self, world: World) -> None:
-        """Add the table, the cubes and the target."""
-        add_wide_table(world)
-        for place, (side, color) in ORDER.items():
-            start = (side[0] * SPAWN_LOW[0], side[1] * SPAWN_LOW[0], CUBE_HALF_SIZE)
-            add_cube(world, f"cube_{place}", CUBE_HALF_SIZE, position=start, color=color)
-        add_target(world, GOAL_RADIUS)
+    table = WideTable()
+    cube_south = Cube(CUBE_HALF_SIZE, RED, start=(0.0, -SPAWN_LOW[0], CUBE_HALF_SIZE))
+    cube_east = Cube(CUBE_HALF_SIZE, GREEN, start=(SPAWN_LOW[0], 0.0, CUBE_HALF_SIZE))
+    cube_north = Cube(CUBE_HALF_SIZE, BLUE, start=(0.0, SPAWN_LOW[0], CUBE_HALF_SIZE))
+    cube_west = Cube(CUBE_HALF_SIZE, YELLOW, start=(-SPAWN_LOW[0], 0.0, CUBE_HALF_SIZE))
+    goal_region = Target(GOAL_RADIUS)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay a cube before each arm."""
         world.set_pose("goal_region", (0.0, 0.0, TARGET_HEIGHT), FACE_UP)
-        for place, ((x, y, _), _) in ORDER.items():
+        for place, (x, y) in ORDER.items():
             out, aside = rng.uniform_between(SPAWN_LOW, SPAWN_HIGH).tolist()
             position = (out * x - aside * y, out * y + aside * x, CUBE_HALF_SIZE)
             world.set_pose(f"cube_{place}", position, rng.yaw_quaternion())
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: stacked in order at the middle, at rest and let go."""
-        told: dict[str, Array] = {}
+        info: dict[str, Array] = {}
         below: str | None = None
-        done = np.ones(self.num_envs, bool)
+        done = state.full(True)
         for place in ORDER:
             grasped = state.is_grasping(place, f"cube_{place}")
             done = done & _lies_in_place(state, place, below)
-            told |= {f"is_{place}_grasping": grasped, f"is_{place}_placed": done & ~grasped}
+            info |= {f"is_{place}_grasping": grasped, f"is_{place}_placed": done & ~grasped}
             below = place
         success = done
         for place in ORDER:
-            success = success & told[f"is_{place}_placed"] & is_at_rest(state, f"cube_{place}")
-        return {**told, "success": success}
+            success = success & info[f"is_{place}_placed"] & is_at_rest(state, f"cube_{place}")
+        return {**info, "success": success}
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:
         """Of each arm: TCP, cube, the way between them and the cube's to its place."""
@@ -97,7 +80,7 @@ class FourRobotStack(MultiRobotTask):
             parts[f"{place}_tcp_pose"] = state.tcp_pose(place)
             parts[f"{cube}_pose"] = state.pose(cube)
             parts[f"{place}_tcp_to_cube_pos"] = state.tcp_offset(place, cube)
-            parts[f"{cube}_to_place_pos"] = _PLACES[level] - state.position(cube)
+            parts[f"{cube}_to_place_pos"] = state.array(_PLACES[level]) - state.position(cube)
             parts[f"is_{place}_grasping"] = info[f"is_{place}_grasping"]
         return parts
 
@@ -105,29 +88,23 @@ class FourRobotStack(MultiRobotTask):
         """For each arm reach (0.2), grasp (0.3) and carry (0.9), 1 when placed; 5 on success."""
         cubes = {place: f"cube_{place}" for place in ORDER}
         to_cube = [state.tcp_distance(place, cube) for place, cube in cubes.items()]
-        astray = norm(_PLACES[:, None] - [state.position(cube) for cube in cubes.values()])
-        near = np.array(closeness(*to_cube, *astray)).reshape(2, len(ORDER), -1)
-        grasped, placed = (
-            np.array([info[f"is_{place}_{what}"] for place in ORDER])
-            for what in ("grasping", "placed")
-        )
-        parts = np.where(grasped, _GRASPED + _CARRIED * near[1], _REACHED * near[0])
-        reward = np.add.reduce(np.where(placed, _ONE, parts))
-        return np.where(info["success"], _DONE, reward)
+        positions = stack([state.position(cube) for cube in cubes.values()])
+        astray = norm(state.array(_PLACES)[:, None] - positions)
+        terms = closeness(*to_cube, *astray)
+        reach, carry = stack(terms[: len(ORDER)]), stack(terms[len(ORDER) :])
+        grasped = stack([info[f"is_{place}_grasping"] for place in ORDER])
+        placed = stack([info[f"is_{place}_placed"] for place in ORDER])
+        parts = where(placed, 1.0, where(grasped, 0.3 + 0.6 * carry, 0.2 * reach))
+        return where(info["success"], 5.0, sum(parts))
 
 
 def _lies_in_place(state: State, place: str, below: str | None) -> Flags:
     """Whether a cube lies on the one below it, the lowest one at the middle, shape (N,) bool."""
     cube = f"cube_{place}"
     if below is not None:
-        return lies_on(state, cube, f"cube_{below}", _ASIDE, _CUBE_SIZE)
-    return state.planar_distance(cube, "goal_region") <= _GOAL_RADIUS
+        return lies_on(state, cube, f"cube_{below}", _ASIDE, 2 * CUBE_HALF_SIZE)
+    return state.planar_distance(cube, "goal_region") <= GOAL_RADIUS
 
 
-_ONE, _DONE = constants(1.0, 5.0)
-_REACHED, _GRASPED, _CARRIED = constants(0.2, 0.3, 0.6)
-_GOAL_RADIUS, _CUBE_SIZE = constants(GOAL_RADIUS, 2 * CUBE_HALF_SIZE)
-_ASIDE = diagonal(CUBE_HALF_SIZE) + np.float32(TOLERANCE)
-_PLACES = np.array(
-    [[0.0, 0.0, (2 * i + 1) * CUBE_HALF_SIZE] for i in range(len(ORDER))], np.float32
-)
+_ASIDE = diagonal(CUBE_HALF_SIZE, TOLERANCE)
+_PLACES = tuple((0.0, 0.0, (2 * i + 1) * CUBE_HALF_SIZE) for i in range(len(ORDER)))

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from math import cos, pi, sin
 
-import numpy as np
-
 from layouts import single
-from simulation import PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, Floats, constants
-from tasks.props import DARK_BLUE, DARK_RED, add_peg
+from simulation import PhysicsSettings, State, World
+from simulation.maths import Array, Floats, where
+from tasks.bodies import Peg
+from tasks.props import DARK_BLUE, DARK_RED
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness
@@ -39,18 +38,7 @@ class LiftPegUpright(MultiRobotTask):
     max_episode_steps = 50
     max_reward = 3
 
-    def build(self, world: World) -> None:
-        """Add the table and the peg."""
-        add_table(world)
-        add_peg(
-            world,
-            "peg",
-            PEG_HALF_LENGTH,
-            PEG_HALF_WIDTH,
-            tail=DARK_RED,
-            head=DARK_BLUE,
-            position=(0.0, 0.0, 0.1),
-        )
+    peg = Peg(PEG_HALF_LENGTH, PEG_HALF_WIDTH, DARK_RED, DARK_BLUE, start=(0.0, 0.0, 0.1))
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the peg on the table."""
@@ -61,8 +49,8 @@ class LiftPegUpright(MultiRobotTask):
         """Success: upright and standing on the table."""
         # Native tells upright from one Euler angle, although that angle is a quarter turn, too,
         # while the peg lies along y.
-        upright = np.abs(np.abs(state.last_euler_angle("peg")) - _QUARTER_TURN) < _MAX_TILT
-        return {"success": upright & (_lift(state) < _MAX_LIFT)}
+        upright = abs(abs(state.last_euler_angle("peg")) - pi / 2) < MAX_TILT
+        return {"success": upright & (_lift(state) < MAX_LIFT)}
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP and peg."""
@@ -70,17 +58,12 @@ class LiftPegUpright(MultiRobotTask):
 
     def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Turn (1), lift (1), reach or grasp (1/5); 3 on success."""
-        turned = np.abs(state.rotation("peg")[:, 2, 0])  # how vertical the peg's own axis is
+        turned = abs(state.rotation("peg")[:, 2, 0])  # how vertical the peg's own axis is
         lifted, reach = closeness(_lift(state), state.tcp_distance("arm", "peg"))
-        held = np.where(state.is_grasping("arm", "peg"), _ONE, reach)
-        return np.where(info["success"], _DONE, turned + lifted + held / _FIVE)
-
-
-_ONE, _DONE, _FIVE = constants(1.0, 3.0, 5.0)
-_PEG_HALF_LENGTH, _MAX_LIFT = constants(PEG_HALF_LENGTH, MAX_LIFT)
-_QUARTER_TURN, _MAX_TILT = constants(pi / 2, MAX_TILT)
+        held = where(state.is_grasping("arm", "peg"), 1.0, reach)
+        return where(info["success"], 3.0, turned + lifted + held / 5.0)
 
 
 def _lift(state: State) -> Floats:
     """How far the peg's middle is from where it is when the peg stands, (N,) (m)."""
-    return np.abs(state.position("peg")[:, 2] - _PEG_HALF_LENGTH)
+    return abs(state.position("peg")[:, 2] - PEG_HALF_LENGTH)

@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import ClassVar
 
 from layouts import single
-from simulation import PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, Floats, constants, norm
-from tasks.props import DARK_BLUE, FACE_UP, TARGET_HEIGHT, add_cube, add_target
+from robots.descriptor import Vector3
+from simulation import PhysicsSettings, State, World
+from simulation.maths import Array, Floats, norm
+from tasks.bodies import Cube, Target
+from tasks.props import DARK_BLUE, FACE_UP, TARGET_HEIGHT
 from tasks.randomness import EpisodeRandom
 from tasks.task import Info, MultiRobotTask
 
@@ -24,20 +26,17 @@ class MovedCube(MultiRobotTask):
 
     Attributes:
         direction: 1 if the target lies farther along x than the cube, -1 if it lies before it.
-        touch_offset: From the cube to where the TCP should move it from, (3,) (m).
+        touch_offset: From the cube to where the TCP should move it from, x, y, z (m).
     """
 
     layout = single({"arm": "panda"})
     physics = PhysicsSettings()
     max_episode_steps = 50
     direction: ClassVar[int]
-    touch_offset: ClassVar[Floats]
+    touch_offset: ClassVar[Vector3]
 
-    def build(self, world: World) -> None:
-        """Add the table, the cube and the target."""
-        add_table(world)
-        add_cube(world, "cube", CUBE_HALF_SIZE, (0.0, 0.0, CUBE_HALF_SIZE), DARK_BLUE)
-        add_target(world, GOAL_RADIUS)
+    cube = Cube(CUBE_HALF_SIZE, DARK_BLUE)
+    goal_region = Target(GOAL_RADIUS)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the cube on the table and the target behind it or before it."""
@@ -49,11 +48,12 @@ class MovedCube(MultiRobotTask):
 
     def over_target(self, state: State) -> Array:
         """Tell whether the cube is within the target's radius, seen from above; (N,) bool."""
-        return state.planar_distance("cube", "goal_region") < _GOAL_RADIUS
+        return state.planar_distance("cube", "goal_region") < GOAL_RADIUS
 
     def touch_distance(self, state: State) -> Floats:
         """Return how far the TCP is from where it should move the cube from, (N,) (m)."""
-        return norm(state.position("cube") + self.touch_offset - state.tcp_position("arm"))
+        touch = state.position("cube") + state.array(self.touch_offset)
+        return norm(touch - state.tcp_position("arm"))
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP, target and cube."""
@@ -62,6 +62,3 @@ class MovedCube(MultiRobotTask):
             "goal_pos": state.position("goal_region"),
             "obj_pose": state.pose("cube"),
         }
-
-
-_GOAL_RADIUS, TOUCHED = constants(GOAL_RADIUS, TOUCH_RADIUS)

@@ -15,7 +15,7 @@ from layouts import Layout
 from robots import TaskError, unknown_name_message
 from robots.bounds import FAR, shown
 from simulation import Simulation, State
-from simulation.arrays import Floats
+from simulation.maths import Floats
 from tasks.arguments import array_of
 
 StateDict = dict[str, dict[str, Tensor]]

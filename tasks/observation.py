@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from layouts import Layout
 from robots import TaskError, unknown_name_message
 from simulation import Camera, Simulation, State
-from simulation.arrays import Array, all_finite
 from simulation.cameras import TEXTURES, RobotCamera
+from simulation.maths import Array, all_finite
 from tasks.finite import NotFinite
 from tasks.native_format import observation_keys
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi
 
-import numpy as np
-
 from layouts import single
 from simulation import Box, Camera, PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, Floats, constants, norm, tanh
+from simulation.maths import Array, Floats, concatenate, maximum, norm, tanh, where
 from simulation.shapes import Finish, linear
+from simulation.state import once_per_state
 from tasks.poses import compose, inverse, transform
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -127,72 +125,61 @@ class PegInsertionSide(MultiRobotTask):
         height = world.design.half_length
         world.set_pose("box_with_hole", (x, y, height), rng.yaw_quaternion(*BOX_YAW))
 
-    def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
-        """Read the designs off the worlds."""
+    def remember(self, state: State) -> dict[str, Array]:
+        """The designs of peg and hole."""
         designs: list[PegDesign] = [world.design for world in self.simulation.worlds]
-        sizes = np.array([(d.half_length, d.radius, d.radius) for d in designs], np.float32)
-        self._half_sizes = sizes
-        self._hole_radii = np.array([design.hole_radius for design in designs], np.float32)
-        self._head = self._half_sizes * np.array([1.0, 0.0, 0.0], np.float32)  # in the peg's frame
-        holes = [(0.0, *d.hole_centre, 1.0, 0.0, 0.0, 0.0) for d in designs]  # in the box's
-        self._hole = np.array(holes, np.float32)
+        return {
+            "half_sizes": state.array([(d.half_length, d.radius, d.radius) for d in designs]),
+            "head": state.array([(d.half_length, 0.0, 0.0) for d in designs]),  # of the peg
+            "hole": state.array([(0.0, *d.hole_centre, 1.0, 0.0, 0.0, 0.0) for d in designs]),
+            "hole_radii": state.array([d.hole_radius for d in designs]),
+        }
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: the peg's head is in the hole, deep enough."""
         at_hole = transform(inverse(self._hole_pose(state)), self._head_position(state))
         x, y, z = at_hole.T
-        inside = np.maximum(np.abs(y), np.abs(z)) <= self._hole_radii
-        return {"success": (x >= _INSERTED) & inside, "peg_head_pos_at_hole": at_hole}
+        inside = maximum(abs(y), abs(z)) <= self.memory.hole_radii
+        return {"success": (x >= INSERTED) & inside, "peg_head_pos_at_hole": at_hole}
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP, peg and hole, each with its size."""
         return {
             "tcp_pose": state.tcp_pose("arm"),
             "peg_pose": state.pose("peg"),
-            "peg_half_size": self._half_sizes,
+            "peg_half_size": self.memory.half_sizes,
             "box_hole_pose": self._hole_pose(state),
-            "box_hole_radius": self._hole_radii,
+            "box_hole_radius": self.memory.hole_radii,
         }
 
     def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Reach the peg's tail (1), grasp (1), line up (3), insert (5); 10 on success."""
         peg, hole = state.pose("peg"), self._hole_pose(state)
-        to_grasp = state.tcp_position("arm") - transform(peg, _GRASP_POINT)
-        reach = _ONE - tanh(_FOUR * norm(to_grasp))
+        to_grasp = state.tcp_position("arm") - transform(peg, state.array(((GRASP_X, 0.0, 0.0),)))
+        reach = 1.0 - tanh(4.0 * norm(to_grasp))
         grasped = state.is_grasping("arm", "peg", MAX_GRASP_ANGLE)
 
-        goal = hole.copy()  # where the peg's middle is when its head is at the hole's centre
-        goal[:, :3] = transform(hole, -self._head)
+        # Where the peg's middle is when its head is at the hole's centre
+        goal = concatenate((transform(hole, -self.memory.head), hole[:, 3:]), 1)
         to_goal = inverse(goal)
         head_off, middle_off = (
             norm(transform(to_goal, point)[:, 1:])
             for point in (self._head_position(state), peg[:, :3])
         )
-        astray = _HALF * (head_off + middle_off) + _FOUR_HALF * np.maximum(head_off, middle_off)
-        line_up = _THREE * (_ONE - tanh(astray))
-        aligned = (head_off < _ALIGNED) & (middle_off < _ALIGNED)
+        astray = 0.5 * (head_off + middle_off) + 4.5 * maximum(head_off, middle_off)
+        line_up = 3.0 * (1.0 - tanh(astray))
+        aligned = (head_off < ALIGNED) & (middle_off < ALIGNED)
         depth = norm(info["peg_head_pos_at_hole"])
-        insert = _FIVE * (_ONE - tanh(_FIVE * depth))
+        insert = 5.0 * (1.0 - tanh(5.0 * depth))
         reward = reach + grasped + line_up * grasped + insert * (grasped & aligned)
-        return np.where(info["success"], _DONE, reward)
+        return where(info["success"], 10.0, reward)
 
+    @once_per_state
     def _hole_pose(self, state: State) -> Floats:
         """Pose of the hole's centre, x along its axis, (N, 7)."""
-        found = state.memo.get("hole_pose")
-        if found is None:
-            found = compose(state.pose("box_with_hole"), self._hole)
-            state.memo["hole_pose"] = found
-        return found
+        return compose(state.pose("box_with_hole"), self.memory.hole)
 
+    @once_per_state
     def _head_position(self, state: State) -> Floats:
         """Position of the middle of the peg's head, (N, 3) (m)."""
-        found = state.memo.get("head_position")
-        if found is None:
-            found = transform(state.pose("peg"), self._head)
-            state.memo["head_position"] = found
-        return found
-
-
-_HALF, _ONE, _THREE, _FOUR, _FOUR_HALF, _FIVE = constants(0.5, 1.0, 3.0, 4.0, 4.5, 5.0)
-_INSERTED, _ALIGNED, _DONE = constants(INSERTED, ALIGNED, 10.0)
-_GRASP_POINT = np.array([[GRASP_X, 0.0, 0.0]], np.float32)
+        return transform(state.pose("peg"), self.memory.head)

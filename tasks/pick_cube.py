@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import ClassVar
 
-import numpy as np
-
 from layouts import single
-from simulation import PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, Floats, constants
-from tasks.props import add_cube, add_goal
+from simulation import PhysicsSettings, State, World
+from simulation.maths import Array, Floats, where
+from tasks.bodies import Cube, Goal
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness
@@ -28,8 +25,8 @@ class PickCube(MultiRobotTask):
     the cube. Success: the cube is within 2.5 cm of the goal and the arm is static.
 
     Attributes:
-        cube_half_size: Half the cube's edge (m).
-        goal_radius: How near to the goal the cube must come (m).
+        cube: What to grasp.
+        goal_site: Where to hold it; its radius is how near the cube must come.
         spawn_half_size: Half the edge of the square that cube and goal are drawn from (m).
         spawn_centre: Its centre, x and y (m).
         max_goal_height: How high above the cube the goal may be (m).
@@ -43,37 +40,27 @@ class PickCube(MultiRobotTask):
     sensed = ("is_grasped", "tcp_pose", "goal_pos")
 
     # mani_skill 3.0.1, envs/tasks/tabletop/pick_cube_cfgs.py, "panda"
-    cube_half_size: ClassVar[float] = 0.02
-    goal_radius: ClassVar[float] = 0.025
+    cube: ClassVar[Cube] = Cube(0.02)
+    goal_site: ClassVar[Goal] = Goal(0.025)
     spawn_half_size: ClassVar[float] = 0.1
     spawn_centre: ClassVar[tuple[float, float]] = (0.0, 0.0)
     max_goal_height: ClassVar[float] = 0.3
 
-    @cached_property
-    def _goal_radius(self) -> Floats:
-        return np.array(self.goal_radius, np.float32)
-
-    def build(self, world: World) -> None:
-        """Add the table, the cube and the goal."""
-        add_table(world)
-        add_cube(world, "cube", self.cube_half_size, position=(0.0, 0.0, self.cube_half_size))
-        add_goal(world, self.goal_radius)
-
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the cube on the table and the goal above it."""
         x, y = self._place(rng)
-        world.set_pose("cube", (x, y, self.cube_half_size), rng.yaw_quaternion())
+        world.set_pose("cube", (x, y, self.cube.half_size), rng.yaw_quaternion())
         x, y = self._place(rng)
-        z = rng.uniform(1) * self.max_goal_height + self.cube_half_size
+        z = rng.uniform(1) * self.max_goal_height + self.cube.half_size
         world.set_pose("goal_site", (x, y, z.item()))
 
     def _place(self, rng: EpisodeRandom) -> list[float]:
         offset = rng.uniform(1, 2) * (self.spawn_half_size * 2) - self.spawn_half_size
-        return (offset[0].numpy() + np.array(self.spawn_centre, np.float32)).tolist()
+        return (offset[0] + offset.new_tensor(self.spawn_centre)).tolist()
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: placed and static."""
-        placed = state.distance("cube", "goal_site") <= self._goal_radius
+        placed = state.distance("cube", "goal_site") <= self.goal_site.radius
         static = state.is_static("arm", STATIC_SPEED)
         return {
             "success": placed & static,
@@ -102,7 +89,4 @@ class PickCube(MultiRobotTask):
         )
         grasped, placed = info["is_grasped"], info["is_obj_placed"]
         reward = reach + grasped + place * grasped + still * placed
-        return np.where(info["success"], _DONE, reward)
-
-
-(_DONE,) = constants(5.0)
+        return where(info["success"], 5.0, reward)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from layouts import single
 from simulation import Camera
+from tasks.bodies import Cube, Goal
 from tasks.pick_cube import PickCube
 from tasks.registry import register_task
 
@@ -22,8 +23,8 @@ class PickCubeSO100(PickCube):
     cameras = (Camera((-0.27, 0.0, 0.4), (-0.56, 0.0, -0.25)),)
 
     # mani_skill 3.0.1, envs/tasks/tabletop/pick_cube_cfgs.py, "so100" (m)
-    cube_half_size = 0.0125
-    goal_radius = 0.0125 * 1.25
+    cube = Cube(0.0125)
+    goal_site = Goal(0.0125 * 1.25)
     spawn_half_size = 0.05
     spawn_centre = (-0.46, 0.0)
     max_goal_height = 0.08

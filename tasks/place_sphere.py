@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from layouts import single
-from simulation import Box, Camera, PhysicsSettings, Sphere, State, World, add_table
-from simulation.arrays import Array, Floats, constants
+from simulation import Box, Camera, PhysicsSettings, State, World
+from simulation.maths import Array, Floats, where
+from tasks.bodies import Ball, Compound
 from tasks.props import DARK_BLUE, WHITE
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -20,6 +19,23 @@ WALL = 0.0025  # half the thickness of the bin's floor and walls; the walls are 
 BIN_HALF_SIZE = 0.02 + 2 * WALL  # outside
 TOLERANCE = 0.005  # between the origins of ball and bin, seen from above
 STATIC_SPEED = 0.2  # rad/s
+
+
+def bin_shapes() -> tuple[Box, ...]:
+    """Return the bin's floor and its walls at -x, +x, -y, +y; the floor's centre is the origin."""
+    across, height = BIN_HALF_SIZE - WALL, 2 * WALL + WALL
+    floor = Box(half_size=(BIN_HALF_SIZE, BIN_HALF_SIZE, WALL), color=WHITE)
+    return (
+        floor,
+        *(
+            Box(half_size=(WALL, BIN_HALF_SIZE, 2 * WALL), position=(x, 0.0, height), color=WHITE)
+            for x in (-across, across)
+        ),
+        *(
+            Box(half_size=(BIN_HALF_SIZE, WALL, 2 * WALL), position=(0.0, y, height), color=WHITE)
+            for y in (-across, across)
+        ),
+    )
 
 
 @register_task("PlaceSphere-v1", "maniskill.place_sphere_native")
@@ -39,11 +55,8 @@ class PlaceSphere(MultiRobotTask):
     cameras = (Camera((0.3, 0.0, 0.2), (-0.1, 0.0, 0.0)),)
     sensed = ("is_grasped", "tcp_pose", "bin_pos")
 
-    def build(self, world: World) -> None:
-        """Add the table, the ball and the bin."""
-        add_table(world)
-        world.add("sphere", Sphere(radius=RADIUS, color=DARK_BLUE))
-        world.add("bin", *_bin(), kind="kinematic")
+    sphere = Ball(RADIUS, DARK_BLUE, start=(0.0, 0.0, 0.0))
+    bin = Compound(bin_shapes(), kind="kinematic")
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay down the ball near the robot and the bin beyond it."""
@@ -57,7 +70,7 @@ class PlaceSphere(MultiRobotTask):
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: in the bin, at rest and let go."""
         grasped = state.is_grasping("arm", "sphere")
-        placed = lies_on(state, "sphere", "bin", _TOLERANCE, _RADIUS, _WALL)
+        placed = lies_on(state, "sphere", "bin", TOLERANCE, RADIUS, WALL)
         static = is_at_rest(state, "sphere")
         return {
             "is_obj_grasped": grasped,
@@ -81,33 +94,11 @@ class PlaceSphere(MultiRobotTask):
         grasped = info["is_obj_grasped"]
         reach, place = closeness(
             state.tcp_distance("arm", "sphere"),
-            distance_to_top(state, "sphere", "bin", _WALL, _RADIUS),
+            distance_to_top(state, "sphere", "bin", WALL, RADIUS),
         )
-        released = letting_go(state, "arm", grasped, _RELEASED)
+        released = letting_go(state, "arm", grasped, 16.0)
         arm_static = state.is_static("arm", STATIC_SPEED)
-        placed = _FROM_3 + (released + stillness(state, "sphere") + arm_static) / _THREE
-        reward = np.where(grasped, _FROM_2 + place, _TWO * reach)
-        reward = np.where(info["is_obj_on_bin"], placed, reward)
-        return np.where(info["success"], _DONE, reward)
-
-
-def _bin() -> list[Box]:
-    """The floor of the bin and its walls at -x, +x, -y, +y, with the floor's centre as origin."""
-    across, height = BIN_HALF_SIZE - WALL, 2 * WALL + WALL
-    floor = Box(half_size=(BIN_HALF_SIZE, BIN_HALF_SIZE, WALL), color=WHITE)
-    return [
-        floor,
-        *(
-            Box(half_size=(WALL, BIN_HALF_SIZE, 2 * WALL), position=(x, 0.0, height), color=WHITE)
-            for x in (-across, across)
-        ),
-        *(
-            Box(half_size=(BIN_HALF_SIZE, WALL, 2 * WALL), position=(0.0, y, height), color=WHITE)
-            for y in (-across, across)
-        ),
-    ]
-
-
-_TWO, _THREE = constants(2.0, 3.0)
-_FROM_2, _FROM_3, _RELEASED, _DONE = constants(4.0, 6.0, 16.0, 13.0)  # rewards
-_RADIUS, _WALL, _TOLERANCE = constants(RADIUS, WALL, TOLERANCE)  # m
+        placed = 6.0 + (released + stillness(state, "sphere") + arm_static) / 3.0
+        reward = where(grasped, 4.0 + place, 2.0 * reach)
+        reward = where(info["is_obj_on_bin"], placed, reward)
+        return where(info["success"], 13.0, reward)

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import pi
-
-import numpy as np
 
 from layouts import single
 from robots.descriptor import Vector3
-from simulation import Box, PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, constants, norm
+from simulation import Box, PhysicsSettings, State, World
+from simulation.maths import Array, norm
 from simulation.shapes import POLISHED, Finish, linear
+from tasks.bodies import Compound
 from tasks.poses import angle_between, compose
 from tasks.props import WHITE
 from tasks.randomness import EpisodeRandom
@@ -36,7 +34,7 @@ BRASS = linear("#DBB539")
 GLOSSY = Finish(roughness=0.1)
 
 
-def charger() -> list[Box]:
+def charger_shapes() -> tuple[Box, ...]:
     """Return the two prongs and the body; the origin is where the prongs leave the body."""
     prongs = [
         Box(
@@ -53,10 +51,10 @@ def charger() -> list[Box]:
         color=WHITE,
         finish=GLOSSY,
     )
-    return [*prongs, body]
+    return (*prongs, body)
 
 
-def receptacle() -> list[Box]:
+def receptacle_shapes() -> tuple[Box, ...]:
     """Return the plate around two slots, as five boxes, and the brass that shows in the slots."""
     depth, width, height = RECEPTACLE_HALF_SIZE
     slot_width, slot_height = (size + CLEARANCE for size in PRONG_HALF_SIZE[1:])
@@ -74,7 +72,7 @@ def receptacle() -> list[Box]:
             collides=not brass,
         )
 
-    return [
+    return (
         box(0.0, lid_z, (depth, width, lid)),
         box(0.0, -lid_z, (depth, width, lid)),
         box(side_y, 0.0, (depth, side, height)),
@@ -82,7 +80,7 @@ def receptacle() -> list[Box]:
         box(0.0, 0.0, (depth, PRONG_OFFSET - slot_width, slot_height)),
         box(-slot_y, 0.0, (depth, slot_width, slot_height), brass=True),
         box(slot_y, 0.0, (depth, slot_width, slot_height), brass=True),
-    ]
+    )
 
 
 @register_task("PlugCharger-v1", "maniskill.plug_charger_native")
@@ -101,12 +99,10 @@ class PlugCharger(MultiRobotTask):
     reward_modes = ("none", "sparse")
     viewpoint = ((0.3, 0.4, 0.35), (-0.05, 0.0, 0.08))
 
-    def build(self, world: World) -> None:
-        """Add the table, the charger and the receptacle."""
-        add_table(world)
-        world.add("charger", *charger(), position=(0.0, 0.0, BODY_HALF_SIZE[2]))
-        above = (0.0, 0.0, RECEPTACLE_HEIGHT)
-        world.add("receptacle", *receptacle(), kind="kinematic", position=above)
+    charger = Compound(charger_shapes(), start=(0.0, 0.0, BODY_HALF_SIZE[2]))
+    receptacle = Compound(
+        receptacle_shapes(), start=(0.0, 0.0, RECEPTACLE_HEIGHT), kind="kinematic"
+    )
 
     def reset_robots(self, world: World, rng: EpisodeRandom) -> None:
         """Stand the arm with noise from the torch stream.
@@ -126,24 +122,19 @@ class PlugCharger(MultiRobotTask):
         turn = rng.yaw_quaternion(*RECEPTACLE_YAW)
         world.set_pose("receptacle", (x, y, RECEPTACLE_HEIGHT), turn)
 
-    def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
-        """Remember where the charger belongs; native takes that at a reset, never later."""
-        goal = compose(state.pose("receptacle"), _HALF_TURN)
-        if len(env_ids) == self.num_envs:
-            self._goal = goal
-        else:
-            self._goal = self._goal.copy()
-            self._goal[list(env_ids)] = goal[list(env_ids)]
+    def remember(self, state: State) -> dict[str, Array]:
+        """Where the charger belongs; native takes that at a reset, never later."""
+        return {"goal": compose(state.pose("receptacle"), state.array(_HALF_TURN))}
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: near the plugged-in pose, in position and angle."""
         charger = state.pose("charger")
-        distance = norm(self._goal[:, :3] - charger[:, :3])
-        angle = angle_between(self._goal[:, 3:], charger[:, 3:])
+        distance = norm(self.memory.goal[:, :3] - charger[:, :3])
+        angle = angle_between(self.memory.goal[:, 3:], charger[:, 3:])
         return {
             "obj_to_goal_dist": distance,
             "obj_to_goal_angle": angle,
-            "success": (distance <= _PLUGGED_DISTANCE) & (angle <= _PLUGGED_ANGLE),
+            "success": (distance <= PLUGGED_DISTANCE) & (angle <= PLUGGED_ANGLE),
         }
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:
@@ -152,10 +143,9 @@ class PlugCharger(MultiRobotTask):
             "tcp_pose": state.tcp_pose("arm"),
             "charger_pose": state.pose("charger"),
             "receptacle_pose": state.pose("receptacle"),
-            "goal_pose": self._goal,
+            "goal_pose": self.memory.goal,
         }
 
 
-_PLUGGED_DISTANCE, _PLUGGED_ANGLE = constants(PLUGGED_DISTANCE, PLUGGED_ANGLE)
 # The charger plugs in facing the plate. The cosine of a quarter turn is 6e-17 in native, too.
-_HALF_TURN = np.array([[0.0, 0.0, 0.0, 6.123233995736766e-17, 0.0, 0.0, 1.0]], np.float32)
+_HALF_TURN = ((0.0, 0.0, 0.0, 6.123233995736766e-17, 0.0, 0.0, 1.0),)

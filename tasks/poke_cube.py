@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from math import pi
 
-import numpy as np
-
 from layouts import single
-from simulation import PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, Floats, constants, norm
-from tasks.props import DARK_BLUE, FACE_UP, TARGET_HEIGHT, add_cube, add_peg, add_target
+from simulation import PhysicsSettings, State, World
+from simulation.maths import Array, Floats, norm, where
+from tasks.bodies import Cube, Peg, Target
+from tasks.props import DARK_BLUE, FACE_UP, TARGET_HEIGHT
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness
@@ -47,20 +46,9 @@ class PokeCube(MultiRobotTask):
     max_reward = 10
     viewpoint = ((0.6, 0.7, 0.6), (0.2, 0.2, 0.35))
 
-    def build(self, world: World) -> None:
-        """Add the table, the cube, the peg and the target."""
-        add_table(world)
-        add_cube(world, "cube", CUBE_HALF_SIZE, (1.0, 0.0, CUBE_HALF_SIZE))
-        add_peg(
-            world,
-            "peg",
-            PEG_HALF_LENGTH,
-            PEG_HALF_WIDTH,
-            tail=DARK_BLUE,
-            head=DARK_BLUE,
-            position=(0.0, 0.0, PEG_HALF_WIDTH),
-        )
-        add_target(world, GOAL_RADIUS)
+    cube = Cube(CUBE_HALF_SIZE, start=(1.0, 0.0, CUBE_HALF_SIZE))
+    peg = Peg(PEG_HALF_LENGTH, PEG_HALF_WIDTH, DARK_BLUE, DARK_BLUE)
+    goal_region = Target(GOAL_RADIUS)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay down the peg, the cube beyond its head and the target behind the cube."""
@@ -74,13 +62,13 @@ class PokeCube(MultiRobotTask):
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: the cube is over the target, and the arm static."""
-        placed = state.planar_distance("cube", "goal_region") < _GOAL_RADIUS
-        angle = np.abs(state.last_euler_angle("peg") - state.last_euler_angle("cube"))
+        placed = state.planar_distance("cube", "goal_region") < GOAL_RADIUS
+        angle = abs(state.last_euler_angle("peg") - state.last_euler_angle("cube"))
         head_distance = norm(_cube_to_head(state)[:, :2])
         return {
             "success": placed & state.is_static("arm", STATIC_SPEED),
             "is_cube_placed": placed,
-            "is_peg_cube_fit": (angle < _MAX_ANGLE) & (head_distance <= _MAX_HEAD_DISTANCE),
+            "is_peg_cube_fit": (angle < MAX_ANGLE) & (head_distance <= MAX_HEAD_DISTANCE),
             "is_peg_grasped": state.is_grasping("arm", "peg"),
             "angle_diff": angle,
             "head_to_cube_dist": head_distance,
@@ -109,17 +97,11 @@ class PokeCube(MultiRobotTask):
             state.distance("cube", "goal_region"),
             state.arm_speed("arm"),
         )
-        held = info["is_peg_grasped"] & (tcp_to_peg < _GRASP_RADIUS)
-        reward = np.where(held, _FROM_2 + near + align, _TWO * reach)
-        reward = np.where(held & info["is_peg_cube_fit"], _FROM_3 + place, reward)
-        reward = np.where(info["is_cube_placed"], reward + still, reward)
-        return np.where(info["success"], _DONE, reward)
-
-
-_TWO, _FROM_2, _FROM_3, _DONE = constants(2.0, 4.0, 7.0, 10.0)
-_GOAL_RADIUS, _GRASP_RADIUS = constants(GOAL_RADIUS, GRASP_RADIUS)
-_MAX_ANGLE, _MAX_HEAD_DISTANCE = constants(MAX_ANGLE, MAX_HEAD_DISTANCE)
-_HEAD_OFFSET = np.array([PEG_HALF_LENGTH, 0.0, 0.0], np.float32)
+        held = info["is_peg_grasped"] & (tcp_to_peg < GRASP_RADIUS)
+        reward = where(held, 4.0 + near + align, 2.0 * reach)
+        reward = where(held & info["is_peg_cube_fit"], 7.0 + place, reward)
+        reward = where(info["is_cube_placed"], reward + still, reward)
+        return where(info["success"], 10.0, reward)
 
 
 def _cube_to_head(state: State) -> Floats:
@@ -128,4 +110,4 @@ def _cube_to_head(state: State) -> Floats:
     As in native, the head is half a peg along the world's x axis from the peg's middle, however
     the peg is turned.
     """
-    return state.position("peg") + _HEAD_OFFSET - state.position("cube")
+    return state.position("peg") + state.array((PEG_HALF_LENGTH, 0.0, 0.0)) - state.position("cube")

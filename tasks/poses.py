@@ -9,15 +9,25 @@ import math
 
 import numpy as np
 
-from simulation.arrays import Floats, arctan2, constants, norm, sin
+from simulation.maths import (
+    Floats,
+    arctan2,
+    columns,
+    concatenate,
+    like,
+    minimum,
+    norm,
+    sin,
+    where,
+    zeros,
+)
 
 # Component j of a product is the sum over k of a[k] · b[_FACTOR[k, j]] · _SIGN[k, j], k = 0 first.
-_FACTOR = np.array([[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]])
-_SIGN = np.array([[1, 1, 1, 1], [-1, 1, -1, 1], [-1, 1, 1, -1], [-1, -1, 1, 1]], np.float32)
-_CONJUGATE = np.array([1, -1, -1, -1], np.float32)
+_FACTOR = ((0, 1, 2, 3), (1, 0, 3, 2), (2, 3, 0, 1), (3, 2, 1, 0))
+_SIGN = ((1, 1, 1, 1), (-1, 1, -1, 1), (-1, 1, 1, -1), (-1, -1, 1, 1))
+_CONJUGATE = (1, -1, -1, -1)
 
 _SMALL_ANGLE = 1e-6  # below it sin(x / 2) / x is taken from its series (rad)
-_HALF, _TWO, _48, _TURN = constants(0.5, 2.0, 48.0, 2 * math.pi)
 
 
 def compose(first: Floats, second: Floats) -> Floats:
@@ -30,18 +40,15 @@ def compose(first: Floats, second: Floats) -> Floats:
     Returns:
         Shape (N, 7), with w ≥ 0.
     """
-    pose = np.empty(first.shape, np.float32)
-    pose[:, :3] = first[:, :3] + _rotated(first[:, 3:], second[:, :3])
-    pose[:, 3:] = _with_positive_w(_product(first[:, 3:], second[:, 3:]))
-    return pose
+    position = first[:, :3] + _rotated(first[:, 3:], second[:, :3])
+    turned = _with_positive_w(_product(first[:, 3:], second[:, 3:]))
+    return concatenate((position, turned), 1)
 
 
 def inverse(pose: Floats) -> Floats:
     """Return the inverse of poses, shape (N, 7)."""
-    inverted = np.empty(pose.shape, np.float32)
-    inverted[:, 3:] = pose[:, 3:] * _CONJUGATE
-    inverted[:, :3] = _rotated(inverted[:, 3:], -pose[:, :3])
-    return inverted
+    turned_back = _conjugate(pose[:, 3:])
+    return concatenate((_rotated(turned_back, -pose[:, :3]), turned_back), 1)
 
 
 def transform(pose: Floats, point: Floats) -> Floats:
@@ -59,30 +66,33 @@ def angle_between(first: Floats, second: Floats) -> Floats:
 
     Native takes the length of the axis-angle vector, which differs from the angle by rounding.
     """
-    turn = _with_positive_w(_product(first * _CONJUGATE, second))
+    turn = _with_positive_w(_product(_conjugate(first), second))
     axis = turn[:, 1:]
     half_angle = arctan2(norm(axis), turn[:, 0])
-    angle = _TWO * half_angle
-    small = np.abs(angle) < _SMALL_ANGLE
+    angle = 2.0 * half_angle
+    small = abs(angle) < _SMALL_ANGLE
     with np.errstate(invalid="ignore"):  # 0 / 0, where the series is taken
-        ratio = np.where(small, _HALF - angle * angle / _48, sin(half_angle) / angle)
+        ratio = where(small, 0.5 - angle * angle / 48.0, sin(half_angle) / angle)
     turned = norm(axis / ratio[:, None])
-    return np.minimum(turned, _TURN - turned)
+    return minimum(turned, (2 * math.pi) - turned)
 
 
 def _product(a: Floats, b: Floats) -> Floats:
     """Products of quaternions, (N, 4)."""
-    factors: Floats = b.take(_FACTOR, 1) * _SIGN
+    factors: Floats = columns(b, _FACTOR) * like(b, _SIGN)
     terms: Floats = a[:, :, None] * factors
     return terms[:, 0] + terms[:, 1] + terms[:, 2] + terms[:, 3]
 
 
 def _rotated(quaternion: Floats, point: Floats) -> Floats:
     """Points (N, 3) turned by quaternions (N, 4)."""
-    as_quaternion = np.zeros((len(point), 4), np.float32)
-    as_quaternion[:, 1:] = point
-    return _product(_product(quaternion, as_quaternion), quaternion * _CONJUGATE)[:, 1:]
+    as_quaternion = concatenate((zeros(point[:, :1]), point), 1)
+    return _product(_product(quaternion, as_quaternion), _conjugate(quaternion))[:, 1:]
+
+
+def _conjugate(quaternion: Floats) -> Floats:
+    return quaternion * like(quaternion, _CONJUGATE)
 
 
 def _with_positive_w(quaternion: Floats) -> Floats:
-    return np.where(quaternion[:, :1] < 0, -quaternion, quaternion)
+    return where(quaternion[:, :1] < 0, -quaternion, quaternion)

@@ -7,7 +7,7 @@ from math import cos, pi, sin
 import numpy as np
 
 from robots.descriptor import Vector3
-from simulation import Box, Cylinder, Plane, Sphere, World
+from simulation import Box, Cylinder, Plane, Shape, Sphere, World
 from simulation.shapes import Color
 
 RED: Color = (1.0, 0.0, 0.0, 1.0)
@@ -79,6 +79,14 @@ def add_peg(
         head: Colour of the half at positive x.
         position: Where it is built (m).
     """
+    shapes = peg_shapes(half_length, half_width, tail=tail, head=head)
+    world.add(name, *shapes, position=position)
+
+
+def peg_shapes(
+    half_length: float, half_width: float, *, tail: Color, head: Color
+) -> tuple[Shape, ...]:
+    """Return what a square peg is made of; see `add_peg`."""
     solid = Box(half_size=(half_length, half_width, half_width), visible=False)
     halves = [
         Box(
@@ -89,7 +97,7 @@ def add_peg(
         )
         for side, color in ((-1, tail), (1, head))
     ]
-    world.add(name, solid, *halves, position=position)
+    return (solid, *halves)
 
 
 def add_target(world: World, radius: float, name: str = "goal_region") -> None:
@@ -102,7 +110,12 @@ def add_target(world: World, radius: float, name: str = "goal_region") -> None:
         radius: Its radius (m).
         name: Its name.
     """
-    rings = [
+    world.add(name, *target_shapes(radius), kind="kinematic")
+
+
+def target_shapes(radius: float) -> tuple[Shape, ...]:
+    """Return the rings of a target; see `add_target`."""
+    return tuple(
         Cylinder(
             radius=radius * (5 - i) / 5,
             half_length=(0.5 + i) * 1e-5,  # the inner ones stand out, so that they are seen
@@ -110,8 +123,7 @@ def add_target(world: World, radius: float, name: str = "goal_region") -> None:
             collides=False,
         )
         for i in range(5)
-    ]
-    world.add(name, *rings, kind="kinematic")
+    )
 
 
 def add_wide_table(world: World) -> None:

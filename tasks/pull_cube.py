@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from simulation import Camera, State
-from simulation.arrays import Array, Floats, constants
-from tasks.moved_cube import CUBE_HALF_SIZE, TOUCHED, MovedCube
+from simulation.maths import Array, Floats, where
+from tasks.moved_cube import CUBE_HALF_SIZE, TOUCH_RADIUS, MovedCube
 from tasks.registry import register_task
 from tasks.shaping import closeness
 from tasks.task import Info
@@ -27,7 +25,7 @@ class PullCube(MovedCube):
     source = "mani_skill 3.0.1, envs/tasks/tabletop/pull_cube.py"
     max_reward = 3
     direction = -1
-    touch_offset = np.array([PULL_OFFSET, 0.0, 0.0], np.float32)
+    touch_offset = (PULL_OFFSET, 0.0, 0.0)
     cameras = (Camera((-0.5, 0.0, 0.25), (0.2, 0.0, -0.5)),)
     sensed = ("tcp_pose", "goal_pos")
 
@@ -39,8 +37,5 @@ class PullCube(MovedCube):
         """Reach behind the cube (1); from there place (1); 3 on success."""
         pull_distance = self.touch_distance(state)
         reach, place = closeness(pull_distance, state.planar_distance("cube", "goal_region"))
-        reward = reach + place * (pull_distance < TOUCHED)
-        return np.where(info["success"], _DONE, reward)
-
-
-(_DONE,) = constants(3.0)
+        reward = reach + place * (pull_distance < TOUCH_RADIUS)
+        return where(info["success"], 3.0, reward)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from math import pi
 
-import numpy as np
-
 from layouts import single
-from simulation import Box, Camera, PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, Flags, Floats, constants, norm, tanh
+from simulation import Box, Camera, PhysicsSettings, State, World
+from simulation.maths import Array, Flags, Floats, floats, norm, tanh, where
 from simulation.shapes import POLISHED
-from tasks.props import DARK_BLUE, RED, add_cube
+from simulation.state import once_per_state
+from tasks.bodies import Compound, Cube
+from tasks.props import DARK_BLUE, RED
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness
@@ -29,6 +29,24 @@ PULLED_DISTANCE = 0.6  # of the cube from the robot's base, seen from above
 MAX_GRASP_ANGLE = 20.0  # degrees; of the tool, for the reward
 
 
+def tool_shapes() -> tuple[Box, Box]:
+    """Return handle and hook; the origin is the handle's end."""
+    handle = Box(
+        half_size=(HANDLE_LENGTH / 2, WIDTH / 2, HEIGHT / 2),
+        position=(HANDLE_LENGTH / 2, 0.0, 0.0),
+        density=HANDLE_DENSITY,
+        color=RED,
+        finish=POLISHED,
+    )
+    hook = Box(
+        half_size=(HOOK_LENGTH / 2, WIDTH, HEIGHT / 2),
+        position=(HANDLE_LENGTH - HOOK_LENGTH / 2, WIDTH, 0.0),
+        color=RED,
+        finish=POLISHED,
+    )
+    return handle, hook
+
+
 @register_task("PullCubeTool-v1", "maniskill.pull_cube_tool_native")
 class PullCubeTool(MultiRobotTask):
     """Grasp an L-shaped tool and pull a cube with it that is out of the arm's reach.
@@ -45,25 +63,8 @@ class PullCubeTool(MultiRobotTask):
     max_reward = 5
     cameras = (Camera((0.3, 0.0, 0.5), (-0.1, 0.0, 0.1)),)
 
-    def build(self, world: World) -> None:
-        """Add the table, the cube and the tool."""
-        add_table(world)
-        origin = (0.0, 0.0, 0.0)
-        add_cube(world, "cube", CUBE_HALF_SIZE, position=origin, color=DARK_BLUE)
-        handle = Box(
-            half_size=(HANDLE_LENGTH / 2, WIDTH / 2, HEIGHT / 2),
-            position=(HANDLE_LENGTH / 2, 0.0, 0.0),
-            density=HANDLE_DENSITY,
-            color=RED,
-            finish=POLISHED,
-        )
-        hook = Box(
-            half_size=(HOOK_LENGTH / 2, WIDTH, HEIGHT / 2),
-            position=(HANDLE_LENGTH - HOOK_LENGTH / 2, WIDTH, 0.0),
-            color=RED,
-            finish=POLISHED,
-        )
-        world.add("l_shape_tool", handle, hook)
+    cube = Cube(CUBE_HALF_SIZE, DARK_BLUE, start=(0.0, 0.0, 0.0))
+    l_shape_tool = Compound(tool_shapes())
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the tool before the robot and the cube beyond its reach."""
@@ -79,16 +80,16 @@ class PullCubeTool(MultiRobotTask):
 
         Progress and distance are told per environment; native averages them over its batch.
         """
-        way = state.position("cube") - state.base_position("arm")
-        success = norm(way[:, :2]) < _PULLED_DISTANCE
-        distance = _distance(state.position("cube"), state.base_position("arm") + _CENTRE)
+        success = self._success(state)
+        centre = state.base_position("arm") + state.array(_CENTRE)
+        distance = _distance(state.position("cube"), centre)
         return {
             "success": success,
             "success_once": success,  # native's words for the same
             "success_at_end": success,
-            "cube_progress": _ONE - tanh(_THREE * distance),
+            "cube_progress": 1.0 - tanh(3.0 * distance),
             "cube_distance": distance,
-            "reward": self._staged_reward(state, success) / _FIVE,
+            "reward": self._staged_reward(state) / 5.0,
         }
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:
@@ -105,29 +106,28 @@ class PullCubeTool(MultiRobotTask):
         While the tool is grasped its place is worth up to 1.5, and the way that a well-placed tool
         has pulled the cube up to 3. A cube that was pushed away costs 2.
         """
-        return self._staged_reward(state, info["success"])
+        return self._staged_reward(state)
 
-    def _staged_reward(self, state: State, success: Flags) -> Floats:
-        key = "PullCubeTool reward"  # native tells it in `evaluate`, too
-        if key not in state.memo:
-            state.memo[key] = _staged_reward(state, success)
-        return state.memo[key]
+    @once_per_state
+    def _success(self, state: State) -> Flags:
+        way = state.position("cube") - state.base_position("arm")
+        return norm(way[:, :2]) < PULLED_DISTANCE
 
+    @once_per_state
+    def _staged_reward(self, state: State) -> Floats:
+        cube, tool = state.position("cube"), state.position("l_shape_tool")
+        target = state.base_position("arm") + state.array(_TARGET)
+        (reach,) = closeness(_distance(state.tcp_position("arm"), tool + state.array(_GRASP)))
+        grasped = state.is_grasping("arm", "l_shape_tool", MAX_GRASP_ANGLE)
+        hook_error = _distance(tool, cube + state.array(_BEHIND_CUBE))
+        placed = 1.5 * (1.0 - tanh(3.0 * hook_error))
+        start = _distance(state.array(_CUBE_START), target)
+        progress = (start - _distance(cube, target)) / start
+        pulled = 3.0 * progress * (hook_error < 0.05)
 
-def _staged_reward(state: State, success: Flags) -> Floats:
-    cube, tool = state.position("cube"), state.position("l_shape_tool")
-    target = state.base_position("arm") + _TARGET
-    (reach,) = closeness(_distance(state.tcp_position("arm"), tool + _GRASP))
-    grasped = state.is_grasping("arm", "l_shape_tool", MAX_GRASP_ANGLE)
-    hook_error = _distance(tool, cube + _BEHIND_CUBE)
-    placed = _ONE_AND_HALF * (_ONE - tanh(_THREE * hook_error))
-    start = _distance(_CUBE_START, target)
-    progress = (start - _distance(cube, target)) / start
-    pulled = _THREE * progress * (hook_error < _NEAR)
-
-    reward = _TWO * reach + _TWO * grasped + placed * grasped + pulled * grasped
-    reward = np.where(cube[:, 0] > _PUSHED_AWAY_X, reward - _TWO, reward)
-    return np.where(success, reward + _FIVE, reward)
+        reward = 2.0 * reach + 2.0 * floats(grasped) + placed * grasped + pulled * grasped
+        reward = where(cube[:, 0] > ARM_REACH + 0.15, reward - 2.0, reward)
+        return where(self._success(state), reward + 5.0, reward)
 
 
 def _distance(start: Floats, end: Floats) -> Floats:
@@ -135,11 +135,9 @@ def _distance(start: Floats, end: Floats) -> Floats:
     return norm(start - end)
 
 
-_ONE, _ONE_AND_HALF, _TWO, _THREE, _FIVE = constants(1.0, 1.5, 2.0, 3.0, 5.0)
-_PULLED_DISTANCE, _NEAR, _PUSHED_AWAY_X = constants(PULLED_DISTANCE, 0.05, ARM_REACH + 0.15)
-_CENTRE = np.array([ARM_REACH * 0.1, 0.0, 0.0], np.float32)  # from the base (m)
-_TARGET = np.array([0.05, 0.0, 0.0], np.float32)  # from the base (m)
-_GRASP = np.array([0.02, 0.0, 0.0], np.float32)  # from the tool's end (m)
+_CENTRE = (ARM_REACH * 0.1, 0.0, 0.0)  # from the base (m)
+_TARGET = (0.05, 0.0, 0.0)  # from the base (m)
+_GRASP = (0.02, 0.0, 0.0)  # from the tool's end (m)
 # Where the tool's end belongs, seen from the cube (m)
-_BEHIND_CUBE = np.array([-(HOOK_LENGTH + CUBE_HALF_SIZE), -0.067, 0.0], np.float32)
-_CUBE_START = np.array([ARM_REACH + 0.1, 0.0, 0.01], np.float32)  # what progress counts from (m)
+_BEHIND_CUBE = (-(HOOK_LENGTH + CUBE_HALF_SIZE), -0.067, 0.0)
+_CUBE_START = (ARM_REACH + 0.1, 0.0, 0.01)  # what progress counts from (m)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from simulation import State
-from simulation.arrays import Array, Floats, constants
-from tasks.moved_cube import CUBE_HALF_SIZE, TOUCHED, MovedCube
+from simulation.maths import Array, Floats, where
+from tasks.moved_cube import CUBE_HALF_SIZE, TOUCH_RADIUS, MovedCube
 from tasks.registry import register_task
 from tasks.shaping import closeness
 from tasks.task import Info
@@ -28,11 +26,11 @@ class PushCube(MovedCube):
     source = "mani_skill 3.0.1, envs/tasks/tabletop/push_cube.py"
     max_reward = 4
     direction = 1
-    touch_offset = np.array([PUSH_OFFSET, 0.0, 0.0], np.float32)
+    touch_offset = (PUSH_OFFSET, 0.0, 0.0)
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: over the target and on the table."""
-        low = state.position("cube")[:, 2] < _MAX_HEIGHT
+        low = state.position("cube")[:, 2] < MAX_HEIGHT
         return {"success": self.over_target(state) & low}
 
     def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
@@ -41,11 +39,8 @@ class PushCube(MovedCube):
         reach, place, down = closeness(
             push_distance,
             state.planar_distance("cube", "goal_region"),
-            np.abs(state.position("cube")[:, 2] - _CUBE_HALF_SIZE),
+            abs(state.position("cube")[:, 2] - CUBE_HALF_SIZE),
         )
-        reached = push_distance < TOUCHED
+        reached = push_distance < TOUCH_RADIUS
         reward = reach + place * reached + place * down * reached
-        return np.where(info["success"], _DONE, reward)
-
-
-_MAX_HEIGHT, _CUBE_HALF_SIZE, _DONE = constants(MAX_HEIGHT, CUBE_HALF_SIZE, 4.0)
+        return where(info["success"], 4.0, reward)

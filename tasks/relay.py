@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
-from math import hypot, sqrt
-
-import numpy as np
+from math import sqrt
 
 from layouts import Layout, ring
 from robots import TaskError
+from robots.descriptor import Vector3
 from simulation import Box, Camera, PhysicsSettings, State, World
-from simulation.arrays import Array, Floats, constants, norm
+from simulation.maths import Array, Floats, copy, floats, minimum, norm, rounded, stack, where
 from tasks.props import DARK_BLUE, FACE_UP, TARGET_HEIGHT, add_goal, add_target, add_wide_table
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
@@ -55,54 +54,49 @@ class Relay(MultiRobotTask):
 
     def build(self, world: World) -> None:
         """Add the table, the baton, the zones and the beacon."""
-        zones = find_zones(self.layout)
-        self._zones = np.array([(*zone, HALF_HEIGHT) for zone in zones], np.float32)
-        # Where the beacon may be: over zone k while that is next, at last higher over the last.
-        heights = [BEACON_HEIGHT] * len(zones) + [2 * BEACON_HEIGHT]
-        self._stations = np.array(
-            [(*zone, z) for zone, z in zip((*zones, zones[-1]), heights, strict=True)], np.float32
-        )
         add_wide_table(world)
-        world.add("baton", *_baton(), position=(*zones[-1], HALF_HEIGHT))
+        world.add("baton", *_baton(), position=self._zones[-1])
         for robot in self.layout:
             add_target(world, ZONE_RADIUS, f"zone_{robot}")
         add_goal(world, 0.02, "beacon")
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the baton into the last zone, the beacon over the first."""
-        for robot, (x, y, _) in zip(self.layout, self._zones.tolist(), strict=True):
+        for robot, (x, y, _) in zip(self.layout, self._zones, strict=True):
             world.set_pose(f"zone_{robot}", (x, y, TARGET_HEIGHT), FACE_UP)
         x, y = rng.uniform_between([-START_OFFSET] * 2, [START_OFFSET] * 2).tolist()
-        last_x, last_y, _ = self._zones[-1].tolist()
+        last_x, last_y, _ = map(rounded, self._zones[-1])
         baton = (last_x + x, last_y + y, HALF_HEIGHT)
         world.set_pose("baton", baton, rng.yaw_quaternion())
         world.set_pose("beacon", self._stations[0])
 
     def respond(self, state: State) -> None:
         """Move the beacon on when the baton is in its zone: so the state tells the progress."""
-        for i, visited in enumerate(self._visited(state).tolist()):
-            away = state.position("baton")[i] - self._zones[min(visited, len(self._zones) - 1)]
-            if visited < len(self._zones) and hypot(*away[:2]) <= ZONE_RADIUS:
-                self.simulation.worlds[i].set_pose("beacon", self._stations[visited + 1])
+        visited = self._visited(state)
+        away = state.position("baton") - self._next_zone(state, visited)
+        arrived = (visited < len(self._zones)) & (norm(copy(away[:, :2])) <= ZONE_RADIUS)
+        onward = state.array(self._stations)[minimum(visited + 1, len(self._zones))]
+        self.simulation.place("beacon", onward, where=arrived)
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: every zone visited, and the baton at rest in the last."""
         visited = self._visited(state)
-        to_last = norm((self._zones[-1] - state.position("baton"))[:, :2].copy())
+        to_last = norm(copy((state.array(self._zones[-1]) - state.position("baton"))[:, :2]))
         rests = is_at_rest(state, "baton")
         return {
             "zones_visited": visited,
             "is_baton_at_rest": rests,
-            "success": (visited == len(self._zones)) & (to_last <= _ZONE_RADIUS) & rests,
+            "success": (visited == len(self._zones)) & (to_last <= ZONE_RADIUS) & rests,
         }
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:
         """Baton and beacon, the way between them, progress, and each TCP and its way."""
+        visited = info["zones_visited"]
         parts: dict[str, Array] = {
             "baton_pose": state.pose("baton"),
             "beacon_pos": state.position("beacon"),
-            "baton_to_zone_pos": self._next_zone(info) - state.position("baton"),
-            "share_visited": info["zones_visited"].astype(np.float32) / len(self._zones),
+            "baton_to_zone_pos": self._next_zone(state, visited) - state.position("baton"),
+            "share_visited": floats(visited) / len(self._zones),
         }
         for robot in self.layout:
             parts[f"{robot}_tcp_pose"] = state.tcp_pose(robot)
@@ -113,22 +107,35 @@ class Relay(MultiRobotTask):
         """Zones visited, and for the next its robot's reach (0.3) and the way (0.6); 1 in all."""
         visited = info["zones_visited"]
         ways = [state.tcp_distance(robot, "baton") for robot in self.layout]
-        turn = np.minimum(visited, len(ways) - 1)
+        turn = minimum(visited, len(ways) - 1)
         reach, carry = closeness(
-            np.stack(ways)[turn, np.arange(self.num_envs)],
-            norm(self._next_zone(info) - state.position("baton")),
+            stack(ways)[turn, state.env_ids],
+            norm(self._next_zone(state, visited) - state.position("baton")),
         )
-        reward = visited.astype(np.float32) + _REACHED * reach + _CARRIED * carry
-        return np.where(info["success"], _ONE, reward / np.float32(len(ways) + 1))
+        reward = floats(visited) + 0.3 * reach + 0.6 * carry
+        return where(info["success"], 1.0, reward / (len(ways) + 1))
+
+    @cached_property
+    def _zones(self) -> tuple[Vector3, ...]:
+        """Where the baton lies in the middle of each zone (m)."""
+        return tuple((*zone, HALF_HEIGHT) for zone in find_zones(self.layout))
+
+    @cached_property
+    def _stations(self) -> tuple[Vector3, ...]:
+        """Where the beacon may be (m): over the zone that is next, at last higher over the last."""
+        zones = find_zones(self.layout)
+        above = [(*zone, BEACON_HEIGHT) for zone in zones]
+        return (*above, (*zones[-1], 2 * BEACON_HEIGHT))
 
     def _visited(self, state: State) -> Array:
         """How many zones the baton has visited, read off the beacon, shape (N,) int64."""
-        ways = state.position("beacon")[:, None] - self._stations
-        return (ways * ways).sum(2).argmin(1)
+        ways = state.position("beacon")[:, None] - state.array(self._stations)
+        squares = ways * ways
+        return (squares[:, :, 0] + squares[:, :, 1] + squares[:, :, 2]).argmin(1)
 
-    def _next_zone(self, info: Info) -> Floats:
+    def _next_zone(self, state: State, visited: Array) -> Floats:
         """Where the baton is to go, shape (N, 3) (m)."""
-        return self._zones[np.minimum(info["zones_visited"], len(self._zones) - 1)]
+        return state.array(self._zones)[minimum(visited, len(self._zones) - 1)]
 
 
 def _baton() -> list[Box]:
@@ -159,13 +166,14 @@ def find_zones(layout: Layout) -> tuple[tuple[float, float], ...]:
             such place is in reach of both.
     """
     names = list(layout)
-    bases = np.array([placement.base_position[:2] for placement in layout.values()])
-    middle = bases.mean(0)
+    bases = [placement.base_position[:2] for placement in layout.values()]
+    middle_x, middle_y = (sum(along) / len(bases) for along in zip(*bases, strict=True))
     zones: list[tuple[float, float]] = []
     for i, j in pairwise([*range(len(names)), 0]):
         first, second = (layout[names[k]].robot.reach for k in (i, j))
-        way = bases[j] - bases[i]
-        apart = float(np.linalg.norm(way))
+        (x, y), (end_x, end_y) = bases[i], bases[j]
+        way_x, way_y = end_x - x, end_y - y
+        apart = sqrt(way_x * way_x + way_y * way_y)
         share = max(WORKING_REACH, apart / (first + second))
         near, far = share * first, share * second
         if share > FARTHEST_REACH or apart <= abs(near - far):
@@ -178,13 +186,9 @@ def find_zones(layout: Layout) -> tuple[tuple[float, float], ...]:
             )
         along = (apart**2 + near**2 - far**2) / (2 * apart)
         aside = sqrt(max(near**2 - along**2, 0.0))
-        ahead = way / apart
-        inward = np.array([-ahead[1], ahead[0]])
-        inward *= np.sign(inward @ (middle - bases[i])) or 1.0
-        x, y = bases[i] + along * ahead + aside * inward
-        zones.append((float(x), float(y)))
+        ahead_x, ahead_y = way_x / apart, way_y / apart
+        if ahead_x * (middle_y - y) < ahead_y * (middle_x - x):  # the middle is to the right
+            aside = -aside
+        zone = (x + along * ahead_x - aside * ahead_y, y + along * ahead_y + aside * ahead_x)
+        zones.append(zone)
     return tuple(zones)
-
-
-_ONE, _REACHED, _CARRIED = constants(1.0, 0.3, 0.6)
-(_ZONE_RADIUS,) = constants(ZONE_RADIUS)

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import hypot
-
-import numpy as np
 
 from layouts import Layout, Placement
 from layouts.placement import load_robot
-from simulation import Camera, PhysicsSettings, Sphere, State, World, add_table
-from simulation.arrays import Array, Floats, constants, norm, tanh
-from tasks.props import FACE_UP, TARGET_HEIGHT, add_target
+from simulation import Camera, PhysicsSettings, State, World
+from simulation.maths import Array, Floats, norm, tanh, where
+from tasks.bodies import Ball, Target
+from tasks.props import FACE_UP, TARGET_HEIGHT
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.task import Info, MultiRobotTask
@@ -47,12 +45,8 @@ class RollBall(MultiRobotTask):
     viewpoint = ((-0.6, 1.3, 0.8), (0.0, 0.13, 0.0))
     cameras = (Camera((-0.1, 0.9, 0.3), (0.0, 0.0, 0.0)),)
 
-    def build(self, world: World) -> None:
-        """Add the table, the ball and the target."""
-        add_table(world)
-        ball = Sphere(radius=BALL_RADIUS, color=(0.0, 0.2, 0.8, 1.0))
-        world.add("ball", ball, position=(0.0, 0.0, 0.1))
-        add_target(world, GOAL_RADIUS)
+    ball = Ball(BALL_RADIUS, (0.0, 0.2, 0.8, 1.0), start=(0.0, 0.0, 0.1))
+    goal_region = Target(GOAL_RADIUS)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the ball before the arm and the target at the far end."""
@@ -63,16 +57,13 @@ class RollBall(MultiRobotTask):
         y = rng.uniform(1) * SPAWN_DEPTH - 1.0 + GOAL_RADIUS
         world.set_pose("goal_region", (x.item(), y.item(), TARGET_HEIGHT), FACE_UP)
 
-    def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
-        """Forget that the arm was where it should hit from."""
-        if len(env_ids) == self.num_envs:
-            self._reached = np.zeros(self.num_envs, bool)
-        else:
-            self._reached[list(env_ids)] = False
+    def remember(self, state: State) -> dict[str, Array]:
+        """Whether the arm has been where it should hit from."""
+        return {"reached": state.full(False)}
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: over the target."""
-        return {"success": state.planar_distance("ball", "goal_region") < _GOAL_RADIUS}
+        return {"success": state.planar_distance("ball", "goal_region") < GOAL_RADIUS}
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP, target, ball, how it rolls, and the ways between them."""
@@ -93,14 +84,10 @@ class RollBall(MultiRobotTask):
         """
         off_target = state.offset("goal_region", "ball")
         off_target = off_target / state.distance("goal_region", "ball")[:, None]
-        hit_from = state.position("ball") + off_target * _HIT_OFFSET
+        hit_from = state.position("ball") + off_target * HIT_OFFSET
         hit_distance = norm(hit_from - state.tcp_position("arm"))
-        self._reached |= hit_distance < _HIT_RADIUS
-        rolled = _ONE - tanh(state.planar_distance("ball", "goal_region"))
-        reach = _ONE - tanh(_TWO * hit_distance)
-        reward = np.where(self._reached, _TWENTY * rolled + _ONE, reach)
-        return np.where(info["success"], _DONE, reward)
-
-
-_ONE, _TWO, _TWENTY, _DONE = constants(1.0, 2.0, 20.0, 30.0)
-_GOAL_RADIUS, _HIT_OFFSET, _HIT_RADIUS = constants(GOAL_RADIUS, HIT_OFFSET, HIT_RADIUS)
+        self.memory.reached |= hit_distance < HIT_RADIUS
+        rolled = 1.0 - tanh(state.planar_distance("ball", "goal_region"))
+        reach = 1.0 - tanh(2.0 * hit_distance)
+        reward = where(self.memory.reached, 20.0 * rolled + 1.0, reach)
+        return where(info["success"], 30.0, reward)

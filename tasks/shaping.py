@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from simulation import State
-from simulation.arrays import Flags, Floats, constants, tanh
-
-_ONE, _FIVE, _TEN = constants(1.0, 5.0, 10.0)
+from simulation.maths import Flags, Floats, stack, tanh, where
 
 
 def closeness(*distances: Floats) -> Sequence[Floats]:
@@ -19,21 +15,21 @@ def closeness(*distances: Floats) -> Sequence[Floats]:
         distances: Arrays of one shape, which are taken together, since calls cost more than
             numbers.
     """
-    return [*(_ONE - tanh(np.array(distances) * _FIVE))]
+    return [*(1.0 - tanh(stack(distances) * 5.0))]
 
 
 def stillness(state: State, body: str) -> Floats:
     """Return ``1 - tanh(10 v + w)`` of a body's speed v (m/s) and spin w (rad/s), shape (N,)."""
-    return _ONE - tanh(state.speed(body) * _TEN + state.spin(body))
+    return 1.0 - tanh(state.speed(body) * 10.0 + state.spin(body))
 
 
-def letting_go(state: State, robot: str, grasped: Flags, released: Floats) -> Floats:
+def letting_go(state: State, robot: str, grasped: Flags, released: float) -> Floats:
     """Return how far a gripper is open while it holds something, and ``released`` afterwards.
 
     Args:
         state: The state.
         robot: Whose gripper.
         grasped: Whether it holds something, shape (N,) bool.
-        released: What having let go is worth, shape ().
+        released: What having let go is worth.
     """
-    return np.where(grasped, state.gripper_opening(robot), released)
+    return where(grasped, state.gripper_opening(robot), released)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from layouts import single
-from simulation import PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, Floats, constants
-from tasks.props import GREEN, RED, add_cube
+from simulation import PhysicsSettings, State, World
+from simulation.maths import Array, Floats, where
+from tasks.bodies import Cube
+from tasks.props import GREEN, RED
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness, letting_go, stillness
@@ -37,11 +36,8 @@ class StackCube(MultiRobotTask):
     max_episode_steps = 50
     max_reward = 8
 
-    def build(self, world: World) -> None:
-        """Add the table and both cubes."""
-        add_table(world)
-        add_cube(world, "cubeA", CUBE_HALF_SIZE, position=(0.0, 0.0, 0.1), color=RED)
-        add_cube(world, "cubeB", CUBE_HALF_SIZE, position=(1.0, 0.0, 0.1), color=GREEN)
+    cubeA = Cube(CUBE_HALF_SIZE, RED, start=(0.0, 0.0, 0.1))
+    cubeB = Cube(CUBE_HALF_SIZE, GREEN, start=(1.0, 0.0, 0.1))
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay both cubes on the table."""
@@ -54,7 +50,7 @@ class StackCube(MultiRobotTask):
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: stacked, at rest and let go."""
         grasped = state.is_grasping("arm", "cubeA")
-        stacked = lies_on(state, "cubeA", "cubeB", _ASIDE, _CUBE_SIZE)
+        stacked = lies_on(state, "cubeA", "cubeB", _ASIDE, 2 * CUBE_HALF_SIZE)
         static = is_at_rest(state, "cubeA")
         return {
             "is_cubeA_grasped": grasped,
@@ -79,17 +75,14 @@ class StackCube(MultiRobotTask):
         grasped = info["is_cubeA_grasped"]
         reach, place = closeness(
             state.tcp_distance("arm", "cubeA"),
-            distance_to_top(state, "cubeA", "cubeB", _CUBE_SIZE),
+            distance_to_top(state, "cubeA", "cubeB", 2 * CUBE_HALF_SIZE),
         )
-        released = letting_go(state, "arm", grasped, _ONE)
-        stacked = _FROM_3 + (released + stillness(state, "cubeA")) * _HALF
-        reward = np.where(grasped, _FROM_2 + place, _TWO * reach)
-        reward = np.where(info["is_cubeA_on_cubeB"], stacked, reward)
-        return np.where(info["success"], _DONE, reward)
+        released = letting_go(state, "arm", grasped, 1.0)
+        stacked = 6.0 + (released + stillness(state, "cubeA")) * 0.5
+        reward = where(grasped, 4.0 + place, 2.0 * reach)
+        reward = where(info["is_cubeA_on_cubeB"], stacked, reward)
+        return where(info["success"], 8.0, reward)
 
 
-_HALF, _ONE, _TWO = constants(0.5, 1.0, 2.0)
-_FROM_2, _FROM_3, _DONE = constants(4.0, 6.0, 8.0)  # rewards
-(_CUBE_SIZE,) = constants(2 * CUBE_HALF_SIZE)  # m
-_ASIDE = diagonal(CUBE_HALF_SIZE) + np.float32(TOLERANCE)
-_APART = 2 * float(diagonal(CUBE_HALF_SIZE) + np.float32(GAP))
+_ASIDE = diagonal(CUBE_HALF_SIZE, TOLERANCE)
+_APART = 2 * diagonal(CUBE_HALF_SIZE, GAP)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from layouts import single
-from simulation import Camera, PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, Flags, constants
-from tasks.props import BLUE, GREEN, RED, add_cube
+from simulation import Camera, PhysicsSettings, State, World
+from simulation.maths import Array, Flags
+from tasks.bodies import Cube
+from tasks.props import BLUE, GREEN, RED
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.stacking import diagonal, is_at_rest
@@ -37,11 +36,9 @@ class StackPyramid(MultiRobotTask):
     reward_modes = ("none", "sparse")
     cameras = (Camera((0.3, 0.0, 0.4), (-0.05, 0.0, 0.1)),)
 
-    def build(self, world: World) -> None:
-        """Add the table and the cubes."""
-        add_table(world)
-        for name, x, color in (("cubeA", 0.0, RED), ("cubeB", 1.0, GREEN), ("cubeC", -1.0, BLUE)):
-            add_cube(world, name, CUBE_HALF_SIZE, position=(x, 0.0, 0.2), color=color)
+    cubeA = Cube(CUBE_HALF_SIZE, RED, start=(0.0, 0.0, 0.2))
+    cubeB = Cube(CUBE_HALF_SIZE, GREEN, start=(1.0, 0.0, 0.2))
+    cubeC = Cube(CUBE_HALF_SIZE, BLUE, start=(-1.0, 0.0, 0.2))
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the cubes on the table."""
@@ -82,9 +79,8 @@ def _is_beside(state: State, cube: str, other: str) -> Flags:
 
 def _differs_in_height(state: State, base: str) -> Flags:
     """Whether the blue cube is higher or lower than another one, shape (N,) bool."""
-    return np.abs(state.offset(base, "cubeC")[:, 2]) > _MIN_HEIGHT
+    return abs(state.offset(base, "cubeC")[:, 2]) > MIN_HEIGHT
 
 
-(_MIN_HEIGHT,) = constants(MIN_HEIGHT)
-_ASIDE = diagonal(2 * CUBE_HALF_SIZE) + np.float32(TOLERANCE)
-_APART = 2 * float(diagonal(CUBE_HALF_SIZE))
+_ASIDE = diagonal(2 * CUBE_HALF_SIZE, TOLERANCE)
+_APART = 2 * diagonal(CUBE_HALF_SIZE)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from simulation import State
-from simulation.arrays import Flags, Floats, constants, norm
+from simulation.maths import Flags, Floats, copy, norm, rounded
 
+# The same in StackCube, StackPyramid and PlaceSphere of mani_skill 3.0.1
 HEIGHT_TOLERANCE = 0.005  # m
+SLOW, SLOW_SPIN = 1e-2, 0.5  # m/s, rad/s
 
 
-def lies_on(state: State, top: str, bottom: str, aside: Floats, *heights: Floats) -> Flags:
+def lies_on(state: State, top: str, bottom: str, aside: float, *heights: float) -> Flags:
     """Tell whether a body lies on another one, to within 5 mm of height.
 
     Args:
@@ -27,10 +29,10 @@ def lies_on(state: State, top: str, bottom: str, aside: Floats, *heights: Floats
     error = state.offset(bottom, top)[:, 2]
     for height in heights:
         error = error - height
-    return (state.planar_distance(bottom, top) <= aside) & (np.abs(error) <= _HEIGHT_TOLERANCE)
+    return (state.planar_distance(bottom, top) <= aside) & (abs(error) <= HEIGHT_TOLERANCE)
 
 
-def distance_to_top(state: State, top: str, bottom: str, *heights: Floats) -> Floats:
+def distance_to_top(state: State, top: str, bottom: str, *heights: float) -> Floats:
     """Return how far a body is from its place on another one, shape (N,) (m).
 
     Args:
@@ -39,7 +41,7 @@ def distance_to_top(state: State, top: str, bottom: str, *heights: Floats) -> Fl
         bottom: The body that it is to lie on.
         heights: How much higher its origin must be, in parts (m), as for `lies_on`.
     """
-    goal = state.position(bottom).copy()
+    goal = copy(state.position(bottom))
     for height in heights:
         goal[:, 2] += height
     return norm(goal - state.position(top))
@@ -47,14 +49,9 @@ def distance_to_top(state: State, top: str, bottom: str, *heights: Floats) -> Fl
 
 def is_at_rest(state: State, body: str) -> Flags:
     """Tell whether a body is slower than 1 cm/s and 0.5 rad/s, shape (N,) bool."""
-    return (state.speed(body) <= _SLOW) & (state.spin(body) <= _SLOW_SPIN)
+    return (state.speed(body) <= SLOW) & (state.spin(body) <= SLOW_SPIN)
 
 
-def diagonal(side: float) -> Floats:
-    """Diagonal of a square in float32, as torch rounds it, shape () (unit of ``side``)."""
-    return norm(np.array([side, side], np.float32))
-
-
-(_HEIGHT_TOLERANCE,) = constants(HEIGHT_TOLERANCE)
-# The same in StackCube, StackPyramid and PlaceSphere of mani_skill 3.0.1 (m/s, rad/s)
-_SLOW, _SLOW_SPIN = constants(1e-2, 0.5)
+def diagonal(side: float, beyond: float = 0.0) -> float:
+    """Return the diagonal of a square and something beyond, as float32 rounds (unit of both)."""
+    return rounded(float(norm(np.array([side, side], np.float32))) + rounded(beyond))

@@ -15,7 +15,7 @@ from torch import Tensor
 from layouts import Layout
 from robots import SimulationError, TaskError
 from simulation import Camera, PhysicsSettings, Simulation, State, World
-from simulation.arrays import Array, Floats, all_finite
+from simulation.maths import Array, Floats, all_finite
 from tasks.actions import ActionReader
 from tasks.arguments import (
     check_info,
@@ -24,8 +24,10 @@ from tasks.arguments import (
     checked_seeds,
     wants_rebuild,
 )
+from tasks.bodies import Declared, Table, WideTable, declared_bodies
 from tasks.finite import NotFinite, refuse_observation, refuse_reward, refuse_state
 from tasks.layout_check import refuse_collisions
+from tasks.memory import Memory
 from tasks.native_format import StateDict, StateTape, read_state_dict, write_state_dict
 from tasks.observation import Observer, read_mode, space_of
 from tasks.randomness import EpisodeRandom
@@ -42,14 +44,18 @@ Info = dict[str, Any]
 class MultiRobotTask(Remade):
     """Something to achieve, for one robot or many; subclasses say what.
 
-    A subclass sets ``layout`` and ``max_episode_steps``, adds its bodies in `build`, places them
-    in `sample` and tells success in `evaluate`. It may say more in `observe` and `dense_reward`.
+    A subclass sets ``layout`` and ``max_episode_steps``, declares its bodies as class attributes
+    (`tasks.bodies`), and tells success in `evaluate`. It may say more in `observe` and
+    `dense_reward`, and override `build` and `sample`, which add and place what is declared.
 
     Attributes:
         task_id: The task's id.
         native_id: Id of the ManiSkill task that it clones; None for a task of our own.
         source: Where its numbers come from; of a clone package, version and file.
         layout: Default layout.
+        table: What the robots stand at, the first of its bodies.
+        bodies: The bodies that its class declares, by name, in the order declared; see
+            `tasks.bodies`.
         robot_counts: How many robots a layout may have, in places called as one likes; None if it
             takes exactly the places of ``layout``.
         physics: Solver settings; None keeps SAPIEN's own defaults.
@@ -69,6 +75,7 @@ class MultiRobotTask(Remade):
         action_space: Actions of all environments, (N, A).
         action_split: Robot name → slice of the flat action, in declared order.
         moving: Which environments the present step advances.
+        memory: What `remember` returned, as attributes.
         observer: What puts its observations together, and its cameras.
         observation_slices: Where each named part stands in the flat observation.
         start: Observation and info of the first reset, when it was made.
@@ -80,6 +87,8 @@ class MultiRobotTask(Remade):
     source: ClassVar[str] = ""
     scenario: ClassVar[Any] = FreshScenario()
     layout: Layout
+    table: ClassVar[Table | WideTable] = Table()
+    bodies: ClassVar[Mapping[str, Declared]] = {}
     robot_counts: ClassVar[range | None] = None
     physics: ClassVar[PhysicsSettings | None] = None
     max_episode_steps: int
@@ -97,8 +106,9 @@ class MultiRobotTask(Remade):
     sensed: ClassVar[tuple[str, ...]] = ("*tcp_pose",)
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Offer dense modes exactly if the subclass computes a dense reward."""
+        """Collect the declared bodies; offer dense modes if there is a dense reward."""
         super().__init_subclass__(**kwargs)
+        cls.bodies = declared_bodies(cls)
         if "reward_modes" not in cls.__dict__:
             dense = cls.dense_reward is not MultiRobotTask.dense_reward
             cls.reward_modes = DENSE_MODES if dense else SPARSE_MODES
@@ -110,12 +120,14 @@ class MultiRobotTask(Remade):
         return None
 
     def build(self, world: World) -> None:
-        """Add the task's bodies to a world; the robots stand already."""
-        raise NotImplementedError
+        """Add the task's bodies to a world, in the order declared; the robots stand already."""
+        for name, body in self.bodies.items():
+            body.add_to(world, name)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Place the task's bodies for a new episode; the robots are placed already."""
-        raise NotImplementedError
+        for name, body in self.bodies.items():
+            body.place(world, name, rng)
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Return ``success`` (N,) bool and whatever else describes the state.
@@ -132,8 +144,16 @@ class MultiRobotTask(Remade):
         """Return the dense reward, (N,)."""
         raise NotImplementedError
 
+    def remember(self, state: State) -> Mapping[str, Array]:
+        """Return what later steps look back at, by name, each (N, …), as it is after a reset.
+
+        The task finds it as an attribute of `memory` and may change it there; the rows of
+        environments that are reset are taken anew.
+        """
+        return {}
+
     def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
-        """Remember what later steps compare with; called after ``env_ids`` were reset."""
+        """Do what a new episode needs besides; called after ``env_ids`` were reset."""
 
     def respond(self, state: State) -> None:
         """Move bodies in answer to a control step, before the step is judged.
@@ -201,6 +221,7 @@ class MultiRobotTask(Remade):
         self._elapsed = np.zeros(self.num_envs, np.int32)
         self._everywhere: Sequence[int] = range(self.num_envs)
         self.moving = self._everywhere
+        self.memory = Memory()
         self._simulation: Simulation | None = Simulation(
             self.layout,
             self._build_world,
@@ -375,6 +396,7 @@ class MultiRobotTask(Remade):
             self._camera = None
         self._elapsed[ids] = 0
         state = self._read()
+        self.memory.renew(self.remember(state), ids)
         self.begin_episodes(state, ids)
         info = self._info(state)
         check_info(type(self).__name__, info)

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from math import cos, pi, radians
 
-import numpy as np
-
 from layouts import face_to_face
-from simulation import Box, Camera, PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, Flags, Floats, arccos, constants, norm
+from simulation import Box, Camera, PhysicsSettings, State
+from simulation.maths import Array, Flags, Floats, arccos, clip, maximum, norm, where
+from tasks.bodies import Area, Compound
 from tasks.poses import transform
 from tasks.props import DARK_BLUE, RED
-from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness
 from tasks.task import Info, MultiRobotTask
@@ -24,11 +22,28 @@ END_HALF_LENGTH = 0.1
 GRIP = 0.25  # of a gripper from the bar's middle
 DENSITY = 500.0  # kg/m³, of wood: 0.8 kg in all, 1 N m about a grip
 
-SPAWN_HALF_SIZE = (0.05, 0.03)  # m
 LARGEST_TURN = radians(20)  # of the bar from the way between the arms
 HEIGHT = 0.2  # of the bar's middle (m)
 LARGEST_TILT = radians(5)
 STATIC_SPEED = 0.2  # rad/s
+
+
+def bar_shapes() -> tuple[Box, ...]:
+    """Return the bar's middle and its two ends."""
+    thick = HALF_THICKNESS
+    middle = Box(
+        half_size=(MIDDLE_HALF_LENGTH, MIDDLE_HALF_WIDTH, thick), density=DENSITY, color=RED
+    )
+    ends = [
+        Box(
+            half_size=(END_HALF_LENGTH, thick, thick),
+            position=(side * (MIDDLE_HALF_LENGTH + END_HALF_LENGTH), 0.0, 0.0),
+            density=DENSITY,
+            color=DARK_BLUE,
+        )
+        for side in (-1, 1)
+    ]
+    return (middle, *ends)
 
 
 @register_task("TwoRobotLiftBar-v1")
@@ -50,36 +65,22 @@ class TwoRobotLiftBar(MultiRobotTask):
     cameras = (Camera((1.0, 0.0, 0.75), (0.0, 0.0, 0.1)),)
     sensed = ("*_tcp_pose", "is_left_grasping", "is_right_grasping")
 
-    def build(self, world: World) -> None:
-        """Add the table and the bar."""
-        add_table(world)
-        thick = HALF_THICKNESS
-        middle = Box(
-            half_size=(MIDDLE_HALF_LENGTH, MIDDLE_HALF_WIDTH, thick), density=DENSITY, color=RED
-        )
-        ends = [
-            Box(
-                half_size=(END_HALF_LENGTH, thick, thick),
-                position=(side * (MIDDLE_HALF_LENGTH + END_HALF_LENGTH), 0.0, 0.0),
-                density=DENSITY,
-                color=DARK_BLUE,
-            )
-            for side in (-1, 1)
-        ]
-        world.add("bar", middle, *ends, position=(0.0, 0.0, thick))
-
-    def sample(self, world: World, rng: EpisodeRandom) -> None:
-        """Lay the bar between the arms, its +x end towards +y."""
-        low = [-half for half in SPAWN_HALF_SIZE]
-        x, y = rng.uniform_between(low, SPAWN_HALF_SIZE).tolist()
-        turn = rng.yaw_quaternion(pi / 2 - LARGEST_TURN, pi / 2 + LARGEST_TURN)
-        world.set_pose("bar", (x, y, HALF_THICKNESS), turn)
+    bar = Compound(
+        bar_shapes(),
+        HALF_THICKNESS,
+        start=(0.0, 0.0, HALF_THICKNESS),
+        spawn=Area(  # its +x end towards +y
+            x=(-0.05, 0.05),
+            y=(-0.03, 0.03),
+            yaw=(pi / 2 - LARGEST_TURN, pi / 2 + LARGEST_TURN),
+        ),
+    )
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: lifted, level, held by both arms, which are static."""
         left, right = state.is_grasping("left", "bar"), state.is_grasping("right", "bar")
-        lifted = state.position("bar")[:, 2] >= _HEIGHT
-        level = state.rotation("bar")[:, 2, 2] >= _LEVEL
+        lifted = state.position("bar")[:, 2] >= HEIGHT
+        level = state.rotation("bar")[:, 2, 2] >= cos(LARGEST_TILT)
         static = state.is_static("left", STATIC_SPEED) & state.is_static("right", STATIC_SPEED)
         return {
             "is_bar_lifted": lifted,
@@ -104,8 +105,8 @@ class TwoRobotLiftBar(MultiRobotTask):
     def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Reach (1), grasp (2), lift (4) level (5) and hold still (6); 7 on success."""
         left, right = info["is_left_grasping"], info["is_right_grasping"]
-        below = np.maximum(_HEIGHT - state.position("bar")[:, 2], _ZERO)
-        upright = np.clip(state.rotation("bar")[:, 2, 2], -_ONE, _ONE)
+        below = maximum(HEIGHT - state.position("bar")[:, 2], 0.0)
+        upright = clip(state.rotation("bar")[:, 2, 2], -1.0, 1.0)
         reach_left, reach_right, lift, level, still_left, still_right = closeness(
             norm(_to_grip(state, "left")),
             norm(_to_grip(state, "right")),
@@ -115,21 +116,16 @@ class TwoRobotLiftBar(MultiRobotTask):
             state.arm_speed("right"),
         )
         both: Flags = left & right
-        reward = (reach_left + reach_right + left + right) * _HALF
-        reward = np.where(both, _TWO + _TWO * lift + level, reward)
+        reward = (reach_left + reach_right + left + right) * 0.5
+        reward = where(both, 2.0 + 2.0 * lift + level, reward)
         raised = both & info["is_bar_lifted"] & info["is_bar_level"]
-        reward = np.where(raised, _FIVE + (still_left + still_right) * _HALF, reward)
-        return np.where(info["success"], _DONE, reward)
+        reward = where(raised, 5.0 + (still_left + still_right) * 0.5, reward)
+        return where(info["success"], 7.0, reward)
 
 
 def _to_grip(state: State, robot: str) -> Floats:
     """Way from a robot's TCP to its grip on the bar, shape (N, 3) (m, world)."""
-    return transform(state.pose("bar"), _GRIPS[robot]) - state.tcp_position(robot)
+    return transform(state.pose("bar"), state.array(_GRIPS[robot])) - state.tcp_position(robot)
 
 
-_ZERO, _HALF, _ONE, _TWO, _FIVE, _DONE = constants(0.0, 0.5, 1.0, 2.0, 5.0, 7.0)
-_HEIGHT, _LEVEL = constants(HEIGHT, cos(LARGEST_TILT))
-_GRIPS = {
-    robot: np.array([[side * GRIP, 0.0, 0.0]], np.float32)
-    for robot, side in (("left", -1), ("right", 1))
-}
+_GRIPS = {"left": ((-GRIP, 0.0, 0.0),), "right": ((GRIP, 0.0, 0.0),)}  # in the bar's frame

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-import numpy as np
-
 from layouts import face_to_face
-from simulation import Camera, PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, Floats, constants, norm, tanh
-from tasks.props import add_cube, add_goal
+from simulation import Camera, PhysicsSettings, State, World
+from simulation.maths import Array, Floats, floats, maximum, norm, tanh, where
+from tasks.bodies import Cube, Goal
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness
@@ -39,11 +35,8 @@ class TwoRobotPickCube(MultiRobotTask):
     cameras = (Camera((1.0, 0.0, 0.75), (0.0, 0.0, 0.25)),)
     sensed = ("left_arm_tcp", "right_arm_tcp")
 
-    def build(self, world: World) -> None:
-        """Add the table, the cube and the goal."""
-        add_table(world)
-        add_cube(world, "cube", CUBE_HALF_SIZE, position=(0.0, 0.0, CUBE_HALF_SIZE))
-        add_goal(world, GOAL_RADIUS)
+    cube = Cube(CUBE_HALF_SIZE)
+    goal_site = Goal(GOAL_RADIUS)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the cube on the left and the goal on the right."""
@@ -55,17 +48,13 @@ class TwoRobotPickCube(MultiRobotTask):
         z = rng.uniform(1) * 0.3 + CUBE_HALF_SIZE
         world.set_pose("goal_site", (x.item(), y.item(), z.item()))
 
-    def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
-        """Remember where the left arm started."""
-        qpos = state.qpos("left")
-        if len(env_ids) == self.num_envs:
-            self._left_start = qpos.copy()
-        else:
-            self._left_start[list(env_ids)] = qpos[list(env_ids)]
+    def remember(self, state: State) -> dict[str, Array]:
+        """Where the left arm started."""
+        return {"left_start": state.qpos("left")}
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: placed, and the right arm static."""
-        placed = state.distance("cube", "goal_site") <= _GOAL_RADIUS
+        placed = state.distance("cube", "goal_site") <= GOAL_RADIUS
         static = state.is_static("right", STATIC_SPEED)
         return {
             "success": placed & static,
@@ -90,33 +79,27 @@ class TwoRobotPickCube(MultiRobotTask):
         to_goal = state.tcp_distance("right", "goal_site")
         reach, across, take, retreat, carry, right_still, left_still, *fingers = closeness(
             state.tcp_distance("left", "cube"),
-            np.maximum(_SIDE_Y - cube_y, _ZERO),
+            maximum(0.05 - cube_y, 0.0),
             state.tcp_distance("right", "cube"),
-            np.abs(state.tcp_position("left")[:, 1] - _RETREAT_Y),
+            abs(state.tcp_position("left")[:, 1] - -0.2),
             to_goal,
             state.arm_speed("right"),
             state.arm_speed("left"),
             *_finger_errors(state),
         )
         grasped = state.is_grasping("right", "cube")
-        strayed = norm(state.qpos("left") - self._left_start)
-        stage_1 = (reach + across) * _HALF
-        ready = (fingers[0] + fingers[1]) * _HALF if fingers else 0.0
-        stage_2 = take + ready + retreat + _TWO * grasped
-        stage_3 = _TWO * carry + (_ONE - tanh(strayed))
-        stage_5 = (right_still + left_still) * _HALF
+        strayed = norm(state.qpos("left") - self.memory.left_start)
+        stage_1 = (reach + across) * 0.5
+        ready = (fingers[0] + fingers[1]) * 0.5 if fingers else 0.0
+        stage_2 = take + ready + retreat + 2.0 * floats(grasped)
+        stage_3 = 2.0 * carry + (1.0 - tanh(strayed))
+        stage_5 = (right_still + left_still) * 0.5
 
-        reward = np.where(cube_y >= _ZERO, _FROM_2 + stage_2, stage_1)
-        reward = np.where(grasped, _FROM_3 + stage_3, reward)
-        reward = np.where((to_goal < _NEAR) & grasped, _FROM_4 + _TWO * stage_3, reward)
-        reward = np.where(info["is_obj_placed"], _FROM_5 + stage_5, reward)
-        return np.where(info["success"], _DONE, reward)
-
-
-_ZERO, _HALF, _ONE, _TWO = constants(0.0, 0.5, 1.0, 2.0)
-_FROM_2, _FROM_3, _FROM_4, _FROM_5, _DONE = constants(2.0, 8.0, 12.0, 19.0, 21.0)  # rewards
-(_GOAL_RADIUS,) = constants(GOAL_RADIUS)
-_SIDE_Y, _RETREAT_Y, _NEAR, _FINGER_GAP = constants(0.05, -0.2, 0.25, 0.07)  # m
+        reward = where(cube_y >= 0.0, 2.0 + stage_2, stage_1)
+        reward = where(grasped, 8.0 + stage_3, reward)
+        reward = where((to_goal < 0.25) & grasped, 12.0 + 2.0 * stage_3, reward)
+        reward = where(info["is_obj_placed"], 19.0 + stage_5, reward)
+        return where(info["success"], 21.0, reward)
 
 
 def _finger_errors(state: State) -> tuple[Floats, ...]:
@@ -124,4 +107,4 @@ def _finger_errors(state: State) -> tuple[Floats, ...]:
     heights = state.finger_heights("right")
     if heights is None:
         return ()
-    return np.abs(heights[0] - heights[1]), np.abs(state.finger_gap("right") - _FINGER_GAP)
+    return abs(heights[0] - heights[1]), abs(state.finger_gap("right") - 0.07)

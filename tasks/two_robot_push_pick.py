@@ -4,26 +4,20 @@ from __future__ import annotations
 
 from math import pi
 
-import numpy as np
-
 from layouts import face_to_face
-from simulation import Box, Camera, Friction, PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, Floats, constants, norm
-from tasks.props import DARK_RED, add_goal
-from tasks.randomness import EpisodeRandom
+from simulation import Camera, Friction, PhysicsSettings, State
+from simulation.maths import Array, Floats, maximum, norm, where
+from tasks.bodies import Area, Cube, Goal
+from tasks.props import DARK_RED
 from tasks.registry import register_task
 from tasks.shaping import closeness
 from tasks.task import Info, MultiRobotTask
 
 # m; the picker's base is at y = 0.7, and a Panda that points down reaches about 0.8 m
 CUBE_HALF_SIZE = 0.02
-CUBE_LOW, CUBE_HIGH = (-0.1, -0.28), (0.1, -0.2)
-GOAL_LOW, GOAL_HIGH = (-0.1, 0.15, 0.1), (0.1, 0.25, 0.3)
 IN_REACH_Y = -0.05  # from here on the cube counts as within reach
 GOAL_RADIUS = 0.025
 PUSH_OFFSET = -0.03  # from the cube's middle to where a stick pushes it, along y
-LARGEST_TURN = pi / 6  # of the cube (rad)
-CUBE_FRICTION = Friction(1.0, 1.0, 0.0)  # so that a stick does not slip off at once
 STATIC_SPEED = 0.2  # rad/s
 
 
@@ -45,27 +39,20 @@ class TwoRobotPushPick(MultiRobotTask):
     cameras = (Camera((1.0, 0.0, 0.75), (0.0, 0.0, 0.1)),)
     sensed = ("*_tcp_pose", "goal_pos", "is_cube_grasped")
 
-    def build(self, world: World) -> None:
-        """Add the table, the cube and the goal."""
-        add_table(world)
-        half = CUBE_HALF_SIZE
-        cube = Box(half_size=(half, half, half), color=DARK_RED, friction=CUBE_FRICTION)
-        world.add("cube", cube, position=(0.0, 0.0, half))
-        add_goal(world, GOAL_RADIUS)
-
-    def sample(self, world: World, rng: EpisodeRandom) -> None:
-        """Lay the cube before the pusher, and the goal before the picker."""
-        x, y = rng.uniform_between(CUBE_LOW, CUBE_HIGH).tolist()
-        turn = rng.yaw_quaternion(-LARGEST_TURN, LARGEST_TURN)
-        world.set_pose("cube", (x, y, CUBE_HALF_SIZE), turn)
-        world.set_pose("goal_site", rng.uniform_between(GOAL_LOW, GOAL_HIGH))
+    cube = Cube(
+        CUBE_HALF_SIZE,
+        DARK_RED,
+        friction=Friction(1.0, 1.0, 0.0),  # so that a stick does not slip off at once
+        spawn=Area(x=(-0.1, 0.1), y=(-0.28, -0.2), yaw=(-pi / 6, pi / 6)),
+    )
+    goal_site = Goal(GOAL_RADIUS, spawn=Area(x=(-0.1, 0.1), y=(0.15, 0.25), z=(0.1, 0.3)))
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: placed, and held by the picker, which is static."""
-        placed = state.distance("cube", "goal_site") <= _GOAL_RADIUS
+        placed = state.distance("cube", "goal_site") <= GOAL_RADIUS
         grasped = state.is_grasping("picker", "cube")
         return {
-            "is_cube_in_reach": state.position("cube")[:, 1] >= _IN_REACH_Y,
+            "is_cube_in_reach": state.position("cube")[:, 1] >= IN_REACH_Y,
             "is_cube_grasped": grasped,
             "is_cube_placed": placed,
             "success": placed & grasped & state.is_static("picker", STATIC_SPEED),
@@ -87,22 +74,17 @@ class TwoRobotPushPick(MultiRobotTask):
     def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Reach and push (1), approach (2), grasp and carry (5), hold still (7); 8 on success."""
         cube = state.position("cube")
-        push_place = cube + _PUSH_OFFSET
+        push_place = cube + state.array((0.0, PUSH_OFFSET, 0.0))
         reach, across, take, carry, still = closeness(
             norm(push_place - state.tcp_position("pusher")),
-            np.maximum(_IN_REACH_Y - cube[:, 1], _ZERO),
+            maximum(IN_REACH_Y - cube[:, 1], 0.0),
             state.tcp_distance("picker", "cube"),
             state.distance("cube", "goal_site"),
             state.arm_speed("picker"),
         )
         grasped = info["is_cube_grasped"]
-        reward = (reach + across) * _HALF
-        reward = np.where(info["is_cube_in_reach"], _ONE + take, reward)
-        reward = np.where(grasped, _THREE + _TWO * carry, reward)
-        reward = np.where(grasped & info["is_cube_placed"], _SIX + still, reward)
-        return np.where(info["success"], _DONE, reward)
-
-
-_ZERO, _HALF, _ONE, _TWO, _THREE, _SIX, _DONE = constants(0.0, 0.5, 1.0, 2.0, 3.0, 6.0, 8.0)
-_GOAL_RADIUS, _IN_REACH_Y = constants(GOAL_RADIUS, IN_REACH_Y)
-_PUSH_OFFSET = np.array([0.0, PUSH_OFFSET, 0.0], np.float32)
+        reward = (reach + across) * 0.5
+        reward = where(info["is_cube_in_reach"], 1.0 + take, reward)
+        reward = where(grasped, 3.0 + 2.0 * carry, reward)
+        reward = where(grasped & info["is_cube_placed"], 6.0 + still, reward)
+        return where(info["success"], 8.0, reward)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from layouts import face_to_face
-from simulation import PhysicsSettings, State, World, add_table
-from simulation.arrays import Array, Floats, constants, norm, tanh
-from tasks.props import DARK_BLUE, FACE_UP, GREEN, TARGET_HEIGHT, add_cube, add_target
+from simulation import PhysicsSettings, State, World
+from simulation.maths import Array, Floats, norm, rounded, tanh, where
+from tasks.bodies import Cube, Target
+from tasks.props import DARK_BLUE, FACE_UP, GREEN, TARGET_HEIGHT
 from tasks.randomness import EpisodeRandom
 from tasks.registry import register_task
 from tasks.shaping import closeness, letting_go
@@ -41,13 +40,9 @@ class TwoRobotStackCube(MultiRobotTask):
     viewpoint = ((0.6, 0.2, 0.4), (-0.1, 0.0, 0.1))
     sensed = ("left_arm_tcp", "right_arm_tcp")
 
-    def build(self, world: World) -> None:
-        """Add the table, both cubes and the target."""
-        add_table(world)
-        for name, x, color in (("cubeA", 1.0, DARK_BLUE), ("cubeB", -1.0, GREEN)):
-            position = (x, 0.0, CUBE_HALF_SIZE)
-            add_cube(world, name, CUBE_HALF_SIZE, position=position, color=color)
-        add_target(world, GOAL_RADIUS)
+    cubeA = Cube(CUBE_HALF_SIZE, DARK_BLUE, start=(1.0, 0.0, CUBE_HALF_SIZE))
+    cubeB = Cube(CUBE_HALF_SIZE, GREEN, start=(-1.0, 0.0, CUBE_HALF_SIZE))
+    goal_region = Target(GOAL_RADIUS)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay a cube before each arm, and the target between them."""
@@ -63,8 +58,8 @@ class TwoRobotStackCube(MultiRobotTask):
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: target reached, stacked, and both let go."""
-        stacked = lies_on(state, "cubeA", "cubeB", _ASIDE, _CUBE_SIZE)
-        placed = state.planar_distance("cubeB", "goal_region") < _GOAL_RADIUS
+        stacked = lies_on(state, "cubeA", "cubeB", _ASIDE, 2 * CUBE_HALF_SIZE)
+        placed = state.planar_distance("cubeB", "goal_region") < GOAL_RADIUS
         left, right = state.is_grasping("left", "cubeA"), state.is_grasping("right", "cubeB")
         return {
             "is_cubeA_grasped": left,
@@ -90,28 +85,24 @@ class TwoRobotStackCube(MultiRobotTask):
     def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Grasp blue (1), place green (3), stack and retreat (7), let go (9); 10 on success."""
         left, right = info["is_cubeA_grasped"], info["is_cubeB_grasped"]
-        push_place = state.position("cubeB") + _PUSH_OFFSET
+        push_place = state.position("cubeB") + state.array(_PUSH_OFFSET)
         push_distance = norm(push_place - state.tcp_position("right"))
         reach, place, stack, retreat = closeness(
             state.tcp_distance("left", "cubeA"),
             state.planar_distance("cubeB", "goal_region"),
-            distance_to_top(state, "cubeA", "cubeB", _CUBE_SIZE),
-            np.abs(state.tcp_position("right")[:, 1] - _RETREAT_Y),
+            distance_to_top(state, "cubeA", "cubeB", 2 * CUBE_HALF_SIZE),
+            abs(state.tcp_position("right")[:, 1] - RETREAT_Y),
         )
-        both_reach = (reach + _ONE - tanh(_FIVE * push_distance)) * _HALF
-        released = letting_go(state, "left", left, _ONE) + letting_go(state, "right", right, _ONE)
+        both_reach = (reach + 1.0 - tanh(5.0 * push_distance)) * 0.5
+        released = letting_go(state, "left", left, 1.0) + letting_go(state, "right", right, 1.0)
 
-        reward = np.where(left, _FROM_2 + (place + left) * _HALF, (both_reach + left) * _HALF)
+        reward = where(left, 2.0 + (place + left) * 0.5, (both_reach + left) * 0.5)
         placed = info["cubeB_placed"]
-        reward = np.where(placed & left, _FROM_3 + (stack * _TWO + retreat), reward)
+        reward = where(placed & left, 4.0 + (stack * 2.0 + retreat), reward)
         stacked = info["is_cubeA_on_cubeB"] & placed
-        reward = np.where(stacked, _FROM_4 + released * _HALF, reward)
-        return np.where(info["success"], _DONE, reward)
+        reward = where(stacked, 8.0 + released * 0.5, reward)
+        return where(info["success"], 10.0, reward)
 
 
-_HALF, _ONE, _TWO, _FIVE = constants(0.5, 1.0, 2.0, 5.0)
-_FROM_2, _FROM_3, _FROM_4, _DONE = constants(2.0, 4.0, 8.0, 10.0)  # rewards
-_GOAL_RADIUS, _RETREAT_Y = constants(GOAL_RADIUS, RETREAT_Y)  # m
-(_CUBE_SIZE,) = constants(2 * CUBE_HALF_SIZE)  # m
-_ASIDE = diagonal(CUBE_HALF_SIZE) + np.float32(TOLERANCE)
-_PUSH_OFFSET = np.array([0.0, np.float32(CUBE_HALF_SIZE) + np.float32(PUSH_GAP), 0.0], np.float32)
+_ASIDE = diagonal(CUBE_HALF_SIZE, TOLERANCE)
+_PUSH_OFFSET = (0.0, rounded(CUBE_HALF_SIZE) + rounded(PUSH_GAP), 0.0)

@@ -10,7 +10,7 @@ import numpy as np
 
 from layouts import Layout, ring, single
 from simulation import PhysicsSettings, State, World, add_table
-from simulation.arrays import Array
+from simulation.maths import Array
 from tasks import EpisodeRandom, MultiRobotTask
 from tasks.props import BLUE, add_cube, add_wide_table
 from tasks.task import Info

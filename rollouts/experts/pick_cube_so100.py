@@ -25,7 +25,7 @@ from tasks.pick_cube_so100 import PickCubeSO100
 
 ARM, CUBE, GOAL = "arm", "cube", "goal_site"
 ROLL, DOWNWARD = "wrist_roll", ("shoulder_lift", "elbow_flex", "wrist_flex")
-HALF = PickCubeSO100.cube_half_size  # m
+HALF = PickCubeSO100.cube.half_size  # m
 
 # Of the robot; jaws in the frame of the fixed one, which points along its own -y (m)
 FACE = 0.01  # x of the fixed jaw's face; the moving jaw comes from -x

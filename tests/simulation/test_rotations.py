@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from simulation.arrays import Floats
+from simulation.maths import Floats
 from simulation.rotations import last_euler_angle, rotation_matrix
 
 

@@ -1,0 +1,100 @@
+"""How much of a T's outline another T covers, counted in pixels as native's PushT does.
+
+A pose is judged by itself: the product of matrices that native takes rounds differently for a
+batch. Poses that were judged are remembered, because the T lies still most of the time.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from simulation.maths import Array, Floats, arccos, cos, sin, where, zeros
+
+RESOLUTION = 64  # pixels along each side of the picture
+PICTURE_HALF_WIDTH = 0.15  # m
+CENTRE_OF_MASS_Y = 0.0375  # of the T, above the bar's centre (m)
+
+
+def yaw(quaternion: Floats) -> Floats:
+    """Angle about z in [0, 2π] of wxyz quaternions (N, 4) that turn about z only, (N,) (rad)."""
+    w, z = quaternion[:, 0], quaternion[:, 3]
+    return 2.0 * arccos(where(z < 0, -w, w))
+
+
+def cover(pose: Floats, goal: tuple[float, float, float], candidates: Array) -> Floats:
+    """Return the share of an outline that each T covers.
+
+    Args:
+        pose: Poses of the T's, (N, 7) (m, wxyz).
+        goal: x, y (m) and yaw (rad) of the outline.
+        candidates: Which are judged, (N,) bool; the others get 0.
+
+    Returns:
+        Shape (N,), from 0 to 1.
+    """
+    shares = zeros(pose[:, 0])
+    for i, judged in enumerate(candidates.tolist()):
+        if judged:
+            shares[i] = _cover(tuple(pose[i].tolist()), goal)
+    return shares
+
+
+@lru_cache(maxsize=1024)
+def _cover(pose: tuple[float, ...], goal: tuple[float, float, float]) -> float:
+    """Share of the outline that a T at ``pose`` covers.
+
+    The T's own pixels are drawn into the outline's frame; what falls outside the picture is drawn
+    into its corner.
+    """
+    x, y, _, *quaternion = pose
+    tee_to_world = _planar_transform(yaw(np.array([quaternion], np.float32)), x, y)
+    tee_to_goal = (_world_to_goal(*goal) @ tee_to_world[None])[0]
+    centres = (tee_to_goal @ _CENTRES).numpy().take(_TEE_PIXELS, 1)[:2]
+    scale = np.float32(RESOLUTION / 2 / PICTURE_HALF_WIDTH)
+    pixels = (centres * scale + np.float32(RESOLUTION / 2)).astype(np.int64)
+    inside = ((pixels >= 0) & (pixels < RESOLUTION)).all(0)
+    drawn = np.zeros((RESOLUTION, RESOLUTION), bool)
+    drawn[tuple(pixels * inside)] = True
+    return float(np.float32((drawn & _OUTLINE).sum()) / np.float32(_OUTLINE.sum()))
+
+
+@lru_cache
+def _world_to_goal(x: float, y: float, turn: float) -> torch.Tensor:
+    x, y = torch.tensor((x, y)).tolist()  # as float32 rounds them
+    angle = np.array([turn], np.float32)
+    # Native reads the angle off the outline's quaternion.
+    return torch.linalg.inv(_planar_transform(2.0 * arccos(cos(angle / 2.0)), x, y))
+
+
+def _planar_transform(yaw: Floats, x: float, y: float) -> torch.Tensor:
+    """Homogeneous 3 × 3 matrix of a rotation about z (rad, one number) and a shift (m)."""
+    cosine, sine = cos(yaw).item(), sin(yaw).item()
+    return torch.tensor([[cosine, -sine, x], [sine, cosine, y], [0.0, 0.0, 1.0]])
+
+
+def _outline() -> NDArray[np.bool_]:
+    """The T as pixels (x, y) of its own frame, (64, 64)."""
+    half, scale = RESOLUTION / 2, RESOLUTION / 2 / PICTURE_HALF_WIDTH
+    picture = np.zeros((RESOLUTION, RESOLUTION), bool)
+    corners = torch.tensor([[[-0.1, -0.025], [0.1, 0.025]], [[-0.025, 0.025], [0.025, 0.175]]])
+    corners[..., 1] -= CENTRE_OF_MASS_Y
+    for (left, bottom), (right, top) in (corners * scale + half).long().tolist():
+        picture[left:right, bottom:top] = True
+    return picture
+
+
+def _pixel_centres() -> torch.Tensor:
+    """Homogeneous coordinates of the centres of all pixels, (3, 4096) (m), from the top row on."""
+    line = torch.arange(RESOLUTION, dtype=torch.float32) - RESOLUTION / 2
+    x = line.expand(RESOLUTION, RESOLUTION)
+    metres = (torch.stack([x, -x.T]) + 0.5) / ((RESOLUTION / 2) / PICTURE_HALF_WIDTH)
+    return torch.cat([metres, torch.ones(1, RESOLUTION, RESOLUTION)]).view(3, -1)
+
+
+_OUTLINE = _outline()
+_TEE_PIXELS = np.flatnonzero(_OUTLINE.T[::-1])  # in the order of the pixel centres
+_CENTRES = _pixel_centres()
