@@ -97,6 +97,17 @@ def read(path: Path) -> list[Trajectory]:
         return list(file)
 
 
+def read_edited(folder: Path, edit: Callable[[h5py.File, Path], None]) -> None:
+    """Change the h5 file, read it, and assert that nothing of another file was read."""
+    path = recording(folder)
+    (folder / "secret").write_bytes(SECRET)
+    with edited(path) as file:
+        edit(file, folder)
+    for episode in read(path):
+        for rows in (episode.actions, episode.rewards):
+            assert rows is None or SECRET[:8] not in rows.tobytes(), "read another file"
+
+
 def expect_whole(path: Path) -> None:
     """Assert that a recording holds what was recorded, to the last bit."""
     found = read(path)
