@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pickle
-import signal
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -19,10 +18,6 @@ from rollouts.shift import Sign, Worker
 from tasks import processes
 
 _PATIENCE = 10.0  # s that a worker may take to end by itself
-_UNGUARDED = (
-    ". Workers load the program that starts them: there, what evaluates or records belongs below"
-    " `if __name__ == '__main__':`"
-)
 
 
 def report(said: Any) -> None:
@@ -164,14 +159,10 @@ class _Process:
         self._process.join(_PATIENCE)
         self.kill()
         code = self._process.exitcode or 0
+        how = processes.ending(code)
         if code > 0 and not self._begun:
-            hint = _UNGUARDED if code == 1 else ""
-            raise WorkerError(
-                f"a worker process ended with exit code {code} before it could begin; it has"
-                f" printed why{hint}"
-            )
-        how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
-        return self._death(f"died {how}")
+            raise WorkerError(f"a worker process could not begin: it {how}")
+        return self._death(how)
 
     def _death(self, how: str) -> Event:
         return Event(self.seed, died=f"worker {self.name} {how}", worker=self.name)

@@ -10,33 +10,33 @@ from robots import AssetError
 from robots.urdf_paths import resolve
 
 FILES = {
-    "/home/me/arm/urdf/meshes/a.stl",
-    "/home/me/arm/meshes/a.stl",
-    "/home/me/arm/parts/a.stl",
-    "/home/me/other/meshes/a.stl",
-    "/home/me/ros/arm_meshes/package.xml",
-    "/home/me/ros/arm_meshes/a.stl",
-    "/home/me/ros/arm/package.xml",
-    "/home/me/ros/arm/deep/c/a.stl",
+    "/opt/me/arm/urdf/meshes/a.stl",
+    "/opt/me/arm/meshes/a.stl",
+    "/opt/me/arm/parts/a.stl",
+    "/opt/me/other/meshes/a.stl",
+    "/opt/me/ros/arm_meshes/package.xml",
+    "/opt/me/ros/arm_meshes/a.stl",
+    "/opt/me/ros/arm/package.xml",
+    "/opt/me/ros/arm/deep/c/a.stl",
     "/etc/passwd",
 }
-ROS = "/home/me/ros/arm/deep/b/arm.urdf"
+ROS = "/opt/me/ros/arm/deep/b/arm.urdf"
 
 
 @pytest.mark.parametrize(
     ("urdf", "reference", "path"),
     [
-        ("/home/me/arm/urdf/arm.urdf", "meshes/a.stl", "/home/me/arm/urdf/meshes/a.stl"),
-        ("/home/me/arm/urdf/arm.urdf", "../meshes/a.stl", "/home/me/arm/meshes/a.stl"),
-        ("/home/me/arm/urdf/arm.urdf", "../parts/a.stl", "/home/me/arm/parts/a.stl"),
-        ("/home/me/arm/arm.urdf", "../other/meshes/a.stl", "/home/me/other/meshes/a.stl"),
-        ("/home/me/arm/arm.urdf", "/home/me/arm/parts/a.stl", "/home/me/arm/parts/a.stl"),
-        ("/home/me/arm/arm.urdf", "file:///home/me/arm/parts/a.stl", "/home/me/arm/parts/a.stl"),
-        ("/home/me/arm/arm.urdf", "file://localhost/home/me/arm/a%20b.stl", "/home/me/arm/a b.stl"),
-        ("/home/me/arm/urdf/arm.urdf", "package://arm/parts/a.stl", "/home/me/arm/parts/a.stl"),
-        ("/home/me/arm/arm.urdf", "package://gone/parts/a.stl", "/home/me/arm/parts/a.stl"),
-        (ROS, "../c/a.stl", "/home/me/ros/arm/deep/c/a.stl"),
-        (ROS, "package://arm_meshes/a.stl", "/home/me/ros/arm_meshes/a.stl"),
+        ("/opt/me/arm/urdf/arm.urdf", "meshes/a.stl", "/opt/me/arm/urdf/meshes/a.stl"),
+        ("/opt/me/arm/urdf/arm.urdf", "../meshes/a.stl", "/opt/me/arm/meshes/a.stl"),
+        ("/opt/me/arm/urdf/arm.urdf", "../parts/a.stl", "/opt/me/arm/parts/a.stl"),
+        ("/opt/me/arm/arm.urdf", "../other/meshes/a.stl", "/opt/me/other/meshes/a.stl"),
+        ("/opt/me/arm/arm.urdf", "/opt/me/arm/parts/a.stl", "/opt/me/arm/parts/a.stl"),
+        ("/opt/me/arm/arm.urdf", "file:///opt/me/arm/parts/a.stl", "/opt/me/arm/parts/a.stl"),
+        ("/opt/me/arm/arm.urdf", "file://localhost/opt/me/arm/a%20b.stl", "/opt/me/arm/a b.stl"),
+        ("/opt/me/arm/urdf/arm.urdf", "package://arm/parts/a.stl", "/opt/me/arm/parts/a.stl"),
+        ("/opt/me/arm/arm.urdf", "package://gone/parts/a.stl", "/opt/me/arm/parts/a.stl"),
+        (ROS, "../c/a.stl", "/opt/me/ros/arm/deep/c/a.stl"),
+        (ROS, "package://arm_meshes/a.stl", "/opt/me/ros/arm_meshes/a.stl"),
         ("sub/arm.urdf", "../meshes/a.stl", "meshes/a.stl"),
     ],
 )
@@ -47,14 +47,14 @@ def test_what_belongs_to_a_robot_is_found(urdf, reference, path):
 @pytest.mark.parametrize(
     ("urdf", "reference"),
     [
-        ("/home/me/arm/arm.urdf", "../../../etc/passwd"),
-        ("/home/me/arm/arm.urdf", "/etc/passwd"),
-        ("/home/me/arm/arm.urdf", "file:///etc/passwd"),
-        ("/home/me/arm/arm.urdf", "package://../../../etc/passwd"),
-        ("/home/me/arm/arm.urdf", "../parts/a.stl"),
-        ("/home/me/arm/arm.urdf", "../meshes/../../../etc/passwd"),
+        ("/opt/me/arm/arm.urdf", "../../../etc/passwd"),
+        ("/opt/me/arm/arm.urdf", "/etc/passwd"),
+        ("/opt/me/arm/arm.urdf", "file:///etc/passwd"),
+        ("/opt/me/arm/arm.urdf", "package://../../../etc/passwd"),
+        ("/opt/me/arm/arm.urdf", "../parts/a.stl"),
+        ("/opt/me/arm/arm.urdf", "../meshes/../../../etc/passwd"),
         ("/home/arm.urdf", "../etc/passwd"),
-        ("/home/me/arm/arm.urdf", "//etc/passwd"),
+        ("/opt/me/arm/arm.urdf", "//etc/passwd"),
         (ROS, "../../../../other/meshes/a.stl"),
         ("sub/arm.urdf", "../../meshes/a.stl"),
         ("arm.urdf", "/etc/passwd"),
@@ -68,8 +68,8 @@ def test_what_lies_elsewhere_is_refused(urdf, reference):
 
 def test_no_folder_of_a_system_counts_as_a_package():
     """A name of a package is looked for around the URDF, up to the root of the disk."""
-    path = resolve("package://etc/passwd", "/home/me/arm/arm.urdf", FILES.__contains__)
-    assert path == "/home/me/arm/etc/passwd"
+    path = resolve("package://etc/passwd", "/opt/me/arm/arm.urdf", FILES.__contains__)
+    assert path == "/opt/me/arm/etc/passwd"
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def test_no_folder_of_a_system_counts_as_a_package():
 )
 def test_what_is_no_path_is_refused(reference, reason):
     with pytest.raises(AssetError, match=reason):
-        resolve(reference, "/home/me/arm/arm.urdf", FILES.__contains__)
+        resolve(reference, "/opt/me/arm/arm.urdf", FILES.__contains__)
 
 
 def test_links_are_compared_as_they_are_written(tmp_path):

@@ -135,7 +135,7 @@ def test_an_episode_that_cannot_be_played(tmp_path):
 def test_workers_that_cannot_begin():
     with pytest.raises(TaskError, match="nothing can be made here"):
         run(cannot_prepare, range(3))
-    with pytest.raises(WorkerError, match="3 worker processes died before .* with exit code 7"):
+    with pytest.raises(WorkerError, match="3 worker processes died before .* ended with code 7"):
         run(dies_before_it_is_ready, range(3))
 
 
@@ -302,8 +302,8 @@ def test_a_program_without_a_guard(tmp_path):
     done = subprocess.run(words, env=env, capture_output=True, text=True, timeout=120)
     assert done.returncode == 1
     last = done.stderr.splitlines()[-1]
-    assert "ended with exit code 1 before it could begin" in last
-    assert last.endswith("belongs below `if __name__ == '__main__':`")
+    assert "a worker process could not begin: it imported the script that starts it" in last
+    assert last.endswith("under `if __name__ == '__main__':`")
 
 
 def test_results_that_cannot_be_sent():

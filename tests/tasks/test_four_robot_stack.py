@@ -64,7 +64,7 @@ def test_every_cube_starts_on_its_arms_side(seed: int):
     env = tasks.make(TASK)
     env.reset(seed)
     state = env.simulation.read()
-    for place, ((x, y, _), _) in ORDER.items():
+    for place, (x, y) in ORDER.items():
         cube = state.position(f"cube_{place}")[0]
         assert 0.25 <= cube[0] * x + cube[1] * y <= 0.33
         assert state.tcp_position(place)[0][:2] @ (x, y) > 0.1

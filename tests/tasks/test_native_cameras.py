@@ -115,8 +115,9 @@ def test_another_scene_is_noticed(pick: Look, what: str, monkeypatch: pytest.Mon
             rendering._Studio, "look", lambda self, c, t, *, markers: looked(self, c, t, markers=1)
         )
     elif what == "colour":
-        monkeypatch.setattr("tasks.props.RED", (0.97, 0.0, 0.0, 1.0))
-        monkeypatch.setattr("tasks.props.add_cube.__defaults__", ((0.97, 0.0, 0.0, 1.0),))
+        cls = tasks.get_task_class("PickCube-v1")
+        cube = replace(cls.cube, color=(0.97, 0.0, 0.0, 1.0))
+        monkeypatch.setattr(cls, "bodies", {**cls.bodies, "cube": cube})
     else:
         part = "extra/obj_pose"
         monkeypatch.setattr(tasks.get_task_class("PickCube-v1"), "sensed", ("*",))
