@@ -30,6 +30,7 @@ ROOMS = ("robots", "layouts", "simulation", "tasks", "rollouts")
 _CONNECT_SECONDS = 10.0  # that a port may take to accept
 _JOIN_SECONDS = 60.0  # that all of joining may take, the import of Ray included
 _ANSWER_SECONDS = 20.0  # that the head may take to answer a question
+_NEWS_SECONDS = 10.0  # that it may take to learn that a node is dead
 _AWAY_SECONDS = 30.0  # that it may be gone; Ray ends this process after 60
 _LOOK_SECONDS = 5.0  # between looks whether it is there
 _THIS_MACHINE = ("localhost", "127.0.0.1", "::1")  # for which Ray takes an address of its own
@@ -105,15 +106,25 @@ class Cluster:
         self.expect_head()
         return int(self._ask(self._ray.available_resources).get("CPU", 0))
 
-    def has(self, node: str | None) -> bool:
-        """Return whether a node lives; whether this process's own does is looked at, too."""
-        alive = {about["NodeID"] for about in self._nodes() if about["Alive"]}
+    @property
+    def nodes(self) -> frozenset[str]:
+        """Which nodes live; this process's own is one of them."""
+        alive = frozenset(about["NodeID"] for about in self._nodes() if about["Alive"])
         if self._node not in alive:
             raise WorkerError(
                 "the Ray node of this machine has died, and with it all that was played for this"
                 " process; start it again with `ray start`, then the same command"
             )
-        return node in alive
+        return alive
+
+    def lose(self, nodes: frozenset[str]) -> bool:
+        """Return whether one of the nodes is dead, which the head may learn only in a while."""
+        deadline = time.monotonic() + _NEWS_SECONDS
+        while nodes <= self.nodes:
+            if time.monotonic() > deadline:
+                return False
+            time.sleep(0.2)
+        return True
 
     def expect_head(self) -> None:
         """Do nothing if the head's port is open."""

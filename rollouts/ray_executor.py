@@ -27,7 +27,6 @@ from tasks.processes import Sendable
 PACKAGES = ("sapien", "torch", "numpy")  # which decide the bits of an episode
 
 _FETCH_SECONDS = 60.0  # that an answer may take from the node where it lies
-_NODE_DIED = "its node has died"  # in Ray's words
 
 
 class RayExecutor:
@@ -101,8 +100,8 @@ class _Actors:
 
     def hire(self) -> _Actor:
         """Ask for an actor, which begins when a node has room for it."""
-        self._cluster.expect_head()
-        return _Actor(self._ray, self._cluster, self._class.remote(), self._prepare)
+        nodes = self._cluster.nodes  # which raises if the head is gone, before it is asked
+        return _Actor(self._ray, self._cluster, self._class.remote(), self._prepare, nodes)
 
     def wait(self, workers: Sequence[Worker], seconds: float) -> list[Worker]:
         """Return the actors whose answers arrive within a while."""
@@ -119,8 +118,8 @@ class _Actors:
         Raises:
             WorkerError: If the cluster is gone, or the node of this machine.
         """
-        self._cluster.has(None)
-        return f"{self._cluster.free_cpus} CPUs of the Ray cluster are free"
+        nodes, free = len(self._cluster.nodes), self._cluster.free_cpus
+        return f"{free} CPUs of the Ray cluster, of {nodes} nodes, are free"
 
 
 @dataclass(frozen=True)
@@ -147,10 +146,13 @@ class _Actor:
         answer: What it has been asked for last.
     """
 
-    def __init__(self, ray: Any, cluster: Cluster, actor: Any, prepare: bytes) -> None:
+    def __init__(
+        self, ray: Any, cluster: Cluster, actor: Any, prepare: bytes, nodes: frozenset[str]
+    ) -> None:
         self.seed: int | None = None
         self.name = "actor"
         self._ray, self._cluster, self._actor, self._prepare = ray, cluster, actor, prepare
+        self._nodes = nodes  # it will be on one of them
         self._home: _Home | None = None
         self._ready = False
         self.answer: Any = actor.home.remote()
@@ -200,6 +202,7 @@ class _Actor:
 
     def _settle(self, home: _Home) -> None:
         self._home, self.name = home, f"process {home.process} on node {home.address}"
+        self._nodes = frozenset({home.node})
         here = _versions()
         if home.packages != here:
             raise WorkerError(
@@ -209,13 +212,15 @@ class _Actor:
         self.answer = self._actor.begin.remote(self._prepare)
 
     def _died(self, error: Exception) -> Event:
-        self.kill()  # it may only be out of reach
-        how = _reason(error)
-        lives = self._cluster.has(None if self._home is None else self._home.node)
-        lost = isinstance(error, self._ray.exceptions.ActorUnavailableError) or (
-            not lives if self._home is not None else how == _NODE_DIED
-        )
-        return self._death(f"was lost: {'out of reach' if lost else how}", excused=lost)
+        lost = isinstance(error, self._ray.exceptions.ActorUnavailableError)
+        if not isinstance(error, self._ray.exceptions.ActorDiedError):
+            self.kill()  # it may only be out of reach
+        if self._ready:
+            lost = lost or not self._nodes <= self._cluster.nodes
+        else:  # several of one node would be too many deaths
+            lost = lost or self._cluster.lose(self._nodes)
+        how = "out of reach" if lost else _reason(error)
+        return self._death(f"was lost: {how}", excused=lost)
 
     def _death(self, how: str, *, excused: bool = False) -> Event:
         died = f"worker {self.name} {how}"

@@ -193,6 +193,7 @@ class Shift:
         message = worker.receive()
         self._since[worker] = self._clock.time
         if message is Sign.READY:
+            self._deaths[None] = 0
             self._assign(worker)
         elif isinstance(message, Event):
             yield message
@@ -221,12 +222,12 @@ class Shift:
         """Let an episode be played again, unless too many workers died of it.
 
         Raises:
-            WorkerError: If too many died before they could play anything.
+            WorkerError: If as many died as play at a time, and none became ready in between.
         """
         del self._since[worker]
         seed, died = death.seed, self._deaths
         died[seed] += not death.excused
-        if seed is None and died[seed] >= DEATHS_ALLOWED:
+        if seed is None and died[seed] >= max(DEATHS_ALLOWED, self._count):
             raise WorkerError(
                 f"{died[seed]} worker processes died before they could play anything; the last:"
                 f" {death.died}"

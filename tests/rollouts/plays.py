@@ -89,6 +89,20 @@ class DiesOnce:
         os._exit(7)
 
 
+@dataclass(frozen=True)
+class EveryOtherDies:
+    """Every other worker dies before it is ready."""
+
+    folder: Path
+
+    def __call__(self):
+        begun = len(list(self.folder.iterdir()))
+        (self.folder / str(begun)).touch()
+        if begun % 2 == 0:
+            os._exit(7)
+        return Play().play
+
+
 class HangsOnce(DiesOnce):
     """The first worker to begin is stopped; the others play."""
 

@@ -30,6 +30,7 @@ from rollouts.in_process import InProcessExecutor
 from tests.rollouts.plays import (
     CannotBeLoaded,
     DiesOnce,
+    EveryOtherDies,
     HangsOnce,
     Play,
     SaysAndRests,
@@ -144,6 +145,12 @@ def test_a_worker_that_dies_before_it_is_ready_is_replaced(tmp_path):
     (death,) = [event for event in events if event.died is not None]
     assert death.seed is None
     assert squares(events) == {seed: seed**2 for seed in range(4)}
+
+
+def test_deaths_are_counted_from_the_last_worker_that_was_ready(tmp_path):
+    events = list(ProcessExecutor(1, fresh=True).run(EveryOtherDies(tmp_path), range(4)))
+    assert len([event for event in events if event.died is not None]) == 4
+    assert len(squares(events)) == 4
 
 
 def test_what_cannot_be_sent_is_said():

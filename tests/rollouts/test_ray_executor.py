@@ -72,7 +72,7 @@ def test_a_cluster_without_room(cluster, monkeypatch):
     said = next(events).said
     assert re.fullmatch(
         r"no message for \d s: actor has been getting ready for \d s;"
-        r" 0 CPUs of the Ray cluster are free",
+        r" 0 CPUs of the Ray cluster, of 1 nodes, are free",
         said,
     )
     cluster.grow(1)
@@ -112,8 +112,11 @@ def test_nodes_and_actors_that_are_killed_change_nothing(nodes, tmp_path):
         "its worker process has died",
         "out of reach",
     ]
-    late = "out of reach before it could play anything"  # sent to a node not yet known to be dead
-    assert {words for words in lost if " at seed " not in words} <= {late}
+    late = {  # sent to a node not yet known to be dead, or libraries that could not be loaded
+        "out of reach before it could play anything",
+        "its worker process has died before it could play anything",
+    }
+    assert {words for words in lost if " at seed " not in words} <= late
     assert same_files(tmp_path / FILE, recorded_directly(tmp_path / "direct" / FILE, range(24)))
 
 
