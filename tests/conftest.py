@@ -20,9 +20,10 @@ import pytest
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # read when torch is imported
 
-# A shell's background jobs ignore Ctrl-C, and so would every process that a test interrupts.
+# A shell's background jobs ignore these, and so would every process that a test sends one.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGQUIT, signal.SIG_DFL)
 
 # However slow or busy the machine is, no example of a property takes too long.
 hypothesis.settings.register_profile(

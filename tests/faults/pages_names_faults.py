@@ -7,7 +7,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
-from tests.faults.fault import GOES_ON, Fault, run_command
+from tests.faults.fault import GOES_ON, REFUSED, Fault, run_command
 from tests.layouts.hostile_names import HOSTILE_NAMES
 
 AREA = "pages"
@@ -18,11 +18,13 @@ ROBOTS = ("floor", "things", "tables", "WorldAxes", "label", "__proto__", "const
 def faults() -> Iterator[Fault]:
     """Go through the names, wherever they can stand."""
     for name in NAMES:
+        in_urdf = GOES_ON if name.isprintable() and len(name) <= 200 else REFUSED
         for place in ("title", "note", "link", "joint"):
             what = f"a {place} called {name[:40]!r}"
-            yield Fault(AREA, what, lambda f, n=name, place=place: _name(f, place, n), GOES_ON)
+            promise = GOES_ON if place in ("title", "note") else in_urdf
+            yield Fault(AREA, what, lambda f, n=name, place=place: _name(f, place, n), promise)
         what = f"a saved page of names such as {name[:40]!r}"
-        yield Fault(AREA, what, lambda folder, name=name: _saved_name(folder, name), GOES_ON)
+        yield Fault(AREA, what, lambda folder, name=name: _saved_name(folder, name), in_urdf)
     for name in ROBOTS:
         what = f"a robot called {name!r}"
         yield Fault(AREA, what, lambda folder, name=name: _robot(folder, name), GOES_ON)
