@@ -96,8 +96,11 @@ class PushT(MultiRobotTask):
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: the T covers its outline."""
-        near = state.planar_distance("goal_Tee", "Tee") < FARTHEST_COVERED
-        return {"success": near & (cover(state.pose("Tee"), (*GOAL_XY, GOAL_YAW), near) >= COVERED)}
+        success = state.planar_distance("goal_Tee", "Tee") < FARTHEST_COVERED
+        if success.any():
+            shares = cover(state.pose("Tee"), (*GOAL_XY, GOAL_YAW), success)
+            success = success & (shares >= COVERED)
+        return {"success": success}
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCP, outline and T."""
