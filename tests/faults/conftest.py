@@ -62,6 +62,7 @@ def _page(tried: dict[str, list[tuple[str, str, str, bool]]]) -> str:
 def _cell(text: str) -> str:
     text = re.sub(r"/\S*/pytest-of-\w+/pytest-\d+/", "…/", text.replace(str(ROOT), "…"))
     text = " ".join(text.split())
+    text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
     text = text if len(text) <= SHOWN else f"{text[: SHOWN - 1]}…"
     return html.escape(text, quote=False).replace("|", "\\|").replace("`", "'")
 

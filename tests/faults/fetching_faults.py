@@ -321,6 +321,9 @@ def _killed(number: signal.Signals) -> Callable[[Path], None]:
             finally:
                 killer.join()
                 assert killed
+                until = time.monotonic() + 10  # s; who waits for them reaps them
+                while any(map(is_alive, killed)) and time.monotonic() < until:
+                    time.sleep(0.05)
                 assert not [child for child in killed if is_alive(child)]
 
     return run
