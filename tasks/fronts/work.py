@@ -9,7 +9,7 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
 
 from robots import RobotLayoutsError
-from tasks.processes import ProcessError, Sendable
+from tasks.processes.process import ProcessError, Sendable
 
 if TYPE_CHECKING:
     from tasks.fronts.batch import Batch, Part

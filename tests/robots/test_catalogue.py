@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from robots import AssetError, RobotDescriptor, RobotRegistry, UrdfLocator
-from robots.manifest import AssetPackage, load_manifest
+from robots.assets.manifest import AssetPackage, load_manifest
 from robots.registry import CATALOGUE
-from robots.urdf_xml import UrdfJoint, read_joints, read_links, read_references
+from robots.urdf.summary import UrdfJoint, read_joints, read_links, read_references
 from tests.robots.conftest import contents
 
 ROBOTS = tuple(CATALOGUE)
