@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from robots.assets.fetching import default_sources, ensure, scenery
+from robots.assets import scenery
+from robots.assets.fetching import default_sources, ensure
 from robots.assets.hub_source import REVISION_VARIABLE, HubSource
 from robots.assets.locator import UrdfLocator
 from robots.assets.manifest import AssetFile, load_manifest

@@ -9,7 +9,7 @@ import re
 from importlib import metadata
 from pathlib import Path
 
-from robots.assets.fetching import scenery
+from robots.assets import scenery
 from robots.assets.locator import UrdfLocator
 from robots.assets.manifest import (
     CHECKOUT_CACHE,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from measurements.bench.measurement import BenchmarkError, Measurement, by_series
 from measurements.bench.settings import CORES, Clock, Settings
 from measurements.bench.steps import PHYSICS, random_actions
-from tasks.processes.process import process as processes
+from tasks.processes import process as processes
 
 VECTOR = "vector"
 FEW, MANY = 4, 36  # environments in a worker whose memory is compared

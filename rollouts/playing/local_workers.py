@@ -15,7 +15,7 @@ from robots import RobotLayoutsError
 from rollouts.playing.dispatch import Sign, Worker
 from rollouts.playing.events import Event, Play, WorkerError
 from rollouts.playing.transport import described, loaded, packed, portable
-from tasks.processes.process import process as processes
+from tasks.processes import process as processes
 
 _PATIENCE = 10.0  # s that a worker may take to end by itself
 

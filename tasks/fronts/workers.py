@@ -23,8 +23,8 @@ from tasks.fronts.board import (
     new_shared_memory,
 )
 from tasks.fronts.work import CallFailed, work
+from tasks.processes import process as processes
 from tasks.processes.process import ProcessError, WorkerTraceback, enough
-from tasks.processes.process import process as processes
 
 START_SECONDS = 300.0  # until all workers have built their worlds
 _FAREWELL_SECONDS = 2.0  # that workers may take to end by themselves

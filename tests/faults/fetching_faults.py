@@ -15,7 +15,7 @@ from itertools import repeat
 from pathlib import Path
 from unittest import mock
 
-from robots.assets.fetching import wheel_source
+from robots.assets import wheel_source
 from robots.assets.hub_source import HubSource
 from robots.assets.store import AssetStore
 from robots.assets.wheel_source import ManiSkillWheel

@@ -13,7 +13,7 @@ from unittest import mock
 import pytest
 
 from robots import AssetError
-from robots.assets.fetching import manifest
+from robots.assets import manifest
 from robots.assets.manifest import AssetPackage, Manifest, load_manifest
 from robots.assets.store import AssetStore, FileState
 from tests.faults.fault import GOES_ON, Fault

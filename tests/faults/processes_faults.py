@@ -276,7 +276,7 @@ def _parent_ends(
         task_id: What its vector plays.
         hold: Whether it ``steps`` a vector or ``plays`` episodes.
     """
-    from tasks.processes.process import process as processes
+    from tasks.processes import process as processes
 
     ours, theirs = processes.context.Pipe()
     parent = processes.context.Process(target=_hold, args=(theirs, hold, task_id))
@@ -910,7 +910,7 @@ def _servers() -> Iterator[Fault]:
 
 def _server() -> int:
     """Return the number of the server that forks this process's workers."""
-    from tasks.processes.process import forks
+    from tasks.processes import forks
 
     if forks._server is None:
         with _vector(num_workers=1):
@@ -941,7 +941,7 @@ def _server_lost() -> None:
 
 
 def _server_stops() -> None:
-    from tasks.processes.process import forks
+    from tasks.processes import forks
 
     patience, forks._FORK_SECONDS = forks._FORK_SECONDS, 1.0
     try:
@@ -952,7 +952,7 @@ def _server_stops() -> None:
 
 
 def _server_cannot_load() -> None:
-    from tasks.processes.process import forks
+    from tasks.processes import forks
 
     os.kill(_server(), signal.SIGKILL)
     command = forks._COMMAND

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from robots.assets.fetching import sources as asset_sources
+from robots.assets import sources as asset_sources
 from robots.assets.manifest import AssetFile, load_manifest
 from robots.assets.sources import SourceError, find_mani_skill
 from robots.assets.store import AssetStore, default_root

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from robots import AssetError, RobotRegistry, UnknownNameError, UrdfLocator
+from robots.assets import store as asset_store
 from robots.assets.fetching import ensure
-from robots.assets.fetching import store as asset_store
 from robots.assets.manifest import load_manifest
 from robots.assets.sources import InstalledManiSkill, LocalCopy, SourceError
 from robots.assets.store import AssetStore, FileState, default_root

@@ -14,7 +14,8 @@ from pathlib import Path
 import pytest
 
 from robots import AssetError, UrdfLocator
-from robots.assets.fetching import ensure, wheel_source
+from robots.assets import wheel_source
+from robots.assets.fetching import ensure
 from robots.assets.store import FileState
 from robots.assets.wheel_source import ManiSkillWheel
 from tests.robots.conftest import contents

@@ -14,7 +14,8 @@ from pathlib import Path
 import pytest
 
 from robots import AssetError
-from robots.assets.fetching import ensure, hub_source
+from robots.assets import hub_source
+from robots.assets.fetching import ensure
 from robots.assets.hub_source import HubSource
 from robots.assets.sources import InstalledManiSkill
 from robots.assets.store import FileState

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from robots import AssetError, UnknownNameError, write_manifest
-from robots.assets.fetching import manifest
+from robots.assets import manifest
 from robots.assets.manifest import CHECKOUT_CACHE, Manifest, load_manifest
 from robots.assets.sources import find_mani_skill
 from robots.write_manifest import build_package

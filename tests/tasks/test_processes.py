@@ -22,8 +22,8 @@ from robots import RobotLayoutsError, SimulationError, TaskError
 from simulation.rendering.pictures import vulkan_problem
 from tasks.fronts.vector import VectorTask
 from tasks.fronts.workers import WorkerError
+from tasks.processes import process as processes
 from tasks.processes.fork_server import LOADED
-from tasks.processes.process import process as processes
 from tests.fresh_process import in_fresh_process
 from tests.tasks import breaking
 
