@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import import_module
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots import TaskError
+from robots.common.bounds import shown
+from robots.common.catalogue import Catalogue
 from tasks import MultiRobotTask, get_task_class
 
 Expert = Callable[[MultiRobotTask, int], NDArray[np.float32]]
@@ -43,7 +45,25 @@ CATALOGUE = {
     "TwoRobotStackCube-v1": "experts.maniskill.two_robot_stack_cube:stack_for_two",
 }
 
-_registered: dict[str, Expert] = {}
+
+def _check(given: object, origin: str, name: str) -> Expert:
+    """Return what an entry point gave, if it can be an expert."""
+    if not callable(given):
+        raise TaskError(
+            f"{origin} gave {shown(given)}; the expert of {name} is needed, a function of a task"
+            " and a seed"
+        )
+    return cast(Expert, given)
+
+
+EXPERTS = Catalogue(
+    "expert",
+    CATALOGUE,
+    group="robot_layouts.experts",
+    check=_check,
+    error=TaskError,
+    ignore_case=True,
+)
 
 
 def register_expert(task_id: str, expert: Expert) -> Expert:
@@ -52,29 +72,29 @@ def register_expert(task_id: str, expert: Expert) -> Expert:
     Raises:
         UnknownNameError: If there is no such task.
     """
-    _registered[get_task_class(task_id).task_id] = expert
+    EXPERTS.register(get_task_class(task_id).task_id, expert)
     return expert
 
 
 def find_expert(task_id: str) -> Expert:
     """Return the expert of a task.
 
+    Other packages bring experts through the entry points ``robot_layouts.experts``, named as the
+    tasks that they solve.
+
     Args:
         task_id: The task's id or another of its names.
 
     Raises:
         UnknownNameError: If there is no such task.
-        TaskError: If the task has no expert.
+        TaskError: If the task has no expert, or another package brings it and that goes wrong.
     """
     name = get_task_class(task_id).task_id
-    if name in _registered:
-        return _registered[name]
-    if name not in CATALOGUE:
+    if name not in EXPERTS:
         raise TaskError(f"{name} has no expert yet; tasks with one: {', '.join(list_experts())}")
-    module, _, function = CATALOGUE[name].partition(":")
-    return getattr(import_module(module), function)
+    return EXPERTS[name]
 
 
 def list_experts() -> tuple[str, ...]:
     """Return the ids of all tasks that have an expert, sorted."""
-    return tuple(sorted({*CATALOGUE, *_registered}))
+    return tuple(EXPERTS)

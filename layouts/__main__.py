@@ -15,6 +15,7 @@ from layouts.presets import FACING, PRESETS
 from layouts.validate_command import add_check_options
 from layouts.view_command import add_view_options
 from robots import LayoutError, RobotRegistry, UnknownNameError
+from robots.common.bounds import shown
 from robots.common.commands import FAILED, exit_code, start
 
 # What presets take besides the robots.
@@ -103,10 +104,9 @@ def build(preset: str, robots: Sequence[str], **options: Any) -> Layout:
         UnknownNameError: If there is no such preset, robot or keyframe.
         LayoutError: If a word is malformed, or the preset lacks or does not take an option.
     """
-    if preset not in PRESETS:
-        raise UnknownNameError("layout preset", preset, PRESETS)
+    place = PRESETS[preset]
     given = {name: value for name, value in options.items() if value is not None}
-    parameters = dict(inspect.signature(PRESETS[preset]).parameters)
+    parameters = dict(inspect.signature(place).parameters)
     del parameters["robots"]
     for name in given:
         if name not in parameters:
@@ -115,7 +115,10 @@ def build(preset: str, robots: Sequence[str], **options: Any) -> Layout:
     for name, parameter in parameters.items():
         if parameter.default is parameter.empty and name not in given:
             raise LayoutError(f"{preset} needs --{name}")
-    return PRESETS[preset](_named_robots(robots), **given)
+    layout = place(_named_robots(robots), **given)
+    if not isinstance(layout, Layout):
+        raise LayoutError(f"the preset {preset} returned {shown(layout)}; a Layout is needed")
+    return layout
 
 
 def _named_robots(words: Sequence[str]) -> dict[str, str]:

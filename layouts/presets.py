@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from inspect import signature
 from itertools import pairwise
-from typing import Literal, TypeGuard
+from typing import Literal, TypeGuard, cast
 
 from layouts.distances import apart, centred, gaps, ring_of, share_at_table, table_for
 from layouts.frames import EDGES, check_positive
@@ -22,6 +23,7 @@ from layouts.orientation import yaw_quaternion
 from layouts.placement import Placement, RobotLike, check_robots, faced, load_robot
 from robots import LayoutError, RobotDescriptor, UnknownNameError
 from robots.common.bounds import checked_whole, shown
+from robots.common.catalogue import Catalogue
 from robots.descriptor import Vector3
 
 Distance = float | Literal["auto"]  # m
@@ -232,15 +234,34 @@ def grid(
     return Layout(placements)
 
 
-# Every preset, by the name it has on the command line.
-PRESETS: Mapping[str, Callable[..., Layout]] = {
-    "single": single,
-    "side_by_side": side_by_side,
-    "face_to_face": face_to_face,
-    "ring": ring,
-    "around_table": around_table,
-    "grid": grid,
+# One line per preset, sorted by name: name -> module:function.
+CATALOGUE = {
+    "around_table": "layouts.presets:around_table",
+    "face_to_face": "layouts.presets:face_to_face",
+    "grid": "layouts.presets:grid",
+    "ring": "layouts.presets:ring",
+    "side_by_side": "layouts.presets:side_by_side",
+    "single": "layouts.presets:single",
 }
+
+
+def _check(given: object, origin: str, name: str) -> Callable[..., Layout]:
+    """Return what an entry point gave, if it can be a preset."""
+    if not callable(given) or next(iter(signature(given).parameters), None) != "robots":
+        raise LayoutError(
+            f"{origin} gave {shown(given)}; the preset {name} is needed, a function whose first"
+            " argument is robots"
+        )
+    return cast("Callable[..., Layout]", given)
+
+
+PRESETS = Catalogue(
+    "layout preset",
+    CATALOGUE,
+    group="robot_layouts.presets",
+    check=_check,
+    error=LayoutError,
+)
 
 
 def _loaded(robots: Mapping[str, RobotLike]) -> dict[str, RobotDescriptor]:

@@ -15,7 +15,7 @@ from robots.assets.sources import AssetSource, InstalledManiSkill, LocalCopy
 from robots.assets.store import AssetStore, FileState, default_root
 from robots.assets.wheel_source import ManiSkillWheel
 from robots.common.commands import exit_code, print_error, printable, start
-from robots.common.errors import DescriptorError
+from robots.common.errors import RobotLayoutsError
 from robots.common.paths import absolute
 from robots.descriptor import RobotDescriptor
 from robots.registry import RobotRegistry
@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _fetch(options: argparse.Namespace) -> int:
     pictures = not options.physics_only
-    failures: list[DescriptorError] = []
+    failures: list[RobotLayoutsError] = []
     if options.robots:
         robots = [RobotRegistry.load(name) for name in options.robots]
     else:

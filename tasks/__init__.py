@@ -23,6 +23,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from tasks.fronts import parallel_env, register, sb3_vec_env
+from tasks.registry import on_registration
 
 if TYPE_CHECKING:
     from tasks.engine.randomness import EpisodeRandom
@@ -68,4 +69,4 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
 
 
-register()
+on_registration(register)

@@ -9,69 +9,78 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from layouts import Layout, Placement
 from layouts.placement import RobotLike, load_robot
-from robots import RobotDescriptor, TaskError, UnknownNameError
+from robots import RobotDescriptor, TaskError
 from robots.common.bounds import shown
+from robots.common.catalogue import Catalogue, reason
 
 if TYPE_CHECKING:
     from tasks.engine.scenario import Scenario
     from tasks.engine.task import MultiRobotTask
 
-# Beginning of the name of a task that clones one of ManiSkill's.
-CLONE_PREFIX = "maniskill."
+CLONES = "tasks.maniskill."  # where the tasks that clone one of ManiSkill's are
 
-# One line per task, sorted by id: id -> module:class, then its other names.
+# One line per task, sorted by id: id -> module:class.
 CATALOGUE = {
-    "DrawTriangle-v1": (
-        "tasks.maniskill.draw_triangle:DrawTriangle",
-        "maniskill.draw_triangle_native",
-    ),
-    "FourRobotStack-v1": ("tasks.originals.four_robot_stack:FourRobotStack",),
-    "LiftPegUpright-v1": (
-        "tasks.maniskill.lift_peg_upright:LiftPegUpright",
-        "maniskill.lift_peg_upright_native",
-    ),
-    "PegInsertionSide-v1": (
-        "tasks.maniskill.peg_insertion_side:PegInsertionSide",
-        "maniskill.peg_insertion_side_native",
-    ),
-    "PickCube-v1": ("tasks.maniskill.pick_cube:PickCube", "maniskill.pick_cube_native"),
-    "PickCubeSO100-v1": (
-        "tasks.maniskill.pick_cube_so100:PickCubeSO100",
-        "maniskill.pick_cube_so100_native",
-    ),
-    "PlaceSphere-v1": ("tasks.maniskill.place_sphere:PlaceSphere", "maniskill.place_sphere_native"),
-    "PlugCharger-v1": ("tasks.maniskill.plug_charger:PlugCharger", "maniskill.plug_charger_native"),
-    "PokeCube-v1": ("tasks.maniskill.poke_cube:PokeCube", "maniskill.poke_cube_native"),
-    "PullCube-v1": ("tasks.maniskill.pull_cube:PullCube", "maniskill.pull_cube_native"),
-    "PullCubeTool-v1": (
-        "tasks.maniskill.pull_cube_tool:PullCubeTool",
-        "maniskill.pull_cube_tool_native",
-    ),
-    "PushCube-v1": ("tasks.maniskill.push_cube:PushCube", "maniskill.push_cube_native"),
-    "PushT-v1": ("tasks.maniskill.push_t:PushT", "maniskill.push_t_native"),
-    "Relay-v1": ("tasks.originals.relay:Relay",),
-    "RollBall-v1": ("tasks.maniskill.roll_ball:RollBall", "maniskill.roll_ball_native"),
-    "StackCube-v1": ("tasks.maniskill.stack_cube:StackCube", "maniskill.stack_cube_native"),
-    "StackPyramid-v1": (
-        "tasks.maniskill.stack_pyramid:StackPyramid",
-        "maniskill.stack_pyramid_native",
-    ),
-    "TwoRobotLiftBar-v1": ("tasks.originals.two_robot_lift_bar:TwoRobotLiftBar",),
-    "TwoRobotPickCube-v1": (
-        "tasks.maniskill.two_robot_pick_cube:TwoRobotPickCube",
-        "maniskill.two_robot_pick_cube_native",
-    ),
-    "TwoRobotPushPick-v1": ("tasks.originals.two_robot_push_pick:TwoRobotPushPick",),
-    "TwoRobotStackCube-v1": (
-        "tasks.maniskill.two_robot_stack_cube:TwoRobotStackCube",
-        "maniskill.two_robot_stack_cube_native",
-    ),
+    "DrawTriangle-v1": "tasks.maniskill.draw_triangle:DrawTriangle",
+    "FourRobotStack-v1": "tasks.originals.four_robot_stack:FourRobotStack",
+    "LiftPegUpright-v1": "tasks.maniskill.lift_peg_upright:LiftPegUpright",
+    "PegInsertionSide-v1": "tasks.maniskill.peg_insertion_side:PegInsertionSide",
+    "PickCube-v1": "tasks.maniskill.pick_cube:PickCube",
+    "PickCubeSO100-v1": "tasks.maniskill.pick_cube_so100:PickCubeSO100",
+    "PlaceSphere-v1": "tasks.maniskill.place_sphere:PlaceSphere",
+    "PlugCharger-v1": "tasks.maniskill.plug_charger:PlugCharger",
+    "PokeCube-v1": "tasks.maniskill.poke_cube:PokeCube",
+    "PullCube-v1": "tasks.maniskill.pull_cube:PullCube",
+    "PullCubeTool-v1": "tasks.maniskill.pull_cube_tool:PullCubeTool",
+    "PushCube-v1": "tasks.maniskill.push_cube:PushCube",
+    "PushT-v1": "tasks.maniskill.push_t:PushT",
+    "Relay-v1": "tasks.originals.relay:Relay",
+    "RollBall-v1": "tasks.maniskill.roll_ball:RollBall",
+    "StackCube-v1": "tasks.maniskill.stack_cube:StackCube",
+    "StackPyramid-v1": "tasks.maniskill.stack_pyramid:StackPyramid",
+    "TwoRobotLiftBar-v1": "tasks.originals.two_robot_lift_bar:TwoRobotLiftBar",
+    "TwoRobotPickCube-v1": "tasks.maniskill.two_robot_pick_cube:TwoRobotPickCube",
+    "TwoRobotPushPick-v1": "tasks.originals.two_robot_push_pick:TwoRobotPushPick",
+    "TwoRobotStackCube-v1": "tasks.maniskill.two_robot_stack_cube:TwoRobotStackCube",
 }
 
-_registered: dict[str, type[MultiRobotTask]] = {}  # lower-case name -> class
-_listed: list[str] = []  # first name of each registered task
-
 TaskClass = TypeVar("TaskClass", bound="type[MultiRobotTask]")
+
+_listeners: list[Callable[[], None]] = []
+
+
+def _native_name(name: str) -> str:
+    return f"maniskill.{name}_native"
+
+
+def _check(given: object, origin: str, name: str) -> type[MultiRobotTask]:
+    """Return what an entry point gave, if it is a task's class of the name that it goes by."""
+    from tasks.engine.task import MultiRobotTask
+
+    if not (isinstance(given, type) and issubclass(given, MultiRobotTask) and given.task_id):
+        raise TaskError(
+            f"{origin} gave {shown(given)}; a subclass of tasks.MultiRobotTask is needed, with"
+            f" @register_task({name!r}) above it"
+        )
+    if given.task_id.lower() != name.lower():
+        raise TaskError(f"{origin} is listed as {name!r}, but its task is {given.task_id!r}")
+    return given
+
+
+TASKS = Catalogue(
+    "task",
+    CATALOGUE,
+    group="robot_layouts.tasks",
+    check=_check,
+    error=TaskError,
+    aliases={
+        _native_name(target.partition(":")[0].removeprefix(CLONES)): task_id
+        for task_id, target in CATALOGUE.items()
+        if target.startswith(CLONES)
+    },
+    ignore_case=True,
+    hint="A task of your own goes by 'module:Id', and is registered there by @register_task('Id').",
+)
 
 
 def register_task(*names: str) -> Callable[[TaskClass], TaskClass]:
@@ -90,52 +99,62 @@ def register_task(*names: str) -> Callable[[TaskClass], TaskClass]:
 
     def register(cls: TaskClass) -> TaskClass:
         for name in names:
-            registered = _registered.get(name.lower())
-            owner = _built_in(name) if registered is None else _home(registered)
-            if owner not in (None, _home(cls)):
+            if (owner := TASKS.home(name)) not in (None, f"{cls.__module__}:{cls.__qualname__}"):
                 raise TaskError(f"the name {name!r} is already taken by {owner}")
-        _registered.update({name.lower(): cls for name in names})
-        if names[0] not in _listed and names[0] not in CATALOGUE:
-            _listed.append(names[0])
-            import_module("tasks.fronts").register()
         cls.task_id = names[0]
-        cls.native_id = names[0] if any(map(_is_clone_name, names)) else None
+        cls.native_id = names[0] if any(map(_is_native_name, names)) else None
+        TASKS.register(names[0], cls, names[1:])
+        for listener in _listeners:
+            listener()
         return cls
 
     return register
 
 
+def on_registration(listener: Callable[[], None]) -> None:
+    """Call a function now, and whenever a task has been registered."""
+    _listeners.append(listener)
+    listener()
+
+
 def list_tasks() -> tuple[str, ...]:
     """Return every task id, sorted."""
-    return tuple(sorted({*CATALOGUE, *_listed}))
+    return tuple(TASKS)
 
 
 def list_clones() -> tuple[str, ...]:
-    """Return the id of every task that clones one of ManiSkill's, sorted."""
-    built_in = (i for i, (_, *names) in CATALOGUE.items() if any(map(_is_clone_name, names)))
-    registered = (i for i in _listed if _registered[i.lower()].native_id is not None)
-    return tuple(sorted({*built_in, *registered}))
+    """Return the id of every task that clones one of ManiSkill's, sorted.
+
+    Of tasks that other packages bring, only those are known that were looked up before.
+    """
+    native = filter(_is_native_name, TASKS.aliases)
+    return tuple(sorted({TASKS.aliases[name] for name in native}))
 
 
 def get_task_class(name: str) -> type[MultiRobotTask]:
     """Return the class of a task by id or other name, ignoring case.
 
-    ``pick_cube`` is short for ``maniskill.pick_cube_native``.
+    ``pick_cube`` is short for ``maniskill.pick_cube_native``. ``mylab.tray:TwoArmTray-v1`` imports
+    ``mylab.tray`` and takes the task that is registered there by that id.
 
     Raises:
         UnknownNameError: If no task has that name (also a ``KeyError``).
+        TaskError: If it is in a module that cannot be imported, or in a broken entry point.
     """
-    for key in (str(name).lower(), f"{CLONE_PREFIX}{str(name).lower()}_native"):
-        if key not in _registered and (target := _built_in(key)):
-            import_module(target.partition(":")[0])  # registers itself
-        if key in _registered:
-            return _registered[key]
-    raise UnknownNameError("task", name, _all_names())
+    name = str(name)
+    module, colon, task_id = name.rpartition(":")
+    if colon:
+        _import(module, name)
+        name = task_id
+    for spelling in (name, _native_name(name)):
+        if spelling in TASKS:
+            return TASKS[spelling]
+    raise TASKS.unknown(name, f"Importing {module!r} registered no such task." if colon else None)
 
 
 def other_names(cls: type[MultiRobotTask]) -> tuple[str, ...]:
     """Return what a task class is known as besides its id, in lower case."""
-    return tuple(n for n, c in _registered.items() if c is cls and n != cls.task_id.lower())
+    return TASKS.aliases_of(cls.task_id)
 
 
 def make(
@@ -222,24 +241,19 @@ def _stand(placement: Placement, robot: RobotLike) -> Placement:
     return placement.with_robot(robot)
 
 
-def _is_clone_name(name: str) -> bool:
-    return name.lower().startswith(CLONE_PREFIX)
+def _is_native_name(name: str) -> bool:
+    return name.lower().startswith("maniskill.")
 
 
-def _built_in(name: str) -> str | None:
-    for task_id, (target, *others) in CATALOGUE.items():
-        if str(name).lower() in (task_id.lower(), *(other.lower() for other in others)):
-            return target
-    return None
+def _import(module: str, name: str) -> None:
+    """Import the module of a user that registers a task.
 
-
-def _home(cls: type) -> str:
-    return f"{cls.__module__}:{cls.__qualname__}"
-
-
-def _all_names() -> list[str]:
-    others = [name for _, *names in CATALOGUE.values() for name in names]
-    registered = [name for name in _registered if name not in map(str.lower, [*CATALOGUE, *others])]
-    listed = [name for name in _listed if name.lower() in registered]
-    rest = [name for name in registered if name not in map(str.lower, listed)]
-    return [*CATALOGUE, *others, *listed, *rest]
+    Raises:
+        TaskError: If that fails.
+    """
+    try:
+        import_module(module)
+    except (Exception, SystemExit) as error:  # whatever the code of another package does
+        raise TaskError(
+            f"the module {module!r} of the task {name!r} cannot be imported: {reason(error)}"
+        ) from error

@@ -5,7 +5,7 @@ import pytest
 
 import tasks
 from experts import find_expert, list_experts, register_expert
-from experts import registry as registry_module
+from experts.registry import EXPERTS
 from layouts import face_to_face
 from parity.compare.native_env import make_native, native_action
 from robots import TaskError, UnknownNameError
@@ -93,13 +93,14 @@ def test_an_unknown_task_is_named_with_the_closest():
 
 
 def test_a_task_without_an_expert_says_which_have_one(monkeypatch):
-    monkeypatch.setattr(registry_module, "CATALOGUE", {TASK: registry_module.CATALOGUE[TASK]})
+    monkeypatch.setattr(EXPERTS, "lines", {TASK: EXPERTS.lines[TASK]})
+    monkeypatch.setattr(EXPERTS, "registered", {})
     with pytest.raises(TaskError, match=f"PushT-v1 has no expert yet; tasks with one: {TASK}"):
         find_expert("PushT-v1")
 
 
 def test_an_expert_can_be_registered(monkeypatch):
-    monkeypatch.setattr(registry_module, "_registered", {})
+    monkeypatch.setattr(EXPERTS, "registered", {})
     expert = register_expert("pusht-v1", lambda task, seed: np.zeros((1, 7), np.float32))
     assert find_expert("PushT-v1") is expert
     assert "PushT-v1" in list_experts()

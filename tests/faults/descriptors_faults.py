@@ -26,6 +26,7 @@ from robots import (
 )
 from robots.fetch_assets import main as fetch_assets
 from robots.inspect import main as inspect
+from robots.registry import ROBOTS
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.tiny_files import run_main, settings
 
@@ -293,7 +294,7 @@ def _load(name: Any) -> None:
 
 
 def _register(value: Any) -> None:
-    with mock.patch.object(RobotRegistry, "_registered", {}):
+    with mock.patch.object(ROBOTS, "registered", {}):
         RobotRegistry.register(value)
 
 
@@ -343,5 +344,5 @@ def _others() -> None:
     with contextlib.suppress(Exception):  # everything but that robot, and then its one error
         run_main(fetch_assets, "--check")
     mine = replace(PANDA, name="mine")
-    with mock.patch.object(RobotRegistry, "_registered", {}):
+    with mock.patch.object(ROBOTS, "registered", {}):
         assert RobotRegistry.register(mine) is mine

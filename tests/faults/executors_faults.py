@@ -605,7 +605,7 @@ def _record(
     from rollouts.recording.record import record
     from tests.rollouts.plays import at_random
 
-    with patch.dict("experts.registry._registered", {TASK: at_random}):
+    with patch.dict("experts.registry.EXPERTS.registered", {TASK: at_random}):
         record(TASK, seeds, folder, workers=workers, **arguments)
 
 

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from layouts import Frame, Layout, Placement, around_table, face_to_face, ring
 from layouts.presets import PRESETS
 from robots import LayoutError, RobotRegistry
+from robots.registry import ROBOTS
 
 floats = st.floats(-1e6, 1e6)
 vectors = st.tuples(floats, floats, floats)
@@ -147,7 +148,7 @@ class TestRoundTrip:
             layout = Layout({"arm": Placement(odd, keyframe=name)})
             assert Layout.from_yaml(layout.to_yaml()) == layout
         finally:
-            del RobotRegistry._registered["odd_panda"]
+            del ROBOTS.registered["odd_panda"]
 
 
 class TestRobotsThatCannotBeWritten:

@@ -171,7 +171,7 @@ class TestSource:
         assert source.episode.actions.shape[1] == 16
 
     def test_neither(self, monkeypatch):
-        monkeypatch.setattr("experts.registry.CATALOGUE", {})
+        monkeypatch.setattr("experts.registry.EXPERTS.lines", {})
         with pytest.raises(TaskError, match="has no expert yet"):
             find_source(tasks.get_task_class("PushT-v1"), None, None)
 

@@ -26,6 +26,7 @@ from robots.assets.sources import find_mani_skill
 from robots.data_module import write_module
 from robots.from_urdf import Guess, guess_descriptor, main
 from robots.registry import CATALOGUE
+from robots.registry import ROBOTS as CATALOGUED
 
 CHECKOUT = Path(__file__).parents[2]
 # What is guessed of these is right. One that the guess gets wrong is left out, and says why here.
@@ -242,7 +243,7 @@ class TestRobotDescriptions:
 
 
 def test_a_guess_can_be_registered_under_its_own_name(monkeypatch):
-    monkeypatch.setattr(RobotRegistry, "_registered", {})
+    monkeypatch.setattr(CATALOGUED, "registered", {})
     mine = RobotDescriptor.from_urdf(urdf_of("koch"), "my_koch", quiet=True)
     assert RobotRegistry.register(replace(mine, reach=0.4)).name == "my_koch"
     assert "my_koch" in RobotRegistry.names()

@@ -11,14 +11,14 @@ from pathlib import Path
 import pytest
 
 from robots import DescriptorError, RobotRegistry, UnknownNameError, closest_match
-from robots.registry import CATALOGUE
+from robots.registry import CATALOGUE, ROBOTS
 
 CHECKOUT = Path(__file__).parents[2]
 
 
 @pytest.fixture(autouse=True)
 def _own_registrations(monkeypatch):
-    monkeypatch.setattr(RobotRegistry, "_registered", {})
+    monkeypatch.setattr(ROBOTS, "registered", {})
 
 
 def test_loading_twice_gives_the_same_robot():

@@ -104,7 +104,7 @@ def test_it_is_what_one_sees_by_hand():
 
 
 def test_an_expert_plays_its_plan(monkeypatch):
-    monkeypatch.setitem(registry._registered, TASK, at_random)
+    monkeypatch.setitem(registry.EXPERTS.registered, TASK, at_random)
     found = evaluate("expert", TASK, [4, NO_PLAN], executor=Here())
     episode = play(env := tasks.make(TASK), 4, at_random(env, 4))
     assert found.lengths == {4: 24, NO_PLAN: 0}

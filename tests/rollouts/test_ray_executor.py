@@ -55,7 +55,7 @@ def nodes(cluster):
 
 @pytest.fixture
 def _cheap_expert(monkeypatch):
-    monkeypatch.setitem(registry._registered, TASK, at_random)
+    monkeypatch.setitem(registry.EXPERTS.registered, TASK, at_random)
 
 
 def run(nodes, prepare, seeds, workers=None):

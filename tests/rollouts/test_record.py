@@ -29,7 +29,7 @@ FILE = "trajectory.h5"
 
 @pytest.fixture(autouse=True)
 def _cheap_expert(monkeypatch):
-    monkeypatch.setitem(registry._registered, TASK, at_random)
+    monkeypatch.setitem(registry.EXPERTS.registered, TASK, at_random)
 
 
 def arguments(out: Path, episodes: int, workers: int = 1, **more: object) -> list[str]:

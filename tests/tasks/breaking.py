@@ -146,13 +146,13 @@ TASKS.update(
 @contextmanager
 def offered():
     """Register these tasks meanwhile, so that no other test meets them in the catalogue."""
-    new = {task_id: cls for task_id, cls in TASKS.items() if task_id not in registry._listed}
+    registered = registry.TASKS.registered
+    new = {task_id: cls for task_id, cls in TASKS.items() if task_id not in registered}
     for task_id, cls in new.items():
         register_task(task_id)(cls)
     try:
         yield
     finally:
         for task_id in new:
-            del registry._registered[task_id.lower()]
-            registry._listed.remove(task_id)
+            del registered[task_id]
             gymnasium.registry.pop(f"RobotLayouts/{task_id}", None)

@@ -10,7 +10,7 @@ import tasks
 from layouts import single
 from robots import TaskError, UnknownNameError
 from simulation import Friction, PhysicsSettings, State, World
-from tasks import registry
+from tasks.registry import TASKS
 
 
 @pytest.mark.parametrize("task_id", tasks.list_clones())
@@ -153,8 +153,8 @@ class Still(tasks.MultiRobotTask):
 
 
 def test_a_user_can_declare_a_task(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(registry, "_registered", dict(registry._registered))
-    monkeypatch.setattr(registry, "_listed", list(registry._listed))
+    monkeypatch.setattr(TASKS, "registered", dict(TASKS.registered))
+    monkeypatch.setattr(TASKS, "aliases", dict(TASKS.aliases))
     tasks.register_task("Still-v0", "test.still")(Still)
     env = tasks.make("test.STILL", num_envs=2)
     assert "Still-v0" in tasks.list_tasks()
