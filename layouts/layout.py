@@ -10,7 +10,6 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, TypeVar
 
 from layouts.description import describe
-from layouts.files import written_whole
 from layouts.frames import (
     ORIGIN,
     Frame,
@@ -24,6 +23,7 @@ from layouts.orientation import yaw_quaternion
 from layouts.placement import Placement, RobotLike, placed
 from robots import LayoutError, UnknownNameError
 from robots.common.bounds import FAR, checked_number, shown
+from robots.common.writing import write_whole
 from robots.descriptor import Vector3
 
 if TYPE_CHECKING:
@@ -237,10 +237,10 @@ class Layout(Mapping[str, Placement]):
 
         Raises:
             LayoutError: If a robot is not registered, or not as it is here.
+            UnwritableFileError: If it cannot be written (also an ``OSError``).
         """
         text = self.to_yaml()
-        with written_whole(path) as unfinished:
-            unfinished.write_text(text, encoding="utf-8")
+        write_whole(path, text)
         return Path(path)
 
     @classmethod

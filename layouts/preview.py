@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from layouts.description import action_text, decimal, facing_text, headline
-from layouts.files import written_whole
 from layouts.frames import table_outlines
 from layouts.orientation import forward, yaw_degrees
 from robots import LayoutError, MissingPackageError
+from robots.common.writing import written_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

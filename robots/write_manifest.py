@@ -23,6 +23,7 @@ from robots.assets.sources import find_mani_skill
 from robots.common.commands import exit_code, start
 from robots.common.errors import AssetError
 from robots.common.files import read_regular, read_text
+from robots.common.writing import write_whole
 from robots.registry import CATALOGUE, RobotRegistry
 from robots.urdf.summary import read_references
 
@@ -48,12 +49,7 @@ def _write(*, check: bool) -> int:
             f"{path} is {'up to date' if fresh else 'stale; run python -m robots.write_manifest'}"
         )
         return 0 if fresh else 1
-    partial = path.with_suffix(".partial")
-    try:
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(path)
-    except OSError as error:
-        raise AssetError(f"cannot write {path}: {error.strerror}") from error
+    write_whole(path, text, AssetError)
     print(f"wrote {path}")
     return 0
 

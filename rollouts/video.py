@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from layouts import Layout
-from robots import MissingPackageError, RecordingError, RobotLayoutsError
+from robots import MissingPackageError, RecordingError
+from robots.common.writing import PARTIAL, written_whole
 from robots.descriptor import Vector3
 from simulation.rendering.pictures import Cameras, vulkan_problem
 from tasks import MultiRobotTask
@@ -87,17 +88,12 @@ def open_video(path: Path, frames_per_second: float) -> Generator[Callable[[Pict
         MissingPackageError: If imageio is not installed.
         RecordingError: If the file cannot be written.
     """
-    partial = path.with_name(f"{path.stem}.{os.getpid()}.partial{path.suffix}")
-    try:
-        with _writer(partial, frames_per_second) as writer:
-            yield writer.append_data
-        os.replace(partial, path)
-    except OSError as error:
-        if isinstance(error, RobotLayoutsError):
-            raise
-        raise RecordingError(f"cannot write {path}: {error}") from error
-    finally:
-        partial.unlink(missing_ok=True)
+    partial = path.with_name(f"{path.stem}.{os.getpid()}{PARTIAL}{path.suffix}")
+    with (
+        written_whole(path, RecordingError, partial=partial),
+        _writer(partial, frames_per_second) as writer,
+    ):
+        yield writer.append_data
 
 
 def overview(layout: Layout) -> tuple[Vector3, Vector3] | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import shutil
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,9 +13,9 @@ from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 import yaml
 
 from layouts.export.urdf import base_link, rpy
-from layouts.files import written_whole
 from layouts.visuals import Part, load_meshes, read_visuals, require_trimesh, simplified
 from robots import LayoutError, RobotDescriptor
+from robots.common.writing import write_whole, written_whole
 from robots.urdf.paths import resolve
 from robots.urdf.summary import parse_urdf, read_urdf
 
@@ -43,9 +42,7 @@ def write_drake(layout: Layout, path: str | os.PathLike[str], *, visuals: bool =
         for place, placement in layout.items()
         for directive in _directives(place, placement, models[placement.robot])
     ]
-    with written_whole(target) as unfinished:
-        text = yaml.dump({"directives": directives}, Dumper=_Dumper, sort_keys=False)
-        unfinished.write_text(text, encoding="utf-8")
+    write_whole(target, yaml.dump({"directives": directives}, Dumper=_Dumper, sort_keys=False))
     return target
 
 
@@ -92,17 +89,14 @@ def _write_models(
         if robot not in names:
             twins = sum(other.name == robot.name for other in names)
             names[robot] = f"{robot.name}_{twins + 1}" if twins else robot.name
-    folder.parent.mkdir(parents=True, exist_ok=True)
     _expect_own(folder)
-    with tempfile.TemporaryDirectory(dir=folder.parent) as unfinished:
-        made = Path(unfinished) / "robots"
+    with written_whole(folder) as made:
         for robot, name in names.items():
             urdf = robot.urdf.locate(pictures=visuals)
             drawn = read_visuals(urdf) if visuals else {}
             _write_model(urdf, drawn, made / name, f"{name}.urdf")
         if folder.exists():
             shutil.rmtree(folder)
-        made.rename(folder)
     return {robot: folder / name / f"{name}.urdf" for robot, name in names.items()}
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
-from layouts.files import written_whole
 from robots import LayoutError
+from robots.common.writing import written_whole
 from robots.descriptor import Quaternion, Vector3
 from robots.urdf.model import read_model
 from robots.urdf.paths import resolve

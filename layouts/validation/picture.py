@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from layouts.description import decimal, headline
-from layouts.files import written_whole
 from layouts.preview import COLOURS, FAINT, INK, LONGEST_NAME, SUPPORTED, TABLE, blank_figure
 from layouts.validation.kinematics import Floats
 from layouts.validation.report import Clearance, Report, length_text
 from robots import LayoutError
+from robots.common.writing import written_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from layouts.files import written_whole
 from layouts.view_command import LOOPBACK
 from layouts.viewer.cell import Cell
 from layouts.viewer.guard import policy
@@ -17,6 +16,7 @@ from layouts.viewer.page import contacts_text
 from layouts.viewer.scene import Scene
 from layouts.viewer.server import ViewerError, serving
 from layouts.viewer.text import as_html
+from robots.common.writing import write_whole
 
 NO_SLIDERS = "A saved page has no sliders; the one that view serves without --html has them."
 NOTE_STYLE = (  # above the bar that plays a motion
@@ -49,14 +49,7 @@ def save_html(cell: Cell, path: str | os.PathLike[str]) -> Path:
     page = _with(page, "<title>Viser</title>", f"<title>{html.escape(cell.title)}</title>")
     page = _with(page, "<head>", f"<head>\n{_policy()}")
     page = _with(page, '<div id="root"></div>', f'<div id="root"></div>\n{_note(cell)}')
-    try:
-        with written_whole(target) as unfinished:
-            unfinished.write_text(page, encoding="utf-8")
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        if isinstance(error, (FileExistsError, NotADirectoryError)):
-            reason = f"{target.parent} is no folder"
-        raise ViewerError(f"cannot save a page as {str(target)!r}: {reason}") from error
+    write_whole(target, page, ViewerError)
     return target
 
 

@@ -15,7 +15,6 @@ import gymnasium
 from gymnasium.vector import AsyncVectorEnv
 
 import tasks
-from layouts.files import written_whole
 from measurements.bench.catalogue import BENCHMARKS
 from measurements.bench.command import add_arguments, run_benchmarks, settings_of
 from measurements.bench.episodes import timed_resets
@@ -28,6 +27,7 @@ from measurements.bench.steps import PHYSICS, Played
 from parity.compare.native_env import make_native, native_action, quiet
 from robots import RobotLayoutsError, TaskError
 from robots.common.commands import start
+from robots.common.writing import write_whole
 from tasks import MultiRobotTask, get_task_class, list_clones
 
 NATIVE, HERE = "native", "here"
@@ -203,8 +203,7 @@ def _expect_clones(task_ids: Sequence[str]) -> None:
 def _keep(report: Report) -> None:
     if report.left_out:
         raise BenchmarkError(f"nothing is recorded, as {', '.join(report.left_out)} was left out")
-    with written_whole(RECORD) as unfinished:
-        unfinished.write_text(report.as_json(), encoding="utf-8")
+    write_whole(RECORD, report.as_json())
     print(f"{RECORD}: recorded; `python -m parity readme` shows it in README.md")
 
 

@@ -14,10 +14,10 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from layouts.files import written_whole
 from measurements.bench.measurement import BenchmarkError, Measurement
 from measurements.bench.plot import draw
 from measurements.bench.settings import CORES
+from robots.common.writing import write_whole, written_whole
 
 JSON, MARKDOWN, PLOT = "bench.json", "bench.md", "bench.png"
 PACKAGES = ("mani_skill", "sapien", "gymnasium", "torch", "numpy")  # that times depend on
@@ -95,15 +95,14 @@ class Report:
 
         Raises:
             MissingPackageError: If there is no matplotlib for the plot; the rest is written.
-            OSError: If it cannot be written.
+            UnwritableFileError: If it cannot be written (also an ``OSError``).
         """
         json_path, markdown_path, plot_path = (folder / name for name in (JSON, MARKDOWN, PLOT))
         for path, text in (
             (json_path, self.as_json()),
             (markdown_path, "\n".join(self.markdown()) + "\n"),
         ):
-            with written_whole(path) as unfinished:
-                unfinished.write_text(text, encoding="utf-8")
+            write_whole(path, text)
         figure = draw(self.measurements, self.told())
         with written_whole(plot_path) as unfinished:
             figure.savefig(unfinished, format="png")

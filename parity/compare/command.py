@@ -26,7 +26,8 @@ from parity.compare.printed import document, sentences, table
 from parity.compare.runs import Run, play
 from parity.compare.task_summary import summarise, summary_table
 from parity.records.results import RESULTS, record
-from robots import CONTROL_MODES, RobotLayoutsError, TaskError, closest_match
+from robots import CONTROL_MODES, RecordingError, TaskError, closest_match
+from robots.common.writing import write_whole
 from rollouts.progress import LiveLine
 from tasks import MultiRobotTask
 
@@ -106,9 +107,10 @@ def _compare(args: argparse.Namespace) -> int:
     for sentence in sentences(results):
         console.print(sentence, markup=False, highlight=False, soft_wrap=True)
     if args.json:
-        _write(args.json, json.dumps(found | {"tasks": summaries}, indent=1) + "\n")
+        text = json.dumps(found | {"tasks": summaries}, indent=1) + "\n"
+        write_whole(args.json, text, RecordingError)
     if args.record:
-        _write(RESULTS, record(found, summaries))
+        write_whole(RESULTS, record(found, summaries), RecordingError)
     return 0 if all(result.equal for result in results) else 1
 
 
@@ -201,10 +203,3 @@ def _check(args: argparse.Namespace) -> None:
         )
     if args.json and not args.json.absolute().parent.is_dir():
         raise TaskError(f"--json {args.json}: there is no folder {args.json.absolute().parent}")
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text)
-    except OSError as error:
-        raise RobotLayoutsError(f"cannot write {path}: {error.strerror}") from error

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import platform
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -29,6 +28,7 @@ from parity.compare.snapshot import Snapshot, largest_difference
 from parity.compare.task_summary import number_text
 from parity.show.native_pictures import NativeScene
 from robots import CONTROL_MODES, RecordingError, RobotLayoutsError
+from robots.common.writing import written_whole
 from rollouts.progress import LiveLine
 from rollouts.reading.trajectory import TrajectoryError
 from rollouts.video import open_video
@@ -332,14 +332,9 @@ def describe(env: MultiRobotTask, source: Source, name: str) -> dict[str, Any]:
 
 def save(path: Path, arrays: Arrays, about: Mapping[str, Any]) -> None:
     """Write arrays and a json text about them; the file appears when it is whole."""
-    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
-    try:
-        with partial.open("wb") as file:
-            everything: dict[str, Any] = {**arrays, METADATA: np.array(json.dumps(about))}
-            np.savez_compressed(file, **everything)
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
+    everything: dict[str, Any] = {**arrays, METADATA: np.array(json.dumps(about))}
+    with written_whole(path, RecordingError) as partial, partial.open("wb") as file:
+        np.savez_compressed(file, **everything)
 
 
 def load(path: Path) -> tuple[Arrays, dict[str, Any]]:

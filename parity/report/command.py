@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from parity.report.html import render
 from parity.show import embedding
 from parity.sweep.entries import SUMMARY, read_summary
 from robots import RecordingError, TaskError
+from robots.common.writing import write_whole
 
 LIMIT = 25.0  # MB
 MARGIN = 20_000  # bytes kept free when clips are made to fit
@@ -39,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     add("--limit", type=float, default=LIMIT, metavar="MB", help="largest page (%(default)g MB)")
     args = parser.parse_args(argv)
     page = make(args.runs, args.results, args.limit)
-    _write(args.out, page)
+    write_whole(args.out, page, RecordingError)
     print(f"{args.out}: {len(page.encode()) / 1e6:.1f} MB")
     return 0
 
@@ -86,15 +86,3 @@ def _too_large(limit: float, why: str) -> str:
 
 def _encoded(count: int) -> int:
     return -(-count // 3) * 4 + 100  # base64, and the words around it
-
-
-def _write(path: Path, page: str) -> None:
-    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
-    try:
-        path.absolute().parent.mkdir(parents=True, exist_ok=True)
-        partial.write_text(page, encoding="utf-8")
-        os.replace(partial, path)
-    except OSError as error:
-        raise RecordingError(f"cannot write {path}: {error}") from error
-    finally:
-        partial.unlink(missing_ok=True)

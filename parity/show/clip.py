@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ from parity.show.native_pictures import NativeScene, Picture, expect_same_shapes
 from parity.show.panels import Labels, contact_sheet, moments, side_by_side
 from parity.show.side_by_side import Frame, PixelCount, frames, most_alike, play, play_and_look
 from robots import MissingPackageError, RecordingError
+from robots.common.writing import write_whole
 from rollouts.video import open_video, package_problem
 
 NAME = "side_by_side"
@@ -186,7 +186,7 @@ class Clip:
         made = self._measured(pixels, len(shown[0].native))
         _write_png(folder / made.sheet, contact_sheet(shown, labels, "; ".join(made.sentences())))
         text = json.dumps(asdict(made), indent=1, ensure_ascii=False) + "\n"
-        _write(folder / f"{NAME}.json", text.encode())
+        write_whole(folder / f"{NAME}.json", text, RecordingError)
         return made
 
     def _labels(self) -> Labels:
@@ -229,15 +229,4 @@ def _success_text(made: SideBySide) -> str:
 def _write_png(path: Path, picture: Picture) -> None:
     import imageio.v3 as imageio
 
-    _write(path, imageio.imwrite("<bytes>", picture, extension=".png"))
-
-
-def _write(path: Path, content: bytes) -> None:
-    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
-    try:
-        partial.write_bytes(content)
-        os.replace(partial, path)
-    except OSError as error:
-        raise RecordingError(f"cannot write {path}: {error.strerror}") from error
-    finally:
-        partial.unlink(missing_ok=True)
+    write_whole(path, imageio.imwrite("<bytes>", picture, extension=".png"), RecordingError)

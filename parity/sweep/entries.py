@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import platform
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,6 +13,7 @@ from parity.compare.task_summary import number_text
 from parity.records.results import ResultsError
 from parity.sweep.plan import Plan
 from robots import RecordingError
+from robots.common.writing import write_whole
 
 SUMMARY = "summary.json"
 
@@ -60,13 +60,7 @@ def write_summary(path: Path, entries: Mapping[str, Entry]) -> None:
         indent=1,
         ensure_ascii=False,
     )
-    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_text(text + "\n", encoding="utf-8")
-        os.replace(partial, path)
-    except OSError as error:
-        raise RecordingError(f"cannot write {path}: {error}") from error
+    write_whole(path, text + "\n", RecordingError)
 
 
 def blank(task_id: str, options: Mapping[str, Any]) -> Entry:

@@ -20,6 +20,7 @@ from robots.assets.manifest import CHECKOUT_CACHE, AssetFile
 from robots.common.errors import AssetError, UnreadableFileError
 from robots.common.files import open_regular
 from robots.common.paths import absolute
+from robots.common.writing import remove, written_whole
 
 ROOT_VARIABLE = "ROBOT_LAYOUTS_ASSETS"
 _LOCK, _PARTIAL, _RECORD = ".lock", ".partial", "fetched.json"
@@ -123,7 +124,7 @@ class AssetStore:
             with _destination_errors(self.root):
                 alone = _wait_for_lock(lock, self.root, say)
                 if alone:
-                    _remove(partial)
+                    remove(partial)
                 partial.mkdir(exist_ok=True)
                 scratch = Path(tempfile.mkdtemp(dir=partial))
             try:
@@ -181,21 +182,9 @@ def _sha256(path: Path, limit: int) -> str:
     return digest
 
 
-def _remove(path: Path) -> None:
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        path.unlink(missing_ok=True)
-
-
 def _write(path: Path, data: bytes, scratch: Path) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = scratch / "file"
-    with partial.open("wb") as stream:
-        stream.write(data)
-        stream.flush()
-        os.fsync(stream.fileno())
-    os.replace(partial, path)
+    with written_whole(path, None, partial=scratch / "file", sync=True) as partial:
+        partial.write_bytes(data)
 
 
 @contextmanager

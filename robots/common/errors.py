@@ -72,6 +72,10 @@ class UnreadableFileError(RobotLayoutsError, OSError):
         return (type(self), (self.filename, self.strerror, self.errno))
 
 
+class UnwritableFileError(RobotLayoutsError, OSError):
+    """A file that cannot be written; what was there before stays."""
+
+
 class SimulationError(RobotLayoutsError, RuntimeError):
     """A world that cannot be built or stepped as asked."""
 

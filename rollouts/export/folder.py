@@ -9,7 +9,8 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
-from robots import RecordingError, RobotLayoutsError
+from robots import RecordingError
+from robots.common.writing import PARTIAL, writing_errors, written_whole
 from rollouts.recording.disk import claim
 
 
@@ -28,23 +29,18 @@ def new_folder(path: Path) -> Generator[Path]:
     Raises:
         RecordingError: If the folder cannot be written.
     """
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
+    partial = path.with_name(f".{path.name}.{os.getpid()}{PARTIAL}")
+    with writing_errors(path, RecordingError):
         partial.parent.mkdir(parents=True, exist_ok=True)
         _remove_abandoned(path)
         right = claim(partial)
         if right is None:
             raise RecordingError(f"another process is writing {partial}")
         try:
-            yield partial
-            os.replace(partial, path)
+            with written_whole(path, RecordingError, partial=partial):
+                yield partial
         finally:
-            shutil.rmtree(partial, ignore_errors=True)
             os.close(right)
-    except RobotLayoutsError:
-        raise
-    except OSError as error:
-        raise RecordingError(f"cannot write {path}: {_reason(error)}") from error
 
 
 def refuse_used(path: Path) -> None:
@@ -53,14 +49,13 @@ def refuse_used(path: Path) -> None:
     Raises:
         RecordingError: If so.
     """
-    try:
-        used = any(path.iterdir())
-    except FileNotFoundError:
-        return
-    except NotADirectoryError as error:
-        raise RecordingError(f"{path} is a file; a folder's name is needed") from error
-    except OSError as error:
-        raise RecordingError(f"cannot write {path}: {_reason(error)}") from error
+    with writing_errors(path, RecordingError):
+        try:
+            used = any(path.iterdir())
+        except FileNotFoundError:
+            return
+        except NotADirectoryError as error:
+            raise RecordingError(f"{path} is a file; a folder's name is needed") from error
     if used:
         raise RecordingError(f"{path} is not empty; choose another folder, or empty it")
 
@@ -74,8 +69,3 @@ def _remove_abandoned(path: Path) -> None:
             if right is not None:
                 shutil.rmtree(entry.path, ignore_errors=True)
                 os.close(right)
-
-
-def _reason(error: OSError) -> str:
-    """Return why in a few words; HDF5 and Arrow use many."""
-    return os.strerror(error.errno) if error.errno else str(error)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import re
 import zlib
 from collections.abc import Mapping
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 
 from robots import RecordingError
 from robots.common.files import parse_json, read_regular
+from robots.common.writing import PARTIAL, write_whole
 from rollouts.reading.hdf5_reading import MAX_BYTES
 from rollouts.reading.json_fields import (
     ANYTHING,
@@ -35,7 +35,6 @@ from rollouts.reading.json_fields import (
     whole,
 )
 from rollouts.reading.summary import MAX_SEED, OWN_EPISODE
-from rollouts.recording.disk import PARTIAL, replaced
 from tasks.episode import REBUILT, Episode
 
 CHECKSUM = "checksum"  # attribute of an episode's group in the h5 file
@@ -117,8 +116,7 @@ class PartWriter:
 
     def store(self, seed: int, part: bytes) -> None:
         """Write an episode that was encoded, perhaps on another machine; else as `write`."""
-        with replaced(part_path(self.folder, seed), f".{os.getpid()}") as partial:
-            partial.write_bytes(part)
+        write_whole(part_path(self.folder, seed), part, RecordingError, parents=False)
 
     def encode(self, episode: Episode) -> bytes:
         """Return what `write` writes."""

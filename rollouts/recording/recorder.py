@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 
 from robots import RecordingError, UnreadableFileError
 from robots.common.files import open_regular, read_text
+from robots.common.writing import PARTIAL, write_whole
 from rollouts.reading.summary import MAX_JSON
-from rollouts.recording.disk import PARTIAL, claim, disk_errors, write_text
+from rollouts.recording.disk import claim, disk_errors
 from rollouts.recording.episode_files import (
     PartWriter,
     list_earlier_parts,
@@ -248,7 +249,7 @@ class Recorder:
         episodes = [{"episode_id": number, **about} for number, about in abouts]
         text = json.dumps({**self._header, "episodes": episodes}, indent=1) + "\n"
         if not self._json_says(text):
-            write_text(self.json_path, text)
+            write_whole(self.json_path, text, RecordingError, parents=False)
         for part in parts.values():
             part.unlink(missing_ok=True)
         with suppress(OSError):  # something else was put there meanwhile, and is not ours to delete

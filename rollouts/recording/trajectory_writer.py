@@ -21,11 +21,12 @@ from numpy.typing import NDArray
 
 from robots import RecordingError
 from robots.common.files import parse_json
+from robots.common.writing import written_whole
 from rollouts.reading.damage import damage_errors
 from rollouts.reading.hdf5_file import Hdf5File
 from rollouts.reading.json_fields import FieldError
 from rollouts.reading.summary import OWN_EPISODE
-from rollouts.recording.disk import replaced
+from rollouts.recording.disk import disk_errors
 from rollouts.recording.episode_files import CHECKSUM, Stored, checksum, read_part
 from rollouts.recording.provenance import read_described
 
@@ -95,7 +96,10 @@ def join(
         RecordingError: If it cannot be written, or an episode not be read; nothing is changed.
     """
     about: dict[str, dict[str, Any]] = {}
-    with replaced(path) as partial:
+    with (
+        disk_errors(path),
+        written_whole(path, RecordingError, parents=False, sync=True) as partial,
+    ):
         _reserve(partial, _room(path, episodes))
         with ExitStack() as stack:
             file = stack.enter_context(h5py.File(partial, "r+", libver=_VERSIONS))
@@ -107,7 +111,6 @@ def join(
                 stored = _read(present, episode)
                 writer.write(f"traj_{number}", stored)
                 about[f"traj_{number}"] = stored.about
-        _sync(partial)
     return about
 
 
@@ -203,8 +206,3 @@ def _read_episode(file: Hdf5File, name: str) -> Stored:
 
 def _refusal(path: Path, reason: str) -> RecordingError:
     return RecordingError(f"{path} is no recording of this library, or it is damaged: {reason}")
-
-
-def _sync(path: Path) -> None:
-    with path.open("rb") as stream:
-        os.fsync(stream.fileno())

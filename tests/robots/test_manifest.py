@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import resource
 import shutil
 from pathlib import Path
 
@@ -168,8 +169,13 @@ def test_a_path_that_leads_elsewhere_is_refused(path):
 
 def test_a_manifest_that_cannot_be_written_stays_as_it_was(tmp_path, monkeypatch, capsys):
     (tmp_path / "manifest.json").write_text("the one before")
-    (tmp_path / "manifest.partial").mkdir()
     monkeypatch.setattr(write_manifest, "CHECKOUT_CACHE", tmp_path)
-    assert write_manifest.main([]) == 1
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))  # bytes
+    try:
+        assert write_manifest.main([]) == 1
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert [path.name for path in tmp_path.iterdir()] == ["manifest.json"]
     assert (tmp_path / "manifest.json").read_text() == "the one before"
     assert capsys.readouterr().err.startswith(f"error: cannot write {tmp_path}/manifest.json")
