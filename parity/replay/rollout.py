@@ -33,7 +33,7 @@ from rollouts.progress import LiveLine
 from rollouts.reading.trajectory import TrajectoryError
 from rollouts.video import open_video
 from tasks import MultiRobotTask
-from tasks.engine.native_format import articulation_keys
+from tasks.native.format import articulation_keys
 
 Arrays = dict[str, NDArray[Any]]
 

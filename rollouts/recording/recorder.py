@@ -28,8 +28,8 @@ from rollouts.recording.episode_files import (
 from rollouts.recording.provenance import describe_layout, describe_simulation, differences, listing
 from rollouts.recording.trajectory_writer import join, read_joined
 from tasks import MultiRobotTask
-from tasks.engine.native_format import observation_keys
 from tasks.episode import Episode
+from tasks.native.format import observation_keys
 
 __all__ = ["Recorder", "describe_layout"]
 

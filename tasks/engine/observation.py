@@ -18,7 +18,7 @@ from simulation import Camera, Simulation, State
 from simulation.maths import Array, all_finite
 from simulation.rendering.cameras import TEXTURES, RobotCamera
 from tasks.engine.finite import NotFinite
-from tasks.engine.native_format import observation_keys
+from tasks.native.format import observation_keys
 
 if TYPE_CHECKING:
     from simulation.rendering.pictures import Observers, View

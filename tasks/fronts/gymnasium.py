@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from robots import TaskError
 from tasks.engine.arguments import checked_seeds
 from tasks.engine.observation import space_of
-from tasks.engine.randomness import FirstSeeds
 from tasks.engine.remade import Remade
 from tasks.fronts.numbers import info_row, row
+from tasks.language.randomness import FirstSeeds
 from tasks.registry import make
 
 RENDER_MODES = ["rgb_array"]

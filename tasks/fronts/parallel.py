@@ -14,11 +14,11 @@ from pettingzoo import ParallelEnv
 from robots import TaskError, UnknownNameError
 from robots.common.bounds import shown
 from tasks.engine.arguments import RECONFIGURE, checked_options, checked_seeds
-from tasks.engine.native_format import observation_keys
 from tasks.engine.observation import space_of
-from tasks.engine.randomness import FirstSeeds
 from tasks.engine.remade import Remade
 from tasks.fronts.numbers import info_row, row
+from tasks.language.randomness import FirstSeeds
+from tasks.native.format import observation_keys
 from tasks.registry import make
 
 Observation = Any

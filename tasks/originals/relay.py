@@ -8,22 +8,27 @@ from math import sqrt
 
 from layouts import Layout, ring
 from robots import TaskError
-from robots.descriptor import Vector3
-from simulation import Box, Camera, PhysicsSettings, State, World
-from simulation.maths import Array, Floats, copy, floats, minimum, norm, rounded, stack, where
-from tasks.engine.randomness import EpisodeRandom
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.props import (
+from tasks import (
     DARK_BLUE,
     FACE_UP,
     TARGET_HEIGHT,
+    Box,
+    Camera,
+    EpisodeRandom,
+    Info,
+    MultiRobotTask,
+    PhysicsSettings,
+    State,
+    Vector3,
+    World,
     add_goal,
     add_target,
     add_wide_table,
+    closeness,
+    is_at_rest,
+    register_task,
 )
-from tasks.language.shaping import closeness
-from tasks.language.stacking import is_at_rest
-from tasks.registry import register_task
+from tasks.maths import Array, Floats, copy, floats, minimum, norm, rounded, stack, where
 
 # Of the baton (m): a square frame, which the tip of a stick, closed fingers or a jaw take along
 # from inside, and which a gripper can also hold by a side.
