@@ -192,7 +192,7 @@ def describe(env: MultiRobotTask) -> Iterator[RenderableType]:
     for name, value in (
         ("randomisation", said.randomisation),
         ("success", said.success),
-        ("episode", f"{env.max_episode_steps} steps, {env.made_from.control_frequency:g} per s"),
+        ("episode", f"{env.max_episode_steps} steps, {env.scenario.control_frequency:g} per s"),
         ("reward modes", ", ".join([f"{cls.reward_modes[0]} (default)", *cls.reward_modes[1:]])),
         ("source", cls.source),
         ("other names", ", ".join(other_names(cls))),

@@ -69,7 +69,7 @@ def recorded_motion(
         for name, rows in states.get("actors", {}).items()
         if name in world.bodies and body_parts(world.bodies[name].shapes)
     }
-    return Motion(1 / task.made_from.control_frequency, qpos, poses)
+    return Motion(1 / task.scenario.control_frequency, qpos, poses)
 
 
 def in_declared_order(world: World, robot: str, qpos: NDArray[Any]) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, cast
 
 import numpy as np
 import torch
@@ -28,9 +28,17 @@ from tasks.engine.layout_check import refuse_collisions
 from tasks.engine.memory import Memory
 from tasks.engine.observation import Observer, read_mode, space_of
 from tasks.engine.remade import Remade
-from tasks.engine.scenario import FreshScenario, Scenario
+from tasks.engine.scenario import Scenario
 from tasks.language.randomness import EpisodeRandom
 from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict
+
+
+class _FreshScenario:
+    """``cls.scenario``: a new scenario at every access, made from the class's own attributes."""
+
+    def __get__(self, instance: object, owner: type[MultiRobotTask]) -> Scenario:
+        """Return it; a task that was made has its own as an attribute."""
+        return Scenario(layout=owner.layout, physics=owner.physics)
 
 
 class MultiRobotTask(Declaration, Remade):
@@ -52,10 +60,9 @@ class MultiRobotTask(Declaration, Remade):
         observer: What puts its observations together, and its cameras.
         observation_slices: Where each named part stands in the flat observation.
         start: Observation and info of the first reset, when it was made.
-        made_from: The scenario it was made from.
     """
 
-    scenario: ClassVar[Any] = FreshScenario()
+    scenario: Scenario = cast(Scenario, _FreshScenario())
 
     # -- making and closing ------------------------------------------------------------------
 
@@ -77,7 +84,7 @@ class MultiRobotTask(Declaration, Remade):
         check_places(own.__name__, scenario.layout, own.layout, self.robot_counts)
         if scenario.check_layout and scenario.layout != own.layout:
             refuse_collisions(scenario.layout)
-        self.made_from = scenario
+        self.scenario = scenario
         self.layout = scenario.layout.in_control_mode(scenario.control_mode)
         self.num_envs = scenario.num_envs
         self.obs_mode = scenario.obs_mode
@@ -248,7 +255,7 @@ class MultiRobotTask(Declaration, Remade):
         Raises:
             TaskError: If the task was not made with ``render_mode="rgb_array"``.
         """
-        if self.made_from.render_mode is None:
+        if self.scenario.render_mode is None:
             raise TaskError("this task draws no pictures; make it with render_mode='rgb_array'")
         if self._camera is None:
             from simulation.rendering.pictures import Cameras

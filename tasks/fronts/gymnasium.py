@@ -56,7 +56,7 @@ class GymnasiumTask(Remade, gymnasium.Env[Any, NDArray[np.float32]]):
         self._first = FirstSeeds(1)
         self._seed = self.task.seeds[0]
         self.render_mode = render_mode
-        frames = round(self.task.made_from.control_frequency)
+        frames = round(self.task.scenario.control_frequency)
         self.metadata = {**self.metadata, "render_fps": frames}  # type: ignore[misc]
         self.action_space = self.task.single_action_space
         self.observation_space = space_of(row(self.task.start[0]))
