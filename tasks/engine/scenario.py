@@ -32,7 +32,7 @@ class Scenario:
         obs_mode: ``"state"`` (flat), ``"state_dict"`` (named parts), ``"none"``, or what cameras
             see (needs a Vulkan driver): ``"rgb"``, ``"rgbd"``, or any of ``rgb``, ``depth``,
             ``segmentation`` and ``position`` joined by ``+``, and to them ``state`` or
-            ``state_dict``, without which only what a real robot senses is told beside images.
+            ``state_dict``, without which images come only with what a real robot senses.
         reward_mode: One of the task's modes; None takes its first.
         control_mode: ``"pd_joint_delta_pos"``, or ``"pd_joint_pos"`` for actions that are joint
             positions.

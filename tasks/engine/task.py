@@ -305,8 +305,8 @@ class MultiRobotTask(Declaration, Remade):
         return state
 
     def _info(self, state: State) -> Info:
-        told = {key: np.asarray(value) for key, value in self.evaluate(state).items()}
-        return {"elapsed_steps": self._elapsed.copy(), **told}
+        evaluated = {key: np.asarray(value) for key, value in self.evaluate(state).items()}
+        return {"elapsed_steps": self._elapsed.copy(), **evaluated}
 
     def _observation(self, state: State, info: Info) -> Any:
         if self.observer.mode.nothing:

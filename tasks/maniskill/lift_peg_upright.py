@@ -53,7 +53,7 @@ class LiftPegUpright(Clone):
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: upright and standing on the table."""
-        # Native tells upright from one Euler angle, although that angle is a quarter turn, too,
+        # Native judges uprightness by one Euler angle, although that angle is a quarter turn, too,
         # while the peg lies along y.
         upright = abs(abs(state.last_euler_angle("peg")) - pi / 2) < MAX_TILT
         return {"success": upright & (_lift(state) < MAX_LIFT)}

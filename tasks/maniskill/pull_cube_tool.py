@@ -87,7 +87,7 @@ class PullCubeTool(Clone):
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: the cube is near the robot.
 
-        Progress and distance are told per environment; native averages them over its batch.
+        Progress and distance are kept per environment; native averages them over its batch.
         """
         success = self._success(state)
         centre = state.base_position("arm") + state.array(_CENTRE)

@@ -37,7 +37,7 @@ INNER_HALF_WIDTH, SIDE_HALF_WIDTH, HALF_HEIGHT = 0.035, 0.008, 0.015
 ZONE_RADIUS = 0.05  # m
 START_OFFSET = 0.02  # of the baton from the middle of the last zone, along x and y (m)
 BEACON_HEIGHT = 0.1  # over the zone that is next; twice that when all were visited (m)
-WORKING_REACH = 0.65  # share of a robot's reach at which it likes to work
+WORKING_REACH = 0.65  # share of a robot's reach within which it works well
 FARTHEST_REACH = 0.9  # share of a robot's reach at which a zone may be
 ROBOTS = range(3, 9)
 
@@ -83,7 +83,7 @@ class Relay(MultiRobotTask):
         world.set_pose("beacon", self._stations[0])
 
     def respond(self, state: State) -> None:
-        """Move the beacon on when the baton is in its zone: so the state tells the progress."""
+        """Move the beacon on when the baton is in its zone: so the state holds the progress."""
         visited = self._visited(state)
         away = state.position("baton") - self._next_zone(state, visited)
         arrived = (visited < len(self._zones)) & (norm(copy(away[:, :2])) <= ZONE_RADIUS)
