@@ -109,8 +109,8 @@ def test_a_restart_that_fails_may_be_tried_again(shared, monkeypatch):
         shared.step(ACTION)
     start = workers_module._Worker.__init__
 
-    def doomed(self, part):
-        start(self, part)
+    def doomed(self, part, timeout):
+        start(self, part, timeout)
         if part.start == 0:
             os.kill(self.pid, signal.SIGKILL)
 
