@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import pickle
 import resource
+import signal
 import sys
 import threading
 import weakref
@@ -20,7 +21,7 @@ import tasks
 from robots import RobotLayoutsError, SimulationError, TaskError
 from rollouts.levels import read_level
 from simulation.rendering import vulkan_problem
-from tasks import processes
+from tasks import forks, processes
 from tasks.fork_server import LOADED
 from tasks.fronts.vector import VectorTask
 from tasks.fronts.workers import WorkerError
@@ -192,6 +193,61 @@ def test_too_few_descriptors_are_one_error_and_nothing_is_left(more):
         VectorTask(TASK, 8, num_workers=8)
     assert multiprocessing.active_children() == before
     assert len(os.listdir("/proc/self/fd")) == open_before
+
+
+def test_threads_may_look_at_each_others_processes():
+    over = threading.Event()
+
+    def look():
+        while not over.is_set():
+            multiprocessing.active_children()
+
+    threads = [threading.Thread(target=look) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    try:
+        for _ in range(40):
+            process = processes.context.Process(target=os._exit, args=(3,), daemon=True)
+            processes.start(process)
+            process.join()
+            assert process.exitcode == 3
+            process.close()
+    finally:
+        over.set()
+        for thread in threads:
+            thread.join()
+
+
+def test_a_worker_that_is_stopped_before_it_has_read_what_to_run_holds_nobody_up(monkeypatch):
+    in_worker(look_around)  # the server is there already
+    fork, pids = forks._fork, []
+
+    def fork_and_stop(descriptors):
+        server, (pid, status, line) = fork(descriptors)
+        os.kill(pid, signal.SIGSTOP)
+        pids.append(pid)
+        return server, (pid, status, line)
+
+    monkeypatch.setattr(forks, "_fork", fork_and_stop)
+    monkeypatch.setattr(forks, "_FORK_SECONDS", 0.5)
+    process = processes.context.Process(target=len, args=(bytes(2**20),), daemon=True)
+    with pytest.raises(processes.ProcessError, match=r"took nothing of what it is to run for 0\.5 s"):
+        processes.start(process)
+    monkeypatch.undo()
+    while os.path.exists(f"/proc/{pids[0]}"):
+        pass
+    in_worker(look_around)
+
+
+def test_a_worker_whose_server_is_stopped_can_be_ended(monkeypatch):
+    in_worker(look_around)
+    with vector(1) as env:
+        monkeypatch.setattr(forks, "_FORK_SECONDS", 0.5)
+        pid = env._crew._crew[0].pid
+        os.kill(forks._server._pid, signal.SIGSTOP)
+    assert pid not in [child.pid for child in multiprocessing.active_children()]
+    monkeypatch.undo()
+    in_worker(look_around)
 
 
 # -- errors ---------------------------------------------------------------------------------------
