@@ -15,7 +15,7 @@ from layouts.presets import FACING, PRESETS
 from layouts.validate_command import add_check_options
 from layouts.view_command import add_view_options
 from robots import LayoutError, RobotRegistry, UnknownNameError
-from robots.commands import FAILED, exit_code, start
+from robots.common.commands import FAILED, exit_code, start
 
 # What presets take besides the robots.
 OPTIONS = ("spacing", "radius", "facing", "columns", "edges", "table", "inset", "keyframe")

@@ -10,7 +10,7 @@ from typing import Any
 
 from layouts.orientation import multiplied, normalised, rotated, rpy_quaternion
 from robots import LayoutError, UnknownNameError
-from robots.bounds import FAR, as_float, checked_numbers, shown
+from robots.common.bounds import FAR, as_float, checked_numbers, shown
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 
 ORIGIN: Vector3 = (0.0, 0.0, 0.0)
@@ -241,7 +241,7 @@ def declared_quaternion(declared: Any, default: Quaternion) -> Quaternion:
 
 
 def check_positive(what: str, value: Any) -> float:
-    """Return a distance: a number greater than 0 and of at most `robots.bounds.FAR` (m).
+    """Return a distance: a number greater than 0 and of at most `robots.common.bounds.FAR` (m).
 
     Raises:
         LayoutError: If it is none.
@@ -255,7 +255,7 @@ def check_positive(what: str, value: Any) -> float:
 
 
 def numbers(what: str, values: Any, count: int) -> tuple[float, ...]:
-    """Return ``count`` floats of at most `robots.bounds.FAR`.
+    """Return ``count`` floats of at most `robots.common.bounds.FAR`.
 
     Raises:
         LayoutError: If ``values`` are not that.

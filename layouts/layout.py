@@ -23,7 +23,7 @@ from layouts.frames import (
 from layouts.orientation import yaw_quaternion
 from layouts.placement import Placement, RobotLike, placed
 from robots import LayoutError, UnknownNameError
-from robots.bounds import FAR, checked_number, shown
+from robots.common.bounds import FAR, checked_number, shown
 from robots.descriptor import Vector3
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from layouts.frames import ORIGIN, Pose, check_pose, declared_quaternion
 from layouts.orientation import inverted, multiplied, normalised
 from robots import LayoutError, RobotDescriptor, RobotRegistry
-from robots.bounds import as_float, shown
+from robots.common.bounds import as_float, shown
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 
 RobotLike = str | RobotDescriptor

@@ -21,7 +21,7 @@ from layouts.layout import Layout
 from layouts.orientation import yaw_quaternion
 from layouts.placement import Placement, RobotLike, check_robots, faced, load_robot
 from robots import LayoutError, RobotDescriptor, UnknownNameError
-from robots.bounds import checked_whole, shown
+from robots.common.bounds import checked_whole, shown
 from robots.descriptor import Vector3
 
 Distance = float | Literal["auto"]  # m

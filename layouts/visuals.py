@@ -13,11 +13,11 @@ import numpy as np
 
 from layouts.validation.kinematics import Floats, origin_matrix
 from robots import AssetError, MissingPackageError
-from robots.mesh_files import load_scene
-from robots.urdf_numbers import numbers_of
-from robots.urdf_paths import resolve
-from robots.urdf_shapes import UrdfShape, read_shape
-from robots.urdf_xml import parse_urdf, read_urdf
+from robots.urdf.mesh_files import load_scene
+from robots.urdf.numbers import numbers_of
+from robots.urdf.paths import resolve
+from robots.urdf.shapes import UrdfShape, read_shape
+from robots.urdf.summary import parse_urdf, read_urdf
 
 Rgba = tuple[float, float, float, float]  # 0 … 1
 

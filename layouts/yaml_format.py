@@ -28,7 +28,7 @@ from robots import (
     UnknownNameError,
     UnreadableFileError,
 )
-from robots.files import read_text
+from robots.common.files import read_text
 
 VERSION = 1
 MAX_LENGTH = 1 << 20  # bytes of a file, characters of a text; 20,000 robots fit

@@ -7,15 +7,18 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from robots import UnknownNameError
-from robots.commands import MEANINGLESS, exit_code, print_error, start
+from robots.common.commands import MEANINGLESS, exit_code, print_error, start
 
 # Command -> the module whose ``main(argv)`` runs it, and what it does.
 COMMANDS = {
-    "inventory": ("parity.inventory", "list every task, and what proves it"),
-    "compare": ("parity.compare", "step tasks beside native and compare every bit"),
-    "replay": ("parity.replay", "play recorded actions beside native, episode by episode"),
-    "rollout": ("parity.rollout", "play one episode in native and here, and keep its arrays"),
-    "render": ("parity.render", "show native and ours side by side, with their difference"),
+    "inventory": ("parity.records.inventory", "list every task, and what proves it"),
+    "compare": ("parity.compare.command", "step tasks beside native and compare every bit"),
+    "replay": ("parity.replay.command", "play recorded actions beside native, episode by episode"),
+    "rollout": (
+        "parity.replay.rollout",
+        "play one episode in native and here, and keep its arrays",
+    ),
+    "render": ("parity.show.command", "show native and ours side by side, with their difference"),
     "sweep": (
         "parity.sweep.command",
         "rollouts, agreement and clips of every task, in one summary",
@@ -24,8 +27,11 @@ COMMANDS = {
         "parity.report.command",
         "make one HTML page of a sweep and the recorded results",
     ),
-    "bench": ("parity.bench", "time steps, resets and vectors beside native"),
-    "readme": ("parity.readme", "write the recorded results into README.md, or check them there"),
+    "bench": ("measurements.bench.native", "time steps, resets and vectors beside native"),
+    "readme": (
+        "measurements.readme",
+        "write the recorded results into README.md, or check them there",
+    ),
 }
 
 

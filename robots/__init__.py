@@ -3,18 +3,8 @@
 Importing this package loads neither a simulator nor torch, and touches no file or network.
 """
 
-from robots.descriptor import (
-    CONTROL_MODES,
-    ActionNumber,
-    ActionSplit,
-    CameraMount,
-    Fingers,
-    GripperMaterial,
-    Home,
-    JointGroup,
-    RobotDescriptor,
-)
-from robots.errors import (
+from robots.assets.locator import LocalUrdf, UrdfLocator
+from robots.common.errors import (
     ActionError,
     AssetError,
     DescriptorError,
@@ -29,7 +19,17 @@ from robots.errors import (
     closest_match,
     unknown_name_message,
 )
-from robots.locator import LocalUrdf, UrdfLocator
+from robots.descriptor import (
+    CONTROL_MODES,
+    ActionNumber,
+    ActionSplit,
+    CameraMount,
+    Fingers,
+    GripperMaterial,
+    Home,
+    JointGroup,
+    RobotDescriptor,
+)
 from robots.registry import RobotRegistry
 
 __all__ = [

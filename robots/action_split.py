@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from robots.errors import DescriptorError, UnknownNameError
-from robots.fields import settle, settle_fields
+from robots.common.errors import DescriptorError, UnknownNameError
+from robots.common.fields import settle, settle_fields
 
 
 def names(prefix: str, first: int, last: int) -> tuple[str, ...]:

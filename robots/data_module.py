@@ -13,7 +13,7 @@ from robots.action_split import ActionSplit, names
 from robots.descriptor import Home, RobotDescriptor
 
 WIDTH = 100
-_HOMES = {"LocalUrdf": "robots.locator", "UrdfLocator": "robots.locator"}
+_HOMES = {"LocalUrdf": "robots.assets.locator", "UrdfLocator": "robots.assets.locator"}
 
 
 def write_module(robot: RobotDescriptor, reasons: Sequence[str] = ()) -> str:

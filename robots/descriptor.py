@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, NoReturn, Protocol, runtime_checkable
 
 from robots.action_split import ActionNumber, ActionSplit, JointGroup, names
-from robots.errors import DescriptorError, UnknownNameError
-from robots.fields import settle_fields
+from robots.common.errors import DescriptorError, UnknownNameError
+from robots.common.fields import settle_fields
 
 __all__ = [
     "CONTROL_MODES",
@@ -45,7 +45,7 @@ CONTROL_MODES = ("pd_joint_delta_pos", "pd_joint_pos")  # ManiSkill's names
 
 @runtime_checkable
 class UrdfSource(Protocol):
-    """Where a URDF comes from; see `robots.locator.UrdfLocator`."""
+    """Where a URDF comes from; see `robots.assets.locator.UrdfLocator`."""
 
     def locate(self, *, pictures: bool = False) -> Path:
         """Return the path of a complete, checked URDF on this machine."""

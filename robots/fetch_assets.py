@@ -5,20 +5,20 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from robots import scenery
-from robots.asset_sources import AssetSource, InstalledManiSkill, LocalCopy
-from robots.asset_store import AssetStore, FileState, default_root
-from robots.assets import default_sources, ensure
-from robots.commands import exit_code, print_error, printable, start
+from robots.assets import scenery
+from robots.assets.fetching import default_sources, ensure
+from robots.assets.hub_source import REVISION_VARIABLE, HubSource
+from robots.assets.locator import UrdfLocator
+from robots.assets.manifest import AssetFile, load_manifest
+from robots.assets.progress import size
+from robots.assets.sources import AssetSource, InstalledManiSkill, LocalCopy
+from robots.assets.store import AssetStore, FileState, default_root
+from robots.assets.wheel_source import ManiSkillWheel
+from robots.common.commands import exit_code, print_error, printable, start
+from robots.common.errors import DescriptorError
+from robots.common.paths import absolute
 from robots.descriptor import RobotDescriptor
-from robots.errors import DescriptorError
-from robots.hub_source import REVISION_VARIABLE, HubSource
-from robots.locator import UrdfLocator
-from robots.manifest import AssetFile, load_manifest
-from robots.paths import absolute
-from robots.progress import size
 from robots.registry import RobotRegistry
-from robots.wheel_source import ManiSkillWheel
 
 SOURCES = ("local", "hf", "mani_skill", "wheel")
 ONLINE_SOURCES = ("hf", "wheel")

@@ -6,12 +6,12 @@ import hashlib
 import os
 from pathlib import Path
 
+from robots.common.errors import AssetError, UnreadableFileError
+from robots.common.files import read_regular
 from robots.descriptor import UrdfSource
-from robots.errors import AssetError, UnreadableFileError
-from robots.files import read_regular
-from robots.mesh_files import MAX_MESH_BYTES
-from robots.srdf import srdf_beside
-from robots.urdf_xml import read_references, read_urdf
+from robots.urdf.mesh_files import MAX_MESH_BYTES
+from robots.urdf.srdf import srdf_beside
+from robots.urdf.summary import read_references, read_urdf
 
 
 def asset_fingerprint(source: UrdfSource) -> str:

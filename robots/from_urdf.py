@@ -17,10 +17,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from robots.commands import exit_code, start
-from robots.errors import AssetError, MissingPackageError, UnknownNameError
+from robots.common.commands import exit_code, start
+from robots.common.errors import AssetError, MissingPackageError, UnknownNameError
+from robots.common.paths import absolute
 from robots.guess import Guess, guess
-from robots.paths import absolute
 
 __all__ = ["Guess", "guess_descriptor", "main"]
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from robots.assets.locator import LocalUrdf
+from robots.common.errors import DescriptorError
 from robots.descriptor import (
     ActionSplit,
     Fingers,
@@ -15,12 +17,10 @@ from robots.descriptor import (
     JointGroup,
     RobotDescriptor,
 )
-from robots.errors import DescriptorError
-from robots.locator import LocalUrdf
-from robots.urdf_anatomy import FARTHEST_SLIDE, Anatomy, find_anatomy
-from robots.urdf_model import ModelJoint, UrdfModel, read_model
-from robots.urdf_reach import link_frame, reach
-from robots.urdf_xml import read_urdf
+from robots.urdf.anatomy import FARTHEST_SLIDE, Anatomy, find_anatomy
+from robots.urdf.model import ModelJoint, UrdfModel, read_model
+from robots.urdf.reach import link_frame, reach
+from robots.urdf.summary import read_urdf
 
 STIFFNESS, DAMPING, FORCE = 1e3, 1e2, 100.0  # what ManiSkill gives its Panda
 STEP = 0.1  # of an arm joint, per control step (rad, m)

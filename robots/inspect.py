@@ -6,18 +6,18 @@ import argparse
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from robots.asset_sources import SourceError, find_mani_skill
-from robots.asset_store import AssetStore, FileState, default_root
-from robots.commands import exit_code, print_error, start
+from robots.assets.locator import LocalUrdf, UrdfLocator
+from robots.assets.manifest import AssetFile, AssetPackage, load_manifest
+from robots.assets.progress import size
+from robots.assets.sources import SourceError, find_mani_skill
+from robots.assets.store import AssetStore, FileState, default_root
+from robots.common.commands import exit_code, print_error, start
 from robots.descriptor import JointGroup, RobotDescriptor
 from robots.fetch_assets import describe_file
-from robots.locator import LocalUrdf, UrdfLocator
-from robots.manifest import AssetFile, AssetPackage, load_manifest
-from robots.progress import size
 from robots.registry import RobotRegistry
-from robots.urdf_model import read_model
-from robots.urdf_reach import link_frame
-from robots.urdf_xml import UrdfJoint, read_joints, read_urdf
+from robots.urdf.model import read_model
+from robots.urdf.reach import link_frame
+from robots.urdf.summary import UrdfJoint, read_joints, read_urdf
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

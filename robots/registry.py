@@ -5,24 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from importlib import import_module, metadata
 
+from robots.common.errors import DescriptorError, RobotLayoutsError, UnknownNameError
+from robots.common.fields import show
 from robots.descriptor import RobotDescriptor
-from robots.errors import DescriptorError, RobotLayoutsError, UnknownNameError
-from robots.fields import show
 
 ENTRY_POINT_GROUP = "robot_layouts.robots"
 
 # One line per robot, sorted by name: name -> module:attribute.
 CATALOGUE = {
-    "fetch": "robots.fetch:FETCH",
-    "floating_panda_gripper": "robots.floating_panda_gripper:FLOATING_PANDA_GRIPPER",
-    "koch": "robots.koch:KOCH",
-    "mobile_panda": "robots.mobile_panda:MOBILE_PANDA",
-    "panda": "robots.panda:PANDA",
-    "panda_pinch": "robots.panda_pinch:PANDA_PINCH",
-    "panda_stick": "robots.panda_stick:PANDA_STICK",
-    "panda_wristcam": "robots.panda_wristcam:PANDA_WRISTCAM",
-    "so100": "robots.so100:SO100",
-    "xarm7": "robots.xarm7:XARM7",
+    "fetch": "robots.catalogue.fetch:FETCH",
+    "floating_panda_gripper": "robots.catalogue.floating_panda_gripper:FLOATING_PANDA_GRIPPER",
+    "koch": "robots.catalogue.koch:KOCH",
+    "mobile_panda": "robots.catalogue.mobile_panda:MOBILE_PANDA",
+    "panda": "robots.catalogue.panda:PANDA",
+    "panda_pinch": "robots.catalogue.panda_pinch:PANDA_PINCH",
+    "panda_stick": "robots.catalogue.panda_stick:PANDA_STICK",
+    "panda_wristcam": "robots.catalogue.panda_wristcam:PANDA_WRISTCAM",
+    "so100": "robots.catalogue.so100:SO100",
+    "xarm7": "robots.catalogue.xarm7:XARM7",
 }
 
 

@@ -9,13 +9,9 @@ import re
 from importlib import metadata
 from pathlib import Path
 
-from robots import scenery
-from robots.asset_sources import find_mani_skill
-from robots.commands import exit_code, start
-from robots.errors import AssetError
-from robots.files import read_regular, read_text
-from robots.locator import UrdfLocator
-from robots.manifest import (
+from robots.assets import scenery
+from robots.assets.locator import UrdfLocator
+from robots.assets.manifest import (
     CHECKOUT_CACHE,
     LARGEST_FILE,
     AssetFile,
@@ -23,8 +19,12 @@ from robots.manifest import (
     Manifest,
     PackageOrigin,
 )
+from robots.assets.sources import find_mani_skill
+from robots.common.commands import exit_code, start
+from robots.common.errors import AssetError
+from robots.common.files import read_regular, read_text
 from robots.registry import CATALOGUE, RobotRegistry
-from robots.urdf_xml import read_references
+from robots.urdf.summary import read_references
 
 HUB_DATASET = "RoboVerseOrg/roboverse_data"
 PREFIX = "maniskill_"  # package maniskill_panda is mani_skill's folder assets/robots/panda

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 
-from robots.commands import exit_code, start
-from rollouts import (
-    evaluate_command,
-    record_command,
-    replay_command,
-    soak_command,
-    view_command,
-)
-from rollouts.bench import command as bench_command
-from rollouts.export import command as export_command
+from robots.common.commands import exit_code, start
+
+# Command -> its module, with DESCRIPTION, add_arguments(parser) and run(options).
+COMMANDS = {
+    "record": "rollouts.recording.record_command",
+    "evaluate": "rollouts.evaluate_command",
+    "replay": "rollouts.playing.replay_command",
+    "export": "rollouts.export.command",
+    "view": "rollouts.view_command",
+    "bench": "measurements.bench.command",
+    "soak": "measurements.soak.command",
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -50,15 +53,8 @@ def _parser() -> argparse.ArgumentParser:
     add("--out", type=Path, default=Path("runs/demo"), metavar="DIR", help="default %(default)s")
     add("--no-video", action="store_true", help="make no video")
     demo.set_defaults(run=_demo)
-    for name, module in (
-        ("record", record_command),
-        ("evaluate", evaluate_command),
-        ("replay", replay_command),
-        ("export", export_command),
-        ("view", view_command),
-        ("bench", bench_command),
-        ("soak", soak_command),
-    ):
+    for name, path in COMMANDS.items():
+        module = import_module(path)
         command = commands.add_parser(name, help=module.DESCRIPTION, description=module.DESCRIPTION)
         module.add_arguments(command)
         command.set_defaults(run=module.run)

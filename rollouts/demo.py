@@ -13,13 +13,13 @@ from rich.markup import escape
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 import tasks
+from experts import find_expert
 from layouts import Layout
 from robots import AssetError, MissingPackageError, RecordingError
-from rollouts.episode import Episode, play
-from rollouts.experts import find_expert
-from rollouts.recorder import Recorder
+from rollouts.recording.recorder import Recorder
 from rollouts.video import film, video_problem
 from tasks import MultiRobotTask
+from tasks.episode import Episode, play
 
 ENOUGH = 0.9  # share of episodes that must succeed
 FILMED_EPISODES, FILMING_SECONDS = 4, 60.0

@@ -8,11 +8,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from robots import CONTROL_MODES, TaskError
-from rollouts import workers
-from rollouts.workers import INTERRUPTED, one_or_more, stop_signals, zero_or_more
+from rollouts.playing import command_options as workers
+from rollouts.playing.command_options import INTERRUPTED, one_or_more, stop_signals, zero_or_more
 
 if TYPE_CHECKING:
-    from rollouts.executor import Event
+    from rollouts.playing.executor import Event
     from rollouts.progress import LiveLine
 
 DESCRIPTION = "let a policy play episodes in worker processes, and tell how well it does"

@@ -15,10 +15,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from experts import find_expert
+from experts.registry import Expert
 from robots import TaskError
-from rollouts.conversion import Planner
-from rollouts.episode import REBUILT
-from rollouts.executor import (
+from rollouts.playing.executor import (
     EPISODE_SECONDS,
     Event,
     Executor,
@@ -26,10 +26,10 @@ from rollouts.executor import (
     modules_of,
     play_all,
 )
-from rollouts.experts import find_expert
-from rollouts.experts.registry import Expert
-from rollouts.seeds import checked_seeds
+from rollouts.playing.plan_conversion import Planner
+from rollouts.playing.seeds import checked_seeds
 from tasks import MultiRobotTask, Scenario, get_task_class
+from tasks.episode import REBUILT
 from tasks.registry import make_scenario
 
 Policy = Callable[[Any], Any]
@@ -132,7 +132,7 @@ def evaluate(
         seeds: Which episodes, each once.
         workers: How many processes play; None: one for each core that this process may use; 0:
             none, but this one.
-        executor: Who plays instead, such as `rollouts.ray_executor.RayExecutor`.
+        executor: Who plays instead, such as `rollouts.playing.ray_executor.RayExecutor`.
         episode_timeout: Seconds that an episode may take in a worker until that is ended and the
             episode played again, three times in all; None if it may take for ever.
         on_event: Called with each event of the executor, to show progress.

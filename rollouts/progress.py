@@ -8,7 +8,7 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import Progress, TaskID
 
-from robots.commands import is_watched, notice
+from robots.common.commands import is_watched, notice
 
 PATIENCE = 2.0  # s without any word
 PLAIN_INTERVAL = 10.0  # s between lines where stderr is no terminal

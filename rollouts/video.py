@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from layouts import Layout
 from robots import MissingPackageError, RecordingError, RobotLayoutsError
 from robots.descriptor import Vector3
-from rollouts.episode import Episode, play
-from simulation.rendering import Cameras, vulkan_problem
+from simulation.rendering.pictures import Cameras, vulkan_problem
 from tasks import MultiRobotTask
+from tasks.episode import Episode, play
 
 Picture = NDArray[np.uint8]  # (H, W, 3)
 

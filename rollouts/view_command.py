@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 from layouts.view_command import add_page_options, show
 from layouts.viewer import Cell, Motion
-from rollouts.replay_command import add_recording
+from rollouts.playing.replay_command import add_recording
 
 if TYPE_CHECKING:
-    from rollouts.trajectory import Trajectory, TrajectoryFile
+    from rollouts.reading.trajectory import Trajectory, TrajectoryFile
     from tasks import MultiRobotTask
 
 DESCRIPTION = "look at an episode of a recording, ours or ManiSkill's, step by step in a browser"
@@ -35,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         RobotLayoutsError: If the recording cannot be shown.
     """
-    from rollouts.replay import open_recording
+    from rollouts.playing.replay import open_recording
 
     with open_recording(options.file, options.task) as file:
         return show(lambda: episode_cell(file, options.episode), options)
@@ -51,8 +51,8 @@ def episode_cell(file: TrajectoryFile, number: int) -> Cell:
     Raises:
         TrajectoryError: If there is no such episode, or it cannot be shown.
     """
-    from rollouts.replay import task_for
-    from rollouts.trajectory import TrajectoryError
+    from rollouts.playing.replay import task_for
+    from rollouts.reading.trajectory import TrajectoryError
     from tasks.view import task_cell
 
     if not 0 <= number < len(file):
@@ -70,8 +70,8 @@ def episode_cell(file: TrajectoryFile, number: int) -> Cell:
 
 def _motion(task: MultiRobotTask, trajectory: Trajectory) -> Motion:
     """Reset the task as the episode began, and return what happens in it."""
-    from rollouts.episode import REBUILT, play
-    from rollouts.trajectory import TrajectoryError
+    from rollouts.reading.trajectory import TrajectoryError
+    from tasks.episode import REBUILT, play
     from tasks.view import recorded_motion
 
     states = trajectory.states

@@ -3,8 +3,8 @@
 The only room that imports sapien.
 """
 
-from simulation.cameras import Camera
 from simulation.physics import SAPIEN_DEFAULTS, Friction, PhysicsSettings
+from simulation.rendering.cameras import Camera
 from simulation.scene import build_scene
 from simulation.shapes import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
 from simulation.simulation import Simulation

@@ -18,12 +18,12 @@ import sapien.physx as physx
 from sapien.wrapper.urdf_loader import URDFLoader
 
 from robots import AssetError, RobotDescriptor
-from robots.mesh_files import load_scene, read_corners
-from robots.srdf import ExcludedPair, read_excluded_pairs
-from robots.urdf_model import UrdfModel, read_model
-from robots.urdf_paths import resolve
-from robots.urdf_shapes import UrdfShape
-from robots.urdf_xml import parse_urdf, read_urdf
+from robots.urdf.mesh_files import load_scene, read_corners
+from robots.urdf.model import UrdfModel, read_model
+from robots.urdf.paths import resolve
+from robots.urdf.shapes import UrdfShape
+from robots.urdf.srdf import ExcludedPair, read_excluded_pairs
+from robots.urdf.summary import parse_urdf, read_urdf
 
 MOST_PAIRS = 31  # that SAPIEN's loader can keep apart: a bit each
 

@@ -9,7 +9,7 @@ from typing import Any
 import sapien.physx as physx
 
 from robots import SimulationError
-from robots.bounds import (
+from robots.common.bounds import (
     FAR,
     checked_flag,
     checked_number,

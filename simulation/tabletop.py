@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import cos, pi, sin
 
-from robots import scenery
+from robots.assets import scenery
 from simulation.shapes import Box, Floor, Mesh, Plane, Shape
 from simulation.world import World
 

@@ -14,7 +14,7 @@ from robots import SimulationError, UnknownNameError
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 from simulation.blueprint import Blueprint, read_blueprint
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, apply
-from simulation.render_device import expect_render_device, outlive_forks
+from simulation.rendering.device import expect_render_device, outlive_forks
 from simulation.robot import SimulatedRobot
 from simulation.shapes import Shape, add_collision
 
@@ -210,7 +210,7 @@ def _floats(values: Any) -> list[float]:
 
 
 def _draw(entity: sapien.Entity, shapes: tuple[Shape, ...]) -> None:
-    from simulation.visuals import visual_component
+    from simulation.rendering.visuals import visual_component
 
     component = visual_component(shapes)
     if component is not None:

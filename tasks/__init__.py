@@ -25,10 +25,10 @@ from typing import TYPE_CHECKING, Any
 from tasks.fronts import parallel_env, register, sb3_vec_env
 
 if TYPE_CHECKING:
-    from tasks.randomness import EpisodeRandom
+    from tasks.engine.randomness import EpisodeRandom
+    from tasks.engine.scenario import Scenario
+    from tasks.engine.task import MultiRobotTask
     from tasks.registry import get_task_class, list_clones, list_tasks, make, register_task
-    from tasks.scenario import Scenario
-    from tasks.task import MultiRobotTask
 
 __all__ = [
     "EpisodeRandom",
@@ -44,9 +44,9 @@ __all__ = [
 ]
 
 _MODULES = {
-    "EpisodeRandom": "tasks.randomness",
-    "MultiRobotTask": "tasks.task",
-    "Scenario": "tasks.scenario",
+    "EpisodeRandom": "tasks.engine.randomness",
+    "MultiRobotTask": "tasks.engine.task",
+    "Scenario": "tasks.engine.scenario",
     "get_task_class": "tasks.registry",
     "list_clones": "tasks.registry",
     "list_tasks": "tasks.registry",

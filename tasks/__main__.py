@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from rich.console import Console
 
 from layouts.view_command import add_page_options, page_words, show
-from robots.commands import exit_code, start
+from robots.common.commands import exit_code, start
 from tasks.description import (
     declared_facts,
     describe,

@@ -18,10 +18,10 @@ from rich.table import Table
 from layouts import Layout
 from robots import TaskError
 from simulation import Camera
-from simulation.cameras import RobotCamera
-from tasks.observation import cameras_of
+from simulation.rendering.cameras import RobotCamera
+from tasks.engine.observation import cameras_of
+from tasks.engine.task import MultiRobotTask
 from tasks.registry import get_task_class, make, other_names
-from tasks.task import MultiRobotTask
 
 # Written by ``python -m parity compare --all --record``; a checkout and the wheel both carry it.
 PARITY_RESULTS = Path(__file__).parents[1] / "parity" / "results.json"

@@ -10,51 +10,60 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from layouts import Layout, Placement
 from layouts.placement import RobotLike, load_robot
 from robots import RobotDescriptor, TaskError, UnknownNameError
-from robots.bounds import shown
+from robots.common.bounds import shown
 
 if TYPE_CHECKING:
-    from tasks.scenario import Scenario
-    from tasks.task import MultiRobotTask
+    from tasks.engine.scenario import Scenario
+    from tasks.engine.task import MultiRobotTask
 
 # Beginning of the name of a task that clones one of ManiSkill's.
 CLONE_PREFIX = "maniskill."
 
 # One line per task, sorted by id: id -> module:class, then its other names.
 CATALOGUE = {
-    "DrawTriangle-v1": ("tasks.draw_triangle:DrawTriangle", "maniskill.draw_triangle_native"),
-    "FourRobotStack-v1": ("tasks.four_robot_stack:FourRobotStack",),
+    "DrawTriangle-v1": (
+        "tasks.maniskill.draw_triangle:DrawTriangle",
+        "maniskill.draw_triangle_native",
+    ),
+    "FourRobotStack-v1": ("tasks.originals.four_robot_stack:FourRobotStack",),
     "LiftPegUpright-v1": (
-        "tasks.lift_peg_upright:LiftPegUpright",
+        "tasks.maniskill.lift_peg_upright:LiftPegUpright",
         "maniskill.lift_peg_upright_native",
     ),
     "PegInsertionSide-v1": (
-        "tasks.peg_insertion_side:PegInsertionSide",
+        "tasks.maniskill.peg_insertion_side:PegInsertionSide",
         "maniskill.peg_insertion_side_native",
     ),
-    "PickCube-v1": ("tasks.pick_cube:PickCube", "maniskill.pick_cube_native"),
+    "PickCube-v1": ("tasks.maniskill.pick_cube:PickCube", "maniskill.pick_cube_native"),
     "PickCubeSO100-v1": (
-        "tasks.pick_cube_so100:PickCubeSO100",
+        "tasks.maniskill.pick_cube_so100:PickCubeSO100",
         "maniskill.pick_cube_so100_native",
     ),
-    "PlaceSphere-v1": ("tasks.place_sphere:PlaceSphere", "maniskill.place_sphere_native"),
-    "PlugCharger-v1": ("tasks.plug_charger:PlugCharger", "maniskill.plug_charger_native"),
-    "PokeCube-v1": ("tasks.poke_cube:PokeCube", "maniskill.poke_cube_native"),
-    "PullCube-v1": ("tasks.pull_cube:PullCube", "maniskill.pull_cube_native"),
-    "PullCubeTool-v1": ("tasks.pull_cube_tool:PullCubeTool", "maniskill.pull_cube_tool_native"),
-    "PushCube-v1": ("tasks.push_cube:PushCube", "maniskill.push_cube_native"),
-    "PushT-v1": ("tasks.push_t:PushT", "maniskill.push_t_native"),
-    "Relay-v1": ("tasks.relay:Relay",),
-    "RollBall-v1": ("tasks.roll_ball:RollBall", "maniskill.roll_ball_native"),
-    "StackCube-v1": ("tasks.stack_cube:StackCube", "maniskill.stack_cube_native"),
-    "StackPyramid-v1": ("tasks.stack_pyramid:StackPyramid", "maniskill.stack_pyramid_native"),
-    "TwoRobotLiftBar-v1": ("tasks.two_robot_lift_bar:TwoRobotLiftBar",),
+    "PlaceSphere-v1": ("tasks.maniskill.place_sphere:PlaceSphere", "maniskill.place_sphere_native"),
+    "PlugCharger-v1": ("tasks.maniskill.plug_charger:PlugCharger", "maniskill.plug_charger_native"),
+    "PokeCube-v1": ("tasks.maniskill.poke_cube:PokeCube", "maniskill.poke_cube_native"),
+    "PullCube-v1": ("tasks.maniskill.pull_cube:PullCube", "maniskill.pull_cube_native"),
+    "PullCubeTool-v1": (
+        "tasks.maniskill.pull_cube_tool:PullCubeTool",
+        "maniskill.pull_cube_tool_native",
+    ),
+    "PushCube-v1": ("tasks.maniskill.push_cube:PushCube", "maniskill.push_cube_native"),
+    "PushT-v1": ("tasks.maniskill.push_t:PushT", "maniskill.push_t_native"),
+    "Relay-v1": ("tasks.originals.relay:Relay",),
+    "RollBall-v1": ("tasks.maniskill.roll_ball:RollBall", "maniskill.roll_ball_native"),
+    "StackCube-v1": ("tasks.maniskill.stack_cube:StackCube", "maniskill.stack_cube_native"),
+    "StackPyramid-v1": (
+        "tasks.maniskill.stack_pyramid:StackPyramid",
+        "maniskill.stack_pyramid_native",
+    ),
+    "TwoRobotLiftBar-v1": ("tasks.originals.two_robot_lift_bar:TwoRobotLiftBar",),
     "TwoRobotPickCube-v1": (
-        "tasks.two_robot_pick_cube:TwoRobotPickCube",
+        "tasks.maniskill.two_robot_pick_cube:TwoRobotPickCube",
         "maniskill.two_robot_pick_cube_native",
     ),
-    "TwoRobotPushPick-v1": ("tasks.two_robot_push_pick:TwoRobotPushPick",),
+    "TwoRobotPushPick-v1": ("tasks.originals.two_robot_push_pick:TwoRobotPushPick",),
     "TwoRobotStackCube-v1": (
-        "tasks.two_robot_stack_cube:TwoRobotStackCube",
+        "tasks.maniskill.two_robot_stack_cube:TwoRobotStackCube",
         "maniskill.two_robot_stack_cube_native",
     ),
 }

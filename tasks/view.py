@@ -14,8 +14,8 @@ from robots import TaskError
 from robots.descriptor import Quaternion
 from simulation import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
 from simulation.world import World
-from tasks.native_format import articulation_keys
-from tasks.task import MultiRobotTask
+from tasks.engine.native_format import articulation_keys
+from tasks.engine.task import MultiRobotTask
 
 PLANE_SIZE = 6.0  # m, of what is drawn of an infinite plane
 ROOT = 13  # numbers of a row before the joints: the root's pose and velocities

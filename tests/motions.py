@@ -11,7 +11,7 @@ from math import atan2, cos, pi, sin
 import numpy as np
 
 import tasks
-from parity.episodes import Episode
+from parity.compare.episodes import Episode
 from simulation.kinematics import InverseKinematics
 
 OPEN, CLOSED = 1.0, -1.0

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import pytest
 
 import tasks
-from parity.comparison import EpisodeResult, History, compare
-from parity.episodes import Episode
-from parity.sides import NativeSide, OurSide
+from parity.compare.both_sides import NativeSide, OurSide
+from parity.compare.episodes import Episode
+from parity.compare.lockstep import EpisodeResult, History, compare
 
 TASKS = tasks.list_clones()
 NATIVE = [

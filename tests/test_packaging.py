@@ -16,7 +16,16 @@ else:
     import tomli as tomllib
 
 ROOT = Path(__file__).parent.parent
-ROOMS = ("robots", "layouts", "simulation", "tasks", "rollouts", "parity")
+ROOMS = (
+    "robots",
+    "layouts",
+    "simulation",
+    "tasks",
+    "experts",
+    "rollouts",
+    "parity",
+    "measurements",
+)
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 ROBOT_FILES = (".urdf", ".srdf", ".stl", ".obj", ".dae", ".glb", ".gltf", ".ply")
@@ -54,7 +63,9 @@ class TestWheel:
         assert f"{room}/py.typed" in wheel.namelist()
 
     def test_carries_what_the_report_page_is_made_of(self, wheel):
-        names = {f"parity/templates/report.{suffix}" for suffix in ("html.jinja", "css", "js")}
+        names = {
+            f"parity/report/templates/report.{suffix}" for suffix in ("html.jinja", "css", "js")
+        }
         assert names <= {*wheel.namelist()}
 
     def test_carries_the_asset_manifest_unchanged(self, wheel):

@@ -17,8 +17,8 @@ from layouts.export.urdf import base_link, rpy
 from layouts.files import written_whole
 from layouts.visuals import Part, load_meshes, read_visuals, require_trimesh, simplified
 from robots import LayoutError, RobotDescriptor
-from robots.urdf_paths import resolve
-from robots.urdf_xml import parse_urdf, read_urdf
+from robots.urdf.paths import resolve
+from robots.urdf.summary import parse_urdf, read_urdf
 
 if TYPE_CHECKING:
     from layouts.layout import Layout

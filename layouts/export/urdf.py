@@ -12,10 +12,10 @@ from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 from layouts.files import written_whole
 from robots import LayoutError
 from robots.descriptor import Quaternion, Vector3
-from robots.srdf import srdf_beside
-from robots.urdf_model import read_model
-from robots.urdf_paths import resolve
-from robots.urdf_xml import parse_urdf, read_urdf
+from robots.urdf.model import read_model
+from robots.urdf.paths import resolve
+from robots.urdf.srdf import srdf_beside
+from robots.urdf.summary import parse_urdf, read_urdf
 
 if TYPE_CHECKING:
     from layouts.layout import Layout

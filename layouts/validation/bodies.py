@@ -14,12 +14,12 @@ import numpy as np
 
 from layouts.validation.kinematics import Floats, Kinematics, origin_matrix
 from robots import AssetError, MissingPackageError, RobotDescriptor
-from robots.mesh_files import has_volume, read_corners
-from robots.srdf import read_excluded_pairs
-from robots.urdf_model import read_model
-from robots.urdf_paths import resolve
-from robots.urdf_shapes import UrdfShape
-from robots.urdf_xml import read_urdf
+from robots.urdf.mesh_files import has_volume, read_corners
+from robots.urdf.model import read_model
+from robots.urdf.paths import resolve
+from robots.urdf.shapes import UrdfShape
+from robots.urdf.srdf import read_excluded_pairs
+from robots.urdf.summary import read_urdf
 
 SIDES = 32  # of the polygon that stands for a circle; 0.5 % of the radius is lost
 

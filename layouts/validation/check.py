@@ -44,7 +44,7 @@ from layouts.validation.report import (
     reach_text,
 )
 from robots import LayoutError
-from robots.commands import notice
+from robots.common.commands import notice
 
 Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)
 Targets = Mapping[str, Sequence[float]] | Sequence[Sequence[float]]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots import DescriptorError, UnknownNameError
-from robots.urdf_model import ModelJoint, UrdfModel
+from robots.urdf.model import ModelJoint, UrdfModel
 
 Floats = NDArray[np.float64]
 

@@ -7,10 +7,10 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from parity import embedding
+from parity.records.results import RESULTS, ResultsError, read
 from parity.report.content import page_content
 from parity.report.html import render
-from parity.results import RESULTS, ResultsError, read
+from parity.show import embedding
 from parity.sweep.entries import SUMMARY, read_summary
 from robots import RecordingError, TaskError
 

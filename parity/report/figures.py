@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from parity.clip import SideBySide
-from parity.snapshot import STATE
-from parity.summary import REWARD, number_text, success_text
+from parity.compare.snapshot import STATE
+from parity.compare.task_summary import REWARD, number_text, success_text
+from parity.show.clip import SideBySide
 
 UNKNOWN = "–"
 

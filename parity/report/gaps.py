@@ -6,13 +6,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from parity.inventory import missing_tasks
-from parity.native import INSTALL
+from experts import list_experts
+from parity.compare.native_env import INSTALL
+from parity.compare.task_summary import number_text
+from parity.records.inventory import missing_tasks
 from parity.report.figures import is_verified
 from parity.report.tasks import no_clip, problems
-from parity.summary import number_text
 from robots import MissingPackageError
-from rollouts.experts import list_experts
 
 
 @dataclass(frozen=True)

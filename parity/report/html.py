@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any
 
-from parity.embedding import Embedded
+from parity.show.embedding import Embedded
 from robots import MissingPackageError
 
 
@@ -26,7 +26,7 @@ def render(context: Mapping[str, Any], fitted: Mapping[str, Embedded]) -> str:
         import jinja2
     except ImportError:
         raise MissingPackageError("a page needs jinja2: pip install jinja2") from None
-    folder = files("parity") / "templates"
+    folder = files("parity.report") / "templates"
     parts = {
         name: (folder / f"report.{suffix}").read_text(encoding="utf-8")
         for name, suffix in (("page", "html.jinja"), ("style", "css"), ("script", "js"))

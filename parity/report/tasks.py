@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from parity.compare.task_summary import number_text
 from parity.report.figures import cells, is_verified
-from parity.summary import number_text
 from tasks import MultiRobotTask, get_task_class
 from tasks.description import read_docstring, robots_text
 

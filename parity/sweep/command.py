@@ -11,12 +11,12 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress, TimeElapsedColumn
 
-from parity.clip import SideBySide
+from parity.show.clip import SideBySide
 from parity.sweep.entries import SUMMARY, Entry, is_done, line, read_summary, write_summary
 from parity.sweep.plan import Plan, plan
 from parity.sweep.processes import STAGE_SECONDS, Progressed, sweep
 from parity.sweep.stages import STAGES
-from rollouts.executor import Executor
+from rollouts.playing.executor import Executor
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -82,7 +82,7 @@ def _run(args: argparse.Namespace) -> int:
 def _cluster(args: argparse.Namespace) -> Executor | None:
     if args.ray is None:
         return None
-    from rollouts.ray_executor import RayExecutor
+    from rollouts.playing.ray_executor import RayExecutor
 
     return RayExecutor(
         args.ray, args.workers, attempts=1, fresh=True, episode_timeout=STAGE_SECONDS

@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from parity.findings import versions
-from parity.results import ResultsError
-from parity.summary import number_text
+from parity.compare.printed import versions
+from parity.compare.task_summary import number_text
+from parity.records.results import ResultsError
 from parity.sweep.plan import Plan
 from robots import RecordingError
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import tasks
-from parity.inventory import find_files
+from experts import list_experts
+from parity.records.inventory import find_files
 from robots import TaskError
-from rollouts.experts import list_experts
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from parity.sweep.entries import Entry, blank
 from parity.sweep.plan import Plan
 from parity.sweep.stages import sweep_task
 from robots import RecordingError, RobotLayoutsError
-from rollouts.executor import (
+from rollouts.playing.executor import (
     Executor,
     ProcessExecutor,
     WorkersDied,

@@ -10,17 +10,17 @@ from pathlib import Path
 from typing import Any
 
 import tasks
-from parity.clip import Candidate, Clip
-from parity.comparison import EpisodeResult
-from parity.episodes import load_episodes, random_episodes, recorded_control_mode
-from parity.replay import agree
-from parity.rollout import Source, expert_source, roll_out
-from parity.runs import Run, play
-from parity.sides import NativeSide, OurSide
+from experts import list_experts
+from parity.compare.both_sides import NativeSide, OurSide
+from parity.compare.episodes import load_episodes, random_episodes, recorded_control_mode
+from parity.compare.lockstep import EpisodeResult
+from parity.compare.runs import Run, play
+from parity.replay.command import agree
+from parity.replay.rollout import Source, expert_source, roll_out
+from parity.show.clip import Candidate, Clip
 from parity.sweep.entries import Entry
 from parity.sweep.plan import Plan
 from robots import CONTROL_MODES
-from rollouts.experts import list_experts
 
 PANEL = 384  # pixels of each of a clip's three pictures
 STAGES = ("agreement", "rollout", "clip")

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 import tasks
 from layouts import Layout, Placement
 from robots import RobotDescriptor
-from rollouts.episode import States
-from rollouts.trajectory import Trajectory, TrajectoryError, TrajectoryFile
+from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
 from tasks import MultiRobotTask
-from tasks.native_format import articulation_keys
+from tasks.engine.native_format import articulation_keys
+from tasks.episode import States
 
 Floats = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -214,7 +214,7 @@ def make_task(file: TrajectoryFile, *, pictures: bool = False) -> MultiRobotTask
 
 
 def recorded_layout(described: Mapping[str, Mapping[str, Any]]) -> Layout:
-    """Return the layout that `rollouts.provenance.describe_layout` described."""
+    """Return the layout that `rollouts.recording.provenance.describe_layout` described."""
     return Layout(
         {
             place: Placement(

@@ -13,7 +13,7 @@ from typing import Any
 from robots import MissingPackageError, TaskError, UnknownNameError
 from rollouts.export.columns import ColumnReader, Columns, make_task, succeeded
 from rollouts.export.folder import new_folder, refuse_used
-from rollouts.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
 from tasks.description import read_docstring
 
 FORMATS = ("lerobot", "robomimic")

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from robots import RecordingError, RobotLayoutsError
-from rollouts.disk import claim
+from rollouts.recording.disk import claim
 
 
 @contextmanager

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots import MissingPackageError, SimulationError
-from rollouts.episode import REBUILT, States
 from rollouts.export.columns import Columns, state_row
-from rollouts.trajectory import TrajectoryError
+from rollouts.reading.trajectory import TrajectoryError
 from rollouts.video import INSTALL, overview
-from simulation.rendering import SIZE, Cameras, vulkan_problem
+from simulation.rendering.pictures import SIZE, Cameras, vulkan_problem
 from tasks import MultiRobotTask
+from tasks.episode import REBUILT, States
 
 SHAPE = (SIZE, SIZE, 3)
 CODEC = "h264"

@@ -10,9 +10,9 @@ from typing import Any
 import h5py
 import numpy as np
 
-from rollouts.episode import States
 from rollouts.export.columns import POSE, ColumnReader, Columns, Floats
 from rollouts.export.writer import DatasetWriter
+from tasks.episode import States
 
 FILE_NAME = "low_dim.hdf5"  # what robomimic calls observations without pictures
 GYM = 2  # robomimic's number for environments made by gym

@@ -11,11 +11,11 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from robots import TaskError
-from tasks.arguments import RECONFIGURE, SEED
+from tasks.engine.arguments import RECONFIGURE, SEED
+from tasks.engine.observation import told_dtype
+from tasks.engine.scenario import Scenario
+from tasks.engine.task import FIRST_SEED, MultiRobotTask
 from tasks.fronts.board import Arrays, Shapes
-from tasks.observation import told_dtype
-from tasks.scenario import Scenario
-from tasks.task import FIRST_SEED, MultiRobotTask
 
 OBSERVATION, INFO = "obs", "info"  # what the names of their arrays begin with
 SEEDS = f"{INFO}/{SEED}"  # which only a reset changes

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots import TaskError
-from tasks.arguments import checked_seeds
+from tasks.engine.arguments import checked_seeds
+from tasks.engine.observation import space_of
+from tasks.engine.randomness import FirstSeeds
+from tasks.engine.remade import Remade
 from tasks.fronts.numbers import info_row, row
-from tasks.observation import space_of
-from tasks.randomness import FirstSeeds
 from tasks.registry import make
-from tasks.remade import Remade
 
 RENDER_MODES = ["rgb_array"]
 

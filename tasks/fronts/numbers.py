@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tasks.arguments import RECONFIGURE, SEED
-from tasks.observation import told_dtype
+from tasks.engine.arguments import RECONFIGURE, SEED
+from tasks.engine.observation import told_dtype
 
 
 def row(observation: Any, env: int = 0) -> Any:

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from robots import TaskError, UnknownNameError
-from robots.bounds import shown
-from tasks.arguments import RECONFIGURE, checked_options, checked_seeds
+from robots.common.bounds import shown
+from tasks.engine.arguments import RECONFIGURE, checked_options, checked_seeds
+from tasks.engine.native_format import observation_keys
+from tasks.engine.observation import space_of
+from tasks.engine.randomness import FirstSeeds
+from tasks.engine.remade import Remade
 from tasks.fronts.numbers import info_row, row
-from tasks.native_format import observation_keys
-from tasks.observation import space_of
-from tasks.randomness import FirstSeeds
 from tasks.registry import make
-from tasks.remade import Remade
 
 Observation = Any
 """An array, or with images a mapping of them."""

@@ -16,16 +16,16 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from robots import SimulationError, TaskError, unknown_name_message
-from tasks.actions import ActionReader
-from tasks.arguments import RECONFIGURE, checked_options, checked_seeds
+from tasks.engine.actions import ActionReader
+from tasks.engine.arguments import RECONFIGURE, checked_options, checked_seeds
+from tasks.engine.observation import space_of
+from tasks.engine.randomness import FirstSeeds
+from tasks.engine.remade import Remade
+from tasks.engine.task import FIRST_SEED
 from tasks.fronts.batch import FINAL, INFO, OBSERVATION, Beginning, Part
 from tasks.fronts.gymnasium import RENDER_MODES
 from tasks.fronts.workers import Failure, InProcess, WorkerError, Workers, WorkersFailed
-from tasks.observation import space_of
-from tasks.randomness import FirstSeeds
 from tasks.registry import get_task_class, make_scenario
-from tasks.remade import Remade
-from tasks.task import FIRST_SEED
 
 RESET_OPTIONS = (RECONFIGURE, "reset_mask")
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from robots import RobotLayoutsError
 from tasks.fronts.channel import Channel
-from tasks.processes import ProcessError, Sendable
+from tasks.processes.process import ProcessError, Sendable
 
 if TYPE_CHECKING:
     from tasks.fronts.batch import Batch, Part

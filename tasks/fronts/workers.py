@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from robots import SimulationError
-from tasks import processes
 from tasks.fronts.batch import Part
 from tasks.fronts.board import (
     Arrays,
@@ -24,7 +23,8 @@ from tasks.fronts.board import (
 )
 from tasks.fronts.channel import Channel
 from tasks.fronts.work import ATTACH, SETTLE, CallFailed, work
-from tasks.processes import ProcessError, WorkerTraceback, enough
+from tasks.processes import process as processes
+from tasks.processes.process import ProcessError, WorkerTraceback, enough
 
 START_SECONDS = 300.0  # until all workers have built their worlds
 _FAREWELL_SECONDS = 2.0  # that workers may take to end by themselves

@@ -217,7 +217,7 @@ def _goes_back(change: Callable[[Any], Any], folder: Path) -> str:
 
 def _spoilt_task(**methods: Any) -> Any:
     """Make PickCube with other methods, two environments."""
-    from tasks.pick_cube import PickCube
+    from tasks.maniskill.pick_cube import PickCube
 
     return type("Mine", (PickCube,), methods)
 
@@ -254,7 +254,7 @@ def _robot_reward(earned: Any, folder: Path) -> None:
 
 
 def _lost(obs_mode: str, folder: Path) -> None:
-    from tasks.pick_cube import PickCube
+    from tasks.maniskill.pick_cube import PickCube
 
     task = _made(PickCube, obs_mode=obs_mode)
     task.step(np.zeros((2, 8), np.float32))
@@ -269,7 +269,7 @@ def _lose(task: Any) -> None:
 
 
 def _found_again(folder: Path) -> str:
-    from tasks.pick_cube import PickCube
+    from tasks.maniskill.pick_cube import PickCube
 
     task, other = _made(PickCube), _made(PickCube)
     _lose(task)
@@ -293,7 +293,7 @@ def _large_reward(folder: Path) -> str:
 
 
 def _taken(key: str, folder: Path) -> None:
-    from tasks.pick_cube import PickCube
+    from tasks.maniskill.pick_cube import PickCube
 
     def evaluate(self: Any, state: Any) -> Any:
         return {**PickCube.evaluate(self, state), key: np.zeros(self.num_envs)}

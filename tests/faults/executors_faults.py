@@ -270,7 +270,7 @@ def _do(what: str, folder: Path) -> None:
 
 
 def _plays_again(what: str, folder: Path, during: str = "play") -> str:
-    from rollouts.executor import ProcessExecutor
+    from rollouts.playing.executor import ProcessExecutor
 
     executor = ProcessExecutor(1, episode_timeout=1.0)
     return _expect_squares(executor, Mischief(folder, what, during))
@@ -286,7 +286,7 @@ def _expect_squares(executor: Any, prepare: Any, deaths: int = 1) -> str:
 
 
 def _gives_up(what: str, folder: Path, during: str) -> None:
-    from rollouts.executor import ProcessExecutor
+    from rollouts.playing.executor import ProcessExecutor
 
     executor = ProcessExecutor(1, attempts=2, episode_timeout=0.3)
     for event in executor.run(Mischief(folder, what, during, again=True), range(3)):
@@ -325,7 +325,7 @@ def _program(text: str, folder: Path) -> str:
 _OPENING = """
 import json, multiprocessing, os, resource, signal, sys, time
 from robots import RobotLayoutsError
-from rollouts.executor import ProcessExecutor
+from rollouts.playing.executor import ProcessExecutor
 from tests.rollouts.plays import Play
 
 def tell(*words):
@@ -396,7 +396,7 @@ if __name__ == "__main__":
 if __name__ == "__main__":
     import subprocess
     text = "def play():\\n    return str\\n"
-    text += "from rollouts.executor import ProcessExecutor\\n"
+    text += "from rollouts.playing.executor import ProcessExecutor\\n"
     text += "next(ProcessExecutor(1).run(play, [0]))\\n"
     done = subprocess.run([sys.executable], input=text, capture_output=True, text=True)
     assert done.stderr.count("Traceback") == 1, done.stderr
@@ -462,8 +462,8 @@ class _Nobody:
 
     def run(self, prepare: Any, seeds: Any) -> Any:
         """Play, after a fashion."""
-        from rollouts.executor import Event, WorkerError
-        from rollouts.in_process import InProcessExecutor
+        from rollouts.playing.executor import Event, WorkerError
+        from rollouts.playing.in_process import InProcessExecutor
 
         if self.what == "forgets one":
             yield from InProcessExecutor().run(prepare, seeds[1:])
@@ -482,7 +482,7 @@ def _with_executor(what: str, folder: Path) -> None:
 
 
 def _recording_with_forgetful_executor(folder: Path) -> None:
-    from rollouts.trajectory import TrajectoryFile
+    from rollouts.reading.trajectory import TrajectoryFile
 
     executor = _Nobody()
     executor.what = "forgets one"
@@ -517,7 +517,7 @@ def _cluster() -> Any:
 
 
 def _on_ray(**more: Any) -> Any:
-    from rollouts.ray_executor import RayExecutor
+    from rollouts.playing.ray_executor import RayExecutor
 
     modules = ["tests.faults.executors_faults"]
     return RayExecutor(_cluster().address, 1, modules=modules, episode_timeout=2.0, **more)
@@ -542,7 +542,7 @@ def _unloadable_on_ray(folder: Path) -> None:
 
 
 def _join(address: str) -> None:
-    from rollouts.ray_executor import RayExecutor
+    from rollouts.playing.ray_executor import RayExecutor
 
     next(RayExecutor(address).run(Mischief(Path(), "", ""), [0]))
 
@@ -554,7 +554,7 @@ def _stale_environment(folder: Path) -> None:
 
 def _port_that_is_no_head(answer: bytes, folder: Path) -> None:
     with (
-        patch("rollouts.ray_cluster._JOIN_SECONDS", SILENT_SECONDS),
+        patch("rollouts.playing.ray_cluster._JOIN_SECONDS", SILENT_SECONDS),
         _answering_port(answer) as port,
     ):
         _join(f"127.0.0.77:{port}")
@@ -602,21 +602,21 @@ def _evaluate(policy: Any = len, seeds: Any = (0,), workers: Any = 1, **argument
 def _record(
     seeds: Any = (0,), folder: Path = Path("/nowhere"), workers: Any = 1, **arguments: Any
 ) -> None:
-    from rollouts.record import record
+    from rollouts.recording.record import record
     from tests.rollouts.plays import at_random
 
-    with patch.dict("rollouts.experts.registry._registered", {TASK: at_random}):
+    with patch.dict("experts.registry._registered", {TASK: at_random}):
         record(TASK, seeds, folder, workers=workers, **arguments)
 
 
 def _process_executor(**arguments: Any) -> None:
-    from rollouts.executor import ProcessExecutor
+    from rollouts.playing.executor import ProcessExecutor
 
     ProcessExecutor(**arguments)
 
 
 def _ray_executor(**arguments: Any) -> None:
-    from rollouts.ray_executor import RayExecutor
+    from rollouts.playing.ray_executor import RayExecutor
 
     RayExecutor(**arguments)
 

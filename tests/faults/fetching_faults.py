@@ -15,10 +15,10 @@ from itertools import repeat
 from pathlib import Path
 from unittest import mock
 
-from robots import wheel_source
-from robots.asset_store import AssetStore
-from robots.hub_source import HubSource
-from robots.wheel_source import ManiSkillWheel
+from robots.assets import wheel_source
+from robots.assets.hub_source import HubSource
+from robots.assets.store import AssetStore
+from robots.assets.wheel_source import ManiSkillWheel
 from tests.faults.fault import GOES_ON, REFUSED, Fault
 from tests.faults.tiny_files import (
     CONTENTS,

@@ -12,9 +12,10 @@ from unittest import mock
 
 import pytest
 
-from robots import AssetError, manifest
-from robots.asset_store import AssetStore, FileState
-from robots.manifest import AssetPackage, Manifest, load_manifest
+from robots import AssetError
+from robots.assets import manifest
+from robots.assets.manifest import AssetPackage, Manifest, load_manifest
+from robots.assets.store import AssetStore, FileState
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.tiny_files import (
     FILES,

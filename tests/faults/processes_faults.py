@@ -276,7 +276,7 @@ def _parent_ends(
         task_id: What its vector plays.
         hold: Whether it ``steps`` a vector or ``plays`` episodes.
     """
-    from tasks import processes
+    from tasks.processes import process as processes
 
     ours, theirs = processes.context.Pipe()
     parent = processes.context.Process(target=_hold, args=(theirs, hold, task_id))
@@ -315,7 +315,7 @@ def _hold(connection: Any, how: str, task_id: str) -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     if how == "plays":
-        from rollouts.executor import ProcessExecutor
+        from rollouts.playing.executor import ProcessExecutor
         from tests.rollouts.plays import Play
 
         connection.send("begins")
@@ -851,7 +851,7 @@ MAINS = {
     ),
     "defines a task where only it is run": (
         "import gymnasium, tasks\n"
-        "from tasks.push_cube import PushCube\n"
+        "from tasks.maniskill.push_cube import PushCube\n"
         "if __name__ == '__main__':\n"
         "    class Mine(PushCube): pass\n"
         "    tasks.register_task('Mine-v1')(Mine)\n"
@@ -860,7 +860,7 @@ MAINS = {
     ),
     "defines a task in a function": (
         "import gymnasium, tasks\n"
-        "from tasks.push_cube import PushCube\n"
+        "from tasks.maniskill.push_cube import PushCube\n"
         "def mine():\n"
         "    class Mine(PushCube): pass\n"
         "    return Mine\n"
@@ -910,7 +910,7 @@ def _servers() -> Iterator[Fault]:
 
 def _server() -> int:
     """Return the number of the server that forks this process's workers."""
-    from tasks import forks
+    from tasks.processes import forks
 
     if forks._server is None:
         with _vector(num_workers=1):
@@ -941,7 +941,7 @@ def _server_lost() -> None:
 
 
 def _server_stops() -> None:
-    from tasks import forks
+    from tasks.processes import forks
 
     patience, forks._FORK_SECONDS = forks._FORK_SECONDS, 1.0
     try:
@@ -952,7 +952,7 @@ def _server_stops() -> None:
 
 
 def _server_cannot_load() -> None:
-    from tasks import forks
+    from tasks.processes import forks
 
     os.kill(_server(), signal.SIGKILL)
     command = forks._COMMAND

@@ -14,8 +14,8 @@ import h5py
 import numpy as np
 
 if TYPE_CHECKING:
-    from rollouts.recorder import Recorder
-    from rollouts.trajectory import Trajectory
+    from rollouts.reading.trajectory import Trajectory
+    from rollouts.recording.recorder import Recorder
     from tasks import MultiRobotTask
 
 AREA = "recordings"
@@ -35,7 +35,7 @@ def task() -> MultiRobotTask:
 @functools.cache
 def episodes() -> tuple[Any, ...]:
     """Return the episodes that were recorded."""
-    from rollouts.episode import play
+    from tasks.episode import play
 
     rng = np.random.default_rng(0)
     return tuple(
@@ -57,7 +57,7 @@ def contents() -> tuple[bytes, bytes]:
 
 def recorder(path: Path, **how: bool) -> Recorder:
     """Begin a recording, or go on with it."""
-    from rollouts.recorder import Recorder
+    from rollouts.recording.recorder import Recorder
 
     return Recorder(path, task(), **how)
 
@@ -90,7 +90,7 @@ def edit_json(path: Path, edit: Callable[[dict[str, Any]], None]) -> None:
 
 def read(path: Path) -> list[Trajectory]:
     """Read all that a replay or an export would."""
-    from rollouts.trajectory import TrajectoryFile
+    from rollouts.reading.trajectory import TrajectoryFile
 
     with TrajectoryFile(path) as file:
         file.expect(TASK, ACTIONS)

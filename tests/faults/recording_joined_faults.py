@@ -70,7 +70,7 @@ def _flip_and_use(folder: Path, where: str, use: Callable[[Path], Any]) -> None:
 
 
 def _replay(path: Path) -> None:
-    from rollouts.replay import open_recording, replay, task_for
+    from rollouts.playing.replay import open_recording, replay, task_for
 
     with open_recording(path, None) as file:
         task = task_for(file)
@@ -96,7 +96,7 @@ def _export(path: Path, format_name: str) -> None:
 
 
 def _view(path: Path) -> None:
-    from rollouts.replay import open_recording
+    from rollouts.playing.replay import open_recording
     from rollouts.view_command import episode_cell
 
     with open_recording(path, None) as file:

@@ -94,7 +94,7 @@ def _remove(folder: Path, place: tuple[str | int, ...]) -> None:
 
 def _play(path: Path) -> None:
     """Do with a recording what a replay does before it plays."""
-    from rollouts.replay import open_recording, task_for
+    from rollouts.playing.replay import open_recording, task_for
 
     with open_recording(path, None) as file:
         task_for(file).close()
@@ -192,7 +192,7 @@ _HARMLESS: dict[str, Callable[[Path], None]] = {
 
 
 def _npz(folder: Path, make: Callable[[Path], None]) -> None:
-    from parity.episodes import load_episodes
+    from parity.compare.episodes import load_episodes
 
     make(folder / "actions.npz")
     load_episodes(folder / "actions.npz", "PushT-v1", 7)

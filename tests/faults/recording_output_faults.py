@@ -13,7 +13,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 from robots import RobotLayoutsError
-from robots.commands import printable
+from robots.common.commands import printable
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.recording_files import AREA, edited, recording
 
@@ -89,7 +89,7 @@ def _record(folder: Path, redirection: str) -> str:
         f" {redirection}"
     )
     assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
-    from rollouts.trajectory import TrajectoryFile
+    from rollouts.reading.trajectory import TrajectoryFile
 
     with TrajectoryFile(folder / "r" / "trajectory.h5") as file:
         assert [episode.seed for episode in file] == [0, 1, 2]
@@ -115,7 +115,7 @@ def _full(folder: Path) -> None:
 _SLOW = """
 import sys, time
 from rollouts.export.dataset import Export, export
-from robots.commands import start
+from robots.common.commands import start
 def main():
     def wait(done, total):
         print("writing", flush=True)

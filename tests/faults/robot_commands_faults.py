@@ -13,7 +13,7 @@ from pathlib import Path
 from unittest import mock
 
 from robots import RobotRegistry, write_manifest
-from robots.asset_store import AssetStore
+from robots.assets.store import AssetStore
 from robots.fetch_assets import main as fetch_assets
 from robots.fetch_assets import robot_files
 from robots.from_urdf import main as from_urdf

@@ -13,10 +13,10 @@ from pathlib import Path
 from unittest import mock
 
 from robots import AssetError, RobotLayoutsError
-from robots.asset_sources import AssetSource, LocalCopy
-from robots.asset_store import AssetStore, FileState
-from robots.assets import ensure
-from robots.manifest import AssetFile, PackageOrigin
+from robots.assets.fetching import ensure
+from robots.assets.manifest import AssetFile, PackageOrigin
+from robots.assets.sources import AssetSource, LocalCopy
+from robots.assets.store import AssetStore, FileState
 from tests.robots.hub_server import DATASET
 
 ORIGIN = PackageOrigin(

@@ -3,8 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
+from robots.assets.locator import LocalUrdf
 from robots.descriptor import ActionSplit, JointGroup, RobotDescriptor
-from robots.locator import LocalUrdf
 
 BOX = '<box size="0.1 0.1 0.1"/>'
 

@@ -8,7 +8,7 @@ import pytest
 
 from layouts import Layout, around_table, grid, ring, side_by_side
 from robots import RobotRegistry
-from tasks.relay import find_zones
+from tasks.originals.relay import find_zones
 
 CLEAR = 0.05  # m, at the keyframes with joint noise
 # What two panda_wristcam that look at each other have at native's distance.

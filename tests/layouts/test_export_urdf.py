@@ -15,7 +15,7 @@ from layouts.export.urdf import rpy
 from layouts.orientation import normalised, rpy_quaternion
 from layouts.validation.kinematics import pose_matrix
 from robots import AssetError, LayoutError, LocalUrdf, RobotRegistry
-from robots.urdf_xml import read_references
+from robots.urdf.summary import read_references
 from tests.layouts.cells import hung, link_poses, mixed_cell, random_positions, skeleton
 
 DRAWS = 5

@@ -6,12 +6,18 @@ import numpy as np
 import pytest
 
 import tasks
+from measurements.readme import markdown
 from parity.__main__ import main
-from parity.compare import parser, plan
-from parity.episodes import over_range_episodes
-from parity.readme import markdown
-from parity.results import read
-from parity.summary import number_text, reward_text, success_text, summarise, summary_table
+from parity.compare.command import parser, plan
+from parity.compare.episodes import over_range_episodes
+from parity.compare.task_summary import (
+    number_text,
+    reward_text,
+    success_text,
+    summarise,
+    summary_table,
+)
+from parity.records.results import read
 from tests.native import NATIVE
 
 TASK = "TwoRobotPickCube-v1"
@@ -148,7 +154,7 @@ class TestComparing:
 
     def test_what_is_found_is_shown_written_and_recorded(self, capsys, monkeypatch, tmp_path):
         json_file, record_file = tmp_path / "found.json", tmp_path / "results.json"
-        monkeypatch.setattr("parity.compare.RESULTS", record_file)
+        monkeypatch.setattr("parity.compare.command.RESULTS", record_file)
         options = ("--seeds", "1", "--steps", "2", "--json", str(json_file), "--record")
         assert main(["compare", "--all", *options]) == 0
         printed = capsys.readouterr().out
@@ -166,7 +172,7 @@ class TestComparing:
 
     def test_a_difference_is_recorded_too(self, capsys, monkeypatch, tmp_path):
         record_file = tmp_path / "results.json"
-        monkeypatch.setattr("parity.compare.RESULTS", record_file)
+        monkeypatch.setattr("parity.compare.command.RESULTS", record_file)
         task = tasks.get_task_class("PushT-v1")
         dense = task.dense_reward
         monkeypatch.setattr(

@@ -214,13 +214,14 @@ def test_without_a_package_that_mani_skill_needs():
 
 def test_importing_the_room_loads_no_native():
     done = run_alone(
-        "import sys, parity.compare, parity.native; sys.exit('mani_skill' in sys.modules)"
+        "import sys, parity.compare.command, parity.compare.native_env;"
+        " sys.exit('mani_skill' in sys.modules)"
     )
     assert done.returncode == 0, done.stderr
 
 
 def test_all_means_every_task(monkeypatch):
-    from parity.compare import parser, plan
+    from parity.compare.command import parser, plan
 
     runs = plan(parser().parse_args(["--all", "--seeds", "2", "--steps", "3"]))
     assert list(dict.fromkeys(run.task for run in runs)) == list(TASKS)
@@ -228,7 +229,7 @@ def test_all_means_every_task(monkeypatch):
 
 
 def test_a_file_says_in_which_control_mode_it_was_recorded(tmp_path):
-    from parity.compare import parser, plan
+    from parity.compare.command import parser, plan
     from tests.parity.test_episodes import demonstration
 
     path = demonstration(tmp_path, control_mode="pd_joint_pos")
@@ -241,7 +242,7 @@ def test_a_file_says_in_which_control_mode_it_was_recorded(tmp_path):
 
 
 def test_random_positions_lie_within_the_limits_and_partly_beyond():
-    from parity.compare import parser, plan
+    from parity.compare.command import parser, plan
 
     layout = tasks.get_task_class("PickCube-v1").layout.in_control_mode("pd_joint_pos")
     low, high = np.array(layout.action_bounds).T
@@ -255,7 +256,7 @@ def test_random_positions_lie_within_the_limits_and_partly_beyond():
 
 
 def test_demonstrations_are_played_beside_random_actions(tmp_path):
-    from parity.compare import parser, plan
+    from parity.compare.command import parser, plan
     from tests.parity.test_episodes import demonstration
 
     demonstration(tmp_path / "PickCube-v1" / "planned", "trajectory.none.pd_joint_delta_pos")

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from parity.comparison import compare
-from parity.episodes import Episode
-from parity.snapshot import QUANTITIES, differing, largest_difference
+from parity.compare.episodes import Episode
+from parity.compare.lockstep import compare
+from parity.compare.snapshot import QUANTITIES, differing, largest_difference
 from robots import TaskError
 
 COUNTER = ("qpos", "counter")

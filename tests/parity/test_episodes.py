@@ -6,8 +6,8 @@ import h5py
 import numpy as np
 import pytest
 
-from parity.episodes import find_demonstrations, load_episodes, random_episodes
-from rollouts.trajectory import TrajectoryError
+from parity.compare.episodes import find_demonstrations, load_episodes, random_episodes
+from rollouts.reading.trajectory import TrajectoryError
 
 TASK = "PickCube-v1"
 

@@ -10,9 +10,9 @@ import pytest
 
 import tasks
 from parity.__main__ import main
-from parity.inventory import NO_REASON, find_files, missing_tasks, reason
-from parity.native import native_tasks
-from rollouts.trajectory import TrajectoryError
+from parity.compare.native_env import native_tasks
+from parity.records.inventory import NO_REASON, find_files, missing_tasks, reason
+from rollouts.reading.trajectory import TrajectoryError
 from tests.native import NATIVE
 
 ROOT = Path(__file__).parents[2]
@@ -41,7 +41,7 @@ def record(tmp_path):
 
 @pytest.fixture
 def inventory(capsys, monkeypatch, demos, record):
-    monkeypatch.setattr("parity.inventory.list_tasks", lambda: TASKS)
+    monkeypatch.setattr("parity.records.inventory.list_tasks", lambda: TASKS)
 
     def run(*options: str) -> str:
         assert main(["inventory", "--demos", str(demos), "--results", str(record), *options]) == 0
@@ -94,7 +94,8 @@ def test_no_such_folder_or_record(tmp_path, capsys):
 def test_without_mani_skill_the_rest_is_told():
     code = (
         "import sys; sys.modules['mani_skill'] = None\n"
-        "import parity.inventory as inventory; inventory.list_tasks = lambda: ('PickCube-v1',)\n"
+        "import parity.records.inventory as inventory\n"
+        "inventory.list_tasks = lambda: ('PickCube-v1',)\n"
         "sys.exit(inventory.main([]))"
     )
     done = subprocess.run(
@@ -138,7 +139,7 @@ class TestNative:
         assert all(missing.values())
 
     def test_special_reasons_are_about_tasks_that_are_there(self):
-        from parity.inventory import _SPECIAL_PREFIXES, _SPECIAL_REASONS
+        from parity.records.inventory import _SPECIAL_PREFIXES, _SPECIAL_REASONS
 
         known = set(native_tasks())
         assert set(_SPECIAL_REASONS) <= known

@@ -7,9 +7,9 @@ import pytest
 
 import tasks
 from layouts import Layout
-from parity.comparison import EpisodeResult, compare
-from parity.episodes import Episode, random_episodes
-from parity.sides import NativeSide, OurSide
+from parity.compare.both_sides import NativeSide, OurSide
+from parity.compare.episodes import Episode, random_episodes
+from parity.compare.lockstep import EpisodeResult, compare
 from robots import RobotDescriptor, RobotRegistry
 from simulation import State, World
 from tests.motions import touching_episode

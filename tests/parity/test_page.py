@@ -13,10 +13,10 @@ import pytest
 
 import tasks
 from parity.__main__ import COMMANDS, main
-from parity.embedding import ClipError, fit, poster, share, size
+from parity.records.results import RESULTS, read
 from parity.report.figures import COLUMNS, RECORDED_COLUMNS, UNKNOWN, cells, is_verified, tiles
 from parity.report.gaps import grouped
-from parity.results import RESULTS, read
+from parity.show.embedding import ClipError, fit, poster, share, size
 from parity.sweep.entries import SUMMARY, blank, write_summary
 from tests.pages import PATIENCE, running_browser
 

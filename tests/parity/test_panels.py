@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from parity.panels import GAP, SHEET_COLUMNS, Labels, contact_sheet, moments, side_by_side
-from parity.side_by_side import Frame
+from parity.show.panels import GAP, SHEET_COLUMNS, Labels, contact_sheet, moments, side_by_side
+from parity.show.side_by_side import Frame
 
 LABELS = Labels("PickCube-v1, seed 3", 8.0, 50)
 

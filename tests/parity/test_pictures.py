@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 import tasks
-from parity.episodes import random_episodes
-from parity.pictures import (
+from parity.compare.both_sides import NativeSide, OurSide
+from parity.compare.episodes import random_episodes
+from parity.compare.snapshot import Snapshot
+from parity.show.native_pictures import (
     NativeScene,
     PictureError,
     amplified,
     difference,
     expect_same_shapes,
 )
-from parity.side_by_side import HONEST, play_and_look
-from parity.sides import NativeSide, OurSide
-from parity.snapshot import Snapshot
+from parity.show.side_by_side import HONEST, play_and_look
 from tests.native import NATIVE, TASKS
 
 SIZE = 192  # pixels

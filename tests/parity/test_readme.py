@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from measurements.bench.measurement import Measurement
+from measurements.bench.report import Report
+from measurements.readme import BENCH_TABLES, PARITY_TABLE, begin, end, with_lines
 from parity.__main__ import main
-from parity.readme import BENCH_TABLES, PARITY_TABLE, begin, end, with_lines
-from parity.results import ResultsError, read
-from parity.snapshot import QUANTITIES
-from rollouts.bench.measurement import Measurement
-from rollouts.bench.report import Report
+from parity.compare.snapshot import QUANTITIES
+from parity.records.results import ResultsError, read
 from tasks.registry import CATALOGUE
 
 ROOT = Path(__file__).parents[2]
@@ -99,7 +99,7 @@ class Files:
 
 @pytest.fixture
 def files(tmp_path, monkeypatch):
-    monkeypatch.setattr("parity.readme.list_clones", lambda: tuple(CATALOGUE))
+    monkeypatch.setattr("measurements.readme.list_clones", lambda: tuple(CATALOGUE))
     return Files(tmp_path, a_record(*CATALOGUE))
 
 

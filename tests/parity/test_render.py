@@ -9,10 +9,10 @@ import pytest
 
 import tasks
 from parity.__main__ import main
-from parity.clip import Candidate, Clip, ClipOptions, choose
-from parity.episodes import random_episodes
-from parity.side_by_side import HONEST
-from parity.sides import OurSide
+from parity.compare.both_sides import OurSide
+from parity.compare.episodes import random_episodes
+from parity.show.clip import Candidate, Clip, ClipOptions, choose
+from parity.show.side_by_side import HONEST
 from robots import RobotRegistry
 from tests.native import NATIVE
 from tests.parity.test_command import run_alone

@@ -12,15 +12,15 @@ import pytest
 import tasks
 from layouts import Layout
 from parity.__main__ import main
-from parity.comparison import EpisodeResult, FirstDifference
-from parity.native import quiet
-from parity.replay import sentences, table
-from parity.runs import Run, RunResult
-from rollouts.conversion import as_positions
-from rollouts.episode import play
-from rollouts.recorder import Recorder
-from rollouts.replay import replay, task_for
-from rollouts.trajectory import TrajectoryFile
+from parity.compare.lockstep import EpisodeResult, FirstDifference
+from parity.compare.native_env import quiet
+from parity.compare.runs import Run, RunResult
+from parity.replay.command import sentences, table
+from rollouts.playing.plan_conversion import as_positions
+from rollouts.playing.replay import replay, task_for
+from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.recording.recorder import Recorder
+from tasks.episode import play
 from tests.motions import touching_episode
 from tests.native import NATIVE
 

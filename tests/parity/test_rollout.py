@@ -8,8 +8,8 @@ import torch
 
 import tasks
 from parity.__main__ import main
-from parity.native import make_native, native_action
-from parity.rollout import (
+from parity.compare.native_env import make_native, native_action
+from parity.replay.rollout import (
     LEGEND,
     NATIVE_FILE,
     OUR_FILE,
@@ -20,9 +20,9 @@ from parity.rollout import (
     load,
 )
 from robots import TaskError
-from rollouts.episode import play
-from rollouts.recorder import Recorder
-from rollouts.trajectory import TrajectoryError
+from rollouts.reading.trajectory import TrajectoryError
+from rollouts.recording.recorder import Recorder
+from tasks.episode import play
 from tests.native import NATIVE
 
 TASK = "TwoRobotPickCube-v1"
@@ -171,7 +171,7 @@ class TestSource:
         assert source.episode.actions.shape[1] == 16
 
     def test_neither(self, monkeypatch):
-        monkeypatch.setattr("rollouts.experts.registry.CATALOGUE", {})
+        monkeypatch.setattr("experts.registry.CATALOGUE", {})
         with pytest.raises(TaskError, match="has no expert yet"):
             find_source(tasks.get_task_class("PushT-v1"), None, None)
 
@@ -198,7 +198,7 @@ def test_numbered_arrays_are_one_row():
 
 
 def test_metadata_is_json_and_nothing_needs_pickle(tmp_path):
-    from parity.rollout import save
+    from parity.replay.rollout import save
 
     save(tmp_path / "file.npz", {"left.qpos": np.zeros(2, np.float32)}, {"task": "é"})
     with np.load(tmp_path / "file.npz", allow_pickle=False) as data:

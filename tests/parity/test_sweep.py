@@ -15,11 +15,11 @@ import pytest
 
 import tasks
 from parity.__main__ import main
-from parity.comparison import EpisodeResult, FirstDifference
-from parity.episodes import Episode
-from parity.results import ResultsError
-from parity.rollout import load
-from parity.runs import Run
+from parity.compare.episodes import Episode
+from parity.compare.lockstep import EpisodeResult, FirstDifference
+from parity.compare.runs import Run
+from parity.records.results import ResultsError
+from parity.replay.rollout import load
 from parity.sweep.entries import SUMMARY, blank, is_done, read_summary, write_summary
 from parity.sweep.plan import Plan, plan
 from parity.sweep.processes import LOG, sweep
@@ -31,8 +31,8 @@ from parity.sweep.stages import (
     agreement,
 )
 from robots import TaskError, UnknownNameError
-from rollouts.episode import play
-from rollouts.recorder import Recorder
+from rollouts.recording.recorder import Recorder
+from tasks.episode import play
 from tests.native import NATIVE
 from tests.rollouts.clusters import running_cluster
 
@@ -107,7 +107,7 @@ class TestEpisodes:
     def test_the_expert(self, tmp_path, monkeypatch):
         monkeypatch.setattr("parity.sweep.stages.list_experts", lambda: [TASK])
         monkeypatch.setattr(
-            "parity.rollout.find_expert",
+            "parity.replay.rollout.find_expert",
             lambda task_id: lambda task, seed: np.full((2 + seed, 8), seed, np.float32),
         )
         (run,), source = _episodes(Plan(TASK, (), 2, tmp_path, False))

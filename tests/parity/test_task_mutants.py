@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 import tasks
-from parity.episodes import random_episodes
+from parity.compare.episodes import random_episodes
 from simulation import PhysicsSettings, World
 from tests.native import NATIVE, TASKS, against_native
 
@@ -26,7 +26,9 @@ def make_bodies_heavier(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def widen_the_hole(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tasks.peg_insertion_side.CLEARANCE", 0.004)  # m, instead of 0.003
+    monkeypatch.setattr(
+        "tasks.maniskill.peg_insertion_side.CLEARANCE", 0.004
+    )  # m, instead of 0.003
 
 
 def nothing(monkeypatch: pytest.MonkeyPatch) -> None:

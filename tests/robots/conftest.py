@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from robots import asset_sources
-from robots.asset_sources import SourceError, find_mani_skill
-from robots.asset_store import AssetStore, default_root
-from robots.manifest import AssetFile, load_manifest
+from robots.assets import sources as asset_sources
+from robots.assets.manifest import AssetFile, load_manifest
+from robots.assets.sources import SourceError, find_mani_skill
+from robots.assets.store import AssetStore, default_root
 from tests.robots.hub_server import HubServer
 
 REAL_ROOT = default_root()

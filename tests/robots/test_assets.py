@@ -9,13 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from robots import AssetError, RobotRegistry, UnknownNameError, UrdfLocator, asset_store
-from robots.asset_sources import InstalledManiSkill, LocalCopy, SourceError
-from robots.asset_store import AssetStore, FileState, default_root
-from robots.assets import ensure
+from robots import AssetError, RobotRegistry, UnknownNameError, UrdfLocator
+from robots.assets import store as asset_store
+from robots.assets.fetching import ensure
+from robots.assets.manifest import load_manifest
+from robots.assets.sources import InstalledManiSkill, LocalCopy, SourceError
+from robots.assets.store import AssetStore, FileState, default_root
 from robots.fetch_assets import main
-from robots.manifest import load_manifest
-from robots.urdf_xml import read_references
+from robots.urdf.summary import read_references
 from tests.robots.conftest import PANDA, contents
 
 ROBOTS = RobotRegistry.names()
@@ -43,7 +44,7 @@ def right(files) -> dict[str, bytes]:
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize("pictures", [False, True])
 def test_locate_returns_a_urdf_whose_files_are_all_there(robot, pictures, monkeypatch):
-    monkeypatch.setattr("robots.assets.default_sources", lambda: [InstalledManiSkill()])
+    monkeypatch.setattr("robots.assets.fetching.default_sources", lambda: [InstalledManiSkill()])
     locator = RobotRegistry.load(robot).urdf
     package = load_manifest().package(locator.package)
     drawn = pictures and locator.file not in package.undrawable
@@ -291,7 +292,7 @@ def test_the_local_copy_is_where_it_is_said_to_be(monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path))
     assert default_root() == tmp_path / "robot_files"
     monkeypatch.setenv("ROBOT_LAYOUTS_ASSETS", "")
-    assert default_root() == Path(asset_store.__file__).parents[1] / "assets_cache"
+    assert default_root() == Path(asset_store.__file__).parents[2] / "assets_cache"
     monkeypatch.setattr(asset_store, "CHECKOUT_CACHE", tmp_path / "no_checkout")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     assert default_root() == tmp_path / "cache" / "robot-layouts"

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from robots import TaskError
-from robots.bounds import checked_flag, checked_number, checked_numbers, checked_whole, shown
+from robots.common.bounds import checked_flag, checked_number, checked_numbers, checked_whole, shown
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from robots import AssetError, RobotDescriptor, RobotRegistry, UrdfLocator
-from robots.manifest import AssetPackage, load_manifest
+from robots.assets.manifest import AssetPackage, load_manifest
 from robots.registry import CATALOGUE
-from robots.urdf_xml import UrdfJoint, read_joints, read_links, read_references
+from robots.urdf.summary import UrdfJoint, read_joints, read_links, read_references
 from tests.robots.conftest import contents
 
 ROBOTS = tuple(CATALOGUE)
@@ -51,7 +51,7 @@ def robot(request) -> Robot:
 def test_the_catalogue_is_sorted_and_each_descriptor_is_named_as_its_module():
     assert list(CATALOGUE) == sorted(CATALOGUE)
     for name, target in CATALOGUE.items():
-        assert target == f"robots.{name}:{name.upper()}"
+        assert target == f"robots.catalogue.{name}:{name.upper()}"
         assert RobotRegistry.load(name).name == name
 
 
@@ -118,7 +118,7 @@ def test_the_manifest_holds_every_file_that_the_urdf_refers_to(robot):
 def test_robots_that_cannot_be_drawn_say_so_and_only_they(robot):
     locator = robot.descriptor.urdf
     undrawable = locator.file in robot.package.undrawable
-    module = importlib.import_module(f"robots.{robot.descriptor.name}")
+    module = importlib.import_module(f"robots.catalogue.{robot.descriptor.name}")
     assert ("Cannot be drawn" in str(module.__doc__)) == undrawable
     if undrawable:
         with pytest.raises(AssetError, match="cannot be drawn, as mani_skill==3.0.1 lacks"):
@@ -132,7 +132,7 @@ def test_some_robots_cannot_be_drawn():
 
 def test_a_robot_is_at_most_sixty_lines():
     for name in ROBOTS:
-        module = Path(str(importlib.import_module(f"robots.{name}").__file__))
+        module = Path(str(importlib.import_module(f"robots.catalogue.{name}").__file__))
         lines = module.read_text(encoding="utf-8").splitlines()
         assert len(lines) <= 60, (name, len(lines))
 

@@ -8,14 +8,14 @@ import subprocess
 import sys
 from pathlib import Path
 
-from robots.child_process import end, running
+from robots.common.child_process import end, running
 from tests.robots.processes import is_alive, wait_until
 
 CHECKOUT = Path(__file__).parents[2]
 QUIET = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
 PARENT = """
 import os, subprocess, sys
-from robots.child_process import running
+from robots.common.child_process import running
 nothing = subprocess.DEVNULL
 command = [sys.executable, "-c", "import time; time.sleep(600)"]
 with running(command, stdin=nothing, stdout=nothing, stderr=nothing, env=os.environ) as child:

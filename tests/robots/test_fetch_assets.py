@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from robots import RobotRegistry
-from robots.asset_store import AssetStore, FileState
+from robots.assets.manifest import load_manifest
+from robots.assets.store import AssetStore, FileState
 from robots.fetch_assets import main
-from robots.manifest import load_manifest
 
 CHECKOUT = Path(__file__).parents[2]
 MESH = "franka_description/meshes/collision/link4.stl"

@@ -13,10 +13,11 @@ from pathlib import Path
 
 import pytest
 
-from robots import AssetError, UrdfLocator, wheel_source
-from robots.asset_store import FileState
-from robots.assets import ensure
-from robots.wheel_source import ManiSkillWheel
+from robots import AssetError, UrdfLocator
+from robots.assets import wheel_source
+from robots.assets.fetching import ensure
+from robots.assets.store import FileState
+from robots.assets.wheel_source import ManiSkillWheel
 from tests.robots.conftest import contents
 from tests.robots.hub_server import HubServer, stall
 
@@ -66,9 +67,9 @@ def test_a_process_killed_while_writing_leaves_no_half_file(store, physics, tmp_
     script.write_text(
         "import os, signal\n"
         "from robots import asset_store, UrdfLocator\n"
-        "from robots.asset_sources import InstalledManiSkill\n"
-        "import robots.assets\n"
-        "robots.assets.default_sources = lambda: [InstalledManiSkill()]\n"
+        "from robots.assets.sources import InstalledManiSkill\n"
+        "import robots.assets.fetching\n"
+        "robots.assets.fetching.default_sources = lambda: [InstalledManiSkill()]\n"
         "real, calls = os.fsync, []\n"
         "def fsync(descriptor):\n"
         "    calls.append(descriptor)\n"

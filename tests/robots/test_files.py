@@ -8,7 +8,7 @@ import socket
 import pytest
 
 from robots import UnreadableFileError
-from robots.files import (
+from robots.common.files import (
     MAX_JSON_DEPTH,
     open_regular,
     parse_json,

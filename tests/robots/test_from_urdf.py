@@ -21,10 +21,10 @@ from robots import (
     UnknownNameError,
     UrdfLocator,
 )
-from robots.asset_sources import find_mani_skill
+from robots.assets.manifest import load_manifest
+from robots.assets.sources import find_mani_skill
 from robots.data_module import write_module
 from robots.from_urdf import Guess, guess_descriptor, main
-from robots.manifest import load_manifest
 from robots.registry import CATALOGUE
 
 CHECKOUT = Path(__file__).parents[2]

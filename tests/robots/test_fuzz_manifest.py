@@ -11,8 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from robots import AssetError
-from robots.fetched import FetchRecord
-from robots.manifest import LARGEST_FILE, AssetPackage, Manifest, load_manifest
+from robots.assets.fetched import FetchRecord
+from robots.assets.manifest import LARGEST_FILE, AssetPackage, Manifest, load_manifest
 
 PANDA = load_manifest().package("maniskill_panda")
 PACKAGE = AssetPackage(PANDA.origin, PANDA.files[:3], ("panda_pinch.urdf",))

@@ -13,11 +13,12 @@ from pathlib import Path
 
 import pytest
 
-from robots import AssetError, hub_source
-from robots.asset_sources import InstalledManiSkill
-from robots.asset_store import FileState
-from robots.assets import ensure
-from robots.hub_source import HubSource
+from robots import AssetError
+from robots.assets import hub_source
+from robots.assets.fetching import ensure
+from robots.assets.hub_source import HubSource
+from robots.assets.sources import InstalledManiSkill
+from robots.assets.store import FileState
 from tests.robots.conftest import PANDA, contents
 from tests.robots.hub_server import (
     COMMIT,

@@ -61,9 +61,9 @@ print("opened", any("robots" in path for event, path in seen))
 
 def test_locating_loads_neither_the_hub_client_nor_the_simulator(tmp_path: Path):
     code = f"""
-import robots.assets
-from robots.asset_sources import InstalledManiSkill
-robots.assets.default_sources = lambda: [InstalledManiSkill()]
+import robots.assets.fetching
+from robots.assets.sources import InstalledManiSkill
+robots.assets.fetching.default_sources = lambda: [InstalledManiSkill()]
 robots.RobotRegistry.load("panda").urdf.locate()
 print(*[name for name in {HEAVY!r} if name in sys.modules])
 print("ran")

@@ -47,7 +47,7 @@ def test_files_are_told_with_state_and_source(store, physics, fill):
 
 
 def test_without_any_copy_the_report_says_what_is_missing(store, monkeypatch):
-    from robots.asset_sources import SourceError
+    from robots.assets.sources import SourceError
 
     def refuse() -> Path:
         raise SourceError("mani_skill is not installed")

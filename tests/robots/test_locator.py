@@ -8,9 +8,9 @@ import pickle
 import pytest
 
 from robots import AssetError, UnknownNameError, UrdfLocator
-from robots.locator import FileLocator, LocalUrdf
-from robots.manifest import load_manifest
-from robots.scenery import GROUND_TEXTURE, PACKAGE, TABLE
+from robots.assets.locator import FileLocator, LocalUrdf
+from robots.assets.manifest import load_manifest
+from robots.assets.scenery import GROUND_TEXTURE, PACKAGE, TABLE
 
 URDF = """<robot name="toy">
   <link name="base">

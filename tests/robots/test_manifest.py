@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from robots import AssetError, UnknownNameError, manifest, write_manifest
-from robots.asset_sources import find_mani_skill
-from robots.manifest import CHECKOUT_CACHE, Manifest, load_manifest
+from robots import AssetError, UnknownNameError, write_manifest
+from robots.assets import manifest
+from robots.assets.manifest import CHECKOUT_CACHE, Manifest, load_manifest
+from robots.assets.sources import find_mani_skill
 from robots.write_manifest import build_package
 
 

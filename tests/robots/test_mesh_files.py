@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 from robots import AssetError
-from robots.mesh_files import LARGEST, has_volume, load_scene, read_corners
+from robots.urdf.mesh_files import LARGEST, has_volume, load_scene, read_corners
 
 BOX = trimesh.creation.box((0.1, 0.2, 0.3))
 STL: bytes = BOX.export(file_type="stl")

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from robots import AssetError, DescriptorError, LocalUrdf, RobotDescriptor
-from robots.urdf_model import read_model
+from robots.urdf.model import read_model
 
 CHECKOUT = Path(__file__).parents[2]
 
@@ -240,7 +240,7 @@ def watch(event, arguments):
     elif event == "open" and str(arguments[0]) in ("/etc/passwd", "no.stl"):
         seen.append(str(arguments[0]))
 from robots import LocalUrdf, RobotDescriptor
-from robots.errors import RobotLayoutsError
+from robots.common.errors import RobotLayoutsError
 import robots.from_urdf
 sys.addaudithook(watch)
 for path in sys.argv[1:]:

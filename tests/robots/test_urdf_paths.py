@@ -7,7 +7,7 @@ import os
 import pytest
 
 from robots import AssetError
-from robots.urdf_paths import resolve
+from robots.urdf.paths import resolve
 
 FILES = {
     "/opt/me/arm/urdf/meshes/a.stl",

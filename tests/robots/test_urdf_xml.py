@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robots import AssetError
-from robots.urdf_xml import read_joints, read_links, read_references
+from robots.urdf.summary import read_joints, read_links, read_references
 
 URDF = b"""<robot name="toy">
   <material name="wood"><texture filename="textures/wood.png"/></material>

@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 from robots import AssetError
-from robots.asset_store import AssetStore, FileState
-from robots.assets import ensure
-from robots.manifest import load_manifest
-from robots.wheel_source import ManiSkillWheel
+from robots.assets.fetching import ensure
+from robots.assets.manifest import load_manifest
+from robots.assets.store import AssetStore, FileState
+from robots.assets.wheel_source import ManiSkillWheel
 from tests.robots.conftest import PANDA, contents
 from tests.robots.processes import children_of, is_alive, wait_until
 from tests.robots.wheel_index import WheelIndex, build_wheel, members, without_pip_settings

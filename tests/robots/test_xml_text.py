@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from robots import AssetError, LocalUrdf
-from robots.srdf import read_excluded_pairs
-from robots.xml_text import MAX_DEPTH, parse_xml
+from robots.urdf.srdf import read_excluded_pairs
+from robots.urdf.xml_text import MAX_DEPTH, parse_xml
 
 ENTITY = '<?xml version="1.0" encoding="{}"?><!DOCTYPE robot [<!ENTITY a "b">]><robot name="&a;"/>'
 

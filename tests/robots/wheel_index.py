@@ -10,7 +10,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 from unittest import mock
 
-from robots.manifest import AssetFile
+from robots.assets.manifest import AssetFile
 
 WHEEL = "mani_skill-3.0.1-py3-none-any.whl"
 INFO = "mani_skill-3.0.1.dist-info"

@@ -5,8 +5,8 @@ import functools
 import numpy as np
 
 import tasks
-from rollouts.episode import Episode, play
-from rollouts.experts import find_expert
+from experts import find_expert
+from tasks.episode import Episode, play
 
 REBUILT = {"reconfigure": True}
 

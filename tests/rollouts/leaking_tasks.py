@@ -3,7 +3,7 @@
 import os
 from typing import Any
 
-from tasks.push_cube import PushCube
+from tasks.maniskill.push_cube import PushCube
 
 _hoard: list[Any] = []
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from robots import TaskError
-from rollouts import local_workers
-from rollouts.executor import Event, report
+from rollouts.playing import local_workers
+from rollouts.playing.executor import Event, report
 
 TASK = "PushT-v1"
 BARRIER = "TEST_BARRIER"  # environment variable: a folder where `at_random` waits, if it exists

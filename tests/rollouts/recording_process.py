@@ -2,8 +2,8 @@
 
 import sys
 
+from experts import register_expert
 from rollouts.__main__ import main
-from rollouts.experts import register_expert
 from tests.rollouts.plays import TASK, at_random
 
 if __name__ == "__main__":

@@ -10,8 +10,8 @@ import h5py
 import numpy as np
 
 import tasks
-from rollouts.episode import play
-from rollouts.recorder import Recorder
+from rollouts.recording.recorder import Recorder
+from tasks.episode import play
 
 TWO_ROBOTS, SECOND = "TwoRobotPickCube-v1", {"right": "panda_stick"}  # 8 + 7 action numbers
 LEFT_KEY, RIGHT_KEY = "panda_wristcam-agent-0", "panda_stick-agent-1"

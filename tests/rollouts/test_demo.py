@@ -123,7 +123,7 @@ def test_a_video_shows_the_episodes(tmp_path):
     import imageio.v3 as imageio
 
     import tasks
-    from rollouts.episode import play
+    from tasks.episode import play
 
     env = tasks.make(TASK, render_mode="rgb_array")
     episodes = [play(task(), seed, plan(seed)[:3]) for seed in (0, 1)]

@@ -13,12 +13,12 @@ import pytest
 import torch
 
 import tasks
+from experts import find_expert, registry
 from robots import TaskError, UnknownNameError
 from rollouts import Evaluation, Score, evaluate
 from rollouts.__main__ import main
-from rollouts.episode import REBUILT, play
-from rollouts.executor import ProcessExecutor, WorkerError
-from rollouts.experts import find_expert, registry
+from rollouts.playing.executor import ProcessExecutor, WorkerError
+from tasks.episode import REBUILT, play
 from tests.rollouts.plays import NO_PLAN, Here, at_random
 from tests.rollouts.policies import TASK, Wanders, fails, still
 

@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 import torch
 
-import rollouts.shift
+import rollouts.playing.dispatch
 from robots import TaskError
-from rollouts.executor import (
+from rollouts.playing.executor import (
     Event,
     ProcessExecutor,
     WorkerError,
@@ -26,7 +26,7 @@ from rollouts.executor import (
     choose_executor,
     play_all,
 )
-from rollouts.in_process import InProcessExecutor
+from rollouts.playing.in_process import InProcessExecutor
 from tests.rollouts.plays import (
     CannotBeLoaded,
     DiesOnce,
@@ -111,7 +111,7 @@ def test_what_an_episode_says_of_itself():
 def test_ctrl_c_reaches_no_worker():
     """Not even the first one, whose start begins with that of a helper."""
     program = """
-        from rollouts.executor import ProcessExecutor
+        from rollouts.playing.executor import ProcessExecutor
         from tests.rollouts.plays import blocked_signals
 
         if __name__ == "__main__":
@@ -204,7 +204,7 @@ def test_a_worker_that_is_stopped_while_it_answers(tmp_path):
 
 @pytest.mark.long
 def test_a_worker_that_hangs_before_it_is_ready(tmp_path, monkeypatch):
-    monkeypatch.setattr(rollouts.shift, "START_SECONDS", 15.0)
+    monkeypatch.setattr(rollouts.playing.dispatch, "START_SECONDS", 15.0)
     events = run(HangsOnce(tmp_path), range(3), workers=1)
     (death,) = [event for event in events if event.died is not None]
     assert death.seed is None
@@ -221,7 +221,7 @@ def test_a_word_shows_that_an_episode_goes_on():
 
 
 def test_long_silence_is_said(monkeypatch):
-    monkeypatch.setattr(rollouts.shift, "QUIET_SECONDS", 1.0)
+    monkeypatch.setattr(rollouts.playing.dispatch, "QUIET_SECONDS", 1.0)
     said = [event.said for event in run(Play(lasts=2.5), [3]) if event.said]
     patterns = [
         r"no message for \d s: process \d+ has been getting ready for \d s",
@@ -234,7 +234,7 @@ def test_long_silence_is_said(monkeypatch):
 @pytest.mark.long
 def test_the_time_in_which_this_process_is_stopped_makes_nobody_late():
     program = """
-        from rollouts.executor import ProcessExecutor
+        from rollouts.playing.executor import ProcessExecutor
         from tests.rollouts.plays import Play
 
         if __name__ == "__main__":
@@ -272,7 +272,7 @@ def test_a_session_without_a_file():
     """As in a notebook: what a cell defines is refused before anything is started."""
     program = """
         import multiprocessing
-        from rollouts.executor import ProcessExecutor, WorkerError
+        from rollouts.playing.executor import ProcessExecutor, WorkerError
 
         def cell():
             return str
@@ -300,7 +300,7 @@ def test_a_session_without_a_file():
 
 def test_a_program_without_a_guard(tmp_path):
     (tmp_path / "program.py").write_text(
-        "from rollouts.executor import ProcessExecutor\n"
+        "from rollouts.playing.executor import ProcessExecutor\n"
         "from tests.rollouts.plays import Play\n"
         "list(ProcessExecutor(2).run(Play(), range(3)))\n"
     )

@@ -19,11 +19,11 @@ from layouts import Layout, Placement
 from robots import RecordingError, RobotRegistry, TaskError
 from robots.descriptor import ActionSplit
 from rollouts.__main__ import main
-from rollouts.episode import play
 from rollouts.export.columns import ColumnReader
 from rollouts.export.dataset import Export, export
-from rollouts.recorder import Recorder
-from rollouts.trajectory import Trajectory, TrajectoryError, TrajectoryFile
+from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
+from rollouts.recording.recorder import Recorder
+from tasks.episode import play
 from tests.rollouts.recordings import edited, record, succeed
 
 TASK = "PushT-v1"
@@ -274,7 +274,7 @@ def test_pictures_of_an_exact_replay_need_no_help(recording, monkeypatch):
 
 UNFINISHED = """
 import sys, time
-from robots.commands import start
+from robots.common.commands import start
 from rollouts.export.dataset import Export, export
 def main():
     def wait(done, total):

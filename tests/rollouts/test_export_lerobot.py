@@ -15,7 +15,7 @@ from rollouts.export.columns import ColumnReader, make_task
 from rollouts.export.dataset import Export, export
 from rollouts.export.lerobot import LeRobotWriter, Limits
 from rollouts.export.statistics import PictureStatistics
-from rollouts.trajectory import TrajectoryFile
+from rollouts.reading.trajectory import TrajectoryFile
 from rollouts.video import video_problem
 from tests.rollouts.recordings import (
     FINGERS,

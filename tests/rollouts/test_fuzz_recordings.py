@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 
 import tasks
 from robots import RobotLayoutsError
-from rollouts.episode import play
 from rollouts.export.dataset import Export, export
-from rollouts.joined import read_joined
-from rollouts.parts import read_part
-from rollouts.recorder import Recorder
-from rollouts.trajectory import TrajectoryFile
+from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.recording.episode_files import read_part
+from rollouts.recording.recorder import Recorder
+from rollouts.recording.trajectory_writer import read_joined
+from tasks.episode import play
 from tests.rollouts.recordings import edited
 
 TASK = "PushT-v1"

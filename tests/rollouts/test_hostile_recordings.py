@@ -12,12 +12,12 @@ import h5py
 import numpy as np
 import pytest
 
-import rollouts.hdf5_file as hdf5_file
+import rollouts.reading.hdf5_file as hdf5_file
 from robots import UnreadableFileError
 from rollouts.export.dataset import Export, export
-from rollouts.hdf5_file import Hdf5File
-from rollouts.hdf5_reading import ContentError
-from rollouts.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.reading.hdf5_file import Hdf5File
+from rollouts.reading.hdf5_reading import ContentError
+from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
 from tests.rollouts.recordings import edited, record
 
 SECRET = b"root:x:0:0: a secret in another file\n" * 20

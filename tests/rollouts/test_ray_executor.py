@@ -10,17 +10,17 @@ from pathlib import Path
 
 import pytest
 
-import rollouts.ray_executor
-import rollouts.shift
+import rollouts.playing.dispatch
+import rollouts.playing.ray_executor
+from experts import registry
 from robots import MissingPackageError, TaskError, UnknownNameError
 from rollouts import evaluate
 from rollouts.__main__ import main
-from rollouts.executor import WorkerError, WorkersDied
-from rollouts.experts import registry
-from rollouts.ray_cluster import ROOMS, gather_code
-from rollouts.ray_executor import RayExecutor
-from rollouts.record import FILE, record
-from rollouts.trajectory import TrajectoryFile
+from rollouts.playing.executor import WorkerError, WorkersDied
+from rollouts.playing.ray_cluster import ROOMS, gather_code
+from rollouts.playing.ray_executor import RayExecutor
+from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.recording.record import FILE, record
 from tests.rollouts.clusters import Nodes, running_cluster
 from tests.rollouts.plays import (
     TASK,
@@ -67,7 +67,7 @@ def test_a_cluster_without_room(cluster, monkeypatch):
     cluster.shrink()
     with pytest.raises(WorkerError, match="no node of the Ray cluster offers a CPU"):
         run(cluster, Play(), range(3))
-    monkeypatch.setattr(rollouts.shift, "QUIET_SECONDS", 3.0)
+    monkeypatch.setattr(rollouts.playing.dispatch, "QUIET_SECONDS", 3.0)
     events = RayExecutor(cluster.address, 1, modules=MODULES).run(Play(), range(3))
     said = next(events).said
     assert re.fullmatch(
@@ -191,7 +191,7 @@ def test_what_cannot_begin(nodes, monkeypatch):
         run(nodes, dies_before_it_is_ready, range(9), workers=1)
     with pytest.raises(WorkerError, match="cannot be sent to them: "):
         run(nodes, (lambda file: lambda: file)(sys.stderr), range(3))
-    monkeypatch.setattr(rollouts.ray_executor, "_versions", lambda: {"sapien": "0.1"})
+    monkeypatch.setattr(rollouts.playing.ray_executor, "_versions", lambda: {"sapien": "0.1"})
     with pytest.raises(WorkerError, match=r"node 127.* has sapien 3.*, this machine sapien 0\.1;"):
         run(nodes, Play(), range(3))
 
@@ -214,7 +214,7 @@ def test_ray_is_not_installed(monkeypatch, tmp_path, capsys):
 def test_nodes_get_all_the_code(tmp_path):
     gather_code(tmp_path, ["tests.rollouts.plays"])
     assert {path.name for path in tmp_path.iterdir()} == {*ROOMS, "tests"}
-    program = "import robots, rollouts; print(robots.__file__); from robots.manifest import *; "
+    program = "import robots; print(robots.__file__); from robots.assets.manifest import *; "
     program += "print(CHECKOUT_CACHE.exists(), len(load_manifest().packages))"
     words = [sys.executable, "-c", program]
     said = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True).stdout

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import pytest
 
-import rollouts.ray_cluster
-import rollouts.shift
+import rollouts.playing.dispatch
+import rollouts.playing.ray_cluster
 from robots import TaskError
-from rollouts.executor import WorkerError
-from rollouts.ray_executor import RayExecutor
-from rollouts.record import FILE
+from rollouts.playing.executor import WorkerError
+from rollouts.playing.ray_executor import RayExecutor
+from rollouts.recording.record import FILE
 from tests.rollouts.clusters import running_cluster
 from tests.rollouts.plays import Play
 from tests.rollouts.test_executor import squares
@@ -55,7 +55,7 @@ def test_a_cluster_that_refuses(host):
 
 
 def test_a_port_that_is_silent(monkeypatch):
-    monkeypatch.setattr(rollouts.ray_cluster, "_JOIN_SECONDS", 3.0)
+    monkeypatch.setattr(rollouts.playing.ray_cluster, "_JOIN_SECONDS", 3.0)
     with socket.create_server(("127.0.0.77", 0)) as silent:
         port = silent.getsockname()[1]
         with pytest.raises(WorkerError, match="cannot be joined: it does not answer within 3 s"):
@@ -90,7 +90,7 @@ def test_an_actor_that_is_stopped(nodes):
 
 @pytest.mark.long
 def test_an_actor_that_is_stopped_before_it_is_ready(nodes, monkeypatch, tmp_path):
-    monkeypatch.setattr(rollouts.shift, "START_SECONDS", 15.0)
+    monkeypatch.setattr(rollouts.playing.dispatch, "START_SECONDS", 15.0)
     executor = RayExecutor(nodes.address, 1, modules=MODULES)
     played = list(executor.run(StopsItselfOnce(tmp_path), range(6)))
     (death,) = [event for event in played if event.died is not None]
@@ -118,7 +118,7 @@ def record_with(nodes, out: Path, episodes: int, *more: str) -> subprocess.Popen
 
 @pytest.mark.long
 def test_the_node_of_this_machine_is_stopped_before(nodes, monkeypatch):
-    monkeypatch.setattr(rollouts.ray_cluster, "_JOIN_SECONDS", 10.0)
+    monkeypatch.setattr(rollouts.playing.ray_cluster, "_JOIN_SECONDS", 10.0)
     pid = nodes.signal_head("raylet", signal.SIGSTOP)
     with pytest.raises(WorkerError, match="cannot be joined: "):
         next(RayExecutor(nodes.address).run(Play(), [0]))

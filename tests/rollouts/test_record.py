@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 
 import tasks
+from experts import registry
 from rollouts.__main__ import main
-from rollouts.episode import play
-from rollouts.executor import WorkerError
-from rollouts.experts import registry
-from rollouts.in_process import InProcessExecutor
-from rollouts.record import record
-from rollouts.recorder import Recorder
-from rollouts.trajectory import TrajectoryFile
+from rollouts.playing.executor import WorkerError
+from rollouts.playing.in_process import InProcessExecutor
+from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.recording.record import record
+from rollouts.recording.recorder import Recorder
+from tasks.episode import play
 from tests.rollouts.plays import NO_PLAN, TASK, at_random
 from tests.rollouts.test_recorder import same_files
 

@@ -17,10 +17,10 @@ import pytest
 
 import tasks
 from robots import ActionError, RecordingError, TaskError
-from rollouts.episode import Episode, play
-from rollouts.parts import part_path, read_part
-from rollouts.recorder import Recorder
-from rollouts.trajectory import TrajectoryFile
+from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.recording.episode_files import part_path, read_part
+from rollouts.recording.recorder import Recorder
+from tasks.episode import Episode, play
 from tests.rollouts.hand_overs import TASK, plan, task
 from tests.rollouts.recordings import edited
 
@@ -133,9 +133,9 @@ def test_the_first_state_is_the_one_after_the_reset(recorded):
 
 KILLED = """
 import sys, numpy as np, tasks
-from rollouts.episode import play
-from rollouts.recorder import Recorder
-from rollouts.trajectory import TrajectoryFile
+from tasks.episode import play
+from rollouts.recording.recorder import Recorder
+from rollouts.reading.trajectory import TrajectoryFile
 env = tasks.make("PushT-v1")
 with Recorder(sys.argv[1], env) as recorder:
     for seed in range(10**6):
@@ -482,9 +482,9 @@ class TestResuming:
 FULL = """
 import sys, numpy as np, tasks
 from robots import RecordingError
-from rollouts.episode import play
-from rollouts.recorder import Recorder
-from rollouts.trajectory import TrajectoryFile
+from tasks.episode import play
+from rollouts.recording.recorder import Recorder
+from rollouts.reading.trajectory import TrajectoryFile
 env = tasks.make("PushT-v1")
 try:
     with Recorder(sys.argv[1], env) as recorder:

@@ -10,11 +10,11 @@ import pytest
 import tasks
 from robots import UnknownNameError
 from rollouts.__main__ import main
-from rollouts.conversion import as_positions
-from rollouts.episode import play
-from rollouts.recorder import Recorder
-from rollouts.replay import find_official, open_recording, replay, task_for
-from rollouts.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.playing.plan_conversion import as_positions
+from rollouts.playing.replay import find_official, open_recording, replay, task_for
+from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.recording.recorder import Recorder
+from tasks.episode import play
 from tests.rollouts.plays import at_random
 from tests.rollouts.recordings import edited
 

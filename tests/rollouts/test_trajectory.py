@@ -11,9 +11,9 @@ import pytest
 import tasks
 from layouts import Layout
 from robots import LocalUrdf, RobotRegistry
-from rollouts.episode import play
-from rollouts.recorder import Recorder
-from rollouts.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.recording.recorder import Recorder
+from tasks.episode import play
 from tests.rollouts.recordings import edited
 
 TASK = "PushT-v1"

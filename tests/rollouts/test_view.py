@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rollouts.__main__ import main
-from rollouts.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
 from rollouts.view_command import episode_cell
 from tests.pages import browser_page, changed, served, settled
 from tests.rollouts.recordings import LEFT_KEY, TWO_ROBOTS, edited, read, record

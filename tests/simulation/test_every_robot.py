@@ -10,12 +10,12 @@ import sapien
 
 from layouts import single
 from robots import ActionNumber, RobotRegistry
-from robots.asset_sources import find_mani_skill
+from robots.assets.sources import find_mani_skill
 from robots.from_urdf import guess_descriptor
 from robots.registry import CATALOGUE
-from robots.urdf_model import read_model
-from robots.urdf_reach import link_frame
-from robots.urdf_xml import parse_urdf
+from robots.urdf.model import read_model
+from robots.urdf.reach import link_frame
+from robots.urdf.summary import parse_urdf
 from simulation import PhysicsSettings, Simulation
 from simulation.controller import JointPositionController
 

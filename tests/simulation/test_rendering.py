@@ -11,7 +11,7 @@ import torch
 
 import tasks
 from robots import SimulationError, TaskError
-from simulation.rendering import Cameras, look_at, vulkan_problem
+from simulation.rendering.pictures import Cameras, look_at, vulkan_problem
 
 TASK = "TwoRobotPickCube-v1"
 NO_DRIVER = {"VK_DRIVER_FILES": "/nowhere.json", "VK_ICD_FILENAMES": "/nowhere.json"}
@@ -144,7 +144,7 @@ def test_every_task_runs_without_a_driver():
 
 def test_without_a_driver_one_is_told_why_there_are_no_pictures():
     done = run_without_driver(
-        "from simulation.rendering import vulkan_problem\n"
+        "from simulation.rendering.pictures import vulkan_problem\n"
         "print(vulkan_problem())\n"
         "import tasks\n"
         "tasks.make('PickCube-v1', render_mode='rgb_array')\n"

@@ -10,9 +10,9 @@ import gymnasium
 
 from robots import TaskError
 from tasks import registry
-from tasks.push_cube import PushCube
+from tasks.engine.task import FIRST_SEED
+from tasks.maniskill.push_cube import PushCube
 from tasks.registry import register_task
-from tasks.task import FIRST_SEED
 
 HOOKS = ("build", "sample", "evaluate", "observe", "dense_reward", "begin_episodes", "respond")
 

@@ -4,7 +4,7 @@ import torch
 
 from layouts import face_to_face, single
 from robots import ActionError, UnknownNameError
-from tasks.actions import ActionReader
+from tasks.engine.actions import ActionReader
 
 TWO = face_to_face({"left": "panda", "right": "panda_stick"}, spacing=1.5)
 

@@ -13,7 +13,7 @@ from gymnasium.utils.env_checker import check_env
 import tasks
 from robots import SimulationError, TaskError
 from simulation import Camera
-from simulation.rendering import Observers, vulkan_problem
+from simulation.rendering.pictures import Observers, vulkan_problem
 from tests.simulation.test_rendering import run_without_driver
 
 TASK = "PickCube-v1"
@@ -39,7 +39,8 @@ def test_states_need_nothing_that_draws():
         "import sys, tasks\n"
         "for mode in ('state', 'state_dict', 'none'):\n"
         "    tasks.make('PickCube-v1', obs_mode=mode).reset(seed=0)\n"
-        "print([m for m in ('simulation.rendering', 'simulation.visuals') if m in sys.modules])\n"
+        "drawing = ('simulation.rendering.pictures', 'simulation.rendering.visuals')\n"
+        "print([m for m in drawing if m in sys.modules])\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

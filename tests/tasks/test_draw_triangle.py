@@ -4,7 +4,7 @@ import torch
 import tasks
 from robots import SimulationError
 from tasks import MultiRobotTask
-from tasks.draw_triangle import MAX_DOTS
+from tasks.maniskill.draw_triangle import MAX_DOTS
 
 STILL = torch.zeros(1, 7)
 DOWN = torch.tensor([[0.0, 1.0, 0.0, -0.4, 0.0, 0.0, 0.0]])  # until the stick presses the canvas

@@ -3,8 +3,8 @@
 import pytest
 
 import tasks
-from rollouts.experts import find_expert
-from tasks.four_robot_stack import ORDER
+from experts import find_expert
+from tasks.originals.four_robot_stack import ORDER
 from tests.tasks.own import make, put
 
 TASK = "FourRobotStack-v1"

@@ -12,7 +12,7 @@ from gymnasium.utils.env_checker import check_env
 
 import tasks
 from robots import TaskError, UnknownNameError
-from simulation.rendering import vulkan_problem
+from simulation.rendering.pictures import vulkan_problem
 from tasks import fronts
 from tasks.fronts.gymnasium import GymnasiumTask
 from tasks.registry import CATALOGUE
@@ -164,7 +164,7 @@ def test_the_id_may_name_the_module_instead_of_an_import():
 def test_a_task_of_ones_own_is_known_to_gymnasium():
     code = """
 import gymnasium, tasks
-from tasks.pick_cube import PickCube
+from tasks.maniskill.pick_cube import PickCube
 
 @tasks.register_task("Mine-v3")
 class Mine(PickCube):

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import tasks
+from experts import find_expert
 from robots import ActionError, MissingPackageError, TaskError, UnknownNameError
-from rollouts.experts import find_expert
-from simulation.rendering import vulkan_problem
+from simulation.rendering.pictures import vulkan_problem
 
 pytest.importorskip("stable_baselines3")
 

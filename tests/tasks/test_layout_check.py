@@ -8,7 +8,7 @@ import pytest
 import tasks
 from layouts import Layout, Placement, around_table, face_to_face, side_by_side
 from robots import LayoutError, RobotRegistry, TaskError
-from tasks.layout_check import refuse_collisions
+from tasks.engine.layout_check import refuse_collisions
 
 TWO = "TwoRobotPickCube-v1"
 PANDAS = {"left": "panda_wristcam", "right": "panda_wristcam"}
@@ -50,7 +50,7 @@ def test_the_tasks_own_layout_costs_nothing(monkeypatch):
     def fail(layout):
         raise AssertionError("checked")
 
-    monkeypatch.setattr("tasks.task.refuse_collisions", fail)
+    monkeypatch.setattr("tasks.engine.task.refuse_collisions", fail)
     tasks.make(TWO).close()
     with pytest.raises(AssertionError, match="checked"):
         tasks.make(TWO, layout=crowded())

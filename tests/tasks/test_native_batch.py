@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from parity.comparison import HISTORIES
-from parity.episodes import Episode, random_episodes
-from parity.snapshot import differing, select
+from parity.compare.episodes import Episode, random_episodes
+from parity.compare.lockstep import HISTORIES
+from parity.compare.snapshot import differing, select
 from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, Pair, complaints, pair
 

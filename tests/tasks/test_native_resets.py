@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from parity.snapshot import differing
+from parity.compare.snapshot import differing
 from tests.native import NATIVE, TASKS, Pair, pair
 
 pytestmark = NATIVE

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from robots import SimulationError, TaskError
-from tasks.pick_cube import PickCube
+from tasks.maniskill.pick_cube import PickCube
 
 STILL = np.zeros((2, 8), np.float32)
 

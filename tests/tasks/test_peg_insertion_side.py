@@ -2,7 +2,7 @@ import pytest
 import torch
 
 import tasks
-from tasks.peg_insertion_side import HALF_LENGTH, RADIUS, PegDesign
+from tasks.maniskill.peg_insertion_side import HALF_LENGTH, RADIUS, PegDesign
 
 
 def designs(env: tasks.MultiRobotTask) -> list[PegDesign]:

@@ -18,13 +18,14 @@ import numpy as np
 import pytest
 
 import tasks
+from measurements.soak.process_resources import read_level
 from robots import RobotLayoutsError, SimulationError, TaskError
-from rollouts.levels import read_level
-from simulation.rendering import vulkan_problem
-from tasks import forks, processes
-from tasks.fork_server import LOADED
+from simulation.rendering.pictures import vulkan_problem
 from tasks.fronts.vector import VectorTask
 from tasks.fronts.workers import WorkerError
+from tasks.processes import forks
+from tasks.processes import process as processes
+from tasks.processes.fork_server import LOADED
 from tests.fresh_process import in_fresh_process
 from tests.tasks import breaking
 

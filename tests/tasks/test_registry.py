@@ -169,7 +169,7 @@ def test_a_user_can_declare_a_task(monkeypatch: pytest.MonkeyPatch):
 
 def test_a_name_that_is_taken_is_refused():
     with pytest.raises(
-        TaskError, match="'PickCube-v1' is already taken by tasks.pick_cube:PickCube"
+        TaskError, match="'PickCube-v1' is already taken by tasks.maniskill.pick_cube:PickCube"
     ):
         tasks.register_task("PickCube-v1")(Still)
     with pytest.raises(TaskError, match="needs at least one name"):

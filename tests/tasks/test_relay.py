@@ -10,7 +10,7 @@ import torch
 import tasks
 from layouts import Layout, ring
 from robots import TaskError
-from tasks.relay import FARTHEST_REACH, find_zones
+from tasks.originals.relay import FARTHEST_REACH, find_zones
 from tests.tasks.own import look, make, put
 
 TASK = "Relay-v1"

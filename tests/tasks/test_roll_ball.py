@@ -2,7 +2,7 @@ import numpy as np
 import torch
 
 import tasks
-from tasks.roll_ball import HIT_OFFSET
+from tasks.maniskill.roll_ball import HIT_OFFSET
 
 
 def put_ball_where_the_arm_should_hit_it(env: tasks.MultiRobotTask) -> None:

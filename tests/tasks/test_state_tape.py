@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import tasks
-from tasks import native_format
+from tasks.engine import native_format
 
 
 @pytest.mark.parametrize("task_id", tasks.list_tasks())

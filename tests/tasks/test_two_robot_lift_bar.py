@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import tasks
-from rollouts.episode import play
-from rollouts.experts import find_expert
-from rollouts.experts.rehearsal import Rehearsal
-from rollouts.experts.two_robot_lift_bar import STYLES, _script
+from experts import find_expert
+from experts.originals.two_robot_lift_bar import STYLES, _script
+from experts.rehearsal import Rehearsal
 from simulation import State
+from tasks.episode import play
 from tests.tasks.own import look, make, put
 
 TASK = "TwoRobotLiftBar-v1"

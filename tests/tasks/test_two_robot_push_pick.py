@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import tasks
-from rollouts.experts import find_expert
-from rollouts.experts.geometry import gripper_facing
-from rollouts.experts.script import Scene
+from experts import find_expert
+from experts.geometry import gripper_facing
+from experts.script import Scene
 from simulation.kinematics import InverseKinematics
 from tests.tasks.own import look, make, put
 

@@ -271,7 +271,7 @@ def test_wrong_reset_options(options, message):
 
 @pytest.mark.long
 def test_pictures():
-    from simulation.rendering import vulkan_problem
+    from simulation.rendering.pictures import vulkan_problem
 
     if problem := vulkan_problem():
         pytest.skip(problem)

@@ -1,0 +1,5 @@
+"""Scripted experts: for a task and a seed, the actions that solve it."""
+
+from experts.registry import Expert, find_expert, list_experts, register_expert
+
+__all__ = ["Expert", "find_expert", "list_experts", "register_expert"]

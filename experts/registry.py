@@ -1,0 +1,80 @@
+"""Which tasks have an expert, by task id."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots import TaskError
+from tasks import MultiRobotTask, get_task_class
+
+Expert = Callable[[MultiRobotTask, int], NDArray[np.float32]]
+"""``expert(task, seed)`` returns actions (T, A) for the episode that ``seed`` begins.
+
+The task says which layout and physics to plan for and is itself left alone: experts plan in worlds
+of their own. The actions hold for freshly built worlds, ``reset(seed, {"reconfigure": True})``.
+"""
+
+# One line per task, sorted by id: id -> module:function.
+CATALOGUE = {
+    "DrawTriangle-v1": "experts.maniskill.draw_triangle:draw_outline",
+    "FourRobotStack-v1": "experts.originals.four_robot_stack:stack_for_four",
+    "LiftPegUpright-v1": "experts.maniskill.lift_peg_upright:stand_up",
+    "PegInsertionSide-v1": "experts.maniskill.peg_insertion_side:insert_peg",
+    "PickCube-v1": "experts.maniskill.pick_cube:pick_cube",
+    "PickCubeSO100-v1": "experts.maniskill.pick_cube_so100:pick_small_cube",
+    "PlaceSphere-v1": "experts.maniskill.place_sphere:place_sphere",
+    "PlugCharger-v1": "experts.maniskill.plug_charger:plug_in",
+    "PokeCube-v1": "experts.maniskill.poke_cube:poke",
+    "PullCube-v1": "experts.maniskill.slide_cube:slide",
+    "PullCubeTool-v1": "experts.maniskill.pull_cube_tool:pull",
+    "PushCube-v1": "experts.maniskill.slide_cube:slide",
+    "PushT-v1": "experts.maniskill.push_t:push_onto_outline",
+    "Relay-v1": "experts.originals.relay:pass_on",
+    "RollBall-v1": "experts.maniskill.roll_ball:roll",
+    "StackCube-v1": "experts.maniskill.stack_cube:stack_cube",
+    "StackPyramid-v1": "experts.maniskill.stack_pyramid:stack_pyramid",
+    "TwoRobotLiftBar-v1": "experts.originals.two_robot_lift_bar:lift_for_two",
+    "TwoRobotPickCube-v1": "experts.maniskill.two_robot_pick_cube:hand_over",
+    "TwoRobotPushPick-v1": "experts.originals.two_robot_push_pick:push_and_pick",
+    "TwoRobotStackCube-v1": "experts.maniskill.two_robot_stack_cube:stack_for_two",
+}
+
+_registered: dict[str, Expert] = {}
+
+
+def register_expert(task_id: str, expert: Expert) -> Expert:
+    """Make an expert known for a task, in place of the present one if there is one.
+
+    Raises:
+        UnknownNameError: If there is no such task.
+    """
+    _registered[get_task_class(task_id).task_id] = expert
+    return expert
+
+
+def find_expert(task_id: str) -> Expert:
+    """Return the expert of a task.
+
+    Args:
+        task_id: The task's id or another of its names.
+
+    Raises:
+        UnknownNameError: If there is no such task.
+        TaskError: If the task has no expert.
+    """
+    name = get_task_class(task_id).task_id
+    if name in _registered:
+        return _registered[name]
+    if name not in CATALOGUE:
+        raise TaskError(f"{name} has no expert yet; tasks with one: {', '.join(list_experts())}")
+    module, _, function = CATALOGUE[name].partition(":")
+    return getattr(import_module(module), function)
+
+
+def list_experts() -> tuple[str, ...]:
+    """Return the ids of all tasks that have an expert, sorted."""
+    return tuple(sorted({*CATALOGUE, *_registered}))

@@ -1,0 +1,87 @@
+"""Scripts as data: waypoints for each robot, and what a script may look at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experts.geometry import Floats
+from simulation import State
+from tasks import MultiRobotTask
+
+OPEN, CLOSED = 1.0, -1.0
+
+Pose = tuple[Floats, Floats]  # position (m) and quaternion wxyz, world
+
+
+class Scene:
+    """What a script sees of one world, as numpy arrays in the world frame.
+
+    Attributes:
+        design: Geometry that the task drew for this episode, if it draws any.
+    """
+
+    def __init__(self, task: MultiRobotTask) -> None:
+        """Look at the first world of a task as it is now."""
+        self._state: State = task.simulation.read()
+        self.design: Any = task.simulation.worlds[0].design
+
+    def body(self, name: str) -> Pose:
+        """Return the pose of a body."""
+        return _split(self._state.pose(name)[0])
+
+    def tcp(self, robot: str) -> Pose:
+        """Return the pose of a robot's tool centre point."""
+        return _split(self._state.tcp_pose(robot)[0])
+
+    def qpos(self, robot: str) -> Floats:
+        """Return all joints of a robot in SAPIEN's order, shape (dof,) (rad, m)."""
+        return self._state.qpos(robot)[0].astype(float)
+
+    def grasps(self, robot: str, body: str) -> bool:
+        """Return whether a robot's fingers hold a body."""
+        return bool(self._state.is_grasping(robot, body)[0])
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """One thing that one robot does.
+
+    Attributes:
+        name: What it is called in the script of its robot.
+        to: Poses of the TCP, worked out from the scene when the waypoint begins; of those in
+            reach the one with the shortest way there is taken. Without it and ``turn`` it stays.
+        gripper: Action number of the gripper meanwhile, `OPEN` … `CLOSED`.
+        after: Waypoints of other robots, ``"robot.name"``, that must be done before it begins;
+            until then the robot keeps the previous one.
+        near: Arm joints count as arrived when all are this near (rad).
+        steps: Least number of control steps it takes.
+        until: What else must hold for it to be done.
+        turn: Instead of ``to``, how far the arm's joints turn, (arm joints,) (rad), worked out from
+            where they are when the waypoint begins; both in the order of the robot's arm joints.
+        most: Number of control steps after which, if it is not done, the script has failed.
+        at: Instead of ``to``, where the TCP should be, (3,) (m, world), turned in any way: for arms
+            of too few joints to choose that too.
+    """
+
+    name: str
+    to: Callable[[Scene], Sequence[Pose]] | None = None
+    gripper: float = OPEN
+    after: tuple[str, ...] = ()
+    near: float = 0.05
+    steps: int = 0
+    until: Callable[[Scene], bool] | None = None
+    turn: Callable[[Floats], Floats] | None = None
+    most: int | None = None
+    at: Callable[[Scene], Floats] | None = None
+
+
+Script = Mapping[str, Sequence[Waypoint]]
+
+
+def _split(row: NDArray[np.float32]) -> Pose:
+    return row[:3].astype(float), row[3:].astype(float)

@@ -1,0 +1,1 @@
+"""What everything costs, and whether anything grows; no other room needs it."""

@@ -1,0 +1,212 @@
+"""``python -m parity bench``: every benchmark, with native ManiSkill in turns with ours."""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import logging
+import sys
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing, contextmanager
+from functools import partial
+from typing import Any
+
+import gymnasium
+from gymnasium.vector import AsyncVectorEnv
+
+import tasks
+from layouts.files import written_whole
+from measurements.bench.catalogue import BENCHMARKS
+from measurements.bench.command import add_arguments, run_benchmarks, settings_of
+from measurements.bench.episodes import timed_resets
+from measurements.bench.measurement import BenchmarkError, Measurement, by_series
+from measurements.bench.processes import PhysicsProcesses, TimedVector, vector
+from measurements.bench.readme_table import RECORD
+from measurements.bench.report import Report
+from measurements.bench.settings import Benchmark, Settings
+from measurements.bench.steps import PHYSICS, Played
+from parity.compare.native_env import make_native, native_action, quiet
+from robots import RobotLayoutsError, TaskError
+from robots.common.commands import start
+from tasks import MultiRobotTask, get_task_class, list_clones
+
+NATIVE, HERE = "native", "here"
+PROCESSES = 2  # of native's vector and of ours
+FRONT_TASKS = 2  # of a run, whose vectors are timed
+
+Variants = dict[tuple[str, str], Callable[[int], float]]
+
+
+def benchmarks(task_ids: Sequence[str]) -> dict[str, Benchmark]:
+    """Return every benchmark; those that native can run are run beside it, on some tasks."""
+    return {
+        "step": Benchmark("a step of one environment", partial(step, task_ids)),
+        "reset": Benchmark("a reset of one environment", partial(reset, task_ids)),
+        "vector": Benchmark("many environments on two cores", vectors),
+        **{name: one for name, one in BENCHMARKS.items() if name not in ("step", "reset")},
+    }
+
+
+def step(task_ids: Sequence[str], settings: Settings) -> Measurement:
+    """Time one environment of tasks."""
+
+    def variants(task_id: str, native: Any, ours: MultiRobotTask) -> Variants:
+        played = Played(ours, settings)
+        return {
+            (HERE, task_id): played.step,
+            (NATIVE, task_id): lambda number: _native_steps(native, played, number, settings),
+            (PHYSICS, task_id): played.physics,
+        }
+
+    return Measurement(
+        name="step",
+        title="One step with observation, reward and success",
+        unit="µs per step",
+        variable="task",
+        values=tuple(task_ids),
+        samples=_beside_native(task_ids, settings, variants),
+        floors=(PHYSICS,),
+        ratios=((NATIVE, HERE), (HERE, PHYSICS)),
+    )
+
+
+def reset(task_ids: Sequence[str], settings: Settings) -> Measurement:
+    """Time resets of one environment of tasks."""
+
+    def variants(task_id: str, native: Any, ours: MultiRobotTask) -> Variants:
+        return {
+            (HERE, task_id): timed_resets(ours.reset, settings.clock),
+            (NATIVE, task_id): timed_resets(lambda seed: native.reset(seed=seed), settings.clock),
+        }
+
+    return Measurement(
+        name="reset",
+        title="A reset of one environment",
+        unit="ms per reset",
+        variable="task",
+        values=tuple(task_ids),
+        samples=_beside_native(task_ids, settings, variants),
+        ratios=((NATIVE, HERE),),
+    )
+
+
+def vectors(settings: Settings) -> Measurement:
+    """Measure the rate of a vector beside Gymnasium's own vector over native, on as many cores."""
+    share, clock, steps = settings.worker_envs, settings.clock, settings.batch_steps
+    task_ids = settings.tasks[:FRONT_TASKS]
+    samples: dict[tuple[str, str], list[float]] = {}
+    for task_id in task_ids:
+        with (
+            _native_vector(task_id) as native,
+            PhysicsProcesses(task_id, PROCESSES, share) as floor,
+            vector(task_id, PROCESSES * share, PROCESSES) as ours,
+        ):
+            here = TimedVector(ours, clock, steps)
+            variants: Variants = {(HERE, task_id): here.rate}
+            if native is not None:
+                variants[NATIVE, task_id] = TimedVector(native, clock, steps).rate
+            variants[PHYSICS, task_id] = lambda number, here=here: floor.rate(here, number)
+            samples.update(settings.interleave(variants, part=1 / len(task_ids)))
+    return Measurement(
+        name="vector",
+        title=f"Rate of {PROCESSES} × {share} environments; native: AsyncVectorEnv of {PROCESSES}",
+        unit=clock.rate_unit,
+        variable="task",
+        values=task_ids,
+        samples=by_series(task_ids, samples),
+        floors=(PHYSICS,),
+        ratios=((HERE, NATIVE), (HERE, PHYSICS)),
+    )
+
+
+def _beside_native(
+    task_ids: Sequence[str],
+    settings: Settings,
+    variants: Callable[[str, Any, MultiRobotTask], Variants],
+) -> dict[str, list[list[float]]]:
+    """Take samples of one task after the other, with native's environment and ours."""
+    samples: dict[tuple[str, str], list[float]] = {}
+    for task_id in task_ids:
+        native = make_native(task_id)
+        native.reset(seed=0)
+        gc.freeze()  # native collects garbage when it builds a scene; ours is not to count
+        both = variants(task_id, native, tasks.make(task_id))
+        samples.update(settings.interleave(both, part=1 / len(task_ids)))
+        native.close()
+        gc.unfreeze()
+    return by_series(task_ids, samples)
+
+
+def _native_steps(native: Any, played: Played, number: int, settings: Settings) -> float:
+    """Return the time of one of native's steps, in the motion that ours plays (µs)."""
+    actions = [native_action(native, action[0]) for action in played.actions(number)]
+    native.reset(seed=number)
+    start = settings.clock.now()
+    for action in actions:
+        native.step(action)
+    return (settings.clock.now() - start) / len(actions) * 1e6
+
+
+@contextmanager
+def _native_vector(task_id: str) -> Generator[AsyncVectorEnv | None]:
+    """Give Gymnasium's vector over native; native's wrapper cannot run several robots: None."""
+    if len(get_task_class(task_id).layout) > 1:
+        yield None
+        return
+    make = [partial(_native_front, task_id)] * PROCESSES
+    with closing(AsyncVectorEnv(make, context="spawn")) as env:
+        yield env
+
+
+def _native_front(task_id: str) -> gymnasium.Env[Any, Any]:
+    """Make native's environment with NumPy observations, in a process of its own."""
+    import torch
+
+    torch.set_num_threads(1)
+    logging.disable(logging.WARNING)
+    native = make_native(task_id)
+    with quiet():
+        from mani_skill.utils.wrappers.gymnasium import CPUGymWrapper
+
+        return CPUGymWrapper(native)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit code."""
+    parser = argparse.ArgumentParser(prog="python -m parity bench", description=__doc__)
+    add_arguments(parser)
+    parser.epilog = f"Benchmarks: {', '.join(benchmarks(()))}. All of them take some minutes."
+    parser.add_argument("--record", action="store_true", help=f"keep all of it in {RECORD.name}")
+    options = parser.parse_args(argv)
+    logging.disable(logging.WARNING)
+    try:
+        if options.record and (options.only or options.task):
+            raise BenchmarkError("a record holds every benchmark; leave out --only and --task")
+        settings = settings_of(options)
+        task_ids = settings.tasks if options.task else list_clones()
+        _expect_clones(task_ids)
+        status, report = run_benchmarks(options, benchmarks(task_ids), settings)
+        if options.record and report is not None:
+            _keep(report)
+    except RobotLayoutsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return status
+
+
+def _expect_clones(task_ids: Sequence[str]) -> None:
+    for task_id in task_ids:
+        if task_id not in list_clones():
+            raise TaskError(f"{task_id} clones no native task, so there is nothing beside it")
+
+
+def _keep(report: Report) -> None:
+    if report.left_out:
+        raise BenchmarkError(f"nothing is recorded, as {', '.join(report.left_out)} was left out")
+    with written_whole(RECORD) as unfinished:
+        unfinished.write_text(report.as_json(), encoding="utf-8")
+    print(f"{RECORD}: recorded; `python -m parity readme` shows it in README.md")
+
+
+if __name__ == "__main__":
+    start(main)

@@ -1,0 +1,1 @@
+"""Every task stepped for long, while nothing that its processes hold may grow."""

@@ -1,0 +1,1 @@
+"""Tasks stepped beside native in lock-step, every bit compared."""

@@ -1,0 +1,1 @@
+"""The recorded results, and the tables that README.md shows of them."""

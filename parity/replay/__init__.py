@@ -1,0 +1,1 @@
+"""Recorded actions played beside native, and episodes kept as arrays."""

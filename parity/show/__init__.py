@@ -1,0 +1,1 @@
+"""Pictures and clips of native and ours side by side."""

@@ -1,0 +1,1 @@
+"""Where robot files come from: the local copy, and the sources that it is filled from."""

@@ -1,0 +1,204 @@
+"""Brings robot files into the local copy: from each source in turn, checking every file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+
+from robots.assets.hub_source import HubSource
+from robots.assets.manifest import AssetFile, PackageOrigin, load_manifest
+from robots.assets.progress import listing, say, size
+from robots.assets.sources import AssetSource, InstalledManiSkill, SourceError
+from robots.assets.store import AssetStore, FileState, default_root
+from robots.assets.wheel_source import ManiSkillWheel
+from robots.common.errors import AssetError
+from robots.urdf.summary import read_references
+
+
+def locate(package: str, urdf: str, *, pictures: bool) -> Path:
+    """Return a URDF of the local copy, fetching what it needs if that is not there.
+
+    Raises:
+        UnknownNameError: If the manifest has no such package or URDF.
+        AssetError: If some file could not be had from any source, or pictures are asked for of a
+            URDF whose visual meshes nobody has.
+    """
+    about = load_manifest().package(package)
+    files = about.needed(urdf, pictures=pictures)
+    if pictures and urdf in about.undrawable:
+        raise AssetError(
+            f"{package}/{urdf} cannot be drawn, as {about.origin.wheel} lacks some of its visual"
+            " meshes; without pictures it can be simulated"
+        )
+    store = AssetStore(default_root())
+    ensure(files, store, default_sources())
+    return store.root / package / urdf
+
+
+def locate_file(package: str, path: str) -> Path:
+    """Return one file of the local copy, fetching its package if something of that is not there.
+
+    Raises:
+        UnknownNameError: If the manifest has no such package or file.
+        AssetError: If it could not be had from any source.
+    """
+    about = load_manifest().package(package)
+    file, store = about.file(path), AssetStore(default_root())
+    ensure(about.files, store, default_sources())
+    return store.path(file)
+
+
+def default_sources(*, offline: bool = False, revision: str | None = None) -> list[AssetSource]:
+    """Return the sources after the local copy, in the order in which they are tried.
+
+    Args:
+        offline: Whether to leave out those that use the network.
+        revision: Revision of the Hub's dataset, if not the default.
+    """
+    if offline:
+        return [InstalledManiSkill()]
+    return [HubSource(revision=revision), InstalledManiSkill(), ManiSkillWheel()]
+
+
+def ensure(
+    files: Sequence[AssetFile],
+    store: AssetStore,
+    sources: Sequence[AssetSource],
+    *,
+    trust: bool = False,
+) -> None:
+    """Make files usable in the local copy; does nothing if they are.
+
+    Args:
+        files: What is needed.
+        store: The local copy.
+        sources: Where to look, in order.
+        trust: Whether to accept files that differ from the manifest, and mark them.
+
+    Raises:
+        AssetError: If some file could not be had, or not be written; names every source tried.
+    """
+    if not store.unusable(files):
+        return
+    with store.fetching(say) as scratch:
+        wanted = store.unusable(files)  # another process may have fetched them meanwhile
+        if wanted:
+            _say_licences(wanted)
+        failures: list[str] = []
+        for source in sources:
+            if not wanted:
+                return
+            failure = _Fetch(source, store, scratch, trust).run(wanted)
+            missing = store.unusable(wanted)
+            outcome = f"{len(wanted) - len(missing)} of {len(wanted)} files"
+            say(f"{source.title}: {outcome}" + (f"; {_shorten(failure)}" if failure else ""))
+            failures.append(f"{source.title}: {failure}")
+            wanted = missing
+        if wanted:
+            raise AssetError(_failure_text(wanted, store, failures))
+
+
+class _Fetch:
+    """One attempt to get files from one source."""
+
+    def __init__(self, source: AssetSource, store: AssetStore, scratch: Path, trust: bool) -> None:
+        self._source, self._store, self._scratch, self._trust = source, store, scratch, trust
+        self._kept: set[str] = set()  # packages of which files came along
+        self._room = True
+
+    def run(self, files: Sequence[AssetFile]) -> str:
+        """Fetch, refetch once what differs, and return why something is still missing."""
+        different: dict[AssetFile, str] = {}
+        try:
+            different = self._install(files, again=False)
+            if different:
+                different = self._install(list(different), again=True)
+        except SourceError as error:
+            return str(error)
+        if not different:
+            return ""
+        return (
+            f"refused, as {len(different)} files differ from the manifest, twice:"
+            f" {listing([f'{file}{how}' for file, how in different.items()])}"
+            f" (--source {self._source.name} --trust-source would accept them)"
+        )
+
+    def _install(self, files: Sequence[AssetFile], *, again: bool) -> dict[AssetFile, str]:
+        """Install what the source gives, and return what differs from the manifest, and how."""
+        different: dict[AssetFile, str] = {}
+        asked = set(files)
+        trust = self._trust and again
+        fetch = self._source.fetch(files, self._scratch, again=again, trust=trust)
+        with closing(fetch) as contents:
+            for file, data in contents:
+                if file not in asked:
+                    self._keep(file, data)
+                elif data is None:
+                    different[file] = f" (more than {file.limit(trust=trust):,} bytes)"
+                elif not self._accept(file, data, trust=trust):
+                    different[file] = ""
+        return different
+
+    def _accept(self, file: AssetFile, data: bytes, *, trust: bool) -> bool:
+        if trust:
+            _expect_known_references(file, data)
+        return self._store.install(
+            file, data, scratch=self._scratch, source=self._source.title, trust=trust
+        )
+
+    def _keep(self, file: AssetFile, data: bytes | None) -> None:
+        """Keep a file that nobody asked for, so that it need not be fetched another time."""
+        if data is None or not self._room:
+            return
+        try:
+            if self._store.state(file) is FileState.MISSING:
+                self._say_kept(file.origin)
+                self._accept(file, data, trust=False)
+        except AssetError as error:  # what was asked for is there
+            self._room = False
+            say(f"{error} What came along is not kept.")
+
+    def _say_kept(self, origin: PackageOrigin) -> None:
+        if origin.name not in self._kept:
+            self._kept.add(origin.name)
+            say(f"keeping what came along of {origin.name}")
+            say(f"licence {origin.licence}: {origin.licence_note}")
+
+
+def _expect_known_references(file: AssetFile, data: bytes) -> None:
+    """Refuse a differing URDF that needs files nobody would fetch."""
+    if not file.path.endswith(".urdf"):
+        return
+    known = {other.path for other in load_manifest().package(file.origin.name).files}
+    try:
+        references = read_references(data, file.path, exists=known.__contains__)
+    except AssetError as error:
+        raise SourceError(f"cannot be trusted: {error}") from error
+    unknown = sorted({*references.collision, *references.visual} - known)
+    if unknown:
+        raise SourceError(f"its {file} refers to files outside the manifest: {', '.join(unknown)}")
+
+
+def _say_licences(files: Sequence[AssetFile]) -> None:
+    for origin in {file.origin: None for file in files}:
+        total = sum(file.bytes for file in files if file.origin == origin)
+        say(f"fetching {origin.name} ({size(total)})")
+        say(f"licence {origin.licence}: {origin.licence_note}")
+
+
+def _shorten(text: str, length: int = 160) -> str:
+    return text if len(text) <= length else f"{text[:length]} …"
+
+
+def _failure_text(wanted: list[AssetFile], store: AssetStore, failures: list[str]) -> str:
+    states = listing([f"{file}: {store.state(file).value}" for file in wanted], "\n    ")
+    tried = "".join(f"\n    {failure}" for failure in failures) or "\n    none"
+    wheel = wanted[0].origin.wheel
+    return (
+        f"{len(wanted)} robot files cannot be used in {store.root}\n"
+        f"  sources tried:{tried}\n"
+        f"  files:\n    {states}\n"
+        f"  what to do: connect to the network and run `python -m robots.fetch_assets`, or"
+        f" `pip install {wheel}`, or copy the files into {store.root} from another machine"
+    )

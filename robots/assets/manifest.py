@@ -1,0 +1,286 @@
+"""Which robot files there are, what each must contain, and which URDF needs it."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
+from typing import Any, TypedDict
+
+from robots.common.errors import AssetError, UnknownNameError, UnreadableFileError
+from robots.common.fields import settle, settle_fields
+from robots.common.files import parse_json, read_text
+
+LARGEST_FILE = 2**28  # bytes
+LARGEST_TRUSTED_FILE = 2**26  # bytes; of one whose size the manifest does not promise
+_LARGEST_MANIFEST = 2**24  # bytes
+
+CHECKOUT_CACHE = Path(__file__).resolve().parents[2] / "assets_cache"
+
+
+@dataclass(frozen=True)
+class PackageOrigin:
+    """Where the files of one package come from, and under what licence.
+
+    Attributes:
+        name: Package name, also its folder in the cache.
+        mani_skill: Its folder inside the mani_skill package.
+        hub_dataset: Hugging Face dataset that holds a copy.
+        hub_folder: Its folder inside the dataset.
+        wheel: Requirement whose wheel holds the files.
+        licence: Short name of the licence.
+        licence_note: What the licence asks for, in one sentence.
+    """
+
+    name: str
+    mani_skill: str
+    hub_dataset: str
+    hub_folder: str
+    wheel: str
+    licence: str
+    licence_note: str
+
+    def __post_init__(self) -> None:
+        """Refuse folders that are none, or that lead elsewhere."""
+        settle_fields(self, AssetError)
+        _expect_inside(self.mani_skill, f"{self.name}: mani_skill")
+        _expect_inside(self.hub_folder, f"{self.name}: hub_folder")
+        if not re.fullmatch(r"\w[\w-]{0,99}", self.name):
+            raise AssetError(
+                f"a package is called {self.name!r}; its name has letters, digits, _ -"
+            )
+        if not re.fullmatch(r"\w[\w.-]*/\w[\w.-]*", self.hub_dataset):
+            raise AssetError(f"{self.name}: hub_dataset is {self.hub_dataset!r}, not OWNER/NAME")
+        if not re.fullmatch(r"\w[\w.-]*==\w[\w.!+-]*", self.wheel):
+            raise AssetError(f"{self.name}: wheel is {self.wheel!r}, not NAME==VERSION")
+
+
+@dataclass(frozen=True)
+class AssetFile:
+    """One robot file, as the manifest promises it.
+
+    Attributes:
+        origin: The package it belongs to.
+        path: Path inside the package, with forward slashes.
+        bytes: Size (bytes).
+        sha256: SHA-256 of its contents, in hex.
+        physics: URDFs that cannot be simulated without it.
+        pictures: URDFs that cannot be drawn without it.
+    """
+
+    origin: PackageOrigin
+    path: str
+    bytes: int
+    sha256: str
+    physics: tuple[str, ...] = ()
+    pictures: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse a path that leads elsewhere, and sizes and hashes that are none."""
+        settle_fields(self, AssetError, str(self))
+        _expect_inside(self.path, f"a file of {self.origin.name}")
+        if not 0 <= self.bytes <= LARGEST_FILE:
+            raise AssetError(f"{self}: bytes is {self.bytes}; at most {LARGEST_FILE} are fetched")
+        if not re.fullmatch(r"[0-9a-f]{64}", self.sha256):
+            raise AssetError(f"{self}: sha256 is {self.sha256!r}, not 64 digits in lower-case hex")
+
+    def limit(self, *, trust: bool) -> int:
+        """Return the most bytes that are read of what a source gives for it.
+
+        Args:
+            trust: Whether it may differ from what the manifest promises.
+        """
+        return max(self.bytes, LARGEST_TRUSTED_FILE) if trust else self.bytes
+
+    def __str__(self) -> str:
+        """Return package and path."""
+        return f"{self.origin.name}/{self.path}"
+
+
+@dataclass(frozen=True)
+class AssetPackage:
+    """The files of one package, sorted by path.
+
+    Attributes:
+        origin: Where they come from.
+        files: The files.
+        undrawable: URDFs some of whose visual meshes nobody has; physics does not need them.
+    """
+
+    origin: PackageOrigin
+    files: tuple[AssetFile, ...]
+    undrawable: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse files that cannot be beside each other."""
+        settle_fields(self, AssetError)
+        paths = [file.path for file in self.files]
+        folders = {
+            path[:i] for path in paths for i, character in enumerate(path) if character == "/"
+        }
+        for path in paths:
+            if path in folders or paths.count(path) > 1:
+                raise AssetError(f"{self.origin.name}/{path} is there twice")
+
+    @property
+    def urdfs(self) -> tuple[str, ...]:
+        """Every URDF of the package, sorted."""
+        return tuple(sorted({urdf for file in self.files for urdf in file.physics}))
+
+    def needed(self, urdf: str, *, pictures: bool) -> tuple[AssetFile, ...]:
+        """Return the files that a URDF needs, itself included.
+
+        Args:
+            urdf: Path of the URDF inside the package.
+            pictures: Whether it will also be drawn; of one that is undrawable, physics is all
+                there is.
+
+        Raises:
+            UnknownNameError: If the package has no such URDF.
+        """
+        if urdf not in self.urdfs:
+            raise UnknownNameError(f"URDF of {self.origin.name}", urdf, self.urdfs)
+        return tuple(
+            file
+            for file in self.files
+            if urdf in file.physics or (pictures and urdf in file.pictures)
+        )
+
+    def file(self, path: str) -> AssetFile:
+        """Return one file.
+
+        Raises:
+            UnknownNameError: If the package has no such file.
+        """
+        for file in self.files:
+            if file.path == path:
+                return file
+        raise UnknownNameError(
+            f"file of {self.origin.name}", path, [file.path for file in self.files]
+        )
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """Every package of robot files, by name."""
+
+    packages: Mapping[str, AssetPackage]
+
+    def package(self, name: str) -> AssetPackage:
+        """Return one package.
+
+        Raises:
+            UnknownNameError: If the manifest has no such package.
+        """
+        if name not in self.packages:
+            raise UnknownNameError("package of robot files", name, sorted(self.packages))
+        return self.packages[name]
+
+    def to_json(self) -> str:
+        """Return the manifest as it is kept in the repository."""
+        packages = {name: _package_to_json(self.packages[name]) for name in sorted(self.packages)}
+        return json.dumps({"packages": packages}, indent=1) + "\n"
+
+    @classmethod
+    def from_json(cls, text: str) -> Manifest:
+        """Read what `to_json` wrote.
+
+        Raises:
+            AssetError: If it is no manifest; says which field is wrong, and what it would take.
+        """
+        try:
+            value = parse_json(text)
+        except ValueError as error:
+            raise AssetError(str(error)) from error
+        packages = settle(value, _ManifestJson, "manifest", AssetError)["packages"]
+        return cls({name: _package_from_json(name, data) for name, data in packages.items()})
+
+
+@lru_cache(maxsize=1)
+def load_manifest() -> Manifest:
+    """Return the manifest of this checkout, or of this installation.
+
+    Raises:
+        AssetError: If there is none, or it is damaged.
+    """
+    checkout = CHECKOUT_CACHE / "manifest.json"
+    installed = Path(str(resources.files("robots").joinpath("manifest.json")))
+    path = checkout if os.path.lexists(checkout) or not installed.exists() else installed
+    if not os.path.lexists(path):
+        raise AssetError(
+            f"no manifest of robot files: neither {checkout} nor {installed} exists; install"
+            " robot-layouts again"
+        )
+    try:
+        return Manifest.from_json(read_text(path, _LARGEST_MANIFEST))
+    except UnreadableFileError as error:
+        raise AssetError(f"{error}; install robot-layouts again") from error
+    except AssetError as error:
+        raise AssetError(
+            f"the manifest of robot files {path} is damaged: {error}; install robot-layouts again"
+        ) from error
+
+
+class _FileJson(TypedDict):
+    bytes: int
+    sha256: str
+    physics: tuple[str, ...]
+    pictures: tuple[str, ...]
+
+
+class _OriginJson(TypedDict):
+    mani_skill: str
+    hub_dataset: str
+    hub_folder: str
+    wheel: str
+    licence: str
+    licence_note: str
+    files: Mapping[str, _FileJson]
+
+
+class _PackageJson(_OriginJson, total=False):
+    undrawable: tuple[str, ...]
+
+
+class _ManifestJson(TypedDict):
+    packages: Mapping[str, _PackageJson]
+
+
+def _package_to_json(package: AssetPackage) -> dict[str, Any]:
+    origin = {key: value for key, value in vars(package.origin).items() if key != "name"}
+    files = {
+        file.path: {
+            "bytes": file.bytes,
+            "sha256": file.sha256,
+            "physics": list(file.physics),
+            "pictures": list(file.pictures),
+        }
+        for file in sorted(package.files, key=lambda file: file.path)
+    }
+    undrawable = {"undrawable": list(package.undrawable)} if package.undrawable else {}
+    return {**origin, **undrawable, "files": files}
+
+
+def _package_from_json(name: str, data: _PackageJson) -> AssetPackage:
+    about: dict[str, Any] = {**data}
+    files, undrawable = about.pop("files"), about.pop("undrawable", ())
+    origin = PackageOrigin(name, **about)
+    return AssetPackage(
+        origin,
+        tuple(AssetFile(origin, path, **entry) for path, entry in sorted(files.items())),
+        undrawable,
+    )
+
+
+def _expect_inside(path: str, what: str) -> None:
+    """Refuse a path that is not one of plain names with forward slashes."""
+    parts = path.split("/")
+    too_long = any(len(part.encode()) > 255 for part in parts)
+    plain = all(parts) and not {".", ".."} & set(parts) and "\\" not in path and path.isprintable()
+    if too_long or not plain:
+        raise AssetError(f"{what} is {path!r}; it must be a path inside its folder, like a/b.stl")

@@ -1,0 +1,234 @@
+"""The local copy of the robot files: where it is, what in it can be used, how files get in."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Generator, Iterable
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+from robots.assets.fetched import FetchRecord
+from robots.assets.manifest import CHECKOUT_CACHE, AssetFile
+from robots.common.errors import AssetError, UnreadableFileError
+from robots.common.files import open_regular
+from robots.common.paths import absolute
+
+ROOT_VARIABLE = "ROBOT_LAYOUTS_ASSETS"
+_LOCK, _PARTIAL, _RECORD = ".lock", ".partial", "fetched.json"
+_ABSENT = (errno.ENOENT, errno.ENOTDIR)
+_EXCHANGEABLE = (errno.EINVAL, errno.EFBIG, errno.ELOOP)  # no regular file, too large, a loop
+_WAIT_BEFORE_SAYING = 2.0  # s
+
+# sha256 of files hashed by this process, with what tells that a file has changed since.
+_hashed: dict[Path, tuple[tuple[int, ...], str]] = {}
+
+
+def default_root() -> Path:
+    """Return the folder of the local copy.
+
+    ``ROBOT_LAYOUTS_ASSETS`` if it is set, else ``assets_cache/`` of a source checkout, else the
+    user's cache directory.
+
+    Raises:
+        AssetError: If it is in the home directory of a user that does not exist.
+    """
+    chosen = os.environ.get(ROOT_VARIABLE)
+    if chosen:
+        return absolute(chosen, ROOT_VARIABLE)
+    if (CHECKOUT_CACHE / "manifest.json").is_file():
+        return CHECKOUT_CACHE
+    from platformdirs import user_cache_path
+
+    return user_cache_path("robot-layouts", appauthor=False)
+
+
+class FileState(Enum):
+    """What the local copy of a file is worth."""
+
+    VERIFIED = "verified"
+    TRUSTED = "differs from the manifest, trusted"
+    WRONG = "differs from the manifest"
+    MISSING = "missing"
+
+    @property
+    def usable(self) -> bool:
+        """Whether the file may be used."""
+        return self in (FileState.VERIFIED, FileState.TRUSTED)
+
+
+@dataclass(frozen=True)
+class AssetStore:
+    """A folder of robot files, ``<root>/<package>/<path>``, that are checked before use."""
+
+    root: Path
+
+    def path(self, file: AssetFile) -> Path:
+        """Return where a file is or would be."""
+        return self.root / file.origin.name / file.path
+
+    def state(self, file: AssetFile) -> FileState:
+        """Tell whether a file is there and right; hashes it once per process and change.
+
+        Raises:
+            AssetError: If it is there but cannot be read.
+        """
+        try:
+            digest = _sha256(self.path(file), file.limit(trust=True))
+        except UnreadableFileError as error:
+            if error.errno in _ABSENT:
+                return FileState.MISSING
+            if error.errno in _EXCHANGEABLE:
+                return FileState.WRONG
+            raise AssetError(str(error)) from error
+        if digest == file.sha256:
+            return FileState.VERIFIED
+        entry = self.record().files.get(str(file))
+        trusted = entry is not None and entry["trusted"] and entry["sha256"] == digest
+        return FileState.TRUSTED if trusted else FileState.WRONG
+
+    def unusable(self, files: Iterable[AssetFile]) -> list[AssetFile]:
+        """Return the files that are missing or wrong."""
+        return [file for file in files if not self.state(file).usable]
+
+    def record(self) -> FetchRecord:
+        """Return what was fetched: source, sha256 and trust of each file."""
+        return FetchRecord.read(self.root / _RECORD)
+
+    @contextmanager
+    def fetching(self, say: Callable[[str], None]) -> Generator[Path]:
+        """Hold the only right to write here, and give a scratch folder on the same file system.
+
+        What a killed fetch left in the scratch folder is removed. A second process waits.
+
+        Args:
+            say: Told once when another process holds the right for more than two seconds.
+
+        Raises:
+            AssetError: If the folder cannot be written.
+        """
+        with _destination_errors(self.root):
+            self.root.mkdir(parents=True, exist_ok=True)
+            # Opened such that not even a FIFO is waited for.
+            lock = os.open(self.root / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        try:
+            partial = self.root / _PARTIAL
+            with _destination_errors(self.root):
+                alone = _wait_for_lock(lock, self.root, say)
+                if alone:
+                    _remove(partial)
+                partial.mkdir(exist_ok=True)
+                scratch = Path(tempfile.mkdtemp(dir=partial))
+            try:
+                yield scratch
+            finally:
+                shutil.rmtree(scratch, ignore_errors=True)
+                with suppress(OSError):  # not empty: left by another, or in use by it
+                    partial.rmdir()
+        finally:
+            os.close(lock)
+
+    def install(
+        self, file: AssetFile, data: bytes, *, scratch: Path, source: str, trust: bool = False
+    ) -> bool:
+        """Put a file in its place, whole or not at all; only inside `fetching`.
+
+        Args:
+            file: What the manifest promises.
+            data: What the source gave.
+            scratch: The folder that `fetching` gave.
+            source: Name of the source, for the record.
+            trust: Whether to accept contents that differ from the manifest, and mark them.
+
+        Returns:
+            Whether the file was accepted.
+
+        Raises:
+            AssetError: If it cannot be written.
+        """
+        digest = hashlib.sha256(data).hexdigest()
+        matches = digest == file.sha256
+        if not (matches or trust):
+            return False
+        record = self.record()
+        record.files[str(file)] = {"source": source, "sha256": digest, "trusted": not matches}
+        with _destination_errors(self.root):
+            # The record goes first: a file is trusted only if the record names its sha256.
+            record.set_aside()
+            _write(self.root / _RECORD, record.to_json().encode(), scratch)
+            _write(self.path(file), data, scratch)
+        return True
+
+
+def _sha256(path: Path, limit: int) -> str:
+    with open_regular(path) as stream:
+        status = os.fstat(stream.fileno())
+        stamp = (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
+        known = _hashed.get(path)
+        if known is not None and known[0] == stamp:
+            return known[1]
+        if status.st_size > limit:
+            raise UnreadableFileError(path, f"it has more than {limit:,} bytes", errno.EFBIG)
+        digest = hashlib.sha256(stream.read(limit)).hexdigest()
+    _hashed[path] = (stamp, digest)
+    return digest
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _write(path: Path, data: bytes, scratch: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = scratch / "file"
+    with partial.open("wb") as stream:
+        stream.write(data)
+        stream.flush()
+        os.fsync(stream.fileno())
+    os.replace(partial, path)
+
+
+@contextmanager
+def _destination_errors(root: Path) -> Generator[None]:
+    try:
+        yield
+    except OSError as error:
+        place = error.filename2 or error.filename
+        where = f" ({place})" if isinstance(place, (str, Path)) and str(place) != str(root) else ""
+        reason = error.strerror or str(error)
+        if error.errno == errno.EEXIST:
+            reason = "something that is no folder is in its place"
+        raise AssetError(
+            f"cannot write robot files to {root}: {reason}{where}. Make room or"
+            f" give write permission there, or choose another folder with --dest or"
+            f" {ROOT_VARIABLE}."
+        ) from error
+
+
+def _wait_for_lock(descriptor: int, root: Path, say: Callable[[str], None]) -> bool:
+    if sys.platform == "win32":
+        return False  # files are replaced atomically, so two fetches only do the work twice
+    import fcntl
+
+    start = time.monotonic()
+    said = False
+    while True:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if not said and time.monotonic() - start > _WAIT_BEFORE_SAYING:
+                say(f"another process is fetching robot files into {root}; waiting for it")
+                said = True
+            time.sleep(0.05)
+        else:
+            return True

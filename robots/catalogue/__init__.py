@@ -1,0 +1,1 @@
+"""The robots that come with this library: one small module of data each."""

@@ -1,0 +1,59 @@
+"""Fetch, a mobile manipulator that stands still: 7 + 1 numbers, and 3 for its head and torso."""
+
+from dataclasses import replace
+from math import pi
+
+from robots.assets.locator import UrdfLocator
+from robots.catalogue import panda
+from robots.descriptor import ActionSplit, CameraMount, Fingers, GripperMaterial, Home, JointGroup
+
+FINGERS = ("l_gripper_finger_link", "r_gripper_finger_link")
+OPEN = (0.015, 0.015)
+TURNS = (-2 * pi, 2 * pi)  # of joints that turn without end
+# fmt: off
+ARM = replace(
+    panda.ARM,  # the same drives and steps
+    joints=("shoulder_pan_joint", "shoulder_lift_joint", "upperarm_roll_joint", "elbow_flex_joint",
+            "forearm_roll_joint", "wrist_flex_joint", "wrist_roll_joint"),
+    limits=((-1.6056, 1.6056), (-1.221, 1.518), TURNS, (-2.251, 2.251), TURNS, (-2.16, 2.16),
+            TURNS),
+    reset_noise=False,
+)
+# fmt: on
+GRIPPER = replace(
+    panda.PANDA.action_split.groups["gripper"],
+    joints=("l_gripper_finger_joint", "r_gripper_finger_joint"),
+    upper=0.05,
+)
+HEAD = ("head_pan_joint", "head_tilt_joint")
+# ManiSkill drives the base by its speed; here it brakes, with the same damping and force.
+BASE = JointGroup.hold(("root_z_rotation_joint",), stiffness=0.0, damping=1e3, force_limit=500.0)
+SLIDES = ("root_x_axis_joint", "root_y_axis_joint")
+
+FETCH = replace(
+    panda.PANDA,
+    name="fetch",
+    urdf=UrdfLocator("maniskill_fetch", "fetch.urdf"),
+    action_split=ActionSplit(
+        arm=ARM,
+        gripper=GRIPPER,
+        head=replace(ARM, joints=HEAD, limits=((-1.57, 1.57), (-0.76, 1.45))),
+        torso=replace(ARM, joints=("torso_lift_joint",), unit="m", limits=((0.0, 0.38615),)),
+        base_slide=replace(BASE, joints=SLIDES, unit="m"),
+        base_turn=BASE,
+    ),
+    tcp_link="gripper_link",
+    gripper_material=GripperMaterial(FINGERS, 2.0, 2.0, 0.0, patch_radius=0.1),
+    fingers=Fingers(FINGERS, opening_signs=(-1, 1)),
+    cameras=(
+        CameraMount("fetch_head", link="head_camera_link", fov=2.0),
+        CameraMount("fetch_hand", link="gripper_link", position=(-0.1, 0.0, 0.1), fov=2.0),
+    ),
+    keyframes={  # arm, fingers, head, torso, base
+        "rest": (-0.37, -1.032, 0.695, 0.955, -0.1, 2.077, 0, *OPEN, 0, 0.562, 0.386, 0, 0, 0),
+        "tabletop": (0, -pi / 4, 0, pi / 4, 0, pi / 3, 0, *OPEN, 0, 0, 0.386, 0, 0, 0),
+    },
+    home=Home(position=(-1.05, 0.0, -0.9196429), keyframe="tabletop"),  # on the floor
+    reach=1.13,  # of the TCP, from the URDF
+    source="mani_skill 3.0.1, agents/robots/fetch/fetch.py and scene_builder/table",
+)

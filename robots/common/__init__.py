@@ -1,0 +1,1 @@
+"""What every room uses: errors, checks of what users pass, files, commands, child processes."""

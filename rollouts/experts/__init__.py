@@ -1,5 +1,0 @@
-"""Scripted experts: for a task and a seed, the actions that solve it."""
-
-from rollouts.experts.registry import Expert, find_expert, list_experts, register_expert
-
-__all__ = ["Expert", "find_expert", "list_experts", "register_expert"]

@@ -1,0 +1,1 @@
+"""Plays episodes: in this process, in workers, or on a Ray cluster."""

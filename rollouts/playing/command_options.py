@@ -1,0 +1,102 @@
+"""What commands that play many episodes have in common: who plays, and how they are stopped."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+from collections.abc import Generator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, NoReturn
+
+from robots import TaskError
+from rollouts.playing.dispatch import EPISODE_SECONDS, check_timeout
+
+if TYPE_CHECKING:
+    from rollouts.playing.executor import Executor
+
+INTERRUPTED = 130  # exit code, as shells have it
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments that say who plays."""
+    add = parser.add_argument
+    add(
+        "--workers",
+        type=zero_or_more,
+        metavar="W",
+        help="how many processes (1; with --ray, one for each CPU of the cluster); 0: this one",
+    )
+    add(
+        "--episode-timeout",
+        type=_timeout,
+        default=EPISODE_SECONDS,
+        metavar="SECONDS",
+        help="end a worker whose episode takes longer, and play that again; none: never (600)",
+    )
+    add(
+        "--ray",
+        metavar="ADDRESS",
+        help='play on a Ray cluster that this machine has joined: "HOST:PORT" or "auto"',
+    )
+
+
+def chosen_executor(options: argparse.Namespace) -> Executor:
+    """Return who plays.
+
+    Raises:
+        MissingPackageError: If Ray is asked for and not installed.
+        RobotLayoutsError: If the options contradict each other.
+    """
+    if options.ray is not None:
+        from rollouts.playing.ray_executor import RayExecutor
+
+        timeout = options.episode_timeout
+        return RayExecutor(options.ray, options.workers, episode_timeout=timeout)
+    from rollouts.playing.executor import choose_executor
+
+    workers = 1 if options.workers is None else options.workers
+    return choose_executor(workers, episode_timeout=options.episode_timeout)
+
+
+@contextmanager
+def stop_signals() -> Generator[None]:
+    """Let a request to end, as schedulers send it, stop like Ctrl-C."""
+
+    def stop(*_: object) -> NoReturn:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def one_or_more(text: str) -> int:
+    """Read a number for argparse."""
+    return _at_least(1, text)
+
+
+def zero_or_more(text: str) -> int:
+    """Read a number for argparse."""
+    return _at_least(0, text)
+
+
+def _timeout(text: str) -> float | None:
+    try:
+        seconds = None if text == "none" else float(text)
+        check_timeout(seconds)
+    except (ValueError, TaskError):
+        words = f"{text} is no limit; it must be seconds, more than 0, or none"
+        raise argparse.ArgumentTypeError(words) from None
+    return seconds
+
+
+def _at_least(least: int, text: str) -> int:
+    try:
+        number = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no whole number") from None
+    if number < least:
+        raise argparse.ArgumentTypeError(f"{number} is too few; it must be {least} or more")
+    return number

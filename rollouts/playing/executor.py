@@ -1,0 +1,145 @@
+"""Who plays whole episodes: worker processes that may die, or this process."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import closing
+from typing import Protocol
+
+from robots import TaskError
+from rollouts.playing.dispatch import DEATHS_ALLOWED, EPISODE_SECONDS, Rules, Shift, check_count
+from rollouts.playing.events import Event, Play, WorkerError, WorkersDied
+from rollouts.playing.local_workers import LocalProcesses, report
+from rollouts.playing.transport import modules_of
+
+__all__ = [
+    "DEATHS_ALLOWED",
+    "EPISODE_SECONDS",
+    "Event",
+    "Executor",
+    "Play",
+    "ProcessExecutor",
+    "WorkerError",
+    "WorkersDied",
+    "choose_executor",
+    "modules_of",
+    "play_all",
+    "report",
+]
+
+
+class Executor(Protocol):
+    """Something that plays whole episodes somewhere: in processes, or on other machines.
+
+    Episodes must depend on nothing but their seed and what ``prepare`` holds.
+    """
+
+    def run(self, prepare: Callable[[], Play], seeds: Iterable[int]) -> Generator[Event]:
+        """Play the episode of every seed, in any order.
+
+        Args:
+            prepare: Called once in every worker; makes what plays there. It can be pickled. If it
+                has ``modules``, other machines may need these.
+            seeds: Which episodes.
+
+        Yields:
+            One event with a result or an error for every seed, as they end, one for every worker
+            that died, and what is said meanwhile.
+
+        Raises:
+            WorkerError: If no worker can be had.
+            RobotLayoutsError: What ``prepare`` raised.
+        """
+        ...
+
+
+class ProcessExecutor:
+    """Spawned processes of this machine; none is left when `run` ends, whatever ends it."""
+
+    def __init__(
+        self,
+        workers: int | None = 1,
+        *,
+        attempts: int = DEATHS_ALLOWED,
+        fresh: bool = False,
+        episode_timeout: float | None = EPISODE_SECONDS,
+    ) -> None:
+        """Choose how many processes play.
+
+        Args:
+            workers: How many at a time; None: one for each core that this process may use.
+            attempts: How many workers may die of one episode before it is given up.
+            fresh: Whether every episode gets a process of its own.
+            episode_timeout: Seconds that an episode may take, or from one `report` to the next,
+                until its worker is ended, which counts as a death; None if it may take for ever.
+
+        Raises:
+            TaskError: If a number makes no sense.
+        """
+        if workers is not None:
+            check_count("workers", workers, 1)
+        self.workers = len(os.sched_getaffinity(0)) if workers is None else workers
+        self._rules = Rules(attempts, fresh, episode_timeout)
+
+    def run(self, prepare: Callable[[], Play], seeds: Iterable[int]) -> Generator[Event]:
+        """Play the episode of every seed; see `Executor`."""
+        return Shift(LocalProcesses(prepare), seeds, self.workers, self._rules).events()
+
+
+def choose_executor(
+    workers: int | None = None,
+    executor: Executor | None = None,
+    episode_timeout: float | None = EPISODE_SECONDS,
+) -> Executor:
+    """Return who plays.
+
+    Args:
+        workers: How many processes; 0: none, but this one; None: one for each core.
+        executor: Who plays instead, as it was made.
+        episode_timeout: See `ProcessExecutor`.
+
+    Raises:
+        TaskError: If a number makes no sense, or contradicts the executor.
+    """
+    if workers is not None:
+        check_count("workers", workers, 0)
+    limited = episode_timeout != EPISODE_SECONDS
+    if executor is not None:
+        if workers is not None or limited:
+            raise TaskError(
+                "an executor knows its own workers and episode_timeout; pass them where you make it"
+            )
+        return executor
+    if workers == 0:
+        if limited and episode_timeout is not None:
+            raise TaskError(
+                f"episode_timeout is {episode_timeout!r}, but with workers=0 this process plays,"
+                " and nobody could end it; take workers=1"
+            )
+        from rollouts.playing.in_process import InProcessExecutor  # needs torch
+
+        return InProcessExecutor()
+    return ProcessExecutor(workers, episode_timeout=episode_timeout)
+
+
+def play_all(
+    executor: Executor, prepare: Callable[[], Play], seeds: Sequence[int]
+) -> Generator[Event]:
+    """Play the episode of every seed; see `Executor`.
+
+    Raises:
+        WorkerError: If the executor ends without a result or an error for each, besides what it
+            raises itself.
+    """
+    left: set[int | None] = set(seeds)
+    with closing(executor.run(prepare, seeds)) as events:
+        for event in events:
+            if event.result is not None or event.error is not None:
+                left.discard(event.seed)
+            yield event
+    if left:
+        raise WorkerError(
+            f"{type(executor).__name__} ended before {len(left)} of {len(seeds)} episodes were"
+            " played"
+        )

@@ -1,0 +1,77 @@
+"""Experts' plans in any control mode: what the arms were told, as joint positions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experts.registry import Expert
+from robots import CONTROL_MODES, TaskError
+from tasks import MultiRobotTask
+from tasks.episode import REBUILT
+
+DELTAS = CONTROL_MODES[0]  # which all experts speak
+
+
+class Planner:
+    """What an expert does in the episodes of a task, in the task's control mode."""
+
+    def __init__(self, task: MultiRobotTask, expert: Expert) -> None:
+        """Make a task in deltas for the expert to plan for, if this one is in another mode."""
+        self._task, self._expert = task, expert
+        self._converts = task.made_from.control_mode != DELTAS
+        if self._converts:
+            self._task = type(task)(replace(task.made_from, control_mode=DELTAS))
+
+    def __call__(self, seed: int) -> NDArray[np.float32]:
+        """Return the actions (T, A) of the episode that ``seed`` begins."""
+        actions = self._expert(self._task, seed)
+        return as_positions(self._task, seed, actions) if self._converts else actions
+
+    def close(self) -> None:
+        """Let the worlds of its own task go, if it made one."""
+        if self._converts:
+            self._task.close()
+
+
+def as_positions(
+    task: MultiRobotTask, seed: int, actions: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Return the actions in ``pd_joint_pos`` that move everything as these do, to the last bit.
+
+    The episode is played once, and what the drives were told is written down.
+
+    Args:
+        task: A task with one environment in ``pd_joint_delta_pos``.
+        seed: The episode.
+        actions: Shape (T, A).
+
+    Returns:
+        Shape (T, A): joint positions for every group that was relative (rad, m), the other
+        numbers as they are.
+
+    Raises:
+        TaskError: If the task is in another control mode.
+    """
+    if task.made_from.control_mode != DELTAS:
+        raise TaskError(
+            f"actions of {DELTAS} are converted; the task has {task.made_from.control_mode}"
+        )
+    positions = np.array(actions, np.float32)
+    task.reset(seed, options=REBUILT)
+    for row in positions:
+        task.step(row[None])
+        for robot, part in task.action_split.items():
+            _write_targets(task, robot, row[part])
+    return positions
+
+
+def _write_targets(task: MultiRobotTask, robot: str, numbers: NDArray[np.float32]) -> None:
+    driven = iter(task.simulation.worlds[0].robots[robot].driven)
+    split = task.layout[robot].robot.action_split
+    for name, group in split.groups.items():
+        targets = [float(next(driven).drive_target[0]) for _ in group.joints]
+        if group.delta:
+            numbers[split[name]] = targets[: group.size]

@@ -1,0 +1,1 @@
+"""Reads recorded episodes, from files that may be damaged or hostile."""

@@ -1,0 +1,197 @@
+"""The json beside an h5 file of episodes, as ManiSkill writes it and as we do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from robots import CONTROL_MODES, RobotLayoutsError, UnreadableFileError
+from robots.common.files import read_json
+from rollouts.reading.json_fields import (
+    FLAG,
+    NAME,
+    NUMBER,
+    OBJECT,
+    TEXT,
+    FieldError,
+    by_name,
+    either,
+    fields,
+    items,
+    maybe,
+    whole,
+)
+
+MAX_JSON = 2**28  # bytes; some 600,000 episodes
+MAX_STEPS = 10**6  # of an episode; fourteen hours at 20 Hz
+MAX_SEED = 2**32 - 1  # of NumPy's generators
+
+_SEED = whole(0, MAX_SEED)
+_STEPS = whole(1, MAX_STEPS)
+_MODE = either(NAME, by_name(NAME))
+
+_SEEDS = maybe(either(_SEED, items(_SEED)))
+
+_EPISODE = {
+    "episode_seed": _SEEDS,
+    "control_mode": maybe(_MODE),
+    "elapsed_steps": maybe(_STEPS),
+    "reset_kwargs": maybe(fields({}, {"seed": _SEEDS, "options": maybe(OBJECT)})),
+    "success": maybe(either(FLAG, NUMBER)),
+}
+# An episode's own note in a recording of this library, which becomes its entry in the json.
+OWN_EPISODE = fields({**_EPISODE, "episode_seed": _SEED, "elapsed_steps": _STEPS})
+_SUMMARY = fields(
+    {
+        "env_info": fields(
+            {"env_id": NAME},
+            {
+                "env_kwargs": maybe(
+                    fields({}, {"control_mode": maybe(_MODE), "sim_backend": maybe(NAME)})
+                ),
+                "max_episode_steps": maybe(_STEPS),
+            },
+        ),
+        "episodes": items(fields({"episode_id": whole(0, 2**31 - 1)}, _EPISODE)),
+    },
+    {"source_type": maybe(TEXT), "source_desc": maybe(TEXT)},
+)
+
+
+class TrajectoryError(RobotLayoutsError, ValueError):
+    """A file of recorded episodes that cannot be read, or is for something else."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What the json says about an episode.
+
+    Attributes:
+        episode_id: Its number in the file.
+        seed: Seed of its reset; None if there is none, or several.
+        episode_seed: The same as the recording's own note of it, which may be absent.
+        steps: Its control steps, or None.
+        rebuilt: Whether its reset rebuilt the world.
+    """
+
+    episode_id: int
+    seed: int | None
+    episode_seed: int | None
+    steps: int | None
+    rebuilt: bool
+
+    @property
+    def group(self) -> str:
+        """The name of its group in the h5 file."""
+        return f"traj_{self.episode_id}"
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What the json says about a recording.
+
+    Attributes:
+        task_id: Id of the task that was recorded.
+        env_kwargs: What native's environment was made with.
+        control_mode: Control mode of every episode.
+        max_episode_steps: Control steps until an episode was truncated, or None.
+        source_type: Where the actions come from, in ManiSkill's words, or None.
+        episodes: Its episodes, in order.
+    """
+
+    task_id: str
+    env_kwargs: dict[str, Any]
+    control_mode: str
+    max_episode_steps: int | None
+    source_type: str | None
+    episodes: tuple[Entry, ...]
+
+
+def read_summary(path: Path) -> Summary:
+    """Return what the json beside an h5 file says.
+
+    Raises:
+        TrajectoryError: If it cannot be read, is of another kind, or names no control mode in
+            which all episodes can be played.
+    """
+    found = _read(path)
+    info, episodes = found["env_info"], found["episodes"]
+    env_kwargs = info.get("env_kwargs") or {}
+    return Summary(
+        task_id=info["env_id"],
+        env_kwargs=env_kwargs,
+        control_mode=_common_mode(path, episodes, env_kwargs.get("control_mode")),
+        max_episode_steps=info.get("max_episode_steps"),
+        source_type=found.get("source_type"),
+        episodes=tuple(_entry(episode) for episode in episodes),
+    )
+
+
+def recorded_task(path: Path) -> str:
+    """Return the id of the task that a file was recorded in, from the json beside it.
+
+    Raises:
+        TrajectoryError: If the json cannot be read.
+    """
+    return _read(path)["env_info"]["env_id"]
+
+
+def _read(path: Path) -> dict[str, Any]:
+    beside = path.with_suffix(".json")
+    try:
+        found = read_json(beside, MAX_JSON)
+    except UnreadableFileError as error:
+        if error.errno is None:
+            raise TrajectoryError(
+                f"{beside} is not a demonstration's json: {error.strerror}"
+            ) from error
+        raise TrajectoryError(
+            f"cannot read {beside}, which belongs beside {path.name}: {error.strerror}"
+        ) from error
+    try:
+        _SUMMARY.expect(found, "")
+    except FieldError as error:
+        raise TrajectoryError(f"{beside} is not a demonstration's json: {error}") from error
+    listed = [episode["episode_id"] for episode in found["episodes"]]
+    if len(set(listed)) != len(listed):
+        raise TrajectoryError(f"{beside} lists an episode twice")
+    return found
+
+
+def _entry(episode: Mapping[str, Any]) -> Entry:
+    reset: Mapping[str, Any] = episode.get("reset_kwargs") or {}
+    options: Mapping[str, Any] = reset.get("options") or {}
+    return Entry(
+        episode_id=episode["episode_id"],
+        seed=_only(reset.get("seed")),
+        episode_seed=_only(episode.get("episode_seed")),
+        steps=episode.get("elapsed_steps"),
+        rebuilt=bool(options.get("reconfigure")),
+    )
+
+
+def _only(seed: int | list[int] | None) -> int | None:
+    """Return a seed, which native writes as a list where environments are vectors."""
+    if isinstance(seed, list):
+        return seed[0] if len(seed) == 1 else None
+    return seed
+
+
+def _common_mode(path: Path, episodes: list[Mapping[str, Any]], default: Any) -> str:
+    named = {mode for episode in episodes for mode in _modes(episode.get("control_mode", default))}
+    modes = sorted(named or _modes(default))
+    if len(modes) == 1 and modes[0] in CONTROL_MODES:
+        return modes[0]
+    listing = " and ".join(modes[:4]) or "no control mode that it names"
+    raise TrajectoryError(
+        f"{path} was recorded in {listing}; an episode can be played in one of"
+        f" {', '.join(CONTROL_MODES)}"
+    )
+
+
+def _modes(mode: str | Mapping[str, str] | None) -> set[str]:
+    if mode is None:
+        return set()
+    return {mode} if isinstance(mode, str) else set(mode.values())

@@ -1,0 +1,331 @@
+"""Reads recorded episodes: ManiSkill's trajectory format, h5 with a json beside it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NoReturn, TypeVar, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots import UnreadableFileError, closest_match
+from robots.common.files import open_regular
+from rollouts.reading.damage import damage_errors
+from rollouts.reading.hdf5_file import Hdf5File, Shapes
+from rollouts.reading.summary import MAX_STEPS, OWN_EPISODE, Entry, TrajectoryError, read_summary
+from rollouts.recording.episode_files import ARRAYS, CHECKSUM, STATES, TEXTS, checksum
+from rollouts.recording.provenance import (
+    LAYOUT,
+    SIMULATION,
+    action_split,
+    describe_layout,
+    describe_simulation,
+    differences,
+    listing,
+    read_described,
+)
+from tasks import MultiRobotTask
+from tasks.episode import States
+
+__all__ = ["Trajectory", "TrajectoryError", "TrajectoryFile", "expect_file"]
+
+_FLAGS = ("success", "terminated", "truncated")
+_COLUMNS = ("rewards", *_FLAGS)
+
+Number = TypeVar("Number", np.float32, np.bool_)
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """One recorded episode of T steps.
+
+    Attributes:
+        episode_id: Its number in the file.
+        seed: Seed of its reset; None if the file names none, or several.
+        control_mode: ``"pd_joint_delta_pos"`` or ``"pd_joint_pos"``.
+        actions: Flat actions, (T, A).
+        states: State dict of `MultiRobotTask.get_state_dict`, each entry (T + 1, k), the first
+            row being the state after the reset; None if the file holds none.
+        rewards: Shape (T,), or None if the file holds none.
+        success: Shape (T,), or None.
+        terminated: Shape (T,), or None.
+        truncated: Shape (T,), or None.
+        rebuilt: Whether its reset rebuilt the world, so that its states can be had again to the
+            last bit; where worlds are reused, they also depend on the episodes before.
+    """
+
+    episode_id: int
+    seed: int | None
+    control_mode: str
+    actions: NDArray[np.float32]
+    states: States | None = None
+    rewards: NDArray[np.float32] | None = None
+    success: NDArray[np.bool_] | None = None
+    terminated: NDArray[np.bool_] | None = None
+    truncated: NDArray[np.bool_] | None = None
+    rebuilt: bool = False
+
+    @property
+    def solved(self) -> bool | None:
+        """Whether the last step ended in success; None if the file does not say."""
+        return None if self.success is None else bool(self.success[-1])
+
+
+class TrajectoryFile(Sequence[Trajectory]):
+    """A file of recorded episodes, ours or native's; each is read when it is asked for.
+
+    Attributes:
+        path: The h5 file.
+        task_id: Id of the task that was recorded.
+        control_mode: Control mode of every episode.
+        max_episode_steps: Control steps until an episode was truncated, or None.
+        env_kwargs: What native's environment was made with.
+        source_type: Where the actions come from, in ManiSkill's words, or None.
+        layout: What `rollouts.recording.provenance.describe_layout` wrote; None in native's files.
+        simulation: What `rollouts.recording.provenance.describe_simulation` wrote; None in native's
+            files.
+        action_split: Robot name → slice of the flat action; None in native's files.
+        seeds: Reset seed of each episode, or None.
+    """
+
+    def __init__(self, path: str | PathLike[str]) -> None:
+        """Open a file; nothing of its episodes is read yet.
+
+        Args:
+            path: The h5 file; its json must lie beside it.
+
+        Raises:
+            TrajectoryError: If there is no such file, it or its json is of another kind or
+                damaged, or its control mode is unknown.
+        """
+        self.path = Path(path)
+        expect_file(self.path, (".h5",))
+        summary = read_summary(self.path)
+        self.task_id, self.env_kwargs = summary.task_id, summary.env_kwargs
+        self.control_mode = summary.control_mode
+        self.max_episode_steps, self.source_type = summary.max_episode_steps, summary.source_type
+        self._entries = summary.episodes
+        self.seeds = tuple(entry.seed for entry in self._entries)
+        with self._damage("this h5 file"):
+            self._file = Hdf5File(self.path)
+            described = self._file.texts(names=("layout", "simulation")) or {}
+            self.layout = read_described(described, "layout", LAYOUT)
+            self.simulation = read_described(described, "simulation", SIMULATION)
+            self.action_split = action_split(self.layout) if self.layout else None
+
+    def __enter__(self) -> TrajectoryFile:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Close the file."""
+        self.close()
+
+    def close(self) -> None:
+        """Close the file; closing twice is allowed."""
+        self._file.close()
+
+    def __len__(self) -> int:
+        """Return the number of episodes."""
+        return len(self._entries)
+
+    @overload
+    def __getitem__(self, index: int) -> Trajectory: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[Trajectory]: ...
+
+    def __getitem__(self, index: int | slice) -> Trajectory | list[Trajectory]:
+        """Read an episode, or several.
+
+        Raises:
+            IndexError: If there is no such episode.
+            TrajectoryError: If it is damaged or cannot be played.
+        """
+        if isinstance(index, slice):
+            return [self._read(entry) for entry in self._entries[index]]
+        return self._read(self._entries[index])
+
+    def expect(self, task_id: str, action_dim: int) -> None:
+        """Refuse a file of another task, or of robots that take other actions.
+
+        Args:
+            task_id: The task the episodes must be for.
+            action_dim: Numbers of one action A.
+
+        Raises:
+            TrajectoryError: If something differs, or there are no episodes.
+        """
+        if self.task_id != task_id:
+            raise TrajectoryError(f"{self.path} was recorded in {self.task_id}, not in {task_id}")
+        if not self._entries:
+            raise TrajectoryError(f"{self.path} holds no episodes")
+        for entry in self._entries:
+            self._texts(entry)
+            shape = self._action_shape(entry, self._shapes(entry, ("actions",)))
+            if shape[1] != action_dim:
+                self._refuse(
+                    entry,
+                    f"its actions have shape {shape}, not (T, {action_dim}): the robots are others",
+                )
+
+    def expect_world(self, task: MultiRobotTask) -> None:
+        """Refuse a task with another layout, robot files or physics than the recording had.
+
+        Native's files do not say what they had; they pass.
+
+        Raises:
+            TrajectoryError: If something differs; names every difference, or the first few.
+        """
+        here = {"layout": describe_layout(task.layout), "simulation": describe_simulation(task)}
+        recorded = {"layout": self.layout, "simulation": self.simulation}
+        found = [
+            difference
+            for name, about in recorded.items()
+            if about is not None
+            for difference in differences(about, here[name])
+        ]
+        if found:
+            raise TrajectoryError(
+                f"{self.path} was recorded in another world than this {task.task_id}:"
+                f" {listing(found)}"
+            )
+
+    def _read(self, entry: Entry) -> Trajectory:
+        texts = self._texts(entry)
+        self._expect_shapes(entry, self._shapes(entry, ARRAYS))
+        with self._damage(entry.group):
+            arrays = self._file.numbers(entry.group, ARRAYS)
+        self._expect_numbers(entry, arrays)
+        if texts.get(CHECKSUM) not in (None, checksum(texts, arrays)):
+            self._refuse(
+                entry,
+                "it is damaged, or was changed after it was recorded: its checksum is another"
+                f" (after a change on purpose, delete its attribute {CHECKSUM!r})",
+            )
+        return Trajectory(
+            episode_id=entry.episode_id,
+            seed=entry.seed,
+            control_mode=self.control_mode,
+            actions=arrays["actions"].astype(np.float32),
+            states=_states(arrays),
+            rewards=_column(arrays, "rewards", np.float32),
+            **{flag: _column(arrays, flag, np.bool_) for flag in _FLAGS},
+            rebuilt=entry.rebuilt,
+        )
+
+    def _texts(self, entry: Entry) -> dict[str, str]:
+        """Return the attributes of an episode that say what it is, if it has any."""
+        with self._damage(entry.group):
+            texts = self._file.texts(entry.group, (*TEXTS, CHECKSUM))
+            if texts is None:
+                self._refuse(entry, "the json beside it lists it, but it is not in the file")
+            own = read_described(texts, "episode", OWN_EPISODE)
+        if own is not None and own["episode_seed"] != entry.episode_seed:
+            self._refuse(
+                entry,
+                f"the json beside it says seed {entry.episode_seed}, the file"
+                f" {own['episode_seed']}: the recording was killed as it ended; resume it once",
+            )
+        return texts
+
+    def _shapes(self, entry: Entry, names: Collection[str]) -> Shapes:
+        """Return the shapes of an episode's arrays, whose numbers are not read."""
+        with self._damage(entry.group):
+            return self._file.shapes(entry.group, names)
+
+    def _action_shape(self, entry: Entry, shapes: Shapes) -> tuple[int, int]:
+        """Return (T, A), after a look whether T is what the json says."""
+        shape = shapes.get("actions")
+        if shape is None:
+            robots = [name.partition("/")[2] for name in shapes if name.startswith("actions/")]
+            by_robot = f"its actions are by robot ({', '.join(robots)}), not one flat array"
+            self._refuse(entry, by_robot if robots else "it has no actions")
+        if len(shape) != 2 or not shape[0]:
+            self._refuse(entry, f"its actions have shape {shape}, not (T, A)")
+        if shape[0] != (entry.steps or min(shape[0], MAX_STEPS)):
+            self._refuse(
+                entry,
+                f"its actions have shape {shape}; the json beside it says"
+                f" {entry.steps or f'nothing, and at most {MAX_STEPS}'} steps",
+            )
+        return shape
+
+    def _expect_shapes(self, entry: Entry, shapes: Shapes) -> None:
+        steps, _ = self._action_shape(entry, shapes)
+        for name, shape in shapes.items():
+            if name in _COLUMNS and shape != (steps,):
+                self._refuse(entry, f"{name} has shape {shape}, not ({steps},)")
+            if not f"{name}/".startswith(STATES):
+                continue
+            if name.count("/") != 2:
+                self._refuse(entry, f"its states are not by kind and name ({name})")
+            if len(shape) != 2 or shape[0] != steps + 1:
+                what = f"its states of {name.rpartition('/')[2]} have shape {shape}"
+                self._refuse(entry, f"{what}, not ({steps + 1}, k)")
+
+    def _expect_numbers(self, entry: Entry, arrays: Mapping[str, NDArray[Any]]) -> None:
+        if arrays["actions"].dtype.kind != "f" or not np.isfinite(arrays["actions"]).all():
+            self._refuse(entry, "its actions are not all finite floating-point numbers")
+        for name, rows in arrays.items():
+            if not np.isfinite(rows).all():
+                self._refuse(entry, f"its {name} are not all finite")
+
+    def _refuse(self, entry: Entry, why: str) -> NoReturn:
+        raise TrajectoryError(f"{entry.group} of {self.path} cannot be played: {why}")
+
+    def _damage(self, what: str) -> AbstractContextManager[None]:
+        return damage_errors(
+            lambda reason: TrajectoryError(
+                f"{self.path} holds no readable episodes: {what} is of another kind, truncated or"
+                f" damaged ({reason})"
+            )
+        )
+
+
+def expect_file(path: Path, suffixes: Sequence[str]) -> None:
+    """Refuse a path that is no file, or ends with none of ``suffixes``.
+
+    Raises:
+        TrajectoryError: If so; names the file in the folder that is most like it.
+    """
+    if os.path.lexists(path) and not path.is_file():
+        try:
+            open_regular(path).close()
+        except UnreadableFileError as error:
+            raise TrajectoryError(str(error)) from error
+    if not path.is_file():
+        siblings = (p.name for p in path.parent.glob("*") if p.suffix in suffixes)
+        match = closest_match(path.name, siblings)
+        hint = f"; did you mean {path.parent / match}?" if match else ""
+        raise TrajectoryError(f"there is no file {path}{hint}")
+    if path.suffix not in suffixes:
+        raise TrajectoryError(
+            f"{path} is of an unknown kind {path.suffix!r}; known are {', '.join(suffixes)}"
+        )
+
+
+def _states(arrays: Mapping[str, NDArray[Any]]) -> States | None:
+    states: States = {}
+    for name, rows in arrays.items():
+        if name.startswith(STATES):
+            _, kind, entry = name.split("/")
+            states.setdefault(kind, {})[entry] = np.asarray(rows, np.float32)
+    return states or None
+
+
+def _column(
+    columns: Mapping[str, NDArray[Any]], name: str, kind: type[Number]
+) -> NDArray[Number] | None:
+    return columns[name].astype(kind) if name in columns else None

@@ -1,0 +1,280 @@
+"""Finished episodes, each in a small file of its own until the recording ends.
+
+A part is a line that says what it is, two lines of json, the bytes of its arrays, and a checksum of
+all that. It is written while episodes are played, where an h5 file of as many arrays would cost
+fifteen times as much.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots import RecordingError
+from robots.common.files import parse_json, read_regular
+from rollouts.reading.hdf5_reading import MAX_BYTES
+from rollouts.reading.json_fields import (
+    ANYTHING,
+    OBJECT,
+    TEXT,
+    FieldError,
+    Kind,
+    fields,
+    items,
+    whole,
+)
+from rollouts.reading.summary import MAX_SEED, OWN_EPISODE
+from rollouts.recording.disk import PARTIAL, replaced
+from tasks.episode import REBUILT, Episode
+
+CHECKSUM = "checksum"  # attribute of an episode's group in the h5 file
+STATES = "env_states/"
+ARRAYS = ("actions", STATES.rstrip("/"), "rewards", "success", "terminated", "truncated")
+TEXTS = ("action_split", "episode")
+
+_SUFFIX = ".part"
+_EARLIER = ".h5"
+_SEED = re.compile(r"seed-([0-9]{10,})")
+_OPENING = b"robot-layouts episode 1\n"
+_CHECKSUM = 4  # bytes
+_MAX_PART = MAX_BYTES + 2**24  # bytes
+
+_ARRAY_NAME = re.compile(r"(actions|rewards|success|terminated|truncated|env_states(/[^/\0]+){2})")
+_CONTENT = fields(
+    {
+        "attributes": fields({"episode": TEXT}, {"action_split": TEXT}),
+        "arrays": items(items(ANYTHING, 3)),
+    }
+)
+_ARRAY = (
+    Kind("the name of an array", lambda v: isinstance(v, str) and bool(_ARRAY_NAME.fullmatch(v))),
+    Kind("a kind of numbers", lambda v: v in ("<f4", "<f8", "|b1")),
+    items(whole(0, MAX_BYTES)),
+)
+
+
+@dataclass(frozen=True)
+class Stored:
+    """What is stored of an episode.
+
+    Attributes:
+        attributes: Attributes of its group in the h5 file; ``episode`` is its entry in the json,
+            without ``episode_id``.
+        arrays: The arrays of that group by their names there, as ``env_states/actors/cube``.
+
+    The attributes do not include the checksum.
+    """
+
+    attributes: Mapping[str, str]
+    arrays: Mapping[str, NDArray[Any]]
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """Its entry in the json, without ``episode_id``."""
+        return json.loads(self.attributes["episode"])
+
+
+@dataclass(frozen=True)
+class PartWriter:
+    """Writes finished episodes into a folder; worker processes each have a copy.
+
+    Attributes:
+        folder: Where to write.
+        header: What the episodes have in common; every part carries it.
+        control_mode: Control mode as ManiSkill writes it: by robot where there are several.
+    """
+
+    folder: Path
+    header: Mapping[str, Any]
+    control_mode: str | dict[str, str]
+    _text: bytes = field(init=False, repr=False)
+    _split: str = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Write as text once what all parts say."""
+        split = {name: robot["action"] for name, robot in self.header["layout"].items()}
+        object.__setattr__(self, "_text", json.dumps(self.header).encode())
+        object.__setattr__(self, "_split", json.dumps(split))
+
+    def write(self, episode: Episode) -> None:
+        """Write one episode; it is there, whole, when this returns, or not at all.
+
+        Raises:
+            RecordingError: If it cannot be written.
+        """
+        self.store(episode.seed, self.encode(episode))
+
+    def store(self, seed: int, part: bytes) -> None:
+        """Write an episode that was encoded, perhaps on another machine; else as `write`."""
+        with replaced(part_path(self.folder, seed), f".{os.getpid()}") as partial:
+            partial.write_bytes(part)
+
+    def encode(self, episode: Episode) -> bytes:
+        """Return what `write` writes."""
+        arrays = _arrays(episode)
+        about = {
+            "attributes": {
+                "action_split": self._split,
+                "episode": json.dumps(self._about(episode)),
+            },
+            "arrays": [(name, rows.dtype.str, rows.shape) for name, rows in arrays.items()],
+        }
+        numbers = [rows.tobytes() for rows in arrays.values()]
+        content = b"".join(
+            [_OPENING, self._text, b"\n", json.dumps(about).encode(), b"\n", *numbers]
+        )
+        return content + _checksum(content)
+
+    def _about(self, episode: Episode) -> dict[str, Any]:
+        return {
+            "episode_seed": episode.seed,
+            "control_mode": self.control_mode,
+            "elapsed_steps": len(episode.actions),
+            "reset_kwargs": {"seed": episode.seed, "options": REBUILT},
+            "success": episode.solved,
+        }
+
+
+def part_path(folder: Path, seed: int) -> Path:
+    """Return the part of a seed; names sort as seeds do."""
+    return folder / f"seed-{seed:010d}{_SUFFIX}"
+
+
+def seed_of(part: Path) -> int:
+    """Return the seed of a part, from its name.
+
+    Raises:
+        ValueError: If it is not the name of a part.
+    """
+    found = _SEED.fullmatch(part.stem)
+    seed = int(found[1]) if found and part.suffix == _SUFFIX else -1
+    if not 0 <= seed <= MAX_SEED or part_path(part.parent, seed) != part:
+        raise ValueError(f"{part.name} is not the name of a part")
+    return seed
+
+
+def list_parts(folder: Path) -> list[Path]:
+    """Return the parts in a folder, sorted by seed; none if there is no folder."""
+    return sorted(path for path in folder.glob(f"seed-*{_SUFFIX}") if _is_part(path))
+
+
+def list_earlier_parts(folder: Path) -> list[Path]:
+    """Return the parts that an earlier version left in a folder, which are not read any more."""
+    return sorted(folder.glob(f"seed-*{_EARLIER}"))
+
+
+def refuse_foreign(folder: Path) -> None:
+    """Refuse a folder of parts that holds something else, which nobody should delete.
+
+    Raises:
+        RecordingError: If so.
+    """
+    earlier = list_earlier_parts(folder)
+    for path in sorted(folder.iterdir()):
+        ours = path.suffix == PARTIAL or path in earlier or _is_part(path)
+        if not ours or path.is_symlink() or not path.is_file():
+            raise RecordingError(
+                f"{path} is no episode of this library, in a folder that is for such episodes only;"
+                " move it somewhere else"
+            )
+
+
+def read_part(path: Path) -> tuple[dict[str, Any], Stored]:
+    """Return the header of a part and its episode.
+
+    Raises:
+        RecordingError: If it is damaged, or the episode of another seed than its name says.
+        UnreadableFileError: If it cannot be read.
+    """
+    content = read_regular(path, _MAX_PART)
+    whole, checksum = content[:-_CHECKSUM], content[-_CHECKSUM:]
+    if not whole.startswith(_OPENING) or checksum != _checksum(whole):
+        raise RecordingError(f"{path} is damaged, or not an episode of this library")
+    try:
+        header, stored = _parse(whole.removeprefix(_OPENING))
+    except ValueError as error:
+        raise RecordingError(f"{path} is not an episode of this library: {error}") from error
+    seed = stored.about["episode_seed"]
+    if seed != seed_of(path):
+        raise RecordingError(f"{path} is the episode of seed {seed}, under another's name")
+    return header, stored
+
+
+def checksum(attributes: Mapping[str, str], arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Return the checksum of an episode, whatever file it is in and in whatever order.
+
+    It covers `TEXTS` and `ARRAYS`; what others may have added is left out.
+    """
+    names = sorted(name for name in arrays if name.partition("/")[0] in ARRAYS)
+    about = [
+        [(name, attributes.get(name)) for name in TEXTS],
+        [(name, arrays[name].dtype.str, arrays[name].shape) for name in names],
+    ]
+    found = zlib.crc32(json.dumps(about).encode())
+    for name in names:
+        found = zlib.crc32(np.ascontiguousarray(arrays[name]).data, found)
+    return f"crc32 {found:08x}"
+
+
+def _parse(content: bytes) -> tuple[dict[str, Any], Stored]:
+    """Return what a part says after its opening.
+
+    Raises:
+        ValueError: If it is not as `PartWriter` writes it.
+    """
+    header, about, numbers = content.split(b"\n", 2)
+    described, listed = _parse_header(header), parse_json(about.decode())
+    _CONTENT.expect(listed, "")
+    arrays: dict[str, NDArray[Any]] = {}
+    start = 0
+    for array in listed["arrays"]:
+        for value, kind in zip(array, _ARRAY, strict=True):
+            kind.expect(value, "arrays")
+        name, dtype, shape = array
+        count = min(math.prod(shape), MAX_BYTES)
+        arrays[name] = np.frombuffer(numbers, dtype, count, start).reshape(shape).copy()  # aligned
+        start += arrays[name].nbytes
+    about = parse_json(listed["attributes"]["episode"])
+    OWN_EPISODE.expect(about, "episode")
+    if start != len(numbers) or len(arrays.get("actions", ())) != about["elapsed_steps"]:
+        raise FieldError("its arrays are not those of its steps")
+    return described, Stored(listed["attributes"], arrays)
+
+
+@lru_cache(maxsize=1)  # all parts of a recording have the same
+def _parse_header(content: bytes) -> dict[str, Any]:
+    header = parse_json(content.decode())
+    OBJECT.expect(header, "header")
+    return header
+
+
+def _is_part(path: Path) -> bool:
+    try:
+        seed_of(path)
+    except ValueError:
+        return False
+    return True
+
+
+def _arrays(episode: Episode) -> dict[str, NDArray[Any]]:
+    arrays: dict[str, NDArray[Any]] = {"actions": episode.actions}
+    for kind, entries in episode.states.items():
+        arrays.update({f"{STATES}{kind}/{name}": rows for name, rows in entries.items()})
+    for name in ("rewards", "success", "terminated", "truncated"):
+        arrays[name] = getattr(episode, name)
+    return arrays
+
+
+def _checksum(content: bytes) -> bytes:
+    return zlib.crc32(content).to_bytes(_CHECKSUM, "little")

@@ -1,0 +1,116 @@
+"""``python -m rollouts record``: an expert's episodes become a data set."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from robots import CONTROL_MODES, RecordingError
+from rollouts.playing import command_options as workers
+from rollouts.playing.command_options import INTERRUPTED, one_or_more, stop_signals, zero_or_more
+
+if TYPE_CHECKING:
+    from rollouts.playing.executor import Event
+    from rollouts.progress import LiveLine
+    from rollouts.recording.record import Summary
+
+DESCRIPTION = "let an expert play episodes in worker processes, and record them"
+EPILOG = (
+    "The same command goes on where it was stopped or killed. Exit code: 0 if every episode was"
+    " recorded, 1 if not, 2 for bad usage, 130 if interrupted."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.epilog = EPILOG
+    add = parser.add_argument
+    add("--task", required=True, help="task id")
+    add("--episodes", type=one_or_more, required=True, metavar="N", help="how many episodes")
+    workers.add_arguments(parser)
+    add("--seed", type=zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
+    add("--out", type=Path, required=True, metavar="DIR", help="folder of trajectory.h5 and .json")
+    add("--control-mode", choices=CONTROL_MODES, default=CONTROL_MODES[0], help="(%(default)s)")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command; returns its exit code.
+
+    Raises:
+        RobotLayoutsError: If it makes no sense, or cannot go on; finished episodes are kept.
+    """
+    from rollouts.playing.executor import WorkerError
+    from rollouts.progress import LiveLine
+    from rollouts.recording.record import FILE, record
+
+    seeds = range(options.seed, options.seed + options.episodes)
+    executor, line = workers.chosen_executor(options), LiveLine(len(seeds), "episodes")
+    status = _Status(line)
+    try:
+        with stop_signals(), line:
+            summary = record(
+                options.task,
+                seeds,
+                options.out,
+                executor,
+                control_mode=options.control_mode,
+                on_event=status.show,
+            )
+    except KeyboardInterrupt:
+        print(f"stopped; {status.kept}; the same command goes on from there", file=sys.stderr)
+        return INTERRUPTED
+    except (RecordingError, WorkerError):
+        print(f"stopped; {status.kept}", file=sys.stderr)
+        raise
+    _report(summary, options.out / FILE)
+    return 1 if summary.failed else 0
+
+
+class _Status:
+    """How far the recording is, and what happens on the way."""
+
+    def __init__(self, line: LiveLine) -> None:
+        self._line = line
+        self._summary: Summary | None = None
+
+    @property
+    def kept(self) -> str:
+        """How many episodes are on the disk, in words."""
+        return f"{self._summary.recorded if self._summary else 0} episodes are recorded"
+
+    def show(self, summary: Summary, event: Event | None) -> None:
+        """Tell what has come of the episodes so far."""
+        self._summary = summary
+        if event is None:
+            for what in summary.damaged:
+                self._line.say(f"{what} is damaged and does not count as recorded")
+        if event is None and summary.already:
+            total = self._line.total
+            self._line.say(f"{summary.already} of {total} episodes were recorded before")
+        if event is not None and event.said is not None:
+            self._line.say(event.said)
+        if event is not None and event.died is not None:
+            self._line.say(f"{summary.deaths[-1]}; another takes its place")
+        if event is not None and event.error is not None:
+            self._line.say(f"seed {event.seed} is not recorded: {event.error}")
+        solved = sum(played.success for played in summary.played.values())
+        done = summary.already + len(summary.played)
+        who = f", {len(summary.workers)} workers" if len(summary.workers) > 1 else ""
+        self._line.update(done, f"{solved} of {len(summary.played)} succeeded{who}")
+
+
+def _report(summary: Summary, path: Path) -> None:
+    solved = sum(played.success for played in summary.played.values())
+    print(f"{path}: {summary.recorded} episodes")
+    if summary.played:
+        count = len(summary.played)
+        steps = sum(played.steps for played in summary.played.values()) / count
+        print(f"recorded now {count}, {solved} with success, {steps:.1f} steps on average")
+        if len(summary.workers) > 1:
+            print(f"played by {len(summary.workers)} workers")
+    for death in summary.deaths:
+        print(f"made good: {death}")
+    if summary.failed:
+        print(f"not recorded: seeds {', '.join(map(str, sorted(summary.failed)))}")

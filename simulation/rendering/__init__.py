@@ -1,0 +1,1 @@
+"""What is only needed to draw: cameras, visuals, pictures, the graphics device."""

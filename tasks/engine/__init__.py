@@ -1,0 +1,1 @@
+"""What runs a task: resets, steps, observations, state dicts, and checks of its arguments."""

@@ -1,0 +1,272 @@
+"""The border where native's keys and rows are spoken: state dicts and observation parts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from layouts import Layout
+from robots import TaskError, unknown_name_message
+from robots.common.bounds import FAR, shown
+from simulation import Simulation, State
+from simulation.maths import Floats
+from tasks.engine.arguments import array_of
+
+StateDict = dict[str, dict[str, Tensor]]
+
+_UNIT_TOLERANCE = 0.01  # of quaternions: of two digits, say
+_BEYOND_LIMITS = 2 * math.pi  # rad, or m
+_POSE = tuple(
+    f"{what} {axis}"
+    for what, axes in (
+        ("position", "xyz"),
+        ("quaternion", "wxyz"),
+        ("linear velocity", "xyz"),
+        ("angular velocity", "xyz"),
+    )
+    for axis in axes
+)
+_MOMENTS = 128  # that a tape has room for at first: most episodes end before
+
+
+def observation_keys(layout: Layout) -> dict[str, str | None]:
+    """Return native's key of each robot's proprioception; None where native has one robot."""
+    if len(layout) == 1:
+        return dict.fromkeys(layout)
+    return {name: f"{p.robot.name}-{i}" for i, (name, p) in enumerate(layout.items())}
+
+
+def articulation_keys(layout: Layout) -> dict[str, str]:
+    """Return native's state-dict key of each robot."""
+    if len(layout) == 1:
+        return {name: placement.robot.name for name, placement in layout.items()}
+    return {name: f"{p.robot.name}-agent-{i}" for i, (name, p) in enumerate(layout.items())}
+
+
+def read_state_dict(simulation: Simulation, state: State) -> StateDict:
+    """Return every pose and velocity as rows in native's format.
+
+    Bodies that can move are rows of 13: position (m), quaternion (wxyz), linear (m/s) and angular
+    velocity (rad/s). Robots are the same of their root, then qpos and qvel.
+    """
+    actors = {
+        name: _joined(state.pose(name), state.linear_velocity(name), state.angular_velocity(name))
+        for name, body in simulation.worlds[0].bodies.items()
+        if body.kind != "static"
+    }
+    articulations = {
+        key: _joined(*_root_rows(simulation, state, name), state.qpos(name), state.qvel(name))
+        for name, key in articulation_keys(simulation.layout).items()
+    }
+    return {"actors": actors, "articulations": articulations}
+
+
+def _joined(*parts: Floats) -> Tensor:
+    return torch.from_numpy(np.concatenate(parts, 1))
+
+
+def _root_rows(simulation: Simulation, state: State, robot: str) -> list[Floats]:
+    roots = [world.robots[robot].articulation.links[0] for world in simulation.worlds]
+    return [
+        state.link_pose(robot, roots[0].name),
+        np.stack([root.linear_velocity for root in roots]),
+        np.stack([root.angular_velocity for root in roots]),
+    ]
+
+
+class StateTape:
+    """What `read_state_dict` returns, for many moments: cheap to write, put together at the end.
+
+    A tape is for one episode, as it keeps hold of the worlds' bodies: begin it after a reset, or
+    after states were set. A moment is one row of numbers, so that nothing is left over for Python
+    to collect: poses, qpos, qvel, velocities of the bodies, velocities of the robots' roots.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        """Find what has to be read."""
+        world, index = simulation.worlds[0], simulation.index
+        moving = [name for name, body in world.bodies.items() if body.kind != "static"]
+        frames = [index.bodies[name] for name in moving]
+        frames += [index.bases[name] for name in world.robots]
+        self._frames = np.array(frames, np.intp)
+        self._bodies = moving
+        self._dynamic = [name for name in moving if world.bodies[name].kind == "dynamic"]
+        self._joints = {
+            key: index.joints[name] for name, key in articulation_keys(simulation.layout).items()
+        }
+        self._components: list[Any] = [
+            world.bodies[name].component for world in simulation.worlds for name in self._dynamic
+        ]
+        self._roots: list[Any] = [
+            robot.articulation.links[0]
+            for world in simulation.worlds
+            for robot in world.robots.values()
+        ]
+        self._count = count = len(simulation.worlds)
+        poses, joints, velocities = 7 * count * len(frames), count * index.dof, 6 * count
+        widths = poses, joints, joints, velocities * len(self._dynamic)
+        self._ends: list[int] = np.cumsum(widths).tolist()
+        width = self._ends[-1] + velocities * len(self._joints)
+        self._rows: Floats = np.zeros((_MOMENTS, width), np.float32)
+        self._length = 0
+
+    def write(self, state: State) -> None:
+        """Add the present moment; ``state`` must be the read-out of it."""
+        if self._length == len(self._rows):
+            self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
+        row = self._rows[self._length]
+        parts = [state.poses(self._frames), state.joint_positions, state.joint_velocities]
+        for body in self._components:
+            parts += (body.linear_velocity, body.angular_velocity)
+        np.concatenate(parts, axis=None, out=row[: self._ends[-1]])
+        if not self._length:  # roots are fixed: after a step they have no velocity
+            velocities = [(root.linear_velocity, root.angular_velocity) for root in self._roots]
+            row[self._ends[-1] :] = np.ravel(velocities)
+        self._length += 1
+
+    def read(self) -> dict[str, dict[str, NDArray[np.float32]]]:
+        """Return every entry of the state dict with all moments, each (moments, N, k)."""
+        moments, count = self._length, self._count
+        poses, qpos, qvel, velocities, roots = np.split(self._rows[:moments], self._ends, 1)
+        frames = poses.reshape(moments, -1, count, 7).swapaxes(0, 1)
+        moved, fixed = (
+            rows.reshape(moments, count, -1, 6).transpose(2, 0, 1, 3)
+            for rows in (velocities, roots)
+        )
+        qpos, qvel = (rows.reshape(moments, count, -1) for rows in (qpos, qvel))
+        velocity = dict(zip(self._dynamic, moved, strict=True))
+        still = np.zeros((moments, count, 6), np.float32)
+        bases = zip(self._joints.items(), frames[len(self._bodies) :], fixed, strict=True)
+        return {
+            "actors": {
+                name: np.concatenate([pose, velocity.get(name, still)], 2)
+                for name, pose in zip(self._bodies, frames, strict=False)
+            },
+            "articulations": {
+                key: np.concatenate([pose, root, qpos[..., joints], qvel[..., joints]], 2)
+                for (key, joints), pose, root in bases
+            },
+        }
+
+
+def write_state_dict(
+    simulation: Simulation, state: Mapping[str, Mapping[str, Any]], env_ids: list[int]
+) -> None:
+    """Put worlds into a state in native's format.
+
+    Not exact even in native: PhysX's solver memory is no part of it.
+
+    Numbers must be finite and at most `robots.common.bounds.FAR`, quaternions within 1 % of unit
+    length, and joints within a full turn (rad; or 2π m) of their limits: joint noise and contacts
+    push them a little beyond.
+
+    Args:
+        simulation: The worlds.
+        state: What `read_state_dict` returns, one row per entry of ``env_ids``.
+        env_ids: Which worlds.
+
+    Raises:
+        TaskError: If a key is unknown, a row has the wrong length, or a number makes no sense; says
+            in which entry and environment. Nothing is changed then.
+    """
+    rows = _checked_rows(simulation, state, env_ids)
+    robots = {key: name for name, key in articulation_keys(simulation.layout).items()}
+    for row, env in enumerate(env_ids):
+        world = simulation.worlds[env]
+        for name, values in rows["actors"].items():
+            world.set_pose(name, values[row, :3], values[row, 3:7])
+            if world.bodies[name].kind == "dynamic":
+                world.bodies[name].component.set_linear_velocity(values[row, 7:10])
+                world.bodies[name].component.set_angular_velocity(values[row, 10:13])
+        for key, values in rows["articulations"].items():
+            world.robots[robots[key]].restore(values[row])
+    simulation.touched()
+
+
+class _Entry(NamedTuple):
+    """What the numbers of one row are called, and their bounds, each (k,)."""
+
+    names: tuple[str, ...]
+    lowest: NDArray[np.float64]
+    highest: NDArray[np.float64]
+
+
+def _checked_rows(
+    simulation: Simulation, state: Mapping[str, Mapping[str, Any]], env_ids: Sequence[int]
+) -> dict[str, dict[str, Floats]]:
+    known = _entries(simulation)
+    rows: dict[str, dict[str, Floats]] = {group: {} for group in known}
+    for group, values in _items(state, "the state"):
+        if group not in known:
+            raise TaskError(unknown_name_message("state group", group, known))
+        for key, value in _items(values, group):
+            if key not in known[group]:
+                raise TaskError(unknown_name_message(f"entry of {group}", key, known[group]))
+            what, entry = f"{group}/{key}", known[group][key]
+            array = _checked_array(value, what, (len(env_ids), len(entry.names)))
+            _check_numbers(array, what, entry, env_ids)
+            rows[group][key] = array
+    return rows
+
+
+def _entries(simulation: Simulation) -> dict[str, dict[str, _Entry]]:
+    """Return what a state dict of these worlds holds."""
+    world = simulation.worlds[0]
+    pose = _Entry(_POSE, np.full(13, -FAR), np.full(13, FAR))
+    articulations: dict[str, _Entry] = {}
+    for name, key in articulation_keys(simulation.layout).items():
+        joints = world.robots[name].joints
+        low, high = np.concatenate([joint.limits for joint in joints]).T
+        fastest = np.full(len(joints), FAR)
+        articulations[key] = _Entry(
+            (*_POSE, *(f"{what} of {joint.name}" for what in ("qpos", "qvel") for joint in joints)),
+            np.concatenate([pose.lowest, np.maximum(low - _BEYOND_LIMITS, -FAR), -fastest]),
+            np.concatenate([pose.highest, np.minimum(high + _BEYOND_LIMITS, FAR), fastest]),
+        )
+    return {
+        "actors": {name: pose for name, body in world.bodies.items() if body.kind != "static"},
+        "articulations": articulations,
+    }
+
+
+def _items(entries: Any, what: str) -> Iterable[tuple[Any, Any]]:
+    if not isinstance(entries, Mapping):
+        raise TaskError(
+            f"{what} is {shown(entries)}; it must be a mapping, as get_state_dict() returns it"
+        )
+    return entries.items()
+
+
+def _checked_array(value: Any, what: str, shape: tuple[int, int]) -> Floats:
+    array = array_of(value, what, TaskError)
+    if array.dtype.kind not in "fiu":
+        raise TaskError(f"{what} has dtype {array.dtype}; it must hold numbers (float32)")
+    array = np.atleast_2d(array)
+    if array.shape != shape:
+        raise TaskError(f"{what} has shape {array.shape}; it must be {shape}")
+    with np.errstate(over="ignore"):  # what is too large is refused as inf
+        return array.astype(np.float32)
+
+
+def _check_numbers(array: Floats, what: str, entry: _Entry, env_ids: Sequence[int]) -> None:
+    wrong = np.argwhere(~((entry.lowest <= array) & (array <= entry.highest)))
+    if len(wrong):
+        row, place = (int(i) for i in wrong[0])
+        low, high = entry.lowest[place], entry.highest[place]
+        raise TaskError(
+            f"{what}: {entry.names[place]} is {array[row, place]:g} for environment {env_ids[row]};"
+            f" a number from {low:g} to {high:g} is needed"
+        )
+    lengths = np.linalg.norm(array[:, 3:7], axis=1)
+    for env, length in zip(env_ids, lengths, strict=True):
+        if abs(length - 1) > _UNIT_TOLERANCE:
+            raise TaskError(
+                f"{what}: the quaternion (numbers 3 to 6, wxyz) has length {length:.6g} for"
+                f" environment {env}; a rotation has length 1"
+            )

@@ -1,0 +1,289 @@
+"""What a task observes: which parts, in which form, and with which cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+from gymnasium.spaces import Box, Dict, Space
+from numpy.typing import NDArray
+
+from layouts import Layout
+from robots import TaskError, unknown_name_message
+from simulation import Camera, Simulation, State
+from simulation.maths import Array, all_finite
+from simulation.rendering.cameras import TEXTURES, RobotCamera
+from tasks.engine.finite import NotFinite
+from tasks.engine.native_format import observation_keys
+
+if TYPE_CHECKING:
+    from simulation.rendering.pictures import Observers, View
+
+PLAIN_MODES = ("state", "state_dict", "none")
+SHORT_MODES = {"rgbd": "rgb+depth"}
+STATE_FORMS = ("state", "state_dict")  # what may be joined to images
+OBS_MODES = (*PLAIN_MODES, "rgb", "rgbd", "rgb+depth+state", "depth", "rgb+segmentation")
+"""Examples of observation modes; images and a form of state are joined in any order."""
+
+_IMAGE_DTYPES = ("uint8", "int16")
+
+_tensor = torch.from_numpy
+
+
+@dataclass(frozen=True)
+class ObservationMode:
+    """What an ``obs_mode`` asks for.
+
+    Attributes:
+        textures: What cameras tell of each pixel; none if there are no cameras.
+        flat: Whether everything but images is one flat part.
+        privileged: Whether it includes what only a simulation knows.
+        nothing: Whether nothing is observed.
+    """
+
+    textures: tuple[str, ...] = ()
+    flat: bool = False
+    privileged: bool = True
+    nothing: bool = False
+
+
+def read_mode(name: str) -> ObservationMode:
+    """Return what a mode asks for: ``"state"``, ``"rgb"``, ``"rgb+depth+state_dict"``.
+
+    Raises:
+        TaskError: If there is no such mode.
+    """
+    if not isinstance(name, str):
+        raise TaskError(unknown_name_message("obs_mode", name, OBS_MODES))
+    if name in PLAIN_MODES:
+        return ObservationMode(flat=name == "state", nothing=name == "none")
+    parts = SHORT_MODES.get(name, name).split("+")
+    for part in parts:
+        if part not in (*TEXTURES, *STATE_FORMS):
+            wrong = unknown_name_message("obs_mode", name, OBS_MODES)
+            raise TaskError(
+                f"{wrong} Besides, any of {', '.join(TEXTURES)} are joined by '+', and one of"
+                f" {', '.join(STATE_FORMS)} to them"
+            )
+    textures = tuple(texture for texture in TEXTURES if texture in parts)
+    forms = [form for form in STATE_FORMS if form in parts]
+    if not textures or len(forms) > 1 or len(set(parts)) != len(parts):
+        raise TaskError(
+            f"obs_mode {name!r} makes no sense: at least one of {', '.join(TEXTURES)} and at most"
+            f" one of {', '.join(STATE_FORMS)}, each once"
+        )
+    return ObservationMode(textures, flat="state" in forms, privileged=bool(forms))
+
+
+def cameras_of(layout: Layout, cameras: Iterable[Camera]) -> dict[str, Camera | RobotCamera]:
+    """Return every camera of a task under native's name: its own first, then each robot's.
+
+    Raises:
+        TaskError: If two have the same name.
+    """
+    found: dict[str, Camera | RobotCamera] = {}
+    for camera in cameras:
+        if camera.name in found:
+            raise TaskError(f"two cameras are called {camera.name!r}; names must differ")
+        found[camera.name] = camera
+    for robot, key in observation_keys(layout).items():
+        for mount in layout[robot].robot.cameras:
+            name = mount.name if key is None else f"{key}-{mount.name}"
+            if name in found:
+                raise TaskError(
+                    f"a camera of the task and one of the robot {robot!r} are called {name!r};"
+                    " give the task's another name"
+                )
+            found[name] = RobotCamera(robot, mount)
+    return found
+
+
+class Observer:
+    """Puts observations together.
+
+    Attributes:
+        mode: What is asked for.
+        cameras: Camera by its name in observations; none if the mode has no images.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        mode: ObservationMode,
+        cameras: Iterable[Camera],
+        sensed: Sequence[str],
+    ) -> None:
+        """Remember how to observe.
+
+        Args:
+            layout: The robots.
+            mode: What to observe.
+            cameras: The task's own cameras.
+            sensed: See `tasks.MultiRobotTask`.
+
+        Raises:
+            TaskError: If images are asked for and there is no camera, or two have the same name.
+        """
+        self.mode = mode
+        self.cameras = cameras_of(layout, cameras) if mode.textures else {}
+        if mode.textures and not self.cameras:
+            raise TaskError("there is no camera: the task declares none, nor do its robots")
+        self._keys, self._robots, self._sensed = observation_keys(layout), tuple(layout), sensed
+        self._eyes: _Eyes | None = None
+
+    def observe(self, simulation: Simulation, state: State, parts: Mapping[str, Array]) -> Any:
+        """Return an observation of all environments.
+
+        Args:
+            simulation: The worlds.
+            state: What they look like now.
+            parts: What the task observes of them; see `tasks.MultiRobotTask.observe`.
+
+        Raises:
+            TaskError: If something that robots sense is not observed at all.
+            NotFinite: If a number is not finite.
+        """
+        if self.mode.nothing:
+            return {}
+        if not self.mode.privileged:
+            parts = self._sensible(parts)
+        if not self.mode.textures:
+            return self._flat(state, parts) if self.mode.flat else self._named(state, parts)
+        if self._eyes is None:
+            self._eyes = _Eyes(simulation, self.cameras, self.mode.textures)
+        images = self._eyes.look()
+        if self.mode.flat:
+            return {**images, "state": self._flat(state, parts)}
+        return {**self._named(state, parts), **images}
+
+    def senses(self, part: str) -> bool:
+        """Tell whether a part of `tasks.MultiRobotTask.observe` is told beside images."""
+        return any(fnmatchcase(part, pattern) for pattern in self._sensed)
+
+    def seen_by(self, robot: str) -> list[str]:
+        """Return the names of the cameras that stand still, and of those that ride on a robot."""
+        return [
+            name
+            for name, camera in self.cameras.items()
+            if not isinstance(camera, RobotCamera) or camera.robot == robot
+        ]
+
+    def changed(self, env_ids: Iterable[int]) -> None:
+        """Note that these environments do not look any more as they did."""
+        if self._eyes is not None:
+            self._eyes.stale.update(env_ids)
+
+    def close(self) -> None:
+        """Let the cameras go."""
+        self._eyes = None
+
+    def slices(self, state: State, parts: Mapping[str, Array]) -> dict[str, slice]:
+        """Return where each named part stands in the flat observation; nothing if there is none."""
+        if not self.mode.flat:
+            return {}
+        sizes: dict[str, int] = {}
+        for name in self._robots:
+            sizes[f"{name}.qpos"] = sizes[f"{name}.qvel"] = state.qpos(name).shape[1]
+        sizes.update({key: x.shape[1] if x.ndim == 2 else 1 for key, x in parts.items()})
+        slices, start = dict[str, slice](), 0
+        for name, size in sizes.items():
+            slices[name] = slice(start, start + size)
+            start += size
+        return slices
+
+    # -- inside ------------------------------------------------------------------------------
+
+    def _flat(self, state: State, parts: Mapping[str, Array]) -> torch.Tensor:
+        joined = [part for name in self._robots for part in (state.qpos(name), state.qvel(name))]
+        joined.extend(part if part.ndim == 2 else part[:, None] for part in parts.values())
+        flat = np.concatenate(joined, 1, dtype=np.float32)
+        if not all_finite(flat):
+            raise NotFinite
+        return _tensor(flat)
+
+    def _named(self, state: State, parts: Mapping[str, Array]) -> dict[str, Any]:
+        if not all(map(all_finite, (state.joint_velocities, *parts.values()))):
+            raise NotFinite
+        agent: dict[str, Any] = {}
+        for name, key in self._keys.items():
+            own = {
+                "qpos": _tensor(state.qpos(name).copy()),
+                "qvel": _tensor(state.qvel(name).copy()),
+            }
+            agent.update(own if key is None else {key: own})
+        return {"agent": agent, "extra": {key: _tensor(x.copy()) for key, x in parts.items()}}
+
+    def _sensible(self, parts: Mapping[str, Array]) -> dict[str, Array]:
+        for name in self._sensed:
+            if "*" not in name and name not in parts:
+                raise TaskError(unknown_name_message("part that is sensed", name, parts))
+        return {key: x for key, x in parts.items() if self.senses(key)}
+
+
+class _Eyes:
+    """The latest images of every environment; only those that changed are drawn again."""
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        cameras: Mapping[str, Camera | RobotCamera],
+        textures: Sequence[str],
+    ) -> None:
+        from simulation.rendering.pictures import (
+            Observers,  # what draws is loaded by the first picture
+        )
+
+        self._observers: Observers = Observers(simulation, cameras, textures)
+        self._rows: list[dict[str, View]] = [{}] * len(simulation.worlds)
+        self.stale = set(range(len(simulation.worlds)))
+
+    def look(self) -> dict[str, Any]:
+        for env in sorted(self.stale):
+            self._rows[env] = self._observers.look(env)
+        self.stale.clear()
+        names = list(self._rows[0])
+        matrices = ("extrinsic_cv", "cam2world_gl", "intrinsic_cv")
+        return {
+            "sensor_param": {
+                name: {m: _stacked(getattr(row[name], m) for row in self._rows) for m in matrices}
+                for name in names
+            },
+            "sensor_data": {
+                name: {
+                    texture: _stacked(row[name].images[texture] for row in self._rows)
+                    for texture in self._rows[0][name].images
+                }
+                for name in names
+            },
+        }
+
+
+def _stacked(rows: Iterable[NDArray[Any]]) -> torch.Tensor:
+    return _tensor(np.stack(list(rows)))
+
+
+def space_of(values: Any, *, batched: bool = False) -> Space[Any]:
+    """Return the space of an observation: of numbers any, of images what their type can hold.
+
+    Args:
+        values: Arrays or tensors, or mappings of them.
+        batched: Whether the first axis of each counts environments, and is left out.
+    """
+    if isinstance(values, Mapping):
+        return Dict({key: space_of(part, batched=batched) for key, part in values.items()})
+    shape = tuple(values.shape[1:] if batched else values.shape)
+    dtype = told_dtype(values)
+    if np.issubdtype(dtype, np.integer):
+        bounds = np.iinfo(dtype)
+        return Box(int(bounds.min), int(bounds.max), shape, dtype)
+    return Box(-np.inf, np.inf, shape, np.float32)
+
+
+def told_dtype(values: Any) -> Any:
+    """Return the dtype in which an observation is told: of images their own, else float32."""
+    dtype = np.dtype(str(values.dtype).removeprefix("torch."))
+    return dtype.type if dtype.name in _IMAGE_DTYPES else np.float32

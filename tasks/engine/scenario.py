@@ -1,0 +1,147 @@
+"""Everything a task is made with: layout, physics, modes, number of environments."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from layouts import Layout
+from robots import CONTROL_MODES, TaskError, UnknownNameError
+from robots.common.bounds import checked_choice, checked_flag, checked_whole, shown
+from simulation import SAPIEN_DEFAULTS, Camera, PhysicsSettings
+from simulation.physics import substeps
+from tasks.engine.observation import read_mode
+
+if TYPE_CHECKING:
+    from tasks.engine.task import MultiRobotTask
+
+SIMULATORS = ("sapien3",)
+RENDER_MODES = (None, "rgb_array")
+LEAST_BYTES = 400_000  # of an environment: that of PickCube-v1, one of the smallest, takes 435 kB
+
+
+@dataclass
+class Scenario:
+    """How to make a task. Fields may be changed until it is made; an unknown field raises.
+
+    Attributes:
+        layout: Which robots stand where.
+        num_envs: Number of environments in this process; each takes about 0.5 MB and more.
+        physics: Solver settings; None keeps SAPIEN's own defaults.
+        obs_mode: ``"state"`` (flat), ``"state_dict"`` (named parts), ``"none"``, or what cameras
+            see (needs a Vulkan driver): ``"rgb"``, ``"rgbd"``, or any of ``rgb``, ``depth``,
+            ``segmentation`` and ``position`` joined by ``+``, and to them ``state`` or
+            ``state_dict``, without which only what a real robot senses is told beside images.
+        reward_mode: One of the task's modes; None takes its first.
+        control_mode: ``"pd_joint_delta_pos"``, or ``"pd_joint_pos"`` for actions that are joint
+            positions.
+        control_frequency: Control steps per second (Hz); a whole number of physics steps each.
+        max_episode_steps: Control steps until an episode is truncated; None takes the task's.
+        render_mode: ``"rgb_array"`` to draw pictures (needs a Vulkan driver), or None.
+        headless: No window is opened; the only choice.
+        cameras: Cameras to observe with, in the place of the task's own; empty takes those. Those
+            of the robots come after.
+        simulator: ``"sapien3"``.
+        check_layout: Whether to refuse a layout whose robots collide; the task's own layout is
+            never checked.
+    """
+
+    layout: Layout
+    num_envs: int = 1
+    physics: PhysicsSettings | None = None
+    obs_mode: str = "state"
+    reward_mode: str | None = None
+    control_mode: str = CONTROL_MODES[0]
+    control_frequency: float = 20.0
+    max_episode_steps: int | None = None
+    render_mode: str | None = None
+    headless: bool = True
+    cameras: Sequence[Camera] = field(default_factory=list[Camera])
+    simulator: str = "sapien3"
+    check_layout: bool = True
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Refuse fields that a scenario does not have."""
+        known = [f.name for f in fields(self)]
+        if name not in known:
+            raise UnknownScenarioField("scenario field", name, known)
+        object.__setattr__(self, name, value)
+
+    @property
+    def draws(self) -> bool:
+        """Whether anything is drawn: for people, or for cameras that observe."""
+        return self.render_mode is not None or bool(read_mode(self.obs_mode).textures)
+
+    def check(self, reward_modes: Sequence[str]) -> None:
+        """Refuse values that no task can be made with.
+
+        Args:
+            reward_modes: The reward modes of the task.
+
+        Raises:
+            TaskError: If a number is out of range or a mode is not offered.
+            SimulationError: If a control step is no whole number of physics steps.
+        """
+        _check_count(self.num_envs)
+        if not isinstance(self.layout, Layout):
+            raise TaskError(f"layout is a {type(self.layout).__name__}; a Layout is needed")
+        if not (self.physics is None or isinstance(self.physics, PhysicsSettings)):
+            raise TaskError(
+                f"physics is a {type(self.physics).__name__}; PhysicsSettings or None is needed"
+            )
+        for name, choices in (
+            ("simulator", SIMULATORS),
+            ("control_mode", CONTROL_MODES),
+            ("render_mode", RENDER_MODES),
+            ("reward_mode", (None, *reward_modes)),
+        ):
+            checked_choice(name, getattr(self, name), choices, TaskError)
+        read_mode(self.obs_mode)
+        for name in ("check_layout", "headless"):
+            checked_flag(name, getattr(self, name), TaskError)
+        if not self.headless:
+            raise TaskError("headless=False is not offered: no window is opened; use render_mode")
+        if self.max_episode_steps is not None:
+            most = np.iinfo(np.int32).max
+            checked_whole("max_episode_steps", self.max_episode_steps, 1, most, TaskError)
+        substeps(self.physics or SAPIEN_DEFAULTS, self.control_frequency)
+        _check_cameras(self.cameras)
+
+
+def _check_count(num_envs: object) -> None:
+    count = checked_whole("num_envs", num_envs, 1, None, TaskError)
+    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    if count * LEAST_BYTES > memory:
+        raise TaskError(
+            f"num_envs is {count}; that takes {count * LEAST_BYTES / 1e9:.3g} GB at least, and this"
+            f" machine has {memory / 1e9:.3g} GB"
+        )
+
+
+def _check_cameras(cameras: Any) -> None:
+    if not isinstance(cameras, Sequence) or isinstance(cameras, str):
+        raise TaskError(f"cameras is {shown(cameras)}; a list of simulation.Camera is needed")
+    for camera in cameras:
+        if not isinstance(camera, Camera):
+            raise TaskError(f"cameras has a {type(camera).__name__}; simulation.Camera is needed")
+
+
+class UnknownScenarioField(UnknownNameError, AttributeError):
+    """A field that a scenario does not have (also an ``AttributeError``)."""
+
+
+class FreshScenario:
+    """``cls.scenario``: a new scenario at every access, made from the task class's own attributes.
+
+    That of a task that was made is the scenario it was made from.
+    """
+
+    def __get__(self, instance: MultiRobotTask | None, owner: type[MultiRobotTask]) -> Scenario:
+        """Return the class's scenario, or the instance's own."""
+        if instance is not None:
+            return instance.made_from
+        return Scenario(layout=owner.layout, physics=owner.physics)

@@ -1,0 +1,458 @@
+"""The batched task: N worlds of one layout with resets, observations, rewards and success."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+import torch
+from gymnasium.spaces import Box
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+from torch import Tensor
+
+from layouts import Layout
+from robots import SimulationError, TaskError
+from simulation import Camera, PhysicsSettings, Simulation, State, World
+from simulation.maths import Array, Floats, all_finite
+from tasks.engine.actions import ActionReader
+from tasks.engine.arguments import (
+    check_info,
+    check_places,
+    checked_ids,
+    checked_seeds,
+    wants_rebuild,
+)
+from tasks.engine.finite import NotFinite, refuse_observation, refuse_reward, refuse_state
+from tasks.engine.layout_check import refuse_collisions
+from tasks.engine.memory import Memory
+from tasks.engine.native_format import StateDict, StateTape, read_state_dict, write_state_dict
+from tasks.engine.observation import Observer, read_mode, space_of
+from tasks.engine.randomness import EpisodeRandom
+from tasks.engine.remade import Remade
+from tasks.engine.scenario import FreshScenario, Scenario
+from tasks.language.bodies import Declared, Table, WideTable, declared_bodies
+
+FIRST_SEED = 2022  # native seeds environment i with 2022 + i when it is made
+DENSE_MODES = ("normalized_dense", "dense", "sparse", "none")
+SPARSE_MODES = ("sparse", "none")
+
+Info = dict[str, Any]
+
+
+class MultiRobotTask(Remade):
+    """Something to achieve, for one robot or many; subclasses say what.
+
+    A subclass sets ``layout`` and ``max_episode_steps``, declares its bodies as class attributes
+    (`tasks.language.bodies`), and tells success in `evaluate`. It may say more in `observe` and
+    `dense_reward`, and override `build` and `sample`, which add and place what is declared.
+
+    Attributes:
+        task_id: The task's id.
+        native_id: Id of the ManiSkill task that it clones; None for a task of our own.
+        source: Where its numbers come from; of a clone package, version and file.
+        layout: Default layout.
+        table: What the robots stand at, the first of its bodies.
+        bodies: The bodies that its class declares, by name, in the order declared; see
+            `tasks.language.bodies`.
+        robot_counts: How many robots a layout may have, in places called as one likes; None if it
+            takes exactly the places of ``layout``.
+        physics: Solver settings; None keeps SAPIEN's own defaults.
+        max_episode_steps: Control steps until an episode is truncated.
+        reward_modes: Reward modes, the default first.
+        max_reward: What ``normalized_dense`` divides the dense reward by.
+        shared_joint_noise: Whether all robots get the same joint noise at a reset.
+        joint_noise_draws: How often joint noise is drawn at a reset; the last draw counts.
+        rebuilds: Whether every reset builds the worlds anew, with a new `design`.
+        viewpoint: Camera position and target of `render` (m, world).
+        cameras: Cameras that observe, where images are asked for; those of the robots come after.
+        sensed: Which parts of `observe` a real robot knows, so that they are observed beside
+            images; the others are privileged. ``*`` stands for any letters.
+        num_envs: Number of environments N.
+        single_action_space: Action of one environment, (A,); joint limits (rad) where the control
+            mode asks for positions, else [-1, 1].
+        action_space: Actions of all environments, (N, A).
+        action_split: Robot name → slice of the flat action, in declared order.
+        moving: Which environments the present step advances.
+        memory: What `remember` returned, as attributes.
+        observer: What puts its observations together, and its cameras.
+        observation_slices: Where each named part stands in the flat observation.
+        start: Observation and info of the first reset, when it was made.
+        made_from: The scenario it was made from.
+    """
+
+    task_id: ClassVar[str] = ""
+    native_id: ClassVar[str | None] = None
+    source: ClassVar[str] = ""
+    scenario: ClassVar[Any] = FreshScenario()
+    layout: Layout
+    table: ClassVar[Table | WideTable] = Table()
+    bodies: ClassVar[Mapping[str, Declared]] = {}
+    robot_counts: ClassVar[range | None] = None
+    physics: ClassVar[PhysicsSettings | None] = None
+    max_episode_steps: int
+    reward_modes: ClassVar[tuple[str, ...]] = ()
+    max_reward: ClassVar[float] = 1.0
+    shared_joint_noise: ClassVar[bool] = False
+    joint_noise_draws: ClassVar[int] = 1
+    rebuilds: ClassVar[bool] = False
+    viewpoint: ClassVar[tuple[tuple[float, float, float], tuple[float, float, float]]] = (
+        (0.6, 0.7, 0.6),
+        (0.0, 0.0, 0.35),
+    )
+
+    cameras: ClassVar[tuple[Camera, ...]] = (Camera((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1)),)
+    sensed: ClassVar[tuple[str, ...]] = ("*tcp_pose",)
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        """Collect the declared bodies; offer dense modes if there is a dense reward."""
+        super().__init_subclass__(**kwargs)
+        cls.bodies = declared_bodies(cls)
+        if "reward_modes" not in cls.__dict__:
+            dense = cls.dense_reward is not MultiRobotTask.dense_reward
+            cls.reward_modes = DENSE_MODES if dense else SPARSE_MODES
+
+    # -- what a task says --------------------------------------------------------------------
+
+    def design(self, rng: EpisodeRandom) -> Any:
+        """Draw the geometry of one environment; `build` finds it as ``world.design``."""
+        return None
+
+    def build(self, world: World) -> None:
+        """Add the task's bodies to a world, in the order declared; the robots stand already."""
+        for name, body in self.bodies.items():
+            body.add_to(world, name)
+
+    def sample(self, world: World, rng: EpisodeRandom) -> None:
+        """Place the task's bodies for a new episode; the robots are placed already."""
+        for name, body in self.bodies.items():
+            body.place(world, name, rng)
+
+    def evaluate(self, state: State) -> dict[str, Array]:
+        """Return ``success`` (N,) bool and whatever else describes the state.
+
+        Arrays, as the state gives them: they reach the user as tensors.
+        """
+        raise NotImplementedError
+
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
+        """Return named parts of the observation, each (N, k) or (N,), after the robots' own."""
+        return {}
+
+    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
+        """Return the dense reward, (N,)."""
+        raise NotImplementedError
+
+    def remember(self, state: State) -> Mapping[str, Array]:
+        """Return what later steps look back at, by name, each (N, …), as it is after a reset.
+
+        The task finds it as an attribute of `memory` and may change it there; the rows of
+        environments that are reset are taken anew.
+        """
+        return {}
+
+    def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
+        """Do what a new episode needs besides; called after ``env_ids`` were reset."""
+
+    def respond(self, state: State) -> None:
+        """Move bodies in answer to a control step, before the step is judged.
+
+        Called after every step's physics if a subclass has it; the state is read anew then.
+        Only the environments in ``moving`` take the step.
+        """
+
+    def reset_robots(self, world: World, rng: EpisodeRandom) -> None:
+        """Stand every robot at its placement, with joint noise."""
+        shared = self.shared_joint_noise
+        draws = [rng.joint_noise(world.layout, shared) for _ in range(self.joint_noise_draws)]
+        for name, noise in draws[-1].items():
+            self.stand(world, name, noise)
+
+    def stand(self, world: World, robot: str, noise: NDArray[Any]) -> None:
+        """Stand a robot at its placement, off its keyframe by ``noise``, (dof,) (rad, m).
+
+        Groups without reset noise stay exact. The sum is taken in the type of ``noise``.
+        """
+        placement = world.layout[robot]
+        groups = placement.robot.action_split.groups.values()
+        noisy = [group.reset_noise for group in groups for _ in group.joints]
+        qpos = np.array(placement.start_qpos, noise.dtype)
+        world.robots[robot].reset(np.where(noisy, noise + qpos, qpos))
+
+    # -- making and closing ------------------------------------------------------------------
+
+    def __init__(self, scenario: Scenario, *, first_seed: int = FIRST_SEED) -> None:
+        """Build the worlds and reset them with native's first seeds.
+
+        Args:
+            scenario: How to make it; `tasks.make` and ``cls.scenario`` give one to start from.
+            first_seed: Environment i starts with seed ``first_seed + i``.
+
+        Raises:
+            TaskError: If the scenario asks for what the task does not offer.
+            SimulationError: If a control step is no whole number of physics steps.
+            LayoutError: If the robots of a layout other than the task's own collide.
+            AssetError: If robot files cannot be found.
+        """
+        scenario.check(self.reward_modes)
+        own = type(self)
+        check_places(own.__name__, scenario.layout, own.layout, self.robot_counts)
+        if scenario.check_layout and scenario.layout != own.layout:
+            refuse_collisions(scenario.layout)
+        self.made_from = scenario
+        self.layout = scenario.layout.in_control_mode(scenario.control_mode)
+        self.num_envs = scenario.num_envs
+        self.obs_mode = scenario.obs_mode
+        self.reward_mode = scenario.reward_mode or self.reward_modes[0]
+        if scenario.max_episode_steps is not None:
+            self.max_episode_steps = scenario.max_episode_steps
+        self.action_split = self.layout.action_split
+        low, high = np.array(self.layout.action_bounds, np.float32).T
+        rows = self.num_envs, 1
+        self.single_action_space = Box(low, high, dtype=np.float32)
+        self.action_space = Box(np.tile(low, rows), np.tile(high, rows), dtype=np.float32)
+        self._reader = ActionReader(self.layout, self.num_envs)
+        mode = read_mode(scenario.obs_mode)
+        cameras = scenario.cameras or self.cameras if mode.textures else ()
+        self.observer = Observer(self.layout, mode, cameras, self.sensed)
+        self._rngs = [EpisodeRandom(first_seed + i) for i in range(self.num_envs)]
+        self._max_reward = np.array(self.max_reward, np.float32)
+        self._elapsed = np.zeros(self.num_envs, np.int32)
+        self._everywhere: Sequence[int] = range(self.num_envs)
+        self.moving = self._everywhere
+        self.memory = Memory()
+        self._simulation: Simulation | None = Simulation(
+            self.layout,
+            self._build_world,
+            self.num_envs,
+            scenario.physics,
+            control_frequency=scenario.control_frequency,
+            visuals=scenario.draws,
+        )
+        self._camera: Any = None
+        self._responds = type(self).respond is not MultiRobotTask.respond
+        self.start = self._begin(list(range(self.num_envs)), reconfigured=True)
+        self._describe_observation()
+
+    @property
+    def seeds(self) -> list[int]:
+        """What the random streams of each environment last began with."""
+        return [rng.seed for rng in self._rngs]
+
+    @property
+    def simulation(self) -> Simulation:
+        """The worlds.
+
+        Raises:
+            SimulationError: If the task was closed.
+        """
+        if self._simulation is None:
+            raise SimulationError(f"this {type(self).__name__} is closed; make a new one")
+        return self._simulation
+
+    def close(self) -> None:
+        """Let the worlds go; closing twice is allowed."""
+        self._simulation = None
+        self._camera = None
+        vars(self).pop("_state", None)  # it holds the worlds as well
+        self.observer.close()
+
+    # -- episodes ----------------------------------------------------------------------------
+
+    def reset(
+        self,
+        seed: int | Sequence[int | None] | None = None,
+        options: Mapping[str, Any] | None = None,
+        env_ids: Sequence[int] | None = None,
+    ) -> tuple[Any, Info]:
+        """Begin new episodes.
+
+        Args:
+            seed: ``k`` seeds environment i with k + i; a list gives each of ``env_ids`` its own;
+                None, also in a list, lets the random streams run on.
+            options: ``{"reconfigure": True}`` rebuilds the worlds, so that nothing of their
+                past is left in PhysX.
+            env_ids: Which environments; all if None. The others go on as they are.
+
+        Returns:
+            Observation and info of all environments.
+
+        Raises:
+            TaskError: If an argument makes no sense; nothing is reset then.
+        """
+        ids = checked_ids(env_ids, self.num_envs)
+        seeds = checked_seeds(seed, ids)
+        reconfigure = wants_rebuild(options) or self.rebuilds
+        self.simulation.touched()
+        for i, own_seed in zip(ids, seeds, strict=True):
+            if own_seed is not None:
+                self._rngs[i].restart(own_seed)
+            elif reconfigure:
+                self._rngs[i].reseed_for_rebuild()
+        if reconfigure:
+            self.simulation.rebuild(ids, self._build_world)
+        return self._begin(ids, reconfigured=reconfigure)
+
+    def step(
+        self, action: Any, env_ids: Sequence[int] | None = None
+    ) -> tuple[Any, Tensor, Tensor, Tensor, Info]:
+        """Advance environments by one control step.
+
+        There is no automatic reset, and stepping past truncation is allowed.
+
+        Args:
+            action: (N, A) tensor or array in the order of ``action_split``, or a mapping
+                robot name → (N, a); normalised numbers beyond [-1, 1] are clipped, joint
+                positions beyond their limits are not.
+            env_ids: Which environments move; all if None. The others stand still, and what is
+                returned for them means nothing.
+
+        Returns:
+            Observation, reward (N,) float32, terminated (N,), truncated (N,), info. An
+            environment terminates when it succeeds.
+
+        Raises:
+            ActionError: If the action has a wrong shape, type or number; nothing moves then.
+            SimulationError: If physics diverged: a pose is not finite.
+            TaskError: If the task's reward or observation is not finite.
+        """
+        flat = self._reader.read(action)
+        self.moving = self._everywhere if env_ids is None else checked_ids(env_ids, self.num_envs)
+        self.simulation.step(flat, self._state.joint_positions, self.moving)
+        self._elapsed[slice(None) if env_ids is None else self.moving] += 1
+        state = self._read()
+        if self._responds:
+            self.respond(state)
+            self.simulation.touched()
+            state = self._read()
+        info = self._info(state)
+        self.observer.changed(self.moving)
+        obs = self._observation(state, info)
+        reward = _tensor(self._reward(state, flat, info))
+        terminated = _tensor(info["success"].copy())
+        truncated = _tensor(self._elapsed >= self.max_episode_steps)
+        return obs, reward, terminated, truncated, _tensors(info)
+
+    def get_state_dict(self) -> StateDict:
+        """Return all poses and velocities under native's keys; see `native_format`."""
+        return read_state_dict(self.simulation, self._state)
+
+    def begin_tape(self) -> StateTape:
+        """Return a tape of states for the present episode; see `write_tape`."""
+        return StateTape(self.simulation)
+
+    def write_tape(self, tape: StateTape) -> None:
+        """Add the present state to a tape: what `get_state_dict` returns, much cheaper."""
+        tape.write(self._state)
+
+    def set_state_dict(
+        self, state: Mapping[str, Mapping[str, Any]], env_ids: Sequence[int] | None = None
+    ) -> None:
+        """Put environments into a state, row by row.
+
+        Args:
+            state: What `get_state_dict` returns, with one row per environment set.
+            env_ids: Which environments; all if None.
+
+        Raises:
+            TaskError: If a key, a shape or a number is wrong, see `native_format`; nothing is
+                changed then.
+        """
+        ids = checked_ids(env_ids, self.num_envs)
+        write_state_dict(self.simulation, state, ids)
+        self.observer.changed(ids)
+        self._read()
+
+    def render(self) -> np.ndarray:
+        """Return a picture of every environment, (N, 512, 512, 3) uint8.
+
+        Raises:
+            TaskError: If the task was not made with ``render_mode="rgb_array"``.
+        """
+        if self.made_from.render_mode is None:
+            raise TaskError("this task draws no pictures; make it with render_mode='rgb_array'")
+        if self._camera is None:
+            from simulation.rendering.pictures import Cameras
+
+            self._camera = Cameras(self.simulation, *self.viewpoint)
+        return self._camera.take()
+
+    # -- inside ------------------------------------------------------------------------------
+
+    def _build_world(self, world: World, index: int) -> None:
+        rng = self._rngs[index]
+        world.design = self.design(rng)
+        self.build(world)
+        rng.restart_numpy()
+
+    def _begin(self, ids: list[int], *, reconfigured: bool) -> tuple[Any, Info]:
+        for i in ids:
+            world = self.simulation.worlds[i]
+            world.clear()
+            self.reset_robots(world, self._rngs[i])
+            self.sample(world, self._rngs[i])
+        if reconfigured:
+            self._camera = None
+        self._elapsed[ids] = 0
+        state = self._read()
+        self.memory.renew(self.remember(state), ids)
+        self.begin_episodes(state, ids)
+        info = self._info(state)
+        check_info(type(self).__name__, info)
+        self.observer.changed(ids)
+        obs = self._observation(state, info)
+        return obs, {**_tensors(info), "reconfigure": reconfigured}
+
+    def _describe_observation(self) -> None:
+        """Read spaces and slices off the first observation."""
+        state, mode = self._state, self.observer.mode
+        parts = self.observe(state, self._info(state)) if mode.flat else {}
+        self.observation_slices = self.observer.slices(state, parts)
+        if not mode.nothing:
+            self.single_observation_space = space_of(self.start[0], batched=True)
+            self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+
+    def _read(self) -> State:
+        state = self._state = self.simulation.read()
+        if not all_finite(state.all_poses):
+            refuse_state(state, self._elapsed)
+        return state
+
+    def _info(self, state: State) -> Info:
+        told = {key: np.asarray(value) for key, value in self.evaluate(state).items()}
+        return {"elapsed_steps": self._elapsed.copy(), **told}
+
+    def _observation(self, state: State, info: Info) -> Any:
+        if self.observer.mode.nothing:
+            return {}
+        parts = self.observe(state, info)
+        try:
+            return self.observer.observe(self.simulation, state, parts)
+        except NotFinite:
+            refuse_observation(state, parts, self, self._elapsed)
+
+    def _reward(self, state: State, action: Floats, info: Info) -> Floats:
+        match self.reward_mode:
+            case "normalized_dense":
+                return self._dense(state, action, info) / self._max_reward
+            case "dense":
+                return self._dense(state, action, info)
+            case "sparse":
+                return info["success"].astype(np.float32)
+            case _:
+                return np.zeros(self.num_envs, np.float32)
+
+    def _dense(self, state: State, action: Floats, info: Info) -> Floats:
+        reward = np.asarray(self.dense_reward(state, action, info), np.float32)
+        if not all_finite(reward):
+            refuse_reward(reward, self, self._elapsed)
+        return reward
+
+
+_tensor = torch.from_numpy
+
+
+def _tensors(info: Info) -> Info:
+    """Return info as users get it: tensors that share its arrays' memory."""
+    return {key: _tensor(value) for key, value in info.items()}

@@ -1,0 +1,1 @@
+"""What tasks are written in: bodies, areas, geometry, and terms of rewards."""

@@ -1,0 +1,387 @@
+"""Bodies of a task, declared once: shape, colour, and where episodes begin with them."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from math import cos, isfinite, sin
+from typing import ClassVar, Literal, TypeAlias
+
+from layouts.orientation import multiplied
+from robots import TaskError
+from robots.descriptor import IDENTITY, Quaternion, Vector3
+from simulation import Box, Friction, Shape, Sphere, World, add_table
+from simulation.shapes import Color
+from simulation.world import BodyKind
+from tasks.engine.randomness import EpisodeRandom
+from tasks.language.props import (
+    FACE_UP,
+    GREEN,
+    RED,
+    TARGET_HEIGHT,
+    add_wide_table,
+    peg_shapes,
+    target_shapes,
+)
+
+Range: TypeAlias = "float | tuple[float, float]"
+"""A number, or the smallest and the largest that may be drawn."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Area:
+    """Where a body may be when an episode begins, drawn evenly.
+
+    Attributes:
+        x: Of its origin (m, world).
+        y: Of its origin (m, world).
+        z: Of its origin (m, world); None lays the body on the table.
+        yaw: How it is turned about z (rad), or ``"any"`` angle.
+    """
+
+    x: Range = 0.0
+    y: Range = 0.0
+    z: Range | None = None
+    yaw: Range | Literal["any"] = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no range.
+
+        Raises:
+            TaskError: If a bound is not finite, or the lower one is the larger.
+        """
+        for name, value in (("x", self.x), ("y", self.y), ("z", self.z), ("yaw", self.yaw)):
+            if value is None or value == "any":
+                continue
+            low, high = _bounds(name, value)
+            if not (isfinite(low) and isfinite(high) and low <= high):
+                raise TaskError(
+                    f"an area's {name} is {value!r}; it takes a finite number, or two of them, the"
+                    " smaller first"
+                )
+
+    def draw(self, rng: EpisodeRandom, height: float) -> tuple[list[float], Quaternion]:
+        """Draw a pose: first what varies of x, y and z, at once, then the angle.
+
+        Args:
+            rng: The environment's random streams.
+            height: Of a body's origin when it lies on the table (m).
+
+        Returns:
+            Position (m, world) and quaternion (wxyz).
+        """
+        sides = [self.x, self.y, height if self.z is None else self.z]
+        varying = [side for side in sides if isinstance(side, tuple)]
+        if varying:
+            lows, highs = zip(*varying, strict=True)
+            drawn = iter(rng.uniform_between(lows, highs).tolist())
+            sides = [next(drawn) if isinstance(side, tuple) else side for side in sides]
+        return [float(side) for side in sides if not isinstance(side, tuple)], self._turn(rng)
+
+    def _turn(self, rng: EpisodeRandom) -> Quaternion:
+        if self.yaw == "any":
+            return tuple(rng.yaw_quaternion().tolist())
+        if isinstance(self.yaw, tuple):
+            return tuple(rng.yaw_quaternion(*self.yaw).tolist())
+        return (cos(self.yaw / 2), 0.0, 0.0, sin(self.yaw / 2)) if self.yaw else IDENTITY
+
+
+def _bounds(name: str, value: object) -> tuple[float, float]:
+    match value:
+        case (int() | float() as low, int() | float() as high):
+            return float(low), float(high)
+        case int() | float() as both:
+            return float(both), float(both)
+        case _:
+            raise TaskError(
+                f"an area's {name} is {value!r}; it takes a number, or the smallest and the largest"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body(ABC):
+    """A body of a task: a class attribute, under the name by which the state knows it.
+
+    Attributes:
+        spawn: Where episodes begin with it; None leaves that to the task's `sample`.
+        start: Where it is built (m, world); None takes the origin of the table's top.
+        kind: ``"dynamic"`` moves by physics, ``"kinematic"`` by the task, ``"static"`` never.
+    """
+
+    spawn: Area | None = None
+    start: Vector3 | None = None
+    kind: BodyKind = "dynamic"
+
+    marker: ClassVar[bool] = False
+    """Whether it is there for people only: cameras that observe do not see it."""
+
+    @property
+    @abstractmethod
+    def shapes(self) -> tuple[Shape, ...]:
+        """What it is made of, in its own frame."""
+
+    @property
+    def height(self) -> float:
+        """Of its origin above the table when it lies there (m)."""
+        return 0.0
+
+    @property
+    def lying(self) -> Quaternion:
+        """How it is turned when it lies on the table, wxyz, before any yaw."""
+        return IDENTITY
+
+    def add_to(self, world: World, name: str) -> None:
+        """Build it in a world."""
+        start = (0.0, 0.0, self.height) if self.start is None else self.start
+        world.add(name, *self.shapes, kind=self.kind, position=start, marker=self.marker)
+
+    def place(self, world: World, name: str, rng: EpisodeRandom) -> None:
+        """Put it where its area says, if it has one."""
+        if self.spawn is not None:
+            position, turn = self.spawn.draw(rng, self.height)
+            world.set_pose(name, position, _turned(self.lying, turn))
+
+
+@dataclass(frozen=True)
+class Cuboid(Body):
+    """A solid box.
+
+    Attributes:
+        half_size: Half its extents along x, y, z (m).
+        color: Red, green, blue, alpha.
+        density: Density (kg/m³).
+        friction: Contact material; None takes the world's.
+    """
+
+    half_size: Vector3
+    color: Color = RED
+    density: float = 1000.0
+    friction: Friction | None = None
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """The box."""
+        return (
+            Box(
+                half_size=self.half_size,
+                color=self.color,
+                density=self.density,
+                friction=self.friction,
+            ),
+        )
+
+    @property
+    def height(self) -> float:
+        """Half its height (m)."""
+        return self.half_size[2]
+
+
+@dataclass(frozen=True)
+class Cube(Body):
+    """A solid cube.
+
+    Attributes:
+        half_size: Half its edge (m).
+        color: Red, green, blue, alpha.
+        density: Density (kg/m³).
+        friction: Contact material; None takes the world's.
+    """
+
+    half_size: float
+    color: Color = RED
+    density: float = 1000.0
+    friction: Friction | None = None
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """The box."""
+        edges = (self.half_size, self.half_size, self.half_size)
+        return Cuboid(edges, self.color, self.density, self.friction).shapes
+
+    @property
+    def height(self) -> float:
+        """Half its edge (m)."""
+        return self.half_size
+
+
+@dataclass(frozen=True)
+class Ball(Body):
+    """A solid ball.
+
+    Attributes:
+        radius: Its radius (m).
+        color: Red, green, blue, alpha.
+        density: Density (kg/m³).
+        friction: Contact material; None takes the world's.
+    """
+
+    radius: float
+    color: Color = RED
+    density: float = 1000.0
+    friction: Friction | None = None
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """The sphere."""
+        return (
+            Sphere(
+                radius=self.radius,
+                color=self.color,
+                density=self.density,
+                friction=self.friction,
+            ),
+        )
+
+    @property
+    def height(self) -> float:
+        """Its radius (m)."""
+        return self.radius
+
+
+@dataclass(frozen=True)
+class Peg(Body):
+    """A square peg along its own x axis.
+
+    Attributes:
+        half_length: Half its length (m).
+        half_width: Half its width and height (m).
+        tail: Colour of the half at negative x.
+        head: Colour of the half at positive x.
+    """
+
+    half_length: float
+    half_width: float
+    tail: Color = GREEN
+    head: Color = RED
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """One solid box, drawn in two colours."""
+        return peg_shapes(self.half_length, self.half_width, tail=self.tail, head=self.head)
+
+    @property
+    def height(self) -> float:
+        """Half its width (m)."""
+        return self.half_width
+
+
+@dataclass(frozen=True)
+class Compound(Body):
+    """A body of several shapes.
+
+    Attributes:
+        parts: Its shapes, in its own frame.
+        rest_height: Of its origin above the table when it lies there (m).
+    """
+
+    parts: tuple[Shape, ...]
+    rest_height: float = 0.0
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """Its parts."""
+        return self.parts
+
+    @property
+    def height(self) -> float:
+        """What ``rest_height`` says (m)."""
+        return self.rest_height
+
+
+@dataclass(frozen=True)
+class Goal(Body):
+    """A green ball that marks a place in the air, touches nothing, and hides from cameras.
+
+    Attributes:
+        radius: Its radius (m).
+    """
+
+    radius: float
+    kind: BodyKind = field(default="kinematic", kw_only=True)
+    marker: ClassVar[bool] = True
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """The ball."""
+        return (Sphere(radius=self.radius, color=GREEN, collides=False),)
+
+
+@dataclass(frozen=True)
+class Target(Body):
+    """A disc of red and white rings that lies on the table and touches nothing.
+
+    Attributes:
+        radius: Its radius (m).
+    """
+
+    radius: float
+    kind: BodyKind = field(default="kinematic", kw_only=True)
+    start: Vector3 | None = field(default=(0.0, 0.0, 0.0), kw_only=True)
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """The rings."""
+        return target_shapes(self.radius)
+
+    @property
+    def height(self) -> float:
+        """Just above the table (m)."""
+        return TARGET_HEIGHT
+
+    @property
+    def lying(self) -> Quaternion:
+        """Face up."""
+        return FACE_UP
+
+
+@dataclass(frozen=True)
+class Table:
+    """ManiSkill's table, 2.4 m × 1.2 m, its top at z = 0, and the floor below it.
+
+    Attributes:
+        textured: Whether pictures show wood; else the table is white.
+    """
+
+    textured: bool = True
+
+    def add_to(self, world: World, name: str) -> None:
+        """Build it; its body is called ``table-workspace``, as in native."""
+        add_table(world, textured=self.textured)
+
+    def place(self, world: World, name: str, rng: EpisodeRandom) -> None:
+        """Leave it where it is: every reset puts it back."""
+
+
+@dataclass(frozen=True)
+class WideTable:
+    """A table under all robots of a layout, its top at z = 0, and the floor below it."""
+
+    def add_to(self, world: World, name: str) -> None:
+        """Build it; its body is called ``table``."""
+        add_wide_table(world)
+
+    def place(self, world: World, name: str, rng: EpisodeRandom) -> None:
+        """Leave it where it is: every reset puts it back."""
+
+
+Declared: TypeAlias = Body | Table | WideTable
+
+
+def _turned(lying: Quaternion, turn: Quaternion) -> Quaternion:
+    if IDENTITY in (lying, turn):  # exactly the other one
+        return turn if lying == IDENTITY else lying
+    return multiplied(turn, lying)
+
+
+def declared_bodies(task: type) -> dict[str, Declared]:
+    """Return the bodies that a task's class declares, by name, its bases' first."""
+    return dict(_bodies(task))
+
+
+def _bodies(task: type) -> Iterator[tuple[str, Declared]]:
+    names = dict.fromkeys(name for cls in reversed(task.__mro__) for name in vars(cls))
+    for name in names:
+        value = getattr(task, name, None)
+        if isinstance(value, Body | Table | WideTable):
+            yield name, value

@@ -1,0 +1,1 @@
+"""Tasks of our own, for robots that ManiSkill never put at one table."""

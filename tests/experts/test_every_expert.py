@@ -1,0 +1,88 @@
+"""What every expert does: it solves its task in time, as well in native, and repeats itself."""
+
+import numpy as np
+import pytest
+import torch
+
+import tasks
+from experts import find_expert, list_experts
+from parity.compare.native_env import make_native, native_action
+from tests.rollouts.expert_plays import REBUILT, episode, plan, seeds, task
+
+# How many of the seeds 0 ... 49 it solves at least.
+OF_50 = {
+    "DrawTriangle-v1": 48,
+    "LiftPegUpright-v1": 48,
+    "PegInsertionSide-v1": 45,
+    "PlugCharger-v1": 45,
+    "PokeCube-v1": 48,
+    "PullCube-v1": 48,
+    "PullCubeTool-v1": 48,
+    "PushCube-v1": 48,
+    "PushT-v1": 45,
+    "RollBall-v1": 48,
+}
+FAILURES_OF_10 = {"PickCubeSO100-v1": 2}  # 0 of the others
+EXPERTS = list_experts()
+CLONED = [name for name in EXPERTS if name in tasks.list_clones()]
+EPISODES = [(name, seed) for name in EXPERTS for seed in seeds(name)]
+
+
+@pytest.mark.parametrize(("name", "seed"), EPISODES)
+def test_it_solves_its_task_in_time(name: str, seed: int):
+    actions = plan(name, seed)
+    assert actions.dtype == np.float32
+    assert actions.shape[1:] == task(name).single_action_space.shape
+    assert len(actions) <= task(name).max_episode_steps
+    assert np.abs(actions).max() <= 1
+    success = episode(name, seed).success
+    assert success[-1]
+    assert not success[:-1].any()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", OF_50)
+def test_it_solves_most_of_50_seeds(name: str):
+    failed = [seed for seed in range(50) if not episode(name, seed).solved]
+    assert len(failed) <= 50 - OF_50[name], f"failed: {failed}"
+
+
+@pytest.mark.long
+@pytest.mark.native
+# mani_skill's own
+@pytest.mark.filterwarnings("ignore:__array_wrap__:DeprecationWarning")
+@pytest.mark.filterwarnings("ignore:The 'warn' method:DeprecationWarning")
+@pytest.mark.parametrize("name", CLONED)
+def test_the_same_actions_do_the_same_in_native(name: str):
+    native = make_native(name)
+    failed: list[int] = []
+    for seed in range(10):
+        native.reset(seed=seed, options=REBUILT)
+        outcomes = [
+            bool(native.step(native_action(native, action))[-1]["success"][0])
+            for action in plan(name, seed)
+        ]
+        assert outcomes == episode(name, seed).success.tolist(), f"seed {seed}"
+        if not outcomes[-1]:
+            failed.append(seed)
+    native.close()
+    assert len(failed) <= FAILURES_OF_10.get(name, 0), f"failed: {failed}"
+
+
+@pytest.mark.parametrize("name", CLONED)
+def test_it_repeats_itself(name: str):
+    seed = seeds(name)[-1]
+    np.testing.assert_array_equal(find_expert(name)(tasks.make(name), seed), plan(name, seed))
+
+
+@pytest.mark.parametrize("name", CLONED)
+def test_it_leaves_the_task_alone(name: str):
+    env = tasks.make(name)
+    env.reset(seed=11)
+    env.step(torch.zeros(1, *env.single_action_space.shape))
+    before = env.get_state_dict()
+    find_expert(name)(env, seeds(name)[-1])
+    after = env.get_state_dict()
+    for group, entries in before.items():
+        for body, row in entries.items():
+            assert torch.equal(after[group][body], row), body

@@ -1,0 +1,105 @@
+"""The experts solve their tasks, here and in native, and say what they cannot do."""
+
+import numpy as np
+import pytest
+
+import tasks
+from experts import find_expert, list_experts, register_expert
+from experts import registry as registry_module
+from layouts import face_to_face
+from parity.compare.native_env import make_native, native_action
+from robots import TaskError, UnknownNameError
+from tasks.episode import play
+from tests.rollouts.hand_overs import TASK, plan, task
+
+SEEDS = range(10)
+
+
+@pytest.mark.long
+def test_the_hand_over_succeeds_on_95_of_100_seeds():
+    solved = [play(task(), seed, find_expert(TASK)(task(), seed)).solved for seed in range(100)]
+    assert sum(solved) >= 95, f"failed: {[seed for seed, good in enumerate(solved) if not good]}"
+
+
+@pytest.fixture(scope="module")
+def native():
+    env = make_native(TASK)
+    yield env
+    env.close()
+
+
+@pytest.mark.native
+@pytest.mark.filterwarnings("ignore:__array_wrap__:DeprecationWarning")  # mani_skill's own
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_same_actions_succeed_in_native(native, seed):
+    native.reset(seed=seed, options={"reconfigure": True})
+    for action in plan(seed):
+        *_, info = native.step(native_action(native, action))
+    assert bool(info["success"][0])
+
+
+def test_the_cube_changes_hands_in_the_air():
+    """Both grippers hold it at once, higher than it ever lies on the table."""
+    env = task()
+    env.reset(0, options={"reconfigure": True})
+    both = []
+    for action in plan(0):
+        env.step(action)
+        state = env.simulation.read()
+        if all(state.is_grasping(robot, "cube")[0] for robot in ("left", "right")):
+            both.append(float(state.position("cube")[0, 2]))
+    assert both
+    assert min(both) > 0.1
+
+
+@pytest.mark.parametrize("mode", ["sparse", "dense"])
+def test_the_plan_does_not_depend_on_modes(mode):
+    env = tasks.make(TASK, num_envs=3, reward_mode=mode, obs_mode="none")
+    np.testing.assert_array_equal(find_expert(TASK)(env, 2), plan(2))
+
+
+@pytest.mark.parametrize("spacing", [1.4, 1.6])
+def test_other_layouts_are_planned_for(spacing):
+    layout = face_to_face({"left": "panda", "right": "panda_wristcam"}, spacing=spacing)
+    env = tasks.make(TASK, layout=layout)
+    assert play(env, 0, find_expert(TASK)(env, 0)).solved
+
+
+def test_arms_too_far_apart_are_an_error():
+    env = tasks.make(
+        TASK, layout=face_to_face(dict.fromkeys(("left", "right"), "panda"), spacing=4)
+    )
+    with pytest.raises(
+        TaskError, match=r"TwoRobotPickCube-v1, seed 0: no plan: \w+\.\w+ is out of"
+    ):
+        find_expert(TASK)(env, 0)
+
+
+def test_an_arm_without_fingers_is_an_error():
+    env = tasks.make(TASK, robots={"right": "panda_stick"})
+    with pytest.raises(TaskError, match="'right' is a panda_stick, which has none"):
+        find_expert(TASK)(env, 0)
+
+
+def test_every_listed_expert_is_found():
+    assert TASK in list_experts()
+    assert all(callable(find_expert(name)) for name in list_experts())
+    assert find_expert("maniskill.two_robot_pick_cube_native") is find_expert(TASK)
+
+
+def test_an_unknown_task_is_named_with_the_closest():
+    with pytest.raises(UnknownNameError, match=r"unknown task 'TwoRobotPickCub'. Did you mean"):
+        find_expert("TwoRobotPickCub")
+
+
+def test_a_task_without_an_expert_says_which_have_one(monkeypatch):
+    monkeypatch.setattr(registry_module, "CATALOGUE", {TASK: registry_module.CATALOGUE[TASK]})
+    with pytest.raises(TaskError, match=f"PushT-v1 has no expert yet; tasks with one: {TASK}"):
+        find_expert("PushT-v1")
+
+
+def test_an_expert_can_be_registered(monkeypatch):
+    monkeypatch.setattr(registry_module, "_registered", {})
+    expert = register_expert("pusht-v1", lambda task, seed: np.zeros((1, 7), np.float32))
+    assert find_expert("PushT-v1") is expert
+    assert "PushT-v1" in list_experts()

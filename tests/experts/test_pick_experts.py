@@ -1,0 +1,124 @@
+"""The experts that pick, place and stack: how they grip, and what they refuse."""
+
+import numpy as np
+import pytest
+
+import tasks
+from experts import find_expert
+from experts.geometry import rotate
+from experts.grasps import cube_grips, held_at, is_near
+from experts.rehearsal import Rehearsal, first_success
+from experts.script import Scene, Waypoint
+from layouts import Layout, Placement
+from robots import RobotRegistry, TaskError
+from tasks.episode import play
+from tests.rollouts.expert_plays import plan, task
+
+
+@pytest.mark.parametrize(
+    ("task_id", "place"),
+    [
+        ("PickCube-v1", "arm"),
+        ("PickCubeSO100-v1", "arm"),
+        ("PlaceSphere-v1", "arm"),
+        ("StackCube-v1", "arm"),
+        ("StackPyramid-v1", "arm"),
+        ("TwoRobotStackCube-v1", "left"),
+        ("TwoRobotStackCube-v1", "right"),
+    ],
+)
+def test_an_arm_without_fingers_is_an_error(task_id, place):
+    env = tasks.make(task_id, robots={place: "panda_stick"})
+    with pytest.raises(TaskError, match=f"needs fingers on .*'{place}' is a panda_stick, which"):
+        find_expert(task_id)(env, 0)
+
+
+def test_jaws_that_do_not_roll_are_an_error():
+    env = tasks.make("PickCubeSO100-v1", robots={"arm": "panda"})
+    with pytest.raises(TaskError, match="jaws that roll about 'wrist_roll'; 'arm' is a panda"):
+        find_expert("PickCubeSO100-v1")(env, 0)
+
+
+def test_a_cube_out_of_reach_is_an_error():
+    layout = Layout({"arm": Placement(RobotRegistry.load("panda"), position=(-3.0, 0.0, 0.0))})
+    env = tasks.make("StackCube-v1", layout=layout)
+    with pytest.raises(TaskError, match=r"StackCube-v1, seed 0: no plan: arm\.above cubeA is out"):
+        find_expert("StackCube-v1")(env, 0)
+
+
+@pytest.fixture(scope="module")
+def rehearsal() -> Rehearsal:
+    return Rehearsal(task("StackCube-v1"))
+
+
+def test_grips_of_a_cube_face_its_sides(rehearsal):
+    scene = rehearsal.begin(3)
+    cube = scene.body("cubeA")
+    grips = cube_grips(cube)
+    assert len(grips) == 4
+    for position, quaternion in grips:
+        np.testing.assert_array_equal(position, cube[0])
+        # the gripper's y axis, along which its fingers open, is one of the cube's level axes
+        matches = np.abs(_axes(cube[1])[:, :2].T @ _axes(quaternion)[:, 1])
+        np.testing.assert_allclose(np.sort(matches), [0, 1], atol=1e-6)
+
+
+def test_what_is_held_ends_where_it_was_asked_to(rehearsal):
+    """The grip does not change, so that gripper and cube move as one body."""
+    scene = rehearsal.begin(3)
+    place = np.array([0.1, 0.2, 0.3])
+    position, quaternion = scene.tcp("arm")
+    cube = scene.body("cubeA")[0]
+    in_gripper = _axes(quaternion).T @ (cube - position)
+    for position, quaternion in held_at(scene, "arm", "cubeA", place, (-0.5, 0.5), (0.0, 0.4)):
+        np.testing.assert_allclose(position + _axes(quaternion) @ in_gripper, place, atol=1e-6)
+
+
+def test_near_means_every_axis(rehearsal):
+    scene = rehearsal.begin(3)
+    offset = scene.body("cubeA")[0] - scene.body("cubeB")[0]
+    assert is_near(scene, "cubeA", "cubeB", offset, 1e-6)
+    for axis in np.eye(3):
+        assert is_near(scene, "cubeA", "cubeB", offset + 0.009 * axis, 0.01)
+        assert not is_near(scene, "cubeA", "cubeB", offset + 0.011 * axis, 0.01)
+
+
+def test_two_waypoints_of_one_name_are_refused(rehearsal):
+    rehearsal.begin(0)
+    with pytest.raises(TaskError, match=r"2 waypoints are called 'arm\.wait'; one may be"):
+        rehearsal.play({"arm": (Waypoint("wait"), Waypoint("go"), Waypoint("wait"))})
+
+
+def test_a_waypoint_that_takes_too_long_ends_the_attempt(rehearsal):
+    rehearsal.begin(0)
+    script = {"arm": (Waypoint("wait", until=lambda scene: False, most=7),)}
+    attempt = rehearsal.play(script)
+    assert attempt.reason == "arm.wait took more than 7 steps"
+    assert len(attempt.actions) == 7
+
+
+def test_a_waypoint_in_time_goes_on(rehearsal):
+    rehearsal.begin(0)
+    attempt = rehearsal.play({"arm": (Waypoint("wait", steps=5, most=7), Waypoint("rest"))})
+    assert attempt.reason == "the episode ended at arm.rest"
+
+
+def test_the_pyramid_stands_on_two_cubes():
+    """Native also counts a blue cube that is lower; the expert's is higher by an edge."""
+    env = task("StackPyramid-v1")
+    play(env, 0, plan("StackPyramid-v1", 0))
+    scene = Scene(env)
+    for base in ("cubeA", "cubeB"):
+        assert scene.body("cubeC")[0][2] - scene.body(base)[0][2] == pytest.approx(0.04, abs=0.003)
+
+
+def test_first_success_takes_what_the_first_style_leaves(rehearsal):
+    """A script that cannot go on is followed by the next."""
+    stuck = {"arm": (Waypoint("wait", until=lambda scene: False, most=3),)}
+    actions = first_success(task("StackCube-v1"), 0, lambda scene: [stuck, {}])
+    assert len(actions) == task("StackCube-v1").max_episode_steps
+
+
+def _axes(quaternion: np.ndarray) -> np.ndarray:
+    """A rotation's own axes as columns, (3, 3)."""
+    return np.column_stack([rotate(quaternion, axis) for axis in np.eye(3)])

@@ -1,0 +1,182 @@
+"""Scripts are played as they are written, for one arm as for two."""
+
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+import pytest
+
+import tasks
+from experts.geometry import gripper_facing, nearest_quarter_turn, rotate, turn, yaw_of
+from experts.rehearsal import Attempt, Rehearsal, first_success, search
+from experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
+from robots import TaskError, UnknownNameError
+from tasks.episode import play
+
+FORWARD, DOWN = 0.0, gripper_facing(0.0, 0.0)
+
+
+def over_cube(scene: Scene, above: float) -> list[Pose]:
+    position, quaternion = scene.body("cube")
+    direction = nearest_quarter_turn(yaw_of(quaternion))
+    return [(position + [0, 0, above], gripper_facing(direction, 0.0))]
+
+
+def to_goal(scene: Scene) -> list[Pose]:
+    return [(scene.body("goal_site")[0], scene.tcp("arm")[1])]
+
+
+HELD = partial(Scene.grasps, robot="arm", body="cube")
+PICK = {
+    "arm": (
+        Waypoint("above", partial(over_cube, above=0.06), OPEN, near=0.1),
+        Waypoint("around", partial(over_cube, above=0.0), OPEN, near=0.02),
+        Waypoint("grasp", None, CLOSED, steps=3, until=HELD),
+        Waypoint("carry", to_goal, CLOSED, near=0.0),
+    )
+}
+
+
+def nowhere(scene: Scene) -> list[Pose]:
+    return [(np.array([5.0, 0.0, 0.0]), DOWN)]
+
+
+def test_one_arm_plays_a_script():
+    task = tasks.make("PickCube-v1")
+    actions = first_success(task, 0, lambda scene: [PICK])
+    assert len(actions) < 50
+    assert play(task, 0, actions).solved
+
+
+def test_the_first_script_that_succeeds_is_taken():
+    task = tasks.make("PickCube-v1")
+    scripts = [{"arm": (Waypoint("far", nowhere),)}, {}, PICK]
+    np.testing.assert_array_equal(
+        first_success(task, 0, lambda scene: scripts), first_success(task, 0, lambda scene: [PICK])
+    )
+
+
+def test_a_plan_that_fails_is_returned_as_it_is():
+    task = tasks.make("PickCube-v1")
+    actions = first_success(task, 0, lambda scene: [{}])
+    assert actions.shape == (50, 8)
+    assert not play(task, 0, actions).solved
+
+
+def test_no_plan_at_all_is_an_error():
+    script = {"arm": (Waypoint("far", nowhere),)}
+    with pytest.raises(TaskError, match=r"PickCube-v1, seed 3: no plan: arm\.far is out of reach"):
+        first_success(tasks.make("PickCube-v1"), 3, lambda scene: [script])
+
+
+def test_attempts_end_with_the_first_that_succeeds():
+    """Each is made from a fresh world, and sees what came of the one before."""
+    lifted: list[bool] = []
+
+    def attempts(rehearsal: Rehearsal) -> Iterator[Attempt]:
+        for script in ({"arm": PICK["arm"][:3]}, PICK, {}):
+            rehearsal.begin(0)
+            yield rehearsal.play(script)
+            lifted.append(rehearsal.scene().grasps("arm", "cube"))
+
+    task = tasks.make("PickCube-v1")
+    actions = search(task, 0, attempts)
+    assert lifted == [True]
+    np.testing.assert_array_equal(actions, first_success(task, 0, lambda scene: [PICK]))
+
+
+def test_a_waypoint_turns_joints():
+    rehearsal = Rehearsal(tasks.make("PickCube-v1"))
+    start = rehearsal.begin(0).qpos("arm")
+    change = np.array([0.3, 0, 0, 0.2, 0, 0, -0.1])
+    rehearsal.play({"arm": (Waypoint("turn", turn=lambda arm: change),)})
+    np.testing.assert_allclose(rehearsal.scene().qpos("arm")[:7] - start[:7], change, atol=0.01)
+
+
+@pytest.mark.parametrize("heading", [-1.4, 0.0, 1.4])
+@pytest.mark.parametrize("distance", [0.25, 0.35])
+def test_an_arm_of_few_joints_reaches_a_place(heading: float, distance: float):
+    rehearsal = Rehearsal(tasks.make("PickCubeSO100-v1"))
+    rehearsal.begin(0)
+    base = np.array(rehearsal.task.layout["arm"].base_position)
+    place = base + [distance * np.cos(heading), distance * np.sin(heading), 0.1]
+    go = Waypoint("go", at=lambda scene: place)
+    for _ in range(2):  # 50 steps are not enough to turn so far
+        rehearsal.play({"arm": (go,)})
+    np.testing.assert_allclose(rehearsal.scene().tcp("arm")[0], place, atol=0.01)
+
+
+def test_a_place_out_of_reach_is_told():
+    rehearsal = Rehearsal(tasks.make("PickCubeSO100-v1"))
+    rehearsal.begin(0)
+    go = Waypoint("go", at=lambda scene: np.array([0.0, 0.0, 0.1]))
+    assert rehearsal.play({"arm": (go,)}).reason == "arm.go is out of reach"
+
+
+@pytest.fixture(scope="module")
+def two_arms() -> Rehearsal:
+    return Rehearsal(tasks.make("TwoRobotPickCube-v1"))
+
+
+def test_a_waypoint_waits_for_another_robot(two_arms):
+    """Without it the left arm opens its fingers at once; with it after 10 steps of the right."""
+    two_arms.begin(0)
+    attempt = two_arms.play(
+        {
+            "left": (
+                Waypoint("shut", None, CLOSED),
+                Waypoint("open", None, OPEN, after=("right.wait",)),
+            ),
+            "right": (Waypoint("wait", None, steps=10),),
+        }
+    )
+    fingers = attempt.actions[:, 7].tolist()
+    assert 8 <= fingers.index(OPEN) <= 12
+    assert set(fingers[: fingers.index(OPEN)]) == {CLOSED}
+
+
+def test_every_attempt_starts_in_a_new_world(two_arms):
+    """PhysX remembers contacts across resets, so that a plan made in an old world may not hold."""
+    two_arms.begin(0)
+    before = two_arms.task.simulation.worlds[0]
+    two_arms.begin(0)
+    assert two_arms.task.simulation.worlds[0] is not before
+
+
+def test_where_an_attempt_ended_is_told(two_arms):
+    two_arms.begin(0)
+    attempt = two_arms.play({"left": (Waypoint("idle"),)})
+    assert not attempt.success
+    assert attempt.reason == "the episode ended at left.idle, right.start"
+    assert len(attempt.actions) == 100
+
+
+def test_waiting_for_an_unknown_waypoint_is_refused(two_arms):
+    script = {"left": (Waypoint("idle", after=("left.ilde",)),)}
+    with pytest.raises(
+        UnknownNameError, match=r"waypoint.*'left\.ilde'. Did you mean 'left\.idle'"
+    ):
+        two_arms.play(script)
+
+
+def test_an_unknown_robot_is_refused(two_arms):
+    with pytest.raises(UnknownNameError, match="robot of this layout 'lefd'. Did you mean 'left'"):
+        two_arms.play({"lefd": (Waypoint("idle"),)})
+
+
+@pytest.mark.parametrize("direction", [0.0, 1.0, -2.5])
+@pytest.mark.parametrize("tilt", [0.0, 0.5, np.pi / 2])
+def test_a_gripper_leans_the_way_it_faces(direction, tilt):
+    quaternion = gripper_facing(direction, tilt)
+    approach = rotate(quaternion, np.array([0.0, 0.0, 1.0]))
+    level = np.array([np.cos(direction), np.sin(direction), 0.0])
+    np.testing.assert_allclose(approach, np.sin(tilt) * level - [0, 0, np.cos(tilt)], atol=1e-12)
+    assert rotate(quaternion, np.array([0.0, 1.0, 0.0]))[2] == pytest.approx(0)  # opens level
+
+
+@pytest.mark.parametrize("angle", np.linspace(-7, 7, 29))
+def test_quarter_turns_of_a_square_are_the_same(angle):
+    small = nearest_quarter_turn(angle)
+    assert abs(small) <= np.pi / 4 + 1e-9
+    assert (angle - small) / (np.pi / 2) == pytest.approx(round((angle - small) / (np.pi / 2)))
+    assert yaw_of(turn("z", small)) == pytest.approx(small)
