@@ -232,7 +232,7 @@ def test_a_worker_that_is_stopped_before_it_has_read_what_to_run_holds_nobody_up
     monkeypatch.setattr(forks, "_fork", fork_and_stop)
     monkeypatch.setattr(forks, "_FORK_SECONDS", 0.5)
     process = processes.context.Process(target=len, args=(bytes(2**20),), daemon=True)
-    with pytest.raises(processes.ProcessError, match=r"took nothing of what it is to run for 0\.5 s"):
+    with pytest.raises(processes.ProcessError, match="took nothing of what it is to run"):
         processes.start(process)
     monkeypatch.undo()
     while os.path.exists(f"/proc/{pids[0]}"):
