@@ -8,7 +8,6 @@ from collections.abc import Iterable
 
 from robots.common.quoting import shortened, shown
 
-
 _LONGEST_NAME = 1000  # characters; nothing that long is a slip of the pen
 
 
@@ -109,7 +108,8 @@ def unknown_name_message(kind: str, name: object, choices: Iterable[str], hint: 
     match = closest_match(name, choices)
     suggestion = f" Did you mean {match!r}?" if match else ""
     listing = ", ".join(choices) if choices else "none"
-    return f"unknown {kind} {shown(name)}.{suggestion} Choices: {listing}.{' ' + hint if hint else ''}"
+    more = f" {hint}" if hint else ""
+    return f"unknown {kind} {shown(name)}.{suggestion} Choices: {listing}.{more}"
 
 
 def _rebuild_unknown_name(

@@ -8,6 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from tests.faults.fault import Fault
 
 AREA = "bodies"
@@ -66,12 +68,11 @@ def _wrong() -> Iterator[tuple[str, dict[str, Any], str, tuple[Any, ...]]]:
 
 
 def _declare(name: str, arguments: dict[str, Any], _: Path) -> None:
+    from robots import RobotLayoutsError
     from simulation import shapes
     from tasks.language import bodies
 
     make: Callable[..., Any] = getattr(bodies, name, None) or getattr(shapes, name)
-    try:
+    with pytest.raises(RobotLayoutsError, match=f"^{name}: ") as caught:
         make(**arguments)
-    except Exception as error:
-        assert str(error).startswith(f"{name}: "), error
-        raise
+    raise caught.value

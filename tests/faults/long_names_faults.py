@@ -7,6 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from tests.faults.fault import Fault
 
 AREA = "long names"
@@ -63,8 +65,7 @@ _TAKES: dict[str, Callable[[str], Any]] = {
 def _refused_in_short(take: Callable[[str], Any], _: Path) -> None:
     from robots import RobotLayoutsError
 
-    try:
+    with pytest.raises(RobotLayoutsError) as caught:
         take(NAME)
-    except RobotLayoutsError as error:
-        assert len(str(error)) <= LONGEST, f"{len(str(error))} characters"
-        raise
+    assert len(str(caught.value)) <= LONGEST
+    raise caught.value

@@ -283,6 +283,38 @@ def test_an_error_of_ours_keeps_its_type_and_says_where_it_came_from():
     assert "in build" in str(caught.value.__cause__)
 
 
+class Unprintable(TaskError):
+    def __str__(self):
+        raise ValueError("no words")
+
+
+class Unpicklable(TaskError):
+    def __reduce__(self):
+        raise ValueError("not to be pickled")
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (Unprintable("x"), "Unprintable: <exception str() failed>"),
+        (Unpicklable("x"), "Unpicklable: x"),
+        (ValueError("x"), "ValueError: x"),
+        (breaking.Wordless(), "Wordless: <exception str() failed>"),
+    ],
+)
+def test_any_error_arrives_whether_it_was_raised_or_not(error, words):
+    sent = pickle.dumps(processes.Sendable(error, processes.ProcessError))
+    arrived = pickle.loads(sent)
+    assert type(arrived) is processes.ProcessError
+    assert words.partition(":")[0] in str(arrived)
+    if sys.version_info >= (3, 11):  # before, an unprintable error is shown in other words
+        assert words in str(arrived)
+    with suppress(type(error)):
+        raise error
+    arrived = pickle.loads(pickle.dumps(processes.Sendable(error, processes.ProcessError)))
+    assert "test_processes.py:" in str(arrived)
+
+
 # -- threads --------------------------------------------------------------------------------------
 
 
