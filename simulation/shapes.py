@@ -4,15 +4,28 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import sapien
 import sapien.physx as physx
 
-from robots.descriptor import IDENTITY, Quaternion, Vector3
+from robots import SimulationError
+from robots.common.bounds import FAR
+from robots.common.fields import OfLengthOne, Within, settle_fields
+from robots.descriptor import IDENTITY, Quaternion
 from simulation.physics import Friction
 
-Color = tuple[float, float, float, float]  # red, green, blue, alpha in 0 … 1
+Fraction = Annotated[float, Within(0.0, 1.0)]
+Color = tuple[Fraction, Fraction, Fraction, Fraction]  # red, green, blue, alpha
+
+Length = Annotated[float, Within(1e-6, FAR, "m")]
+"""Of an edge, a radius, half of either: more than none."""
+Lengths = tuple[Length, Length, Length]
+Density = Annotated[float, Within(1e-3, 1e6, "kg/m³")]
+Coordinate = Annotated[float, Within(-FAR, FAR, "m")]
+Place = tuple[Coordinate, Coordinate, Coordinate]
+Turn = Annotated[Quaternion, OfLengthOne()]
+Factor = Annotated[float, Within(1e-6, FAR)]
 
 GREY: Color = (0.7, 0.7, 0.7, 1.0)
 
@@ -27,9 +40,17 @@ class Finish:
         specular: Strength of highlights.
     """
 
-    metallic: float = 0.0
-    roughness: float = 1.0
-    specular: float = 0.0
+    metallic: Fraction = 0.0
+    roughness: Fraction = 1.0
+    specular: Fraction = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what no surface can be.
+
+        Raises:
+            SimulationError: If a value is of a wrong type or out of bounds.
+        """
+        settle_fields(self, SimulationError)
 
 
 MATT = Finish()
@@ -57,14 +78,22 @@ class Shape:
         visible: Whether it is drawn.
     """
 
-    position: Vector3 = (0.0, 0.0, 0.0)
-    quaternion: Quaternion = IDENTITY
+    position: Place = (0.0, 0.0, 0.0)
+    quaternion: Turn = IDENTITY
     friction: Friction | None = None
-    density: float = 1000.0
+    density: Density = 1000.0
     color: Color = GREY
     finish: Finish = MATT
     collides: bool = True
     visible: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse what no shape can be.
+
+        Raises:
+            SimulationError: If a value is of a wrong type or out of bounds.
+        """
+        settle_fields(self, SimulationError)
 
 
 @dataclass(frozen=True)
@@ -75,7 +104,7 @@ class Box(Shape):
         half_size: Half its extents along x, y, z (m).
     """
 
-    half_size: Vector3
+    half_size: Lengths
 
 
 @dataclass(frozen=True)
@@ -86,7 +115,7 @@ class Sphere(Shape):
         radius: Radius (m).
     """
 
-    radius: float
+    radius: Length
 
 
 @dataclass(frozen=True)
@@ -98,8 +127,8 @@ class Cylinder(Shape):
         half_length: Half its length (m).
     """
 
-    radius: float
-    half_length: float
+    radius: Length
+    half_length: Length
 
 
 @dataclass(frozen=True)
@@ -111,8 +140,8 @@ class Capsule(Shape):
         half_length: Half the length of its straight part (m).
     """
 
-    radius: float
-    half_length: float
+    radius: Length
+    half_length: Length
 
 
 @dataclass(frozen=True)
@@ -130,8 +159,8 @@ class Mesh(Shape):
         textured: Whether it is drawn as its file says; else in ``color``, with the file's finish.
     """
 
-    file: Path
-    scale: Vector3 = (1.0, 1.0, 1.0)
+    file: Path | str
+    scale: tuple[Factor, Factor, Factor] = (1.0, 1.0, 1.0)
     textured: bool = False
 
 
@@ -145,9 +174,9 @@ class Floor(Shape):
         tile: Length of the texture's sides (m).
     """
 
-    texture: Path
-    size: int = 100
-    tile: float = 4.0
+    texture: Path | str
+    size: Annotated[int, Within(1, FAR, "m", "whole number")] = 100
+    tile: Length = 4.0
     collides: bool = field(default=False, kw_only=True)
 
 

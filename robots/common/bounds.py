@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from numbers import Integral, Real
-from reprlib import Repr
 from typing import Any
 
 from robots.common.errors import RobotLayoutsError
+from robots.common.quoting import shown
 
 FAR = 1e6
 """Where numbers end that mean something: positions (m), velocities (m/s, rad/s), angles (rad).
@@ -119,11 +119,6 @@ def checked_choice(
         raise error(f"{what} {shown(value)} is not offered; choices: {offered}")
 
 
-def shown(value: Any) -> str:
-    """Return what a user gave, as short as it has to be in a message, without addresses."""
-    return _SHORT.repr(value)
-
-
 def as_float(value: Any) -> float | None:
     """Return a number as a float, also an array or tensor that is one; None for all else."""
     if _is_flag(value) or not (isinstance(value, Real) or getattr(value, "ndim", None) == 0):
@@ -132,21 +127,6 @@ def as_float(value: Any) -> float | None:
         return float(value)
     except (TypeError, ValueError, OverflowError, RuntimeError):  # of complex numbers, for one
         return None
-
-
-class _Short(Repr):
-    """Representations of some 80 characters."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.maxstring = self.maxother = self.maxlong = 80
-
-    def repr_instance(self, x: Any, level: int) -> str:
-        text = super().repr_instance(x, level)
-        return f"<{type(x).__name__}>" if type(x).__repr__ is object.__repr__ else text
-
-
-_SHORT = _Short()
 
 
 def _is_flag(value: Any) -> bool:

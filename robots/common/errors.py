@@ -6,13 +6,17 @@ import difflib
 import os
 from collections.abc import Iterable
 
+from robots.common.quoting import shortened, shown
+
+_LONGEST_NAME = 1000  # characters; nothing that long is a slip of the pen
+
 
 class RobotLayoutsError(Exception):
     """Base of every error raised on purpose by this library."""
 
     def __str__(self) -> str:
-        """Return the message as written (``KeyError`` would show its repr)."""
-        return str(self.args[0]) if self.args else ""
+        """Return the message as written (``KeyError`` would show its repr), but never pages."""
+        return shortened(str(self.args[0])) if self.args else ""
 
 
 class UnknownNameError(RobotLayoutsError, KeyError):
@@ -95,7 +99,10 @@ class MissingPackageError(RobotLayoutsError, ImportError):
 def closest_match(name: object, choices: Iterable[str]) -> str | None:
     """Return the choice most like ``name`` (ignoring case), or None if nothing is close."""
     by_lower = {choice.lower(): choice for choice in choices}
-    found = difflib.get_close_matches(str(name).lower(), by_lower, n=1, cutoff=0.5)
+    text = str(name)
+    if len(text) > _LONGEST_NAME:
+        return None
+    found = difflib.get_close_matches(text.lower(), by_lower, n=1, cutoff=0.5)
     return by_lower[found[0]] if found else None
 
 
@@ -105,7 +112,8 @@ def unknown_name_message(kind: str, name: object, choices: Iterable[str], hint: 
     match = closest_match(name, choices)
     suggestion = f" Did you mean {match!r}?" if match else ""
     listing = ", ".join(choices) if choices else "none"
-    return f"unknown {kind} {name!r}.{suggestion} Choices: {listing}.{' ' + hint if hint else ''}"
+    more = f" {hint}" if hint else ""
+    return f"unknown {kind} {shown(name)}.{suggestion} Choices: {listing}.{more}"
 
 
 def _rebuild_unknown_name(

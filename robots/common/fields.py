@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 import types
 import typing
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 from robots.common.errors import RobotLayoutsError
 
@@ -31,6 +33,44 @@ def show(value: Any) -> str:
     return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 1]}…"
 
 
+@dataclass(frozen=True)
+class Within:
+    """Bounds of a number, both included: ``Annotated[float, Within(0.0, 1.0)]``.
+
+    Attributes:
+        low: The smallest number allowed.
+        high: The largest number allowed.
+        unit: Their unit; none if empty.
+        kind: What the number is called.
+    """
+
+    low: float
+    high: float
+    unit: str = ""
+    kind: str = "number"
+
+    def accepts(self, value: Any) -> bool:
+        """Return whether a number is within."""
+        return self.low <= value <= self.high
+
+    def __str__(self) -> str:
+        """Say what the number must be."""
+        return f"a {self.kind} from {self.low:g} to {self.high:g}{self.unit and f' {self.unit}'}"
+
+
+@dataclass(frozen=True)
+class OfLengthOne:
+    """What a quaternion is if it is a rotation: ``Annotated[Quaternion, OfLengthOne()]``."""
+
+    def accepts(self, value: Any) -> bool:
+        """Return whether numbers have length 1, to within rounding."""
+        return abs(math.hypot(*value) - 1) <= 1e-3
+
+    def __str__(self) -> str:
+        """Say what the numbers must be."""
+        return "a rotation, of length 1 (order w, x, y, z)"
+
+
 class _Wrong(Exception):
     """A value is not what its field takes; the message says what it would take."""
 
@@ -43,7 +83,8 @@ def settle(value: Any, hint: Any, name: str, error: type[RobotLayoutsError]) -> 
     Args:
         value: Whatever was given.
         hint: ``bool``, ``int``, ``float``, ``str``, a class, a union, a tuple, a list, a sequence,
-            a mapping from names, or a ``TypedDict``. Numbers must be finite and fit in single
+            a mapping from names, a ``Literal``, a ``TypedDict``, or one of these ``Annotated`` with
+            `Within` or `OfLengthOne`. Numbers must be finite and fit in single
             precision; texts must not be empty, and
             such that UTF-8 can hold them.
         name: What messages call it.
@@ -81,6 +122,10 @@ def _settle(value: Any, hint: Any, name: str) -> Any:
     if hasattr(value, "tolist") and not isinstance(value, type):
         value = value.tolist()  # an array or number of numpy or torch
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if origin is Annotated:
+        return _settle_annotated(value, arguments, name)
+    if origin is typing.Literal:
+        return _settle_literal(value, arguments, name)
     if origin in (typing.Union, types.UnionType):
         return _settle_union(value, arguments, name)
     if origin in (tuple, list, Sequence):
@@ -95,6 +140,25 @@ def _settle(value: Any, hint: Any, name: str) -> Any:
     if typing.is_typeddict(hint):
         return _settle_typed_dict(value, hint, name)
     return _settle_plain(value, hint, name)
+
+
+def _settle_annotated(value: Any, arguments: Sequence[Any], name: str) -> Any:
+    plain, bound = arguments
+    try:
+        settled = _settle(value, plain, name)
+    except _Wrong:
+        if plain not in (int, float):
+            raise  # which of several is wrong
+        raise _Wrong(f"{name} is {show(value)}; it must be {bound}") from None
+    if not bound.accepts(settled):
+        raise _Wrong(f"{name} is {show(value)}; it must be {bound}")
+    return settled
+
+
+def _settle_literal(value: Any, choices: Sequence[Any], name: str) -> Any:
+    if not any(type(value) is type(choice) and value == choice for choice in choices):
+        raise _Wrong(f"{name} is {show(value)}; it must be {' or '.join(map(repr, choices))}")
+    return value
 
 
 def _settle_plain(value: Any, hint: Any, name: str) -> Any:
@@ -166,9 +230,13 @@ def _describe(hint: Any) -> str:
         return _NUMBERS[hint]
     if hint is types.NoneType:
         return "None"
+    if typing.get_origin(hint) is Annotated:
+        return str(typing.get_args(hint)[1])
     if typing.get_origin(hint) is tuple:
         return _describe_sequence(typing.get_args(hint))
-    return f"a {hint.__name__}" if isinstance(hint, type) else str(hint)
+    if not isinstance(hint, type):
+        return str(hint)
+    return f"{'an' if hint.__name__[0] in 'AEIOU' else 'a'} {hint.__name__}"
 
 
 def _describe_sequence(hints: Sequence[Any]) -> str:
@@ -187,4 +255,4 @@ def _is(one: object, other: object) -> bool:
 
 @functools.cache
 def _hints(cls: type) -> dict[str, Any]:
-    return typing.get_type_hints(cls)
+    return typing.get_type_hints(cls, include_extras=not typing.is_typeddict(cls))

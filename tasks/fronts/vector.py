@@ -40,15 +40,13 @@ def _alone(
 
     @wraps(method)
     def call(self: VectorTask, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
-        if not self.busy.acquire(blocking=False):
+        if self.busy.locked():
             raise SimulationError(
                 "this vector is in the middle of another call; give each thread a vector of its"
                 " own, or let them take turns"
             )
-        try:
+        with self.busy:  # Ctrl-C cannot come between taking it and being sure to let it go
             return method(self, *args, **kwargs)
-        finally:
-            self.busy.release()
 
     return call
 

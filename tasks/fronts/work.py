@@ -4,37 +4,42 @@ from __future__ import annotations
 
 import os
 import pickle
-from multiprocessing import reduction
-from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
 
 from robots import RobotLayoutsError
+from tasks.fronts.channel import Channel
 from tasks.processes.process import ProcessError, Sendable
 
 if TYPE_CHECKING:
     from tasks.fronts.batch import Batch, Part
 
 
+ATTACH = "attach"  # take the shared memory that comes with the call
+SETTLE = "settle"  # do nothing: its answer says that what came before is done
+
+
 class CallFailed(RobotLayoutsError):
     """An error in a worker that is none of ours; says what it was and where it came up."""
 
 
-def work(connection: Connection) -> None:
+def work(channel: Channel) -> None:
     """Hold one part of a vector: build it, then answer calls until the main process is gone.
 
-    Every answer is a result and an error, which is one of ours or a `CallFailed`.
+    Every answer has the number of its call, and is a result and an error, which is one of ours or
+    a `CallFailed`. After an error, all further answers are that error: the first may have come
+    when nobody waited for it any more.
     """
     os.environ["OMP_NUM_THREADS"] = "1"
     try:
-        batch = _build(connection)
+        batch = _build(channel)
         if batch is not None:
-            _serve(connection, batch)
+            _serve(channel, batch)
     except (EOFError, OSError):
         os._exit(0)  # dismissed, or the main process is gone
 
 
-def _build(connection: Connection) -> Batch | None:
-    part = connection.recv_bytes()
+def _build(channel: Channel) -> Batch | None:
+    number, part = channel.receive()
     try:
         import torch
 
@@ -43,9 +48,9 @@ def _build(connection: Connection) -> Batch | None:
         torch.set_num_threads(1)
         batch = Batch(_loaded(part))
     except BaseException as error:
-        connection.send((None, Sendable(error, CallFailed)))
+        channel.send(number, pickle.dumps((None, Sendable(error, CallFailed))))
         return None
-    connection.send((batch.shapes(), None))
+    channel.send(number, pickle.dumps((batch.shapes(), None)))
     return batch
 
 
@@ -59,22 +64,29 @@ def _loaded(part: bytes) -> Part:
         ) from error
 
 
-def _serve(connection: Connection, batch: Batch) -> None:
+def _serve(channel: Channel, batch: Batch) -> None:
+    answer: tuple[Any, Sendable | None] = (None, None)
     while True:
-        method, arguments = connection.recv()
-        try:
-            if method == "attach":
-                answer = _attach(connection, batch, *arguments)
-            else:
-                answer = getattr(batch, method)(*arguments)
-        except BaseException as error:  # a task's exit() as well: the others go on
-            connection.send((None, Sendable(error, CallFailed)))
-        else:
-            connection.send_bytes(pickle.dumps((answer, None)))
+        number, call = channel.receive()
+        if answer[1] is None:
+            answer = _answer(channel, batch, call)
+        channel.send(number, pickle.dumps(answer))
 
 
-def _attach(connection: Connection, batch: Batch, shapes: Any, num_envs: int) -> None:
+def _answer(channel: Channel, batch: Batch, call: bytes) -> tuple[Any, Sendable | None]:
+    method, arguments = pickle.loads(call)
+    try:
+        if method == SETTLE:
+            return None, None
+        if method == ATTACH:
+            return _attach(channel, batch, *arguments), None
+        return getattr(batch, method)(*arguments), None
+    except BaseException as error:  # a task's exit() as well: the others go on
+        return None, Sendable(error, CallFailed)
+
+
+def _attach(channel: Channel, batch: Batch, shapes: Any, num_envs: int) -> None:
     from tasks.fronts.board import board_size, lay_out, map_shared_memory
 
-    memory = map_shared_memory(reduction.recv_handle(connection), board_size(shapes, num_envs))
+    memory = map_shared_memory(channel.descriptors.pop(), board_size(shapes, num_envs))
     batch.attach(lay_out(memory, shapes, num_envs))

@@ -6,10 +6,9 @@ import os
 import pickle
 import select
 import time
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import closing, suppress
 from dataclasses import dataclass
-from multiprocessing import reduction
 from typing import Any
 
 from robots import SimulationError
@@ -22,7 +21,8 @@ from tasks.fronts.board import (
     map_shared_memory,
     new_shared_memory,
 )
-from tasks.fronts.work import CallFailed, work
+from tasks.fronts.channel import Channel
+from tasks.fronts.work import ATTACH, SETTLE, CallFailed, work
 from tasks.processes import process as processes
 from tasks.processes.process import ProcessError, WorkerTraceback, enough
 
@@ -134,18 +134,18 @@ class Workers:
         try:
             with enough():
                 for i in numbers:
-                    self._crew[i] = _Worker(self.parts[i])
+                    self._end(i)  # Ctrl-C may have come before that
+                    self._crew[i] = _Worker(self.parts[i], self._timeout)
                 shapes = self._collect(numbers, START_SECONDS)
                 if self._descriptor < 0:
                     self._make_board(shapes[numbers[0]])
+                board = (self._shapes, self.parts[-1].stop)
                 for i in numbers:
-                    self._crew[i].send("attach", (self._shapes, self.parts[-1].stop))
-                    self._crew[i].send_memory(self._descriptor)
+                    self._crew[i].send(ATTACH, board, [self._descriptor])
                 self._collect(numbers, START_SECONDS)
         except BaseException:
             for i in numbers:
-                if i in self._crew:
-                    self._crew.pop(i).end(0.0)
+                self._end(i)
             raise
         for i in numbers:
             self.failures.pop(i, None)
@@ -160,10 +160,10 @@ class Workers:
         Raises:
             WorkersFailed: If workers die, hang or fail; the others have done it.
         """
-        self._collect([i for i, worker in self._crew.items() if worker.busy], self._timeout)
-        for i, own in arguments.items():
-            self._crew[i].send(method, own)
-        return self._collect(list(arguments), self._timeout)
+        unsettled = {i: () for i, worker in self._crew.items() if not worker.settled}
+        if unsettled:  # a call before was interrupted
+            self._exchange(SETTLE, unsettled)
+        return self._exchange(method, arguments)
 
     def expect_owner(self) -> None:
         """Refuse to go on in a fork, which would talk to the same processes.
@@ -184,7 +184,7 @@ class Workers:
         """
         crew, self._crew = self._crew, {}
         for worker in crew.values():
-            worker.connection.close()
+            worker.channel.close()
         deadline = time.monotonic() + _FAREWELL_SECONDS
         for worker in crew.values():
             worker.end(max(0.0, deadline - time.monotonic()))
@@ -202,28 +202,36 @@ class Workers:
         memory = map_shared_memory(os.dup(self._descriptor), size)
         self.arrays = lay_out(memory, shapes, num_envs)
 
+    def _exchange(self, method: str, arguments: Mapping[int, tuple[Any, ...]]) -> dict[int, Any]:
+        for i, own in arguments.items():
+            self._crew[i].send(method, own)
+        return self._collect(list(arguments), self._timeout)
+
     def _collect(self, numbers: list[int], timeout: float | None) -> dict[int, Any]:
         """Wait until workers have answered, and return the answers of those that did."""
         deadline = None if timeout is None else time.monotonic() + timeout
         answers, failures = dict[int, Any](), list[Failure]()
-        waiting = {self._crew[i].connection.fileno(): i for i in numbers}
+        waiting = {i: self._crew[i].descriptors for i in numbers}
+        senders = {descriptor: i for i, own in waiting.items() for descriptor in own}
         poller = select.poll()
-        for descriptor in waiting:
+        for descriptor in senders:
             poller.register(descriptor, select.POLLIN)
         while waiting:
             left = None if deadline is None else max(0.0, deadline - time.monotonic()) * 1000
-            ready = poller.poll(left)
-            for descriptor, _ in ready:
-                poller.unregister(descriptor)
-                i = waiting.pop(descriptor)
+            ready = {senders[descriptor] for descriptor, _ in poller.poll(left)}
+            for i in ready:
                 try:
-                    answers[i] = self._crew[i].receive()
+                    if not self._crew[i].has_answered():
+                        continue
+                    answers[i] = self._crew[i].answer()
                 except _Gone as gone:
                     failures.append(self._lose(i, gone.reason, gone.traceback))
+                for descriptor in waiting.pop(i):
+                    poller.unregister(descriptor)
             if not ready:
                 failures.extend(
                     self._lose(i, f"did not answer within {timeout:g} s and was ended")
-                    for i in waiting.values()
+                    for i in waiting
                 )
                 break
         if failures:
@@ -231,12 +239,16 @@ class Workers:
         return answers
 
     def _lose(self, number: int, reason: str, where: str = "") -> Failure:
-        worker = self._crew.pop(number)
-        worker.end(0.0)
-        reason = f"process {worker.pid} {reason}"
+        reason = f"process {self._crew[number].pid} {reason}"
         failure = Failure(number, self.parts[number].env_ids, reason, where)
         self.failures[number] = failure
+        self._end(number)
         return failure
+
+    def _end(self, number: int) -> None:
+        if number in self._crew:
+            self._crew[number].end(0.0)
+            del self._crew[number]
 
 
 class InProcess:
@@ -289,46 +301,66 @@ class _Gone(Exception):
 
 
 class _Worker:
-    """One process, which holds one part."""
+    """One process, which holds one part.
 
-    def __init__(self, part: Part) -> None:
-        self.connection, theirs = processes.context.Pipe()
-        self._asked = "__init__"  # until it has told the shapes
-        self.busy = True
+    Attributes:
+        settled: Whether it has answered what it was asked last.
+    """
+
+    def __init__(self, part: Part, timeout: float | None) -> None:
+        self.channel, theirs = Channel.pair()
+        self.settled, self._number = False, 0
+        self._asked = "__init__"  # its first answer tells the shapes
+        self._message = b""
         self._process = processes.context.Process(target=work, args=(theirs,), daemon=True)
         try:
-            with theirs:
+            with closing(theirs):
                 packed = _packed(part)
                 processes.start(self._process)
+            if timeout is not None:
+                self.channel.limit_sending(timeout)
         except BaseException:
-            self.connection.close()
+            self.channel.close()
             raise
         self.pid = self._process.pid
-        with suppress(OSError):  # it died: that is read from the connection
-            self.connection.send_bytes(packed)
+        # The end of the process is watched as well: a process that it forked may hold its end of
+        # the channel open.
+        self.descriptors = self.channel.fileno(), self._process.sentinel
+        with suppress(OSError):  # it died: that is read from the channel
+            self.channel.send(self._number, packed)
 
-    def send(self, method: str, arguments: tuple[Any, ...]) -> None:
+    def send(
+        self, method: str, arguments: tuple[Any, ...], descriptors: Sequence[int] = ()
+    ) -> None:
         """Let it do something."""
-        self._asked, self.busy = method, True
+        self.settled = False
+        self._asked, self._number = method, self._number + 1
         with suppress(OSError):
-            self.connection.send_bytes(pickle.dumps((method, arguments)))
+            self.channel.send(self._number, pickle.dumps((method, arguments)), descriptors)
 
-    def send_memory(self, descriptor: int) -> None:
-        """Give it the shared memory, right after an ``attach``."""
-        with suppress(OSError):
-            reduction.send_handle(self.connection, descriptor, self.pid)
+    def has_answered(self) -> bool:
+        """Read what has arrived; returns whether that is its answer to what it was asked last."""
+        try:
+            message = self.channel.receive_now()
+        except BlockingIOError:
+            if self._process.exitcode is None:
+                return False
+            raise _Gone(self._death()) from None
+        except (EOFError, OSError):
+            raise _Gone(self._death()) from None
+        if message is None or message[0] != self._number:
+            return False
+        _, self._message = message
+        self.settled = True
+        return True
 
-    def receive(self) -> Any:
+    def answer(self) -> Any:
         """Return its answer.
 
         Raises:
             RobotLayoutsError: What it could not make its task for.
         """
-        try:
-            answer, error = self.connection.recv()
-        except (EOFError, OSError):
-            raise _Gone(self._death()) from None
-        self.busy = False
+        answer, error = pickle.loads(self._message)
         if error is None:
             return answer
         if self._asked == "__init__" and not isinstance(error, CallFailed):
@@ -339,13 +371,14 @@ class _Worker:
         raise _Gone(f"failed in {call} with {what}", *where)
 
     def end(self, patience: float) -> None:
-        """End it, after a while in which it may do so by itself (s)."""
-        self.connection.close()
-        if self._process.exitcode is None:
-            self._process.join(patience)
-            self._process.kill()
-            self._process.join()
-        self._process.close()
+        """End it, after a while in which it may do so by itself (s); twice is allowed."""
+        self.channel.close()
+        with suppress(ValueError):  # it was closed before
+            if self._process.exitcode is None:
+                self._process.join(patience)
+                self._process.kill()
+                self._process.join()
+            self._process.close()
 
     def _death(self) -> str:
         self._process.join(_FAREWELL_SECONDS)

@@ -6,13 +6,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import cos, isfinite, sin
-from typing import ClassVar, Literal, TypeAlias
+from typing import ClassVar, Literal, TypeAlias, TypedDict
 
 from layouts.orientation import multiplied
 from robots import TaskError
-from robots.descriptor import IDENTITY, Quaternion, Vector3
+from robots.common.fields import settle_fields
+from robots.descriptor import IDENTITY, Quaternion
 from simulation import Box, Friction, Shape, Sphere, World, add_table
-from simulation.shapes import Color
+from simulation.shapes import Color, Coordinate, Density, Length, Lengths, Place
 from simulation.world import BodyKind
 from tasks.language.props import (
     FACE_UP,
@@ -110,11 +111,19 @@ class Body(ABC):
     """
 
     spawn: Area | None = None
-    start: Vector3 | None = None
+    start: Place | None = None
     kind: BodyKind = "dynamic"
 
     marker: ClassVar[bool] = False
     """Whether it is there for people only: cameras that observe do not see it."""
+
+    def __post_init__(self) -> None:
+        """Refuse what no body can be.
+
+        Raises:
+            TaskError: If a value is of a wrong type or out of bounds.
+        """
+        settle_fields(self, TaskError)
 
     @property
     @abstractmethod
@@ -143,33 +152,45 @@ class Body(ABC):
             world.set_pose(name, position, _turned(self.lying, turn))
 
 
+class _Matter(TypedDict):
+    density: float
+    friction: Friction | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solid(Body, ABC):
+    """A body of one matter.
+
+    Attributes:
+        density: Density (kg/m³).
+        friction: Contact material; None takes the world's.
+    """
+
+    density: Density = 1000.0
+    friction: Friction | None = None
+
+    @property
+    def matter(self) -> _Matter:
+        """What its shapes are made of."""
+        return {"density": self.density, "friction": self.friction}
+
+
 @dataclass(frozen=True)
-class Cuboid(Body):
+class Cuboid(Solid):
     """A solid box.
 
     Attributes:
         half_size: Half its extents along x, y, z (m).
         color: Red, green, blue, alpha.
-        density: Density (kg/m³).
-        friction: Contact material; None takes the world's.
     """
 
-    half_size: Vector3
+    half_size: Lengths
     color: Color = RED
-    density: float = 1000.0
-    friction: Friction | None = None
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
         """The box."""
-        return (
-            Box(
-                half_size=self.half_size,
-                color=self.color,
-                density=self.density,
-                friction=self.friction,
-            ),
-        )
+        return (Box(half_size=self.half_size, color=self.color, **self.matter),)
 
     @property
     def height(self) -> float:
@@ -178,26 +199,22 @@ class Cuboid(Body):
 
 
 @dataclass(frozen=True)
-class Cube(Body):
+class Cube(Solid):
     """A solid cube.
 
     Attributes:
         half_size: Half its edge (m).
         color: Red, green, blue, alpha.
-        density: Density (kg/m³).
-        friction: Contact material; None takes the world's.
     """
 
-    half_size: float
+    half_size: Length
     color: Color = RED
-    density: float = 1000.0
-    friction: Friction | None = None
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
         """The box."""
         edges = (self.half_size, self.half_size, self.half_size)
-        return Cuboid(edges, self.color, self.density, self.friction).shapes
+        return (Box(half_size=edges, color=self.color, **self.matter),)
 
     @property
     def height(self) -> float:
@@ -206,32 +223,21 @@ class Cube(Body):
 
 
 @dataclass(frozen=True)
-class Ball(Body):
+class Ball(Solid):
     """A solid ball.
 
     Attributes:
         radius: Its radius (m).
         color: Red, green, blue, alpha.
-        density: Density (kg/m³).
-        friction: Contact material; None takes the world's.
     """
 
-    radius: float
+    radius: Length
     color: Color = RED
-    density: float = 1000.0
-    friction: Friction | None = None
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
         """The sphere."""
-        return (
-            Sphere(
-                radius=self.radius,
-                color=self.color,
-                density=self.density,
-                friction=self.friction,
-            ),
-        )
+        return (Sphere(radius=self.radius, color=self.color, **self.matter),)
 
     @property
     def height(self) -> float:
@@ -250,8 +256,8 @@ class Peg(Body):
         head: Colour of the half at positive x.
     """
 
-    half_length: float
-    half_width: float
+    half_length: Length
+    half_width: Length
     tail: Color = GREEN
     head: Color = RED
 
@@ -268,7 +274,7 @@ class Peg(Body):
 
 @dataclass(frozen=True)
 class Compound(Body):
-    """A body of several shapes.
+    """A body of shapes, at least one.
 
     Attributes:
         parts: Its shapes, in its own frame.
@@ -276,7 +282,17 @@ class Compound(Body):
     """
 
     parts: tuple[Shape, ...]
-    rest_height: float = 0.0
+    rest_height: Coordinate = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what no body can be.
+
+        Raises:
+            TaskError: If there are no parts, or a value is of a wrong type or out of bounds.
+        """
+        super().__post_init__()
+        if not self.parts:
+            raise TaskError("Compound: parts is empty; a body is made of one shape or more")
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -297,7 +313,7 @@ class Goal(Body):
         radius: Its radius (m).
     """
 
-    radius: float
+    radius: Length
     kind: BodyKind = field(default="kinematic", kw_only=True)
     marker: ClassVar[bool] = True
 
@@ -315,9 +331,9 @@ class Target(Body):
         radius: Its radius (m).
     """
 
-    radius: float
+    radius: Length
     kind: BodyKind = field(default="kinematic", kw_only=True)
-    start: Vector3 | None = field(default=(0.0, 0.0, 0.0), kw_only=True)
+    start: Place | None = field(default=(0.0, 0.0, 0.0), kw_only=True)
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -344,6 +360,14 @@ class Table:
     """
 
     textured: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse what is no answer.
+
+        Raises:
+            TaskError: If ``textured`` is neither True nor False.
+        """
+        settle_fields(self, TaskError)
 
     def add_to(self, world: World, name: str) -> None:
         """Build it; its body is called ``table-workspace``, as in native."""

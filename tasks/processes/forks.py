@@ -9,15 +9,17 @@ from __future__ import annotations
 import io
 import multiprocessing
 import os
+import select
 import signal
 import socket
 from collections.abc import Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, nullcontext, suppress
 from multiprocessing import forkserver, popen_forkserver, reduction, resource_tracker, spawn
 from multiprocessing import util as _util
 from multiprocessing.connection import wait
 from multiprocessing.context import set_spawning_popen
 from multiprocessing.process import BaseProcess
+from threading import RLock
 from typing import Any
 
 from tasks.processes.fork_server import (
@@ -81,7 +83,8 @@ class _Popen(_ForkServerPopen):
     """
 
     def __init__(self, process: BaseProcess) -> None:
-        self._owner = os.getpid()
+        self._owner, self._killed = os.getpid(), False
+        self._lock = RLock()  # starting a process looks at all others, in another thread
         super().__init__(process)
 
     def _launch(self, process: BaseProcess) -> None:
@@ -101,19 +104,52 @@ class _Popen(_ForkServerPopen):
         finally:
             set_spawning_popen(None)
         tracker: Any = resource_tracker.getfd()
-        self.pid, self.sentinel, line = _fork([tracker, *surroundings.streams, *self._fds])
+        descriptors = [tracker, *surroundings.streams, *self._fds]
+        self._server, (self.pid, self.sentinel, line) = _fork(descriptors)
         # The line stays open: its end tells the worker that this process has ended.
         self.finalizer = util.Finalize(self, util.close_fds, (line, self.sentinel))
         # A worker that was killed meanwhile is seen where its answers are read.
-        with suppress(BrokenPipeError), open(line, "wb", closefd=False) as pipe:
-            pipe.write(told.getbuffer())
+        with suppress(BrokenPipeError):
+            try:
+                _write(line, told.getbuffer())
+            except TimeoutError:
+                os.kill(self.pid, signal.SIGKILL)
+                raise
 
     def poll(self, flag: int = os.WNOHANG) -> int | None:
-        return super().poll(flag) if os.getpid() == self._owner else 0
+        if os.getpid() != self._owner:
+            return 0
+        if flag != os.WNOHANG and self.returncode is None:
+            self._wait_for_end()
+        with self._lock:
+            return super().poll()
+
+    def close(self) -> None:
+        with self._lock if os.getpid() == self._owner else nullcontext():
+            super().close()
+
+    def _wait_for_end(self) -> None:
+        """Wait for the server's word, which never comes if it is stopped."""
+        if self._killed and not wait([self.sentinel], _FORK_SECONDS):
+            self._server.kill()
+        wait([self.sentinel])
 
     def _send_signal(self, sig: int) -> None:
         if self.poll() is None:
+            self._killed = self._killed or sig == signal.SIGKILL
             super()._send_signal(sig)
+
+
+def _write(descriptor: int, data: memoryview) -> None:
+    """Write to a pipe, and give up once its reader has taken nothing for long."""
+    os.set_blocking(descriptor, False)
+    poller = select.poll()
+    poller.register(descriptor, select.POLLOUT)
+    while data:
+        if not poller.poll(_FORK_SECONDS * 1000):
+            raise TimeoutError(f"one took nothing of what it is to run for {_FORK_SECONDS:g} s")
+        with suppress(BlockingIOError):
+            data = data[os.write(descriptor, data) :]
 
 
 class _Lost(Exception):
@@ -168,23 +204,28 @@ class _Server:
         self._loaded = True
         return forkserver.read_signed(status)
 
+    def kill(self) -> None:
+        """Kill it, and with it all that it forked; the next `fork` finds it lost."""
+        with suppress(ProcessLookupError):
+            os.kill(self._pid, signal.SIGKILL)
+
     def end(self) -> None:
         """End it."""
         self._socket.close()
-        with suppress(ProcessLookupError, ChildProcessError):  # somebody else waited for it
-            os.kill(self._pid, signal.SIGKILL)
+        self.kill()
+        with suppress(ChildProcessError):  # somebody else waited for it
             os.waitpid(self._pid, 0)
 
 
 _server: _Server | None = None
 
 
-def _fork(descriptors: Sequence[int]) -> tuple[int, int, int]:
+def _fork(descriptors: Sequence[int]) -> tuple[_Server, tuple[int, int, int]]:
     """Let the server fork; a new one takes the place of one that was killed or stopped."""
     global _server
     if _server is not None:
         try:
-            return _server.fork(descriptors)
+            return _server, _server.fork(descriptors)
         except _Lost:
             _server.end()
             _server = None
@@ -197,7 +238,7 @@ def _fork(descriptors: Sequence[int]) -> tuple[int, int, int]:
             raise ProcessError(f"the process that forks workers {error}") from None
         raise
     _server = new
-    return result
+    return new, result
 
 
 def _forget_server() -> None:

@@ -124,9 +124,10 @@ class Sendable:
         if isinstance(error, RobotLayoutsError) and _survives_pickling(error):
             self._error = error
         else:
-            last = traceback.extract_tb(error.__traceback__)[-1]
             what = "".join(traceback.format_exception_only(error)).strip()
-            self._error = otherwise(f"{what} ({last.filename}:{last.lineno})")
+            frames = traceback.extract_tb(error.__traceback__)[-1:]
+            where = "".join(f" ({frame.filename}:{frame.lineno})" for frame in frames)
+            self._error = otherwise(what + where)
 
     def __reduce__(self) -> tuple[Callable[[Exception, str], Exception], tuple[Exception, str]]:
         """Pickle as the error."""
@@ -140,7 +141,8 @@ def _arrived(error: Exception, text: str) -> Exception:
 
 def _survives_pickling(error: Exception) -> bool:
     try:
-        return type(pickle.loads(pickle.dumps(error))) is type(error)
+        arrived = pickle.loads(pickle.dumps(error))
+        return type(arrived) is type(error) and str(arrived) == str(error)
     except Exception:  # whatever a class of the user's own does
         return False
 

@@ -122,6 +122,16 @@ class SlowBuild(PushCube):
         super().build(world)
 
 
+class Forks(PushCube):
+    """Leaves a process behind for a while, which holds open all that its worker has open."""
+
+    def build(self, world):
+        super().build(world)
+        if os.fork() == 0:
+            time.sleep(30)
+            os._exit(0)
+
+
 class Grows(PushCube):
     """Has other keys after its first reset."""
 
@@ -138,7 +148,7 @@ class Refuses(PushCube):
 
 
 TASKS.update(
-    {f"{cls.__name__}-v1": cls for cls in (SlowSteps, BusySteps, SlowBuild, Grows, Refuses)}
+    {f"{cls.__name__}-v1": cls for cls in (SlowSteps, BusySteps, SlowBuild, Forks, Grows, Refuses)}
 )
 
 

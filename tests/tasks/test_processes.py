@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import pickle
 import resource
+import signal
 import sys
 import threading
 import weakref
@@ -22,6 +23,7 @@ from robots import RobotLayoutsError, SimulationError, TaskError
 from simulation.rendering.pictures import vulkan_problem
 from tasks.fronts.vector import VectorTask
 from tasks.fronts.workers import WorkerError
+from tasks.processes import forks
 from tasks.processes import process as processes
 from tasks.processes.fork_server import LOADED
 from tests.fresh_process import in_fresh_process
@@ -194,6 +196,61 @@ def test_too_few_descriptors_are_one_error_and_nothing_is_left(more):
     assert len(os.listdir("/proc/self/fd")) == open_before
 
 
+def test_threads_may_look_at_each_others_processes():
+    over = threading.Event()
+
+    def look():
+        while not over.is_set():
+            multiprocessing.active_children()
+
+    threads = [threading.Thread(target=look) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    try:
+        for _ in range(40):
+            process = processes.context.Process(target=os._exit, args=(3,), daemon=True)
+            processes.start(process)
+            process.join()
+            assert process.exitcode == 3
+            process.close()
+    finally:
+        over.set()
+        for thread in threads:
+            thread.join()
+
+
+def test_a_worker_that_is_stopped_before_it_has_read_what_to_run_holds_nobody_up(monkeypatch):
+    in_worker(look_around)  # the server is there already
+    fork, pids = forks._fork, []
+
+    def fork_and_stop(descriptors):
+        server, (pid, status, line) = fork(descriptors)
+        os.kill(pid, signal.SIGSTOP)
+        pids.append(pid)
+        return server, (pid, status, line)
+
+    monkeypatch.setattr(forks, "_fork", fork_and_stop)
+    monkeypatch.setattr(forks, "_FORK_SECONDS", 0.5)
+    process = processes.context.Process(target=len, args=(bytes(2**20),), daemon=True)
+    with pytest.raises(processes.ProcessError, match="took nothing of what it is to run"):
+        processes.start(process)
+    monkeypatch.undo()
+    while os.path.exists(f"/proc/{pids[0]}"):
+        pass
+    in_worker(look_around)
+
+
+def test_a_worker_whose_server_is_stopped_can_be_ended(monkeypatch):
+    in_worker(look_around)
+    with vector(1) as env:
+        monkeypatch.setattr(forks, "_FORK_SECONDS", 0.5)
+        pid = env._crew._crew[0].pid
+        os.kill(forks._server._pid, signal.SIGSTOP)
+    assert pid not in [child.pid for child in multiprocessing.active_children()]
+    monkeypatch.undo()
+    in_worker(look_around)
+
+
 # -- errors ---------------------------------------------------------------------------------------
 
 
@@ -224,6 +281,38 @@ def test_an_error_of_ours_keeps_its_type_and_says_where_it_came_from():
     with pytest.raises(TaskError, match="no such goal") as caught:
         VectorTask("Refuses-v1", 2, num_workers=1)
     assert "in build" in str(caught.value.__cause__)
+
+
+class Unprintable(TaskError):
+    def __str__(self):
+        raise ValueError("no words")
+
+
+class Unpicklable(TaskError):
+    def __reduce__(self):
+        raise ValueError("not to be pickled")
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (Unprintable("x"), "Unprintable: <exception str() failed>"),
+        (Unpicklable("x"), "Unpicklable: x"),
+        (ValueError("x"), "ValueError: x"),
+        (breaking.Wordless(), "Wordless: <exception str() failed>"),
+    ],
+)
+def test_any_error_arrives_whether_it_was_raised_or_not(error, words):
+    sent = pickle.dumps(processes.Sendable(error, processes.ProcessError))
+    arrived = pickle.loads(sent)
+    assert type(arrived) is processes.ProcessError
+    assert words.partition(":")[0] in str(arrived)
+    if sys.version_info >= (3, 11):  # before, an unprintable error is shown in other words
+        assert words in str(arrived)
+    with suppress(type(error)):
+        raise error
+    arrived = pickle.loads(pickle.dumps(processes.Sendable(error, processes.ProcessError)))
+    assert "test_processes.py:" in str(arrived)
 
 
 # -- threads --------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from robots import SimulationError, TaskError
 from tasks.fronts import workers as workers_module
 from tasks.fronts.vector import VectorTask
 from tasks.fronts.workers import WorkerError
+from tests.tasks import breaking
 
 GONE, LEFT = [0, 1], [2, 3]  # environments of the first worker and of the second
 ACTION = np.full((4, 8), 0.2, np.float32)
@@ -99,6 +100,73 @@ def test_after_an_interrupted_step_the_next_one_is_right(shared):
     assert shared.step(ACTION)[4]["elapsed_steps"].tolist() == [2, 2, 2, 2]
 
 
+def interrupted(moment, event, matches, call):
+    """Call something, and raise KeyboardInterrupt at the nth line or instruction of some code.
+
+    Args:
+        moment: n, from 1.
+        event: ``line`` or ``opcode``.
+        matches: Whether a code object counts.
+        call: What is called.
+
+    Returns:
+        Whether it was interrupted, which it is not if the code has fewer of them.
+    """
+    left = moment
+
+    def trace(frame, met, _):
+        nonlocal left
+        if not matches(frame.f_code):
+            return None
+        frame.f_trace_opcodes = True
+        left -= met == event
+        if left == 0:
+            raise KeyboardInterrupt
+        return trace
+
+    sys.settrace(trace)
+    try:
+        call()
+    except KeyboardInterrupt:
+        return True
+    finally:
+        sys.settrace(None)
+    return False
+
+
+def test_a_vector_is_of_use_after_an_interrupt_at_any_instruction_of_a_conversation():
+    def talks(code):
+        return code.co_filename.endswith(("fronts/workers.py", "fronts/channel.py"))
+
+    with closing(VectorTask("PushCube-v1", num_envs=2, num_workers=2, timeout=5.0)) as env:
+        action = np.full((2, 8), 0.2, np.float32)
+        env.reset(seed=4)
+        wanted = env.step(action)[0]
+        moment = 1
+        while interrupted(moment, "opcode", talks, lambda: env.step(action)):
+            env.reset(seed=4)
+            np.testing.assert_array_equal(env.step(action)[0], wanted)
+            moment += 1
+        assert moment > 200
+
+
+def test_an_interrupt_as_a_call_begins_locks_nobody_out():
+    def begins(code):
+        return code.co_filename.endswith("fronts/vector.py") and code.co_name == "call"
+
+    with closing(VectorTask("PushCube-v1", num_envs=1, num_workers=0)) as env:
+        for moment in (1, 2, 3):
+            assert interrupted(moment, "line", begins, env.reset)
+            env.reset()
+
+
+def test_a_worker_s_death_is_seen_although_a_process_that_it_forked_holds_its_connection():
+    with breaking.offered(), closing(VectorTask("Forks-v1", num_workers=1, timeout=20.0)) as env:
+        os.kill(first_worker(env), signal.SIGKILL)
+        with pytest.raises(WorkerError, match="died by SIGKILL"):
+            env.step(ACTION[:1])
+
+
 @pytest.mark.long
 def test_a_restart_that_fails_may_be_tried_again(shared, monkeypatch):
     shared.reset(seed=0)
@@ -109,8 +177,8 @@ def test_a_restart_that_fails_may_be_tried_again(shared, monkeypatch):
         shared.step(ACTION)
     start = workers_module._Worker.__init__
 
-    def doomed(self, part):
-        start(self, part)
+    def doomed(self, part, timeout):
+        start(self, part, timeout)
         if part.start == 0:
             os.kill(self.pid, signal.SIGKILL)
 

@@ -1,0 +1,71 @@
+"""Names of ten million characters, wherever a name is taken: the answer is short."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.faults.fault import Fault
+
+AREA = "long names"
+NAME = "panda " * (10**7 // 6)
+LONGEST = 4000  # characters of a message
+
+
+def faults() -> Iterator[Fault]:
+    """Go through this area's faults."""
+    for what, take in _TAKES.items():
+        yield Fault(AREA, f"{what} of 10 MB", partial(_refused_in_short, take))
+
+
+def _make(**arguments: Any) -> Any:
+    import tasks
+
+    return tasks.make(**{"task_id": "PushCube-v1", **arguments})
+
+
+def _load(name: str) -> Any:
+    from robots import RobotRegistry
+
+    return RobotRegistry.load(name)
+
+
+def _layout(name: str) -> Any:
+    from layouts import single
+
+    return single({name: "panda"})
+
+
+def _yaml(text: str) -> Any:
+    from layouts import Layout
+
+    return Layout.from_yaml(text)
+
+
+_TAKES: dict[str, Callable[[str], Any]] = {
+    "a robot's name": _load,
+    "a task's id": lambda name: _make(task_id=name),
+    "a place": lambda name: _make(robots={name: "panda"}),
+    "a robot in a task": lambda name: _make(robots={"panda": name}),
+    "an obs_mode": lambda name: _make(obs_mode=name),
+    "a reward_mode": lambda name: _make(reward_mode=name),
+    "a control_mode": lambda name: _make(control_mode=name),
+    "a simulator": lambda name: _make(simulator=name),
+    "an argument": lambda name: _make(**{name: 1}),
+    "a number of environments": lambda name: _make(num_envs=name),
+    "a place in a layout": _layout,
+    "a layout in YAML": _yaml,
+}
+
+
+def _refused_in_short(take: Callable[[str], Any], _: Path) -> None:
+    from robots import RobotLayoutsError
+
+    with pytest.raises(RobotLayoutsError) as caught:
+        take(NAME)
+    assert len(str(caught.value)) <= LONGEST
+    raise caught.value

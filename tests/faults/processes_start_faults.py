@@ -1,0 +1,217 @@
+"""Too little to start workers with, and a server of forks that is gone or stopped."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from tests.faults.fault import GOES_ON, Fault
+from tests.faults.worker_processes import (
+    AREA,
+    actions,
+    children,
+    failure,
+    living_workers,
+    open_files,
+    play_own,
+    run_script,
+    server_pid,
+    session_of,
+    vector,
+    wait_until,
+)
+
+
+def faults() -> Iterator[Fault]:
+    """Go through this area's faults."""
+    yield from _too_little()
+    yield from _servers()
+
+
+# -- too little -----------------------------------------------------------------------------------
+
+
+def _too_little() -> Iterator[Fault]:
+    for more in (0, 1, 2, 3, 4, 6, 9, 13, 18, 24):
+        what = f"{more} more file descriptors for 8 workers"
+        yield Fault(AREA, what, lambda _, more=more: _few_descriptors(more))
+    for limit in (16, 20, 24):
+        what = f"8 workers in a process with ulimit -n {limit}"
+        yield Fault(AREA, what, lambda folder, n=limit: _limited(folder, f"ulimit -n {n}"))
+    yield Fault(AREA, "no memory to share", lambda _: _no_shared_memory())
+    for megabytes in (0, 1, 4, 16):
+        what = f"workers that may take {megabytes} MB more"
+        yield Fault(AREA, what, lambda _, more=megabytes: _little_memory(more))
+
+
+def _few_descriptors(more: int) -> None:
+    server_pid()  # is there already
+    before, open_before = children(), open_files()
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (open_before + more, hard))
+    try:
+        with vector(num_envs=8, num_workers=8):
+            raise AssertionError("8 workers with so few descriptors")
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+        assert children() == before
+        assert open_files() == open_before
+
+
+LIMITED = """
+import os, sys, multiprocessing
+from robots import RobotLayoutsError
+from tasks.fronts.vector import VectorTask
+if __name__ == "__main__":
+    try:
+        VectorTask("PushCube-v1", 8, num_workers=8)
+    except RobotLayoutsError as error:
+        assert not multiprocessing.active_children()
+        sys.exit(str(error))
+"""
+
+
+def _limited(folder: Path, limit: str) -> None:
+    from robots import RobotLayoutsError
+
+    done = run_script(folder, LIMITED, limit)
+    assert "Traceback" not in done.stderr, done.stderr[-2000:]
+    if done.returncode:
+        raise RobotLayoutsError(done.stderr.strip())
+
+
+def _no_shared_memory() -> None:
+    """Let no file grow: memory that processes share is one."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before, open_before = children(), open_files()
+    before_signal = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (16, hard))
+    try:
+        with vector(num_workers=2):
+            raise AssertionError("memory was shared")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, before_signal)
+        assert children() == before
+        assert open_files() == open_before
+
+
+@contextmanager
+def _server_may_take(more: int) -> Generator[None]:
+    """Let the server and its forks have so much address space more (bytes)."""
+    server = server_pid()
+    pages = int(Path(f"/proc/{server}/statm").read_text().split()[0])
+    limit = max(1, pages * resource.getpagesize() + more)
+    hard = resource.prlimit(server, resource.RLIMIT_AS)[1]
+    resource.prlimit(server, resource.RLIMIT_AS, (limit, hard))
+    try:
+        yield
+    finally:
+        resource.prlimit(server, resource.RLIMIT_AS, (resource.RLIM_INFINITY, hard))
+
+
+def _little_memory(megabytes: int) -> None:
+    with _server_may_take(megabytes * 2**20), vector(num_envs=64, num_workers=2) as env:
+        for _ in range(5):
+            env.reset(options={"reconfigure": True})
+            env.step(actions(env))
+
+
+# -- the server -----------------------------------------------------------------------------------
+
+
+def _servers() -> Iterator[Fault]:
+    yield Fault(AREA, "the server is killed before a start", lambda _: _no_server(), GOES_ON)
+    yield Fault(AREA, "the server is killed with a vector open", lambda _: _server_lost())
+    yield Fault(AREA, "the server is stopped before a start", lambda _: _server_stops(), GOES_ON)
+    yield Fault(
+        AREA,
+        "the server is stopped with a vector open",
+        lambda _: _server_reports_nothing(),
+        GOES_ON,
+    )
+    yield Fault(AREA, "a worker is stopped while it is started", lambda _: _reads_nothing())
+    yield Fault(AREA, "the server's libraries cannot be loaded", lambda _: _server_cannot_load())
+
+
+def _no_server() -> None:
+    server = server_pid()
+    os.kill(server, signal.SIGKILL)
+    play_own()
+    assert server_pid() != server
+
+
+def _server_lost() -> None:
+    server = server_pid()
+    with vector(num_workers=2) as env:
+        env.reset(seed=4)
+        pids = living_workers(env)
+        os.kill(server, signal.SIGKILL)
+        wait_until(lambda: not any(map(session_of, pids)), "the workers outlive the server")
+        error = failure(lambda: env.step(actions(env)))
+        assert error.env_ids == [0, 1]
+        env.restart()
+        assert env.step(actions(env))[0].tobytes() == play_own()
+        raise error
+
+
+def _server_stops() -> None:
+    from tasks.processes import forks
+
+    patience, forks._FORK_SECONDS = forks._FORK_SECONDS, 1.0
+    try:
+        os.kill(server_pid(), signal.SIGSTOP)
+        play_own()
+    finally:
+        forks._FORK_SECONDS = patience
+
+
+def _server_cannot_load() -> None:
+    from tasks.processes import forks
+
+    os.kill(server_pid(), signal.SIGKILL)
+    command = forks._COMMAND
+    forks._COMMAND = command.replace("serve(", "raise SystemExit(")
+    try:
+        play_own()
+    finally:
+        forks._COMMAND = command
+
+
+def _server_reports_nothing() -> None:
+    from tasks.processes import forks
+
+    before, patience, forks._FORK_SECONDS = children(), forks._FORK_SECONDS, 1.0
+    try:
+        with vector(num_workers=2):
+            os.kill(server_pid(), signal.SIGSTOP)
+        assert children() == before
+        play_own()
+    finally:
+        forks._FORK_SECONDS = patience
+
+
+def _reads_nothing() -> None:
+    """Stop a worker before it has read all that it is to run, which no pipe holds at once."""
+    from tasks.processes import forks
+    from tasks.processes import process as processes
+
+    server_pid()  # is there already
+    fork, patience = forks._fork, forks._FORK_SECONDS
+
+    def fork_and_stop(descriptors: Sequence[int]) -> Any:
+        server, worker = fork(descriptors)
+        os.kill(worker[0], signal.SIGSTOP)
+        return server, worker
+
+    forks._fork, forks._FORK_SECONDS = fork_and_stop, 1.0
+    try:
+        processes.start(processes.context.Process(target=len, args=(bytes(2**20),)))
+    finally:
+        forks._fork, forks._FORK_SECONDS = fork, patience
+        play_own()
