@@ -17,6 +17,7 @@ from measurements.bench.measurement import BenchmarkError, Measurement, by_serie
 from measurements.bench.settings import CORES, Clock, Settings
 from measurements.bench.steps import PHYSICS, random_actions
 from tasks.processes import process as processes
+from tasks.processes.worker import Worker
 
 VECTOR = "vector"
 FEW, MANY = 4, 36  # environments in a worker whose memory is compared
@@ -118,24 +119,16 @@ class PhysicsProcesses:
 
     def __init__(self, task_id: str, count: int, num_envs: int) -> None:
         """Start ``count`` processes, with ``num_envs`` environments each."""
-        self._connections: list[Connection] = []
-        self._processes: list[Any] = []
         self._num_envs = num_envs
+        self._workers: list[Worker[Connection]] = []
         for _ in range(count):
-            ours, theirs = processes.context.Pipe()
-            process = processes.context.Process(
-                target=_work, args=(theirs, task_id, num_envs), daemon=True
-            )
-            processes.start(process)
-            theirs.close()
-            self._connections.append(ours)
-            self._processes.append(process)
+            self._workers.append(Worker(processes.context.Pipe(), _work, task_id, num_envs))
 
     def __enter__(self) -> PhysicsProcesses:
         """Wait until all are ready."""
         try:
-            for connection in self._connections:
-                _answer(connection)
+            for worker in self._workers:
+                _answer(worker)
         except BaseException:
             self.close()
             raise
@@ -153,20 +146,18 @@ class PhysicsProcesses:
             number: The number of the round.
         """
         size = self._num_envs
-        used = self._connections[: timed.num_envs // size]
+        used = self._workers[: timed.num_envs // size]
         actions = timed.actions(number)
-        for i, connection in enumerate(used):
+        for i, worker in enumerate(used):
             own = actions[:, i * size : (i + 1) * size]
             with suppress(OSError):  # it died: that is found when it should answer
-                connection.send((own, number + i * size, timed.clock))
+                worker.line.send((own, number + i * size, timed.clock))
         return timed.clock.rate((timed.steps * size, _answer(one)) for one in used)
 
     def close(self) -> None:
         """End them."""
-        for connection, process in zip(self._connections, self._processes, strict=True):
-            connection.close()
-            process.kill()
-            process.join()
+        for worker in self._workers:
+            worker.end()
 
 
 def _work(connection: Connection, task_id: str, num_envs: int) -> None:
@@ -188,11 +179,11 @@ def _work(connection: Connection, task_id: str, num_envs: int) -> None:
         connection.send(sum(env.simulation.timed_step(action, clock.now) for action in actions))
 
 
-def _answer(connection: Connection) -> float:
+def _answer(worker: Worker[Connection]) -> float:
     try:
-        return connection.recv()
+        return worker.line.recv()
     except (EOFError, OSError):
-        raise BenchmarkError("a process that only does physics ended by itself") from None
+        raise BenchmarkError(f"a process that only does physics {worker.death()}") from None
 
 
 @contextmanager

@@ -6,14 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from robots import RobotLayoutsError
+from tasks.processes.process import WorkerError
+
+__all__ = ["Event", "Play", "WorkerError", "WorkersDied"]
 
 Play = Callable[[int], Any]
 """Plays the episode of a seed and returns what is to be known of it (it can be pickled)."""
-
-
-class WorkerError(RobotLayoutsError, RuntimeError):
-    """Worker processes that cannot be started, or die again and again."""
 
 
 class WorkersDied(WorkerError):

@@ -16,6 +16,7 @@ from rollouts.playing.dispatch import Sign, Worker
 from rollouts.playing.events import Event, Play, WorkerError
 from rollouts.playing.transport import described, loaded, packed, portable
 from tasks.processes import process as processes
+from tasks.processes.worker import Worker as WorkerProcess
 
 _PATIENCE = 10.0  # s that a worker may take to end by itself
 
@@ -73,15 +74,13 @@ class _Process:
         self._begun = False
         self._messages: SimpleQueue[object] = SimpleQueue()
         try:
-            self._connection, theirs = processes.context.Pipe()
-            with theirs:
-                self._process = processes.context.Process(target=_work, args=(theirs,), daemon=True)
-                processes.start(self._process)
+            self._process = WorkerProcess(processes.context.Pipe(), _work)
         except (OSError, AssertionError) as error:  # too many files; a daemon has no children
             raise WorkerError(
                 f"a worker process cannot be started: {error}; workers=0 plays in this process"
             ) from error
         self.name = f"process {self._process.pid}"
+        self._connection = self._process.line
         self._thread = Thread(target=self._converse, args=(job, senders), daemon=True)
         self._thread.start()
 
@@ -118,13 +117,12 @@ class _Process:
     def dismiss(self) -> None:
         """Let it end by itself, for a while."""
         self._send(None)
-        self._process.join(_PATIENCE)
+        self._process.wait(_PATIENCE)
         self.kill()
 
     def kill(self) -> None:
         """End it at once."""
-        self._process.kill()
-        self._process.join(_PATIENCE)
+        self._process.kill(_PATIENCE)
         self._thread.join(_PATIENCE)
         if not self._thread.is_alive():
             self._connection.close()
@@ -156,9 +154,9 @@ class _Process:
         Raises:
             WorkerError: If every other one would die like that.
         """
-        self._process.join(_PATIENCE)
+        self._process.wait(_PATIENCE)
         self.kill()
-        code = self._process.exitcode or 0
+        code = self._process.exit_code or 0
         how = processes.ending(code)
         if code > 0 and not self._begun:
             raise WorkerError(f"a worker process could not begin: it {how}")

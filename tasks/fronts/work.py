@@ -7,7 +7,7 @@ import pickle
 from typing import TYPE_CHECKING, Any
 
 from robots import RobotLayoutsError
-from tasks.fronts.channel import Channel
+from tasks.processes.channel import Channel
 from tasks.processes.process import ProcessError, Sendable
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import pickle
 import select
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import closing, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,13 +21,13 @@ from tasks.fronts.board import (
     map_shared_memory,
     new_shared_memory,
 )
-from tasks.fronts.channel import Channel
 from tasks.fronts.work import ATTACH, SETTLE, CallFailed, work
 from tasks.processes import process as processes
-from tasks.processes.process import ProcessError, WorkerTraceback, enough
+from tasks.processes.channel import Channel
+from tasks.processes.process import WorkerTraceback, enough
+from tasks.processes.worker import FAREWELL_SECONDS, Worker
 
 START_SECONDS = 300.0  # until all workers have built their worlds
-_FAREWELL_SECONDS = 2.0  # that workers may take to end by themselves
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Failure:
     traceback: str = ""
 
 
-class WorkerError(ProcessError):
+class WorkerError(processes.WorkerError):
     """Workers of a vector that died, hung or failed; the others have done what they were asked.
 
     If tasks raised something in them, the ``__cause__`` says where.
@@ -184,8 +184,8 @@ class Workers:
         """
         crew, self._crew = self._crew, {}
         for worker in crew.values():
-            worker.channel.close()
-        deadline = time.monotonic() + _FAREWELL_SECONDS
+            worker.line.close()
+        deadline = time.monotonic() + FAREWELL_SECONDS
         for worker in crew.values():
             worker.end(max(0.0, deadline - time.monotonic()))
         self.arrays = {}
@@ -300,7 +300,7 @@ class _Gone(Exception):
         self.reason, self.traceback = reason, traceback
 
 
-class _Worker:
+class _Worker(Worker[Channel]):
     """One process, which holds one part.
 
     Attributes:
@@ -308,26 +308,18 @@ class _Worker:
     """
 
     def __init__(self, part: Part, timeout: float | None) -> None:
-        self.channel, theirs = Channel.pair()
+        packed = _packed(part)
+        super().__init__(Channel.pair(), work)
         self.settled, self._number = False, 0
         self._asked = "__init__"  # its first answer tells the shapes
         self._message = b""
-        self._process = processes.context.Process(target=work, args=(theirs,), daemon=True)
-        try:
-            with closing(theirs):
-                packed = _packed(part)
-                processes.start(self._process)
-            if timeout is not None:
-                self.channel.limit_sending(timeout)
-        except BaseException:
-            self.channel.close()
-            raise
-        self.pid = self._process.pid
+        if timeout is not None:
+            self.line.limit_sending(timeout)
         # The end of the process is watched as well: a process that it forked may hold its end of
-        # the channel open.
-        self.descriptors = self.channel.fileno(), self._process.sentinel
-        with suppress(OSError):  # it died: that is read from the channel
-            self.channel.send(self._number, packed)
+        # the line open.
+        self.descriptors = self.line.fileno(), self.sentinel
+        with suppress(OSError):  # it died: that is read from the line
+            self.line.send(self._number, packed)
 
     def send(
         self, method: str, arguments: tuple[Any, ...], descriptors: Sequence[int] = ()
@@ -336,18 +328,18 @@ class _Worker:
         self.settled = False
         self._asked, self._number = method, self._number + 1
         with suppress(OSError):
-            self.channel.send(self._number, pickle.dumps((method, arguments)), descriptors)
+            self.line.send(self._number, pickle.dumps((method, arguments)), descriptors)
 
     def has_answered(self) -> bool:
         """Read what has arrived; returns whether that is its answer to what it was asked last."""
         try:
-            message = self.channel.receive_now()
+            message = self.line.receive_now()
         except BlockingIOError:
-            if self._process.exitcode is None:
+            if self.exit_code is None:
                 return False
-            raise _Gone(self._death()) from None
+            raise _Gone(self.death()) from None
         except (EOFError, OSError):
-            raise _Gone(self._death()) from None
+            raise _Gone(self.death()) from None
         if message is None or message[0] != self._number:
             return False
         _, self._message = message
@@ -369,20 +361,6 @@ class _Worker:
         call = "making its task" if self._asked == "__init__" else f"{self._asked}()"
         where = error.__cause__.args if error.__cause__ else ()
         raise _Gone(f"failed in {call} with {what}", *where)
-
-    def end(self, patience: float) -> None:
-        """End it, after a while in which it may do so by itself (s); twice is allowed."""
-        self.channel.close()
-        with suppress(ValueError):  # it was closed before
-            if self._process.exitcode is None:
-                self._process.join(patience)
-                self._process.kill()
-                self._process.join()
-            self._process.close()
-
-    def _death(self) -> str:
-        self._process.join(_FAREWELL_SECONDS)
-        return processes.ending(self._process.exitcode)
 
 
 def _packed(part: Part) -> bytes:

@@ -34,7 +34,11 @@ PR_SET_PDEATHSIG = 1  # of Linux's prctl
 _MOST_DESCRIPTORS = 253  # Linux's SCM_MAX_FD
 
 
-class ProcessError(RobotLayoutsError, RuntimeError):
+class WorkerError(RobotLayoutsError, RuntimeError):
+    """Worker processes that cannot be started, die, hang or fail; the base of all such errors."""
+
+
+class ProcessError(WorkerError):
     """Worker processes that cannot be started."""
 
 

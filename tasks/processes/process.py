@@ -19,12 +19,13 @@ from threading import Thread
 from typing import TypeAlias
 
 from robots import RobotLayoutsError
-from tasks.processes.fork_server import ProcessError, end_with
+from tasks.processes.fork_server import ProcessError, WorkerError, end_with
 from tasks.processes.forks import WorkerProcess, ending
 
 __all__ = [
     "ProcessError",
     "Sendable",
+    "WorkerError",
     "WorkerTraceback",
     "context",
     "end_with_parent",

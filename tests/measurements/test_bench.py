@@ -149,7 +149,7 @@ class TestWhatIsTimed:
             assert floor.rate(timed, 0) > 0
             (child,) = multiprocessing.active_children()
             child.kill()
-            with pytest.raises(BenchmarkError, match="only does physics ended"):
+            with pytest.raises(BenchmarkError, match="only does physics died by SIGKILL"):
                 floor.rate(timed, 1)
         assert not multiprocessing.active_children()
 
