@@ -98,6 +98,7 @@ class Batch:
     def attach(self, board: Arrays) -> None:
         """Take its rows of a board, and write what the environments look like into them."""
         self._rows = {name: x[self._part.start : self._part.stop] for name, x in board.items()}
+        self._task.trust(self._rows["action"])  # the vector writes only what it has checked
         self._write(*self._task.start)
         self._rows[SEEDS][:] = self._task.seeds
 

@@ -85,3 +85,13 @@ def test_a_number_that_is_not_finite_is_named(bad: float, column: int, words: st
 def test_large_finite_numbers_pass():
     action = np.full((1, 8), 3e38, np.float32)
     assert np.array_equal(ActionReader(single({"arm": "panda"}), 1).read(action), action)
+
+
+def test_only_the_very_array_that_was_checked_before_is_not_checked_again():
+    reader = ActionReader(TWO, 2)
+    reader.checked = checked = np.zeros((2, 15), np.float32)
+    assert reader.read(checked) is checked
+    same = checked.copy()
+    same[1, 3] = np.nan
+    with pytest.raises(ActionError, match="action number 3 is nan in environment 1"):
+        reader.read(same)

@@ -222,6 +222,17 @@ def test_what_it_returns_stays_as_it_is():
     np.testing.assert_array_equal(info["elapsed_steps"], before[1])
 
 
+def test_an_action_is_checked_once():
+    env = VectorTask("PickCube-v1", num_envs=2, num_workers=0)
+    checked = env._crew._batch._task._reader.checked
+    assert np.shares_memory(checked, env._crew.arrays["action"])
+    wrong = np.zeros((2, 8), np.float32)
+    wrong[1, 2] = np.inf
+    with pytest.raises(ActionError, match="action number 2 is inf in environment 1"):
+        env.step(wrong)
+    assert not checked.any()
+
+
 def test_actions_by_robot_and_wrong_ones():
     env = make("TwoRobotPickCube-v1", num_envs=2, num_workers=1)
     with closing(env):
