@@ -19,7 +19,7 @@ from robots import AssetError, MissingPackageError, RecordingError
 from rollouts.recording.recorder import Recorder
 from rollouts.video import film, video_problem
 from tasks import MultiRobotTask
-from tasks.episode import Episode, play
+from tasks.episode import PlayedEpisode, play
 
 ENOUGH = 0.9  # share of episodes that must succeed
 FILMED_EPISODES, FILMING_SECONDS = 4, 60.0
@@ -67,7 +67,7 @@ def run_demo(options: DemoOptions, console: Console) -> bool:
     task = tasks.make(options.task, obs_mode="state")
     _show_layout(layout, options.out, console)
 
-    episodes: list[Episode] = []
+    episodes: list[PlayedEpisode] = []
     recording = options.out / "trajectory.h5"
     with Recorder(recording, task, overwrite=True) as recorder, _live(console) as live:
         line = live.add_task("")
@@ -130,12 +130,12 @@ def _live(console: Console) -> Progress:
     return Progress(*columns, console=console, transient=True)
 
 
-def _episode_line(episode: Episode) -> str:
+def _episode_line(episode: PlayedEpisode) -> str:
     outcome = "[green]success[/]" if episode.solved else "[red]failure[/]"
     return f"seed {episode.seed:>3}  {outcome}  {len(episode.actions):>3} steps"
 
 
-def _report(episodes: Sequence[Episode], console: Console) -> None:
+def _report(episodes: Sequence[PlayedEpisode], console: Console) -> None:
     solved = [episode for episode in episodes if episode.solved]
     steps = sum(len(episode.actions) for episode in episodes)
     rate = steps / sum(episode.seconds for episode in episodes)
@@ -151,7 +151,7 @@ def _report(episodes: Sequence[Episode], console: Console) -> None:
     )
 
 
-def _film(options: DemoOptions, episodes: Sequence[Episode], console: Console) -> None:
+def _film(options: DemoOptions, episodes: Sequence[PlayedEpisode], console: Console) -> None:
     path = options.out / "video.mp4"
     task: MultiRobotTask = tasks.make(options.task, render_mode="rgb_array")
     with _live(console) as live:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from experts import find_expert
 from experts.registry import Expert
@@ -29,30 +28,12 @@ from rollouts.playing.executor import (
 from rollouts.playing.plan_conversion import Planner
 from rollouts.playing.seeds import checked_seeds
 from tasks import MultiRobotTask, Scenario, get_task_class
-from tasks.episode import REBUILT
+from tasks.episode import Policy, Score, follow, moments
 from tasks.registry import make_scenario
-
-Policy = Callable[[Any], Any]
-"""``policy(obs)`` returns an action; both as `MultiRobotTask.step` has them, of 1 environment."""
 
 EXPERT = "expert"
 
 _SHOWN = 10  # seeds that a text names
-
-
-@dataclass(frozen=True)
-class Score:
-    """How an episode went.
-
-    Attributes:
-        success: Whether its last step was a success.
-        total: Sum of its rewards.
-        steps: Its control steps.
-    """
-
-    success: bool
-    total: float
-    steps: int
 
 
 @dataclass(frozen=True)
@@ -214,7 +195,7 @@ class _Player:
             plan = self._planner(seed)
         except TaskError:
             return Score(False, 0.0, 0)
-        return _play(self._env, seed, _follow(plan), len(plan))
+        return _play(self._env, seed, follow(plan), len(plan))
 
     def close(self) -> None:
         """Let the worlds go."""
@@ -223,22 +204,17 @@ class _Player:
             self._planner.close()
 
 
-def _follow(plan: NDArray[np.float32]) -> Policy:
-    """Return a policy that carries out a plan without looking."""
-    left = iter(plan)
-    return lambda obs: next(left)
-
-
 def _play(env: MultiRobotTask, seed: int, policy: Policy, most: int) -> Score:
     """Play an episode of at most so many steps."""
-    obs, _ = env.reset(seed, options=REBUILT)
     rewards: list[float] = []
-    success = over = False
-    with torch.no_grad():
-        while not over and len(rewards) < most:
-            obs, reward, terminated, truncated, info = env.step(policy(obs))
-            rewards.append(float(reward))
-            success, over = bool(info["success"]), bool(terminated | truncated)
+    success = False
+    with torch.no_grad(), closing(moments(env, seed, policy, most)) as happening:
+        next(happening)
+        for moment in happening:
+            rewards.append(moment.reward)
+            success = moment.success
+            if moment.terminated or moment.truncated:
+                break
     return Score(success, fsum(rewards), len(rewards))
 
 

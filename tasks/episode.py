@@ -1,11 +1,12 @@
-"""Plays actions through a task and keeps everything that happened."""
+"""Plays episodes of a task with one environment, and keeps what happened in them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass
+from math import fsum
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +16,47 @@ from tasks import MultiRobotTask
 
 States = dict[str, dict[str, NDArray[np.float32]]]
 
+Policy = Callable[[Any], Any]
+"""``policy(obs)`` returns an action; both as `MultiRobotTask.step` has them, of 1 environment."""
+
 REBUILT: dict[str, Any] = {"reconfigure": True}  # reset option: nothing of the past stays in PhysX
 
 
 @dataclass(frozen=True)
 class Episode:
-    """One episode of T steps.
+    """What an episode of T steps follows from.
 
     Attributes:
-        seed: Seed of its reset, which rebuilt the world.
-        actions: Shape (T, A).
+        seed: Seed of its reset.
+        actions: Flat actions, shape (T, A).
+    """
+
+    seed: int
+    actions: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Score:
+    """How an episode went.
+
+    Attributes:
+        success: Whether its last step was a success.
+        total: Sum of its rewards.
+        steps: Its control steps.
+    """
+
+    success: bool
+    total: float
+    steps: int
+
+
+@dataclass(frozen=True)
+class PlayedEpisode(Episode):
+    """An episode and what came of it.
+
+    Attributes:
         states: State dict of `MultiRobotTask.get_state_dict`, each entry (T + 1, k), the first
-            row being the state after the reset.
+            row being the state after the reset, which rebuilt the world.
         rewards: Shape (T,).
         success: Shape (T,).
         terminated: Shape (T,).
@@ -34,8 +64,6 @@ class Episode:
         seconds: Time that the steps took, without reading the states (s).
     """
 
-    seed: int
-    actions: NDArray[np.float32]
     states: States
     rewards: NDArray[np.float32]
     success: NDArray[np.bool_]
@@ -48,6 +76,77 @@ class Episode:
         """Whether the last step ended in success."""
         return bool(self.success[-1])
 
+    @property
+    def score(self) -> Score:
+        """How it went."""
+        return Score(self.solved, fsum(self.rewards.tolist()), len(self.actions))
+
+
+class Moment(NamedTuple):
+    """What a reset or a step returned, of one environment.
+
+    Attributes:
+        observation: As the task gives it.
+        reward: 0 after the reset, as are those below.
+        success: Whether the task is solved.
+        terminated: Whether the episode ended.
+        truncated: Whether its time was over.
+        seconds: Time that the step took (s).
+    """
+
+    observation: Any
+    reward: float = 0.0
+    success: bool = False
+    terminated: bool = False
+    truncated: bool = False
+    seconds: float = 0.0
+
+
+def moments(
+    task: MultiRobotTask,
+    seed: int,
+    policy: Policy,
+    most: int,
+    *,
+    start: Mapping[str, Mapping[str, Any]] | None = None,
+) -> Generator[Moment]:
+    """Begin an episode in a freshly built world, then take a step whenever asked for one.
+
+    Args:
+        task: A task with one environment.
+        seed: Seed of the reset.
+        policy: Who acts; see `follow` for actions that are known.
+        most: Steps after which this ends; whoever looks on may end it before.
+        start: State to begin from instead of the one after the reset; see
+            `MultiRobotTask.set_state_dict`, which is not exact.
+
+    Yields:
+        What the reset returned, then what each step did.
+
+    Raises:
+        TaskError: If the task has several environments.
+        ActionError: If an action has the wrong shape or numbers that are not finite.
+    """
+    if task.num_envs != 1:
+        raise TaskError(f"an episode is played in 1 environment; the task has {task.num_envs}")
+    observation, _ = task.reset(seed, options=REBUILT)
+    if start is not None:
+        task.set_state_dict(start)
+    yield Moment(observation)
+    for _ in range(most):
+        action = policy(observation)
+        began = perf_counter()
+        observation, reward, terminated, truncated, info = task.step(action)
+        seconds = perf_counter() - began
+        success, over, late = bool(info["success"]), bool(terminated), bool(truncated)
+        yield Moment(observation, reward.item(), success, over, late, seconds)
+
+
+def follow(actions: Iterable[Any]) -> Policy:
+    """Return a policy that carries out actions without looking."""
+    left = iter(actions)
+    return lambda observation: next(left)
+
 
 def play(
     task: MultiRobotTask,
@@ -56,42 +155,36 @@ def play(
     watch: Callable[[], None] = lambda: None,
     *,
     start: Mapping[str, Mapping[str, Any]] | None = None,
-) -> Episode:
-    """Play actions in a freshly built world.
+) -> PlayedEpisode:
+    """Play actions in a freshly built world, and keep everything that happens.
 
     Args:
         task: A task with one environment.
         seed: Seed of the reset.
         actions: Shape (T, A) with T of 1 or more.
         watch: Called after the reset and after every step.
-        start: State to begin from instead of the one after the reset; see
-            `MultiRobotTask.set_state_dict`, which is not exact.
+        start: State to begin from instead of the one after the reset; see `moments`.
 
     Raises:
         TaskError: If the task has several environments, or there are no actions.
         ActionError: If an action has the wrong shape or numbers that are not finite.
     """
-    if task.num_envs != 1:
-        raise TaskError(f"an episode is played in 1 environment; the task has {task.num_envs}")
-    if not len(actions):
+    if task.num_envs == 1 and not len(actions):
         raise TaskError("an episode needs at least one action")
-    task.reset(seed, options=REBUILT)
-    if start is not None:
-        task.set_state_dict(start)
+    happening = moments(task, seed, follow(actions), len(actions), start=start)
+    next(happening)
     tape, seconds = task.begin_tape(), 0.0
     rewards = np.empty(len(actions), np.float32)
     success, terminated, truncated = np.empty((3, len(actions)), np.bool_)
     task.write_tape(tape)
     watch()
-    for i, action in enumerate(actions):
-        began = perf_counter()
-        _, reward, ended, cut_off, info = task.step(action)
-        seconds += perf_counter() - began
-        rewards[i], success[i] = reward.item(), info["success"].item()
-        terminated[i], truncated[i] = ended.item(), cut_off.item()
+    for i, moment in enumerate(happening):
+        seconds += moment.seconds
+        rewards[i], success[i] = moment.reward, moment.success
+        terminated[i], truncated[i] = moment.terminated, moment.truncated
         task.write_tape(tape)
         watch()
-    return Episode(
+    return PlayedEpisode(
         seed=seed,
         actions=np.asarray(actions, np.float32),
         states={

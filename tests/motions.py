@@ -11,8 +11,8 @@ from math import atan2, cos, pi, sin
 import numpy as np
 
 import tasks
-from parity.compare.episodes import Episode
 from simulation.kinematics import InverseKinematics
+from tasks.episode import Episode
 
 OPEN, CLOSED = 1.0, -1.0
 STEP = 0.1  # rad that an arm's action of 1 asks for

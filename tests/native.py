@@ -9,8 +9,8 @@ import pytest
 
 import tasks
 from parity.compare.both_sides import NativeSide, OurSide
-from parity.compare.episodes import Episode
 from parity.compare.lockstep import EpisodeResult, History, compare
+from tasks.episode import Episode
 
 TASKS = tasks.list_clones()
 NATIVE = [

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
@@ -20,25 +19,13 @@ from rollouts.reading.trajectory import (
     TrajectoryFile,
     expect_file,
 )
+from tasks.episode import Episode
 
 Bounds = Sequence[tuple[float, float]]
 
 SUFFIXES = (".h5", ".npz")
 
 _OVER_RANGE = 3.0  # native clips normalised actions; a clone has to do the same
-
-
-@dataclass(frozen=True)
-class Episode:
-    """A reset seed and the actions that follow.
-
-    Attributes:
-        seed: Reset seed.
-        actions: Flat actions, (T, A) float32.
-    """
-
-    seed: int
-    actions: NDArray[np.float32]
 
 
 def random_episodes(

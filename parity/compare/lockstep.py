@@ -10,9 +10,9 @@ from typing import Literal
 import numpy as np
 
 from parity.compare.both_sides import Side
-from parity.compare.episodes import Episode
 from parity.compare.snapshot import QUANTITIES, Key, Snapshot, differing, largest_difference
 from robots import TaskError
+from tasks.episode import Episode
 
 History = Literal["fresh", "reused"]
 HISTORIES: tuple[History, ...] = ("fresh", "reused")

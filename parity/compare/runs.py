@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import tasks
 from parity.compare.both_sides import NativeSide, OurSide
-from parity.compare.episodes import Episode
 from parity.compare.lockstep import EpisodeResult, FirstDifference, History, compare
 from parity.compare.snapshot import QUANTITIES
 from robots import CONTROL_MODES
+from tasks.episode import Episode
 
 
 @dataclass(frozen=True)

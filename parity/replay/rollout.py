@@ -21,7 +21,7 @@ from rich.text import Text
 import tasks
 from experts import find_expert
 from parity.compare.both_sides import NativeSide, OurSide, Side
-from parity.compare.episodes import Episode, load_episodes, recorded_control_mode
+from parity.compare.episodes import load_episodes, recorded_control_mode
 from parity.compare.native_env import native_agents
 from parity.compare.printed import versions
 from parity.compare.snapshot import Snapshot, largest_difference
@@ -33,6 +33,7 @@ from rollouts.progress import LiveLine
 from rollouts.reading.trajectory import TrajectoryError
 from rollouts.video import open_video
 from tasks import MultiRobotTask
+from tasks.episode import Episode
 from tasks.native.format import articulation_keys
 
 Arrays = dict[str, NDArray[Any]]

@@ -8,13 +8,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from parity.compare.both_sides import NativeSide, OurSide
-from parity.compare.episodes import Episode
 from parity.show.native_pictures import NativeScene, Picture, expect_same_shapes
 from parity.show.panels import Labels, contact_sheet, moments, side_by_side
 from parity.show.side_by_side import Frame, PixelCount, frames, most_alike, play, play_and_look
 from robots import MissingPackageError, RecordingError
 from robots.common.writing import write_whole
 from rollouts.video import open_video, package_problem
+from tasks.episode import Episode
 
 NAME = "side_by_side"
 

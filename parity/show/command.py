@@ -15,12 +15,13 @@ from rich.console import Console
 import tasks
 from experts import find_expert
 from parity.compare.both_sides import NativeSide, OurSide
-from parity.compare.episodes import Episode, load_episodes, recorded_control_mode
+from parity.compare.episodes import load_episodes, recorded_control_mode
 from parity.show.clip import Candidate, Clip, ClipOptions, SideBySide, choose
 from robots import CONTROL_MODES, MissingPackageError, RecordingError, TaskError
 from rollouts.progress import LiveLine
 from rollouts.video import package_problem
 from tasks import MultiRobotTask
+from tasks.episode import Episode
 
 SIZES = (192, 1024)  # smallest and largest panel (pixels)
 EXPERT_EPISODES = 5  # to choose from

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from parity.compare.both_sides import Side
-from parity.compare.episodes import Episode
 from parity.compare.lockstep import EpisodeResult, compare
 from parity.compare.snapshot import STATE, Snapshot
 from parity.show.native_pictures import NativeScene, Picture, PictureError, difference
+from tasks.episode import Episode
 
 # Of 255: mean difference between a state drawn and the same state seen live. Rounding of poses
 # takes single pixels over an edge, which came to 0.002 at most; a goal left out, to 0.024 or more.

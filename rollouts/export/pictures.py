@@ -16,7 +16,7 @@ from rollouts.reading.trajectory import TrajectoryError
 from rollouts.video import INSTALL, overview
 from simulation.rendering.pictures import SIZE, Cameras, vulkan_problem
 from tasks import MultiRobotTask
-from tasks.episode import REBUILT, States
+from tasks.episode import States, follow, moments
 
 SHAPE = (SIZE, SIZE, 3)
 CODEC = "h264"
@@ -62,14 +62,14 @@ def draw(task: MultiRobotTask, columns: Columns) -> Generator[NDArray[np.uint8]]
             f"episode {columns.episode_id} names no seed, without which its scene cannot be built;"
             " export without video"
         )
-    task.reset(columns.seed, options=REBUILT)
+    happening = moments(task, columns.seed, follow(columns.actions), len(columns) - 1)
+    next(happening)
     eye, target = overview(task.layout) or task.viewpoint
     cameras = Cameras(task.simulation, eye, target)
-    for t, action in enumerate(columns.actions):
+    for t in range(len(columns)):
         _put(task, columns.states, t)
         yield cameras.take()[0]
-        if t + 1 < len(columns):
-            task.step(action)
+        next(happening, None)
 
 
 def _put(task: MultiRobotTask, states: States, t: int) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from experts.registry import Expert
 from robots import CONTROL_MODES, TaskError
 from tasks import MultiRobotTask
-from tasks.episode import REBUILT
+from tasks.episode import follow, moments
 
 DELTAS = CONTROL_MODES[0]  # which all experts speak
 
@@ -60,9 +60,9 @@ def as_positions(
             f"actions of {DELTAS} are converted; the task has {task.scenario.control_mode}"
         )
     positions = np.array(actions, np.float32)
-    task.reset(seed, options=REBUILT)
-    for row in positions:
-        task.step(row[None])
+    happening = moments(task, seed, follow(positions), len(positions))
+    next(happening)
+    for row, _ in zip(positions, happening, strict=True):
         for robot, part in task.action_split.items():
             _write_targets(task, robot, row[part])
     return positions

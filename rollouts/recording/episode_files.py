@@ -35,7 +35,7 @@ from rollouts.reading.json_fields import (
     whole,
 )
 from rollouts.reading.summary import MAX_SEED, OWN_EPISODE
-from tasks.episode import REBUILT, Episode
+from tasks.episode import REBUILT, PlayedEpisode
 
 CHECKSUM = "checksum"  # attribute of an episode's group in the h5 file
 STATES = "env_states/"
@@ -106,7 +106,7 @@ class PartWriter:
         object.__setattr__(self, "_text", json.dumps(self.header).encode())
         object.__setattr__(self, "_split", json.dumps(split))
 
-    def write(self, episode: Episode) -> None:
+    def write(self, episode: PlayedEpisode) -> None:
         """Write one episode; it is there, whole, when this returns, or not at all.
 
         Raises:
@@ -118,7 +118,7 @@ class PartWriter:
         """Write an episode that was encoded, perhaps on another machine; else as `write`."""
         write_whole(part_path(self.folder, seed), part, RecordingError, parents=False)
 
-    def encode(self, episode: Episode) -> bytes:
+    def encode(self, episode: PlayedEpisode) -> bytes:
         """Return what `write` writes."""
         arrays = _arrays(episode)
         about = {
@@ -134,7 +134,7 @@ class PartWriter:
         )
         return content + _checksum(content)
 
-    def _about(self, episode: Episode) -> dict[str, Any]:
+    def _about(self, episode: PlayedEpisode) -> dict[str, Any]:
         return {
             "episode_seed": episode.seed,
             "control_mode": self.control_mode,
@@ -265,7 +265,7 @@ def _is_part(path: Path) -> bool:
     return True
 
 
-def _arrays(episode: Episode) -> dict[str, NDArray[Any]]:
+def _arrays(episode: PlayedEpisode) -> dict[str, NDArray[Any]]:
     arrays: dict[str, NDArray[Any]] = {"actions": episode.actions}
     for kind, entries in episode.states.items():
         arrays.update({f"{STATES}{kind}/{name}": rows for name, rows in entries.items()})

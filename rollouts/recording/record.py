@@ -28,22 +28,9 @@ from rollouts.recording.episode_files import PartWriter
 from rollouts.recording.provenance import describe_layout, differences, listing
 from rollouts.recording.recorder import Recorder
 from tasks import MultiRobotTask, Scenario
-from tasks.episode import play
+from tasks.episode import Score, play
 
 FILE = "trajectory.h5"
-
-
-@dataclass(frozen=True)
-class Played:
-    """What is told of a recorded episode.
-
-    Attributes:
-        success: Whether it ended in success.
-        steps: Its control steps.
-    """
-
-    success: bool
-    steps: int
 
 
 @dataclass(frozen=True)
@@ -67,7 +54,7 @@ class EpisodeJob:
         """What other machines may need to play it."""
         return modules_of(self.task, self.expert)
 
-    def __call__(self) -> Callable[[int], tuple[Played, bytes]]:
+    def __call__(self) -> Callable[[int], tuple[Score, bytes]]:
         """Make the task in a worker, and return what plays and encodes the episode of a seed.
 
         Raises:
@@ -85,10 +72,10 @@ class _Player:
         self._expect_same_robots()
         self._plan = Planner(self._env, job.expert)
 
-    def __call__(self, seed: int) -> tuple[Played, bytes]:
+    def __call__(self, seed: int) -> tuple[Score, bytes]:
         """Play and encode the episode of a seed."""
         episode = play(self._env, seed, self._plan(seed))
-        return Played(episode.solved, len(episode.actions)), self._writer.encode(episode)
+        return episode.score, self._writer.encode(episode)
 
     def close(self) -> None:
         """Let the worlds go."""
@@ -120,7 +107,7 @@ class Summary:
     recorded: int = 0
     already: int = 0
     damaged: list[str] = field(default_factory=list[str])
-    played: dict[int, Played] = field(default_factory=dict[int, Played])
+    played: dict[int, Score] = field(default_factory=dict[int, Score])
     failed: dict[int, Exception] = field(default_factory=dict[int, Exception])
     deaths: list[str] = field(default_factory=list[str])
     workers: set[str] = field(default_factory=set[str])

@@ -29,7 +29,7 @@ from rollouts.recording.episode_files import (
 from rollouts.recording.provenance import describe_layout, describe_simulation, differences, listing
 from rollouts.recording.trajectory_writer import join, read_joined
 from tasks import MultiRobotTask
-from tasks.episode import Episode
+from tasks.episode import PlayedEpisode
 from tasks.native.format import observation_keys
 
 __all__ = ["Recorder", "describe_layout"]
@@ -140,7 +140,7 @@ class Recorder:
         """Seeds of all episodes recorded, those that worker processes wrote included."""
         return {*self._joined, *(seed_of(part) for part in list_parts(self.parts))}
 
-    def add(self, episode: Episode) -> None:
+    def add(self, episode: PlayedEpisode) -> None:
         """Write one episode; it is kept when this returns.
 
         Raises:

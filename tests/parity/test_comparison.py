@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from parity.compare.episodes import Episode
 from parity.compare.lockstep import compare
 from parity.compare.snapshot import QUANTITIES, differing, largest_difference
 from robots import TaskError
+from tasks.episode import Episode
 
 COUNTER = ("qpos", "counter")
 

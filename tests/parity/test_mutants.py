@@ -8,10 +8,11 @@ import pytest
 import tasks
 from layouts import Layout
 from parity.compare.both_sides import NativeSide, OurSide
-from parity.compare.episodes import Episode, random_episodes
+from parity.compare.episodes import random_episodes
 from parity.compare.lockstep import EpisodeResult, compare
 from robots import RobotDescriptor, RobotRegistry
 from simulation import State, World
+from tasks.episode import Episode
 from tests.motions import touching_episode
 from tests.native import NATIVE, against_native, complaints, pair
 

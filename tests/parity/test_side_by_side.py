@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from parity.compare.episodes import Episode
 from parity.compare.lockstep import EpisodeResult
 from parity.compare.snapshot import QUANTITIES
 from parity.show.side_by_side import PixelCount, Playback, most_alike
+from tasks.episode import Episode
 
 
 def snapshots(steps: int, success: int | None) -> list:

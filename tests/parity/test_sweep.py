@@ -15,7 +15,6 @@ import pytest
 
 import tasks
 from parity.__main__ import main
-from parity.compare.episodes import Episode
 from parity.compare.lockstep import EpisodeResult, FirstDifference
 from parity.compare.runs import Run
 from parity.records.results import ResultsError
@@ -32,7 +31,7 @@ from parity.sweep.stages import (
 )
 from robots import TaskError, UnknownNameError
 from rollouts.recording.recorder import Recorder
-from tasks.episode import play
+from tasks.episode import Episode, play
 from tests.native import NATIVE
 from tests.rollouts.clusters import running_cluster
 

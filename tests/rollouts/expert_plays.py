@@ -6,7 +6,7 @@ import numpy as np
 
 import tasks
 from experts import find_expert
-from tasks.episode import Episode, play
+from tasks.episode import PlayedEpisode, play
 
 REBUILT = {"reconfigure": True}
 
@@ -35,7 +35,7 @@ def plan(name: str, seed: int) -> np.ndarray:
 
 
 @functools.cache
-def episode(name: str, seed: int) -> Episode:
+def episode(name: str, seed: int) -> PlayedEpisode:
     """Return the expert's episode, played in an environment that did not plan it."""
     return play(_stage(name), seed, plan(name, seed))
 

@@ -20,7 +20,7 @@ from robots import ActionError, RecordingError, TaskError
 from rollouts.reading.trajectory import TrajectoryFile
 from rollouts.recording.episode_files import part_path, read_part
 from rollouts.recording.recorder import Recorder
-from tasks.episode import Episode, play
+from tasks.episode import PlayedEpisode, play
 from tests.rollouts.hand_overs import TASK, plan, task
 from tests.rollouts.recordings import edited
 
@@ -29,7 +29,7 @@ FIRST_ROBOT, SECOND_ROBOT = "panda_wristcam-agent-0", "panda_wristcam-agent-1"
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory) -> tuple[Recorder, list[Episode]]:
+def recorded(tmp_path_factory) -> tuple[Recorder, list[PlayedEpisode]]:
     folder = tmp_path_factory.mktemp("recording")
     episodes = [play(task(), seed, plan(seed)) for seed in SEEDS]
     with Recorder(folder / "new" / "trajectory.h5", task()) as recorder:
@@ -38,7 +38,7 @@ def recorded(tmp_path_factory) -> tuple[Recorder, list[Episode]]:
     return recorder, episodes
 
 
-def short_episode(env: tasks.MultiRobotTask, seed: int, steps: int = 3) -> Episode:
+def short_episode(env: tasks.MultiRobotTask, seed: int, steps: int = 3) -> PlayedEpisode:
     rng = np.random.default_rng(seed)
     return play(env, seed, rng.uniform(-1, 1, (steps, env.layout.action_dim)).astype(np.float32))
 

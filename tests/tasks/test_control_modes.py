@@ -5,12 +5,12 @@ import pytest
 
 import tasks
 from layouts import single
-from parity.compare.episodes import Episode, random_episodes
+from parity.compare.episodes import random_episodes
 from parity.compare.lockstep import HISTORIES
 from robots import CONTROL_MODES, DescriptorError, RobotRegistry, TaskError, UnknownNameError
 from rollouts.playing.plan_conversion import as_positions
 from simulation.world import World
-from tasks.episode import play
+from tasks.episode import Episode, play
 from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, complaints, pair
 
