@@ -7,11 +7,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from layouts.layout import Layout
+from robots.common.commands import LOOPBACK
 
 if TYPE_CHECKING:
     from layouts.viewer import Cell
 
-LOOPBACK = "127.0.0.1"
 PORT = 8080
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from measurements.bench import readme_table as bench_table
+from parity.compare.results import RESULTS, ResultsError, read
 from parity.compare.task_summary import REWARD_MODES, number_text, reward_text, success_text
-from parity.records.results import RESULTS, ResultsError, read
 from robots import RobotLayoutsError
 from tasks import list_clones
 

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from layouts.view_command import LOOPBACK
 from layouts.viewer.cell import Cell
 from layouts.viewer.guard import policy
 from layouts.viewer.page import contacts_text
 from layouts.viewer.scene import Scene
 from layouts.viewer.server import ViewerError, serving
 from layouts.viewer.text import as_html
+from robots.common.commands import LOOPBACK
 from robots.common.writing import write_whole
 
 NO_SLIDERS = "A saved page has no sliders; the one that view serves without --html has them."

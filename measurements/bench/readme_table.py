@@ -8,7 +8,7 @@ from pathlib import Path
 from measurements.bench import report
 from measurements.bench.measurement import BenchmarkError, Measurement, Value, number_text
 from measurements.bench.report import Report, markdown_table
-from parity.records.results import ResultsError
+from parity.compare.results import ResultsError
 
 RECORD = Path(__file__).parents[1] / "bench.json"
 COMMAND = "make bench ARGS=--record"

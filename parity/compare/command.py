@@ -23,9 +23,9 @@ from parity.compare.episodes import (
 )
 from parity.compare.lockstep import HISTORIES, History
 from parity.compare.printed import document, sentences, table
+from parity.compare.results import RESULTS, record
 from parity.compare.runs import Run, play
 from parity.compare.task_summary import summarise, summary_table
-from parity.records.results import RESULTS, record
 from robots import CONTROL_MODES, RecordingError, TaskError, closest_match
 from robots.common.writing import write_whole
 from rollouts.progress import LiveLine

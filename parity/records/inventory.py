@@ -15,7 +15,7 @@ from rich.table import Table
 
 from experts import list_experts
 from parity.compare.native_env import native_tasks
-from parity.records.results import RESULTS, read
+from parity.compare.results import RESULTS, read
 from robots import MissingPackageError, RobotRegistry
 from rollouts.reading.summary import recorded_task
 from rollouts.reading.trajectory import TrajectoryError

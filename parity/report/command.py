@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from parity.records.results import RESULTS, ResultsError, read
+from parity.compare.results import RESULTS, ResultsError, read
 from parity.report.content import page_content
 from parity.report.html import render
 from parity.show import embedding

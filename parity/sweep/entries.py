@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from parity.compare.printed import versions
+from parity.compare.results import ResultsError
 from parity.compare.task_summary import number_text
-from parity.records.results import ResultsError
 from parity.sweep.plan import Plan
 from robots import RecordingError
 from robots.common.writing import write_whole

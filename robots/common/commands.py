@@ -14,6 +14,7 @@ from typing import Any, NoReturn, TextIO
 from robots.common.errors import RobotLayoutsError, UnknownNameError
 
 FAILED, MEANINGLESS, INTERRUPTED = 1, 2, 130  # exit codes; 130 is what shells have for Ctrl-C
+LOOPBACK = "127.0.0.1"  # where a server is reached from this machine alone
 
 _NOBODY_READS = (errno.EPIPE, errno.EIO)  # the end of a pipe, or of a terminal
 

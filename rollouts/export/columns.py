@@ -214,7 +214,7 @@ def make_task(file: TrajectoryFile, *, pictures: bool = False) -> MultiRobotTask
 
 
 def recorded_layout(described: Mapping[str, Mapping[str, Any]]) -> Layout:
-    """Return the layout that `rollouts.recording.provenance.describe_layout` described."""
+    """Return the layout that `rollouts.reading.provenance.describe_layout` described."""
     return Layout(
         {
             place: Placement(

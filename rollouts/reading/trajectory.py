@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from robots import UnreadableFileError, closest_match
 from robots.common.files import open_regular
 from rollouts.reading.damage import damage_errors
+from rollouts.reading.episode_checksum import ARRAYS, CHECKSUM, STATES, TEXTS, checksum
 from rollouts.reading.hdf5_file import Hdf5File, Shapes
-from rollouts.reading.summary import MAX_STEPS, OWN_EPISODE, Entry, TrajectoryError, read_summary
-from rollouts.recording.episode_files import ARRAYS, CHECKSUM, STATES, TEXTS, checksum
-from rollouts.recording.provenance import (
+from rollouts.reading.provenance import (
     LAYOUT,
     SIMULATION,
     action_split,
@@ -30,6 +29,7 @@ from rollouts.recording.provenance import (
     listing,
     read_described,
 )
+from rollouts.reading.summary import MAX_STEPS, OWN_EPISODE, Entry, TrajectoryError, read_summary
 from tasks import MultiRobotTask
 from tasks.episode import States
 
@@ -87,8 +87,8 @@ class TrajectoryFile(Sequence[Trajectory]):
         max_episode_steps: Control steps until an episode was truncated, or None.
         env_kwargs: What native's environment was made with.
         source_type: Where the actions come from, in ManiSkill's words, or None.
-        layout: What `rollouts.recording.provenance.describe_layout` wrote; None in native's files.
-        simulation: What `rollouts.recording.provenance.describe_simulation` wrote; None in native's
+        layout: What `rollouts.reading.provenance.describe_layout` wrote; None in native's files.
+        simulation: What `rollouts.reading.provenance.describe_simulation` wrote; None in native's
             files.
         action_split: Robot name → slice of the flat action; None in native's files.
         seeds: Reset seed of each episode, or None.

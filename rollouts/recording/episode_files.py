@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from robots import RecordingError
 from robots.common.files import parse_json, read_regular
 from robots.common.writing import PARTIAL, write_whole
+from rollouts.reading.episode_checksum import STATES
 from rollouts.reading.hdf5_reading import MAX_BYTES
 from rollouts.reading.json_fields import (
     ANYTHING,
@@ -36,11 +37,6 @@ from rollouts.reading.json_fields import (
 )
 from rollouts.reading.summary import MAX_SEED, OWN_EPISODE
 from tasks.episode import REBUILT, PlayedEpisode
-
-CHECKSUM = "checksum"  # attribute of an episode's group in the h5 file
-STATES = "env_states/"
-ARRAYS = ("actions", STATES.rstrip("/"), "rewards", "success", "terminated", "truncated")
-TEXTS = ("action_split", "episode")
 
 _SUFFIX = ".part"
 _EARLIER = ".h5"
@@ -207,22 +203,6 @@ def read_part(path: Path) -> tuple[dict[str, Any], Stored]:
     if seed != seed_of(path):
         raise RecordingError(f"{path} is the episode of seed {seed}, under another's name")
     return header, stored
-
-
-def checksum(attributes: Mapping[str, str], arrays: Mapping[str, NDArray[Any]]) -> str:
-    """Return the checksum of an episode, whatever file it is in and in whatever order.
-
-    It covers `TEXTS` and `ARRAYS`; what others may have added is left out.
-    """
-    names = sorted(name for name in arrays if name.partition("/")[0] in ARRAYS)
-    about = [
-        [(name, attributes.get(name)) for name in TEXTS],
-        [(name, arrays[name].dtype.str, arrays[name].shape) for name in names],
-    ]
-    found = zlib.crc32(json.dumps(about).encode())
-    for name in names:
-        found = zlib.crc32(np.ascontiguousarray(arrays[name]).data, found)
-    return f"crc32 {found:08x}"
 
 
 def _parse(content: bytes) -> tuple[dict[str, Any], Stored]:

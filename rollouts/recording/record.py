@@ -24,8 +24,8 @@ from rollouts.playing.executor import (
 )
 from rollouts.playing.plan_conversion import Planner
 from rollouts.playing.seeds import checked_seeds
+from rollouts.reading.provenance import describe_layout, differences, listing
 from rollouts.recording.episode_files import PartWriter
-from rollouts.recording.provenance import describe_layout, differences, listing
 from rollouts.recording.recorder import Recorder
 from tasks import MultiRobotTask, Scenario
 from tasks.episode import Score, play

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 from robots import RecordingError, UnreadableFileError
 from robots.common.files import open_regular, read_text
 from robots.common.writing import PARTIAL, write_whole
+from rollouts.reading.provenance import describe_layout, describe_simulation, differences, listing
 from rollouts.reading.summary import MAX_JSON
 from rollouts.recording.disk import claim, disk_errors
 from rollouts.recording.episode_files import (
@@ -26,7 +27,6 @@ from rollouts.recording.episode_files import (
     refuse_foreign,
     seed_of,
 )
-from rollouts.recording.provenance import describe_layout, describe_simulation, differences, listing
 from rollouts.recording.trajectory_writer import join, read_joined
 from tasks import MultiRobotTask
 from tasks.episode import PlayedEpisode
@@ -54,7 +54,7 @@ class Recorder:
     In the h5 file ``traj_i`` holds the flat actions (T, A), env states (T + 1, k), rewards and
     flags (T,). Its attribute ``action_split`` is json: robot name → first and last + 1 action
     number. The file's attributes ``layout`` and ``simulation`` are json too; see
-    `rollouts.recording.provenance`.
+    `rollouts.reading.provenance`.
 
     Attributes:
         path: The h5 file.

@@ -23,12 +23,13 @@ from robots import RecordingError
 from robots.common.files import parse_json
 from robots.common.writing import written_whole
 from rollouts.reading.damage import damage_errors
+from rollouts.reading.episode_checksum import CHECKSUM, checksum
 from rollouts.reading.hdf5_file import Hdf5File
 from rollouts.reading.json_fields import FieldError
+from rollouts.reading.provenance import read_described
 from rollouts.reading.summary import OWN_EPISODE
 from rollouts.recording.disk import disk_errors
-from rollouts.recording.episode_files import CHECKSUM, Stored, checksum, read_part
-from rollouts.recording.provenance import read_described
+from rollouts.recording.episode_files import Stored, read_part
 
 # From HDF5 1.8, the first in which attributes may be larger than 64 kB.
 _VERSIONS = "v108", "latest"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from layouts import Layout
 from robots import ActionError, UnknownNameError
 from simulation.maths import all_finite
-from tasks.engine.arguments import array_of
+from tasks.arrays import array_of
 
 
 class ActionReader:

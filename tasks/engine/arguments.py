@@ -7,12 +7,11 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any, SupportsIndex
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
 from layouts import Layout
-from robots import RobotLayoutsError, TaskError, unknown_name_message
+from robots import TaskError, unknown_name_message
 from robots.common.bounds import checked_flag, shown
 
 RECONFIGURE = "reconfigure"  # option of a reset, and in its info: whether worlds are rebuilt
@@ -91,22 +90,6 @@ def wants_rebuild(options: Mapping[str, Any] | None) -> bool:
         TaskError: If they make no sense.
     """
     return bool(checked_options(options, (RECONFIGURE,)).get(RECONFIGURE, False))
-
-
-def array_of(value: Any, what: str, error: type[RobotLayoutsError]) -> NDArray[Any]:
-    """Return a tensor, an array or nested lists of numbers as an array, which may share memory.
-
-    Raises:
-        RobotLayoutsError: ``error``, if it is none of these, or of a kind that NumPy lacks.
-    """
-    try:
-        if isinstance(value, Tensor):
-            if value.dtype is not torch.float32 and value.is_floating_point():
-                value = value.double()  # exact; NumPy has not all of the short types
-            return value.numpy(force=value.requires_grad or not value.is_cpu)
-        return np.asarray(value)
-    except (TypeError, ValueError, RuntimeError) as problem:  # sparse, quantized, meta, ragged
-        raise error(f"{what} is not an array of numbers: {problem}") from None
 
 
 def check_places(task: str, layout: Layout, own: Layout, robot_counts: range | None) -> None:

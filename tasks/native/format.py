@@ -16,7 +16,7 @@ from robots import TaskError, unknown_name_message
 from robots.common.bounds import FAR, shown
 from simulation import Simulation, State
 from simulation.maths import Floats
-from tasks.engine.arguments import array_of
+from tasks.arrays import array_of
 
 StateDict = dict[str, dict[str, Tensor]]
 

@@ -10,6 +10,7 @@ from measurements.readme import markdown
 from parity.__main__ import main
 from parity.compare.command import parser, plan
 from parity.compare.episodes import over_range_episodes
+from parity.compare.results import read
 from parity.compare.task_summary import (
     number_text,
     reward_text,
@@ -17,7 +18,6 @@ from parity.compare.task_summary import (
     summarise,
     summary_table,
 )
-from parity.records.results import read
 from tests.native import NATIVE
 
 TASK = "TwoRobotPickCube-v1"

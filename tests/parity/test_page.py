@@ -13,7 +13,7 @@ import pytest
 
 import tasks
 from parity.__main__ import COMMANDS, main
-from parity.records.results import RESULTS, read
+from parity.compare.results import RESULTS, read
 from parity.report.figures import COLUMNS, RECORDED_COLUMNS, UNKNOWN, cells, is_verified, tiles
 from parity.report.gaps import grouped
 from parity.show.embedding import ClipError, fit, poster, share, size

@@ -13,8 +13,8 @@ from measurements.bench.measurement import Measurement
 from measurements.bench.report import Report
 from measurements.readme import BENCH_TABLES, PARITY_TABLE, begin, end, with_lines
 from parity.__main__ import main
+from parity.compare.results import ResultsError, read
 from parity.compare.snapshot import QUANTITIES
-from parity.records.results import ResultsError, read
 from tasks.registry import CATALOGUE
 
 ROOT = Path(__file__).parents[2]

@@ -16,8 +16,8 @@ import pytest
 import tasks
 from parity.__main__ import main
 from parity.compare.lockstep import EpisodeResult, FirstDifference
+from parity.compare.results import ResultsError
 from parity.compare.runs import Run
-from parity.records.results import ResultsError
 from parity.replay.rollout import load
 from parity.sweep.entries import SUMMARY, blank, is_done, read_summary, write_summary
 from parity.sweep.plan import Plan, plan

@@ -1,0 +1,28 @@
+"""Arrays out of what users give for them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from robots import RobotLayoutsError
+
+
+def array_of(value: Any, what: str, error: type[RobotLayoutsError]) -> NDArray[Any]:
+    """Return a tensor, an array or nested lists of numbers as an array, which may share memory.
+
+    Raises:
+        RobotLayoutsError: ``error``, if it is none of these, or of a kind that NumPy lacks.
+    """
+    try:
+        if isinstance(value, Tensor):
+            if value.dtype is not torch.float32 and value.is_floating_point():
+                value = value.double()  # exact; NumPy has not all of the short types
+            return value.numpy(force=value.requires_grad or not value.is_cpu)
+        return np.asarray(value)
+    except (TypeError, ValueError, RuntimeError) as problem:  # sparse, quantized, meta, ragged
+        raise error(f"{what} is not an array of numbers: {problem}") from None
