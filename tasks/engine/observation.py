@@ -8,7 +8,6 @@ from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import torch
 from gymnasium.spaces import Box, Dict, Space
 from numpy.typing import NDArray
 
@@ -30,8 +29,6 @@ OBS_MODES = (*PLAIN_MODES, "rgb", "rgbd", "rgb+depth+state", "depth", "rgb+segme
 """Examples of observation modes; images and a form of state are joined in any order."""
 
 _IMAGE_DTYPES = ("uint8", "int16")
-
-_tensor = torch.from_numpy
 
 
 @dataclass(frozen=True)
@@ -197,25 +194,22 @@ class Observer:
 
     # -- inside ------------------------------------------------------------------------------
 
-    def _flat(self, state: State, parts: Mapping[str, Array]) -> torch.Tensor:
+    def _flat(self, state: State, parts: Mapping[str, Array]) -> NDArray[np.float32]:
         joined = [part for name in self._robots for part in (state.qpos(name), state.qvel(name))]
         joined.extend(part if part.ndim == 2 else part[:, None] for part in parts.values())
         flat = np.concatenate(joined, 1, dtype=np.float32)
         if not all_finite(flat):
             raise NotFinite
-        return _tensor(flat)
+        return flat
 
     def _named(self, state: State, parts: Mapping[str, Array]) -> dict[str, Any]:
         if not all(map(all_finite, (state.joint_velocities, *parts.values()))):
             raise NotFinite
         agent: dict[str, Any] = {}
         for name, key in self._keys.items():
-            own = {
-                "qpos": _tensor(state.qpos(name).copy()),
-                "qvel": _tensor(state.qvel(name).copy()),
-            }
+            own = {"qpos": state.qpos(name).copy(), "qvel": state.qvel(name).copy()}
             agent.update(own if key is None else {key: own})
-        return {"agent": agent, "extra": {key: _tensor(x.copy()) for key, x in parts.items()}}
+        return {"agent": agent, "extra": {key: x.copy() for key, x in parts.items()}}
 
     def _sensible(self, parts: Mapping[str, Array]) -> dict[str, Array]:
         for name in self._sensed:
@@ -260,8 +254,8 @@ class _CameraRig:
         }
 
 
-def _stacked(rows: Iterable[NDArray[Any]]) -> torch.Tensor:
-    return _tensor(np.stack(list(rows)))
+def _stacked(rows: Iterable[NDArray[Any]]) -> NDArray[Any]:
+    return np.stack(list(rows))
 
 
 def space_of(values: Any, *, batched: bool = False) -> Space[Any]:

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from gymnasium.spaces import Box
 from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
 from torch import Tensor
 
 from robots import SimulationError, TaskError
@@ -202,6 +203,14 @@ class MultiRobotTask(Declaration, Remade):
             SimulationError: If physics diverged: a pose is not finite.
             TaskError: If the task's reward or observation is not finite.
         """
+        obs, reward, terminated, truncated, info = self.advance(action, env_ids)
+        flags = _tensor(terminated), _tensor(truncated)
+        return _tensors(obs), _tensor(reward), *flags, _tensors(info)
+
+    def advance(
+        self, action: Any, env_ids: Sequence[int] | None = None
+    ) -> tuple[Any, Floats, NDArray[np.bool_], NDArray[np.bool_], Info]:
+        """Do what `step` does, and return NumPy arrays where it returns tensors."""
         flat = self._reader.read(action)
         self.moving = self._everywhere if env_ids is None else checked_ids(env_ids, self.num_envs)
         self.simulation.step(flat, self._state.joint_positions, self.moving)
@@ -214,10 +223,9 @@ class MultiRobotTask(Declaration, Remade):
         info = self._info(state)
         self.observer.changed(self.moving)
         obs = self._observation(state, info)
-        reward = _tensor(self._reward(state, flat, info))
-        terminated = _tensor(info["success"].copy())
-        truncated = _tensor(self._elapsed >= self.max_episode_steps)
-        return obs, reward, terminated, truncated, _tensors(info)
+        reward = self._reward(state, flat, info)
+        truncated = self._elapsed >= self.max_episode_steps
+        return obs, reward, info["success"].copy(), truncated, info
 
     def trust(self, actions: Floats) -> None:
         """Take what is in this very array, (N, A), as actions that were checked before."""
@@ -291,7 +299,7 @@ class MultiRobotTask(Declaration, Remade):
         check_info(type(self).__name__, info)
         self.observer.changed(ids)
         obs = self._observation(state, info)
-        return obs, {**_tensors(info), "reconfigure": reconfigured}
+        return _tensors(obs), {**_tensors(info), "reconfigure": reconfigured}
 
     def _describe_observation(self) -> None:
         """Read spaces and slices off the first observation."""
@@ -342,6 +350,8 @@ class MultiRobotTask(Declaration, Remade):
 _tensor = torch.from_numpy
 
 
-def _tensors(info: Info) -> Info:
-    """Return info as users get it: tensors that share its arrays' memory."""
-    return {key: _tensor(value) for key, value in info.items()}
+def _tensors(tree: Any) -> Any:
+    """Return arrays, or mappings of them, as users get them: tensors that share their memory."""
+    if isinstance(tree, dict):
+        return {key: _tensors(value) for key, value in tree.items()}
+    return _tensor(tree)

@@ -16,6 +16,7 @@ from tasks.engine.observation import told_dtype
 from tasks.engine.scenario import Scenario
 from tasks.engine.task import MultiRobotTask
 from tasks.fronts.board import Arrays, Shapes
+from tasks.fronts.numbers import as_array, stepper
 
 OBSERVATION, INFO = "obs", "info"  # what the names of their arrays begin with
 SEEDS = f"{INFO}/{SEED}"  # which only a reset changes
@@ -75,7 +76,7 @@ class Batch:
         """
         scenario = replace(part.scenario, num_envs=len(part.env_ids))
         self._task = part.task(scenario, first_seed=part.task.first_seed + part.start)
-        self._part = part
+        self._step, self._part = stepper(self._task), part
         self._over = np.zeros(len(part.env_ids), bool)  # begin anew at the next step
         self._rows: Arrays = {}
 
@@ -145,12 +146,13 @@ class Batch:
     # -- inside ------------------------------------------------------------------------------
 
     def _move(self, action: NDArray[np.float32], env_ids: list[int] | None) -> None:
-        obs, reward, terminated, truncated, info = self._task.step(action, env_ids)
+        obs, reward, terminated, truncated, info = self._step(action, env_ids)
         self._write(obs, info)
         rows = self._rows
-        rows["reward"][:] = reward.numpy()
-        rows["terminated"][:] = False if self._part.ignore_terminations else terminated.numpy()
-        rows["truncated"][:] = truncated.numpy()
+        rows["reward"][:] = as_array(reward)
+        ends = not self._part.ignore_terminations
+        rows["terminated"][:] = as_array(terminated) if ends else False
+        rows["truncated"][:] = as_array(truncated)
 
     def _restart(self, ended: NDArray[np.bool_]) -> None:
         rows, ids = self._rows, np.flatnonzero(ended).tolist()
@@ -181,7 +183,7 @@ def _told(obs: Any, info: Mapping[str, Any]) -> Iterator[tuple[str, NDArray[Any]
     yield from _leaves(OBSERVATION, obs)
     for key, value in info.items():
         if key != RECONFIGURE:  # which is not told of single environments
-            yield f"{INFO}/{key}", value.numpy()
+            yield f"{INFO}/{key}", as_array(value)
 
 
 def _leaves(name: str, tree: Any) -> Iterator[tuple[str, NDArray[Any]]]:
@@ -189,5 +191,5 @@ def _leaves(name: str, tree: Any) -> Iterator[tuple[str, NDArray[Any]]]:
         for key, part in tree.items():
             yield from _leaves(f"{name}/{key}", part)
     else:
-        array: NDArray[Any] = tree.numpy()
+        array = as_array(tree)
         yield name, array.astype(told_dtype(array), copy=False)

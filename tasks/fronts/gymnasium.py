@@ -12,7 +12,7 @@ from robots import TaskError
 from tasks.engine.arguments import checked_seeds
 from tasks.engine.observation import space_of
 from tasks.engine.remade import Remade
-from tasks.fronts.numbers import info_row, row
+from tasks.fronts.numbers import info_row, row, stepper
 from tasks.language.randomness import FirstSeeds
 from tasks.registry import make
 
@@ -53,6 +53,7 @@ class GymnasiumTask(Remade, gymnasium.Env[Any, NDArray[np.float32]]):
         if "max_episode_steps" in fields:
             raise TaskError("time limits are gymnasium.make's: gymnasium.make(max_episode_steps=…)")
         self.task = make(task_id, render_mode=render_mode, **fields)
+        self._step = stepper(self.task)
         self._first = FirstSeeds(1)
         self._seed = self.task.seeds[0]
         self.render_mode = render_mode
@@ -92,7 +93,7 @@ class GymnasiumTask(Remade, gymnasium.Env[Any, NDArray[np.float32]]):
         Returns:
             Observation, reward, terminated, truncated and info. It is never truncated by itself.
         """
-        obs, reward, terminated, _, info = self.task.step(action)
+        obs, reward, terminated, _, info = self._step(action)
         ended = bool(terminated[0])
         return row(obs), reward[0].item(), ended, False, info_row(info, self._seed)
 

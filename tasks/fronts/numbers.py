@@ -1,14 +1,26 @@
-"""Plain numbers and arrays for what a task returns as tensors."""
+"""Plain numbers and arrays for what a task returns."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tasks.engine.arguments import RECONFIGURE, SEED
 from tasks.engine.observation import told_dtype
+from tasks.engine.task import MultiRobotTask
+
+
+def stepper(task: MultiRobotTask) -> Callable[..., Any]:
+    """Return what steps a task without making tensors, unless its class has a step of its own."""
+    return task.advance if type(task).step is MultiRobotTask.step else task.step
+
+
+def as_array(value: Any) -> NDArray[Any]:
+    """Return what a task gave as an array, which shares its memory."""
+    return value if isinstance(value, np.ndarray) else value.numpy()
 
 
 def row(observation: Any, env: int = 0) -> Any:
@@ -21,7 +33,7 @@ def row(observation: Any, env: int = 0) -> Any:
         return np.empty(0, np.float32)
     if isinstance(observation, Mapping):
         return {key: row(part, env) for key, part in observation.items()}
-    return observation[env].numpy().astype(told_dtype(observation))
+    return np.array(as_array(observation)[env], told_dtype(observation))
 
 
 def info_row(info: Mapping[str, Any], seed: int) -> dict[str, Any]:
@@ -34,7 +46,7 @@ def info_row(info: Mapping[str, Any], seed: int) -> dict[str, Any]:
         seed: What the environment's random streams began with.
     """
     told: dict[str, Any] = {
-        key: value[0].item() if value.ndim == 1 else value[0].numpy().copy()
+        key: value[0].item() if value.ndim == 1 else as_array(value)[0].copy()
         for key, value in info.items()
         if key != RECONFIGURE
     }

@@ -16,7 +16,7 @@ from robots.common.bounds import shown
 from tasks.engine.arguments import RECONFIGURE, checked_options, checked_seeds
 from tasks.engine.observation import space_of
 from tasks.engine.remade import Remade
-from tasks.fronts.numbers import info_row, row
+from tasks.fronts.numbers import info_row, row, stepper
 from tasks.language.randomness import FirstSeeds
 from tasks.native.format import observation_keys
 from tasks.registry import make
@@ -70,6 +70,7 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         if not (robot_reward is None or callable(robot_reward)):
             raise TaskError(f"robot_reward is {shown(robot_reward)}; a function is needed, or None")
         self._robot_reward = robot_reward
+        self._step = stepper(self.task)
         self._first = FirstSeeds(1)
         self._seed = self.task.seeds[0]
         self.possible_agents = list(self.task.layout)
@@ -140,7 +141,7 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         """
         if not self.agents:
             raise TaskError("no episode is being played; call reset() first")
-        obs, reward, terminated, truncated, info = self.task.step(actions)
+        obs, reward, terminated, truncated, info = self._step(actions)
         observations, shared = self._observations(obs), reward[0].item()
         told = info_row(info, self._seed)
         over, late = bool(terminated[0]), bool(truncated[0])

@@ -4,6 +4,7 @@ import torch
 import tasks
 from robots import SimulationError
 from tasks import MultiRobotTask
+from tasks.fronts.numbers import stepper
 from tasks.maniskill.draw_triangle import MAX_DOTS
 
 STILL = torch.zeros(1, 7)
@@ -67,3 +68,10 @@ def test_only_the_sparse_reward_is_offered_as_in_native():
     assert tasks.get_task_class("DrawTriangle-v1").reward_modes == ("sparse",)
     with pytest.raises(ValueError, match="reward_mode 'none' is not offered"):
         tasks.make("DrawTriangle-v1", reward_mode="none")
+
+
+def test_fronts_take_the_step_of_its_own():
+    env = tasks.make("DrawTriangle-v1")
+    assert stepper(env) == env.step
+    other = tasks.make("PickCube-v1")
+    assert stepper(other) == other.advance
