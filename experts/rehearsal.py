@@ -41,7 +41,7 @@ class Rehearsal:
         """Build one environment with the layout and physics of ``task``, without pictures."""
         cheapest = "none" if "none" in task.reward_modes else None
         scenario = replace(
-            task.made_from,
+            task.scenario,
             num_envs=1,
             obs_mode="none",
             reward_mode=cheapest,

@@ -63,7 +63,7 @@ def film(
     """
     eye, target = overview(task.layout) or task.viewpoint
     start, shown = perf_counter(), 0
-    with open_video(path, task.made_from.control_frequency) as append:
+    with open_video(path, task.scenario.control_frequency) as append:
         for episode in episodes:
             if shown and (perf_counter() - start) * (shown + 1) / shown > seconds:
                 break

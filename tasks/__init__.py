@@ -11,10 +11,12 @@ Making an environment of it for other programs (each loads its package when it i
     parallel_env: PettingZoo, one agent per robot.
     sb3_vec_env: Stable-Baselines3.
 
-Writing a task:
+Writing a task (`tasks.vocabulary` lists every name; functions of arrays are in `tasks.maths`):
     MultiRobotTask: What a task's class subclasses.
     register_task: Gives it its names.
-    EpisodeRandom: The random streams that it draws from.
+    Cube, Goal, Table, Area, …: Bodies that it declares, and where they begin.
+    State, World, EpisodeRandom: What its methods are given.
+    closeness, stillness, lies_on, …: Terms of rewards and of success.
 
 ``python -m tasks list`` prints a table of all tasks. Importing this loads neither torch nor sapien.
 """
@@ -25,12 +27,13 @@ from typing import TYPE_CHECKING, Any
 from tasks.fronts import parallel_env, register, sb3_vec_env
 
 if TYPE_CHECKING:
-    from tasks.engine.randomness import EpisodeRandom
-    from tasks.engine.scenario import Scenario
-    from tasks.engine.task import MultiRobotTask
-    from tasks.registry import get_task_class, list_clones, list_tasks, make, register_task
+    from tasks.registry import get_task_class, list_clones, list_tasks, make
+    from tasks.vocabulary import *  # noqa: F403
+    from tasks.vocabulary import EpisodeRandom, MultiRobotTask, Scenario, register_task
 
-__all__ = [
+_REGISTRY = ("get_task_class", "list_clones", "list_tasks", "make", "register_task")
+
+__all__ = [  # what only tasks' files need is in `tasks.vocabulary`
     "EpisodeRandom",
     "MultiRobotTask",
     "Scenario",
@@ -43,23 +46,15 @@ __all__ = [
     "sb3_vec_env",
 ]
 
-_MODULES = {
-    "EpisodeRandom": "tasks.engine.randomness",
-    "MultiRobotTask": "tasks.engine.task",
-    "Scenario": "tasks.engine.scenario",
-    "get_task_class": "tasks.registry",
-    "list_clones": "tasks.registry",
-    "list_tasks": "tasks.registry",
-    "make": "tasks.registry",
-    "register_task": "tasks.registry",
-}
-
 
 def __getattr__(name: str) -> Any:
     """Load what is asked for, once."""
-    if name not in _MODULES:
+    if name.startswith("_"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(_MODULES[name]), name)
+    home = import_module("tasks.registry" if name in _REGISTRY else "tasks.vocabulary")
+    if name not in (*_REGISTRY, *getattr(home, "__all__", ())):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(home, name)
     return value
 
 

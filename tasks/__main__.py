@@ -1,4 +1,4 @@
-"""``python -m tasks``: what there is to achieve, and what it looks like."""
+"""``python -m tasks``: lists tasks, describes one, or shows it on a page."""
 
 from __future__ import annotations
 

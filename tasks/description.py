@@ -186,13 +186,13 @@ def describe(env: MultiRobotTask) -> Iterator[RenderableType]:
         env: The task, with flat observations.
     """
     cls = type(env)
-    said = read_docstring(cls)
-    yield f"{cls.task_id}: {said.summary}\n"
+    text = read_docstring(cls)
+    yield f"{cls.task_id}: {text.summary}\n"
     rows = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
     for name, value in (
-        ("randomisation", said.randomisation),
-        ("success", said.success),
-        ("episode", f"{env.max_episode_steps} steps, {env.made_from.control_frequency:g} per s"),
+        ("randomisation", text.randomisation),
+        ("success", text.success),
+        ("episode", f"{env.max_episode_steps} steps, {env.scenario.control_frequency:g} per s"),
         ("reward modes", ", ".join([f"{cls.reward_modes[0]} (default)", *cls.reward_modes[1:]])),
         ("source", cls.source),
         ("other names", ", ".join(other_names(cls))),
@@ -205,7 +205,7 @@ def describe(env: MultiRobotTask) -> Iterator[RenderableType]:
     yield action_table(env.layout)
     yield f"Observation, {observation_size(env)} numbers"
     yield observation_table(env.observation_slices, env.observer.senses)
-    yield "Cameras, with obs_mode='rgb' or 'rgbd'; beside images only what is sensed is told"
+    yield "Cameras, with obs_mode='rgb' or 'rgbd'; with images, only sensed parts are observed"
     yield camera_table(cameras_of(env.layout, cls.cameras))
 
 
@@ -244,13 +244,13 @@ def observation_table(slices: dict[str, slice], senses: Callable[[str], bool]) -
 
     Args:
         slices: Where each entry stands.
-        senses: Tells of an entry whether real robots know it, so that it is told beside images.
+        senses: Whether real robots sense an entry, so that it is observed together with images.
     """
     rows = _table("entry", "slice", "size", "sensed", numbers=(1, 2))
     for name, part in slices.items():
         size, joints = str(part.stop - part.start), name.endswith((".qpos", ".qvel"))
-        told = "yes" if joints or senses(name) else "no"
-        rows.add_row(name, f"{part.start}:{part.stop}", size, told)
+        sensed = "yes" if joints or senses(name) else "no"
+        rows.add_row(name, f"{part.start}:{part.stop}", size, sensed)
     return rows
 
 

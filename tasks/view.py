@@ -14,8 +14,8 @@ from robots import TaskError
 from robots.descriptor import Quaternion
 from simulation import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
 from simulation.world import World
-from tasks.engine.native_format import articulation_keys
 from tasks.engine.task import MultiRobotTask
+from tasks.native.format import articulation_keys
 
 PLANE_SIZE = 6.0  # m, of what is drawn of an infinite plane
 ROOT = 13  # numbers of a row before the joints: the root's pose and velocities
@@ -69,7 +69,7 @@ def recorded_motion(
         for name, rows in states.get("actors", {}).items()
         if name in world.bodies and body_parts(world.bodies[name].shapes)
     }
-    return Motion(1 / task.made_from.control_frequency, qpos, poses)
+    return Motion(1 / task.scenario.control_frequency, qpos, poses)
 
 
 def in_declared_order(world: World, robot: str, qpos: NDArray[Any]) -> Floats:

@@ -33,7 +33,7 @@ from rollouts.progress import LiveLine
 from rollouts.reading.trajectory import TrajectoryError
 from rollouts.video import open_video
 from tasks import MultiRobotTask
-from tasks.engine.native_format import articulation_keys
+from tasks.native.format import articulation_keys
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -279,7 +279,7 @@ def _named(snapshot: Snapshot, robots: Mapping[str, str]) -> Arrays:
 def _play_native(
     env: MultiRobotTask, episode: Episode, film: Path | None, on_step: Callable[[str], None]
 ) -> Arrays:
-    mode, size = env.made_from.control_mode, PICTURE_SIZE if film else None
+    mode, size = env.scenario.control_mode, PICTURE_SIZE if film else None
     side = NativeSide(env.task_id, control_mode=mode, picture_size=size)
     native, keys = side.envs[0], articulation_keys(env.layout)
 
@@ -290,7 +290,7 @@ def _play_native(
         if film is None:
             return play(side, episode, keys, poses, lambda: on_step("native"))
         scene = NativeScene(native)
-        with open_video(film / VIDEO_FILE, env.made_from.control_frequency) as append:
+        with open_video(film / VIDEO_FILE, env.scenario.control_frequency) as append:
 
             def watch() -> None:
                 append(scene.live())
@@ -319,9 +319,9 @@ def describe(env: MultiRobotTask, source: Source, name: str) -> dict[str, Any]:
         "source": source.name,
         "seed": source.episode.seed,
         "reset": {"seed": source.episode.seed, "options": {"reconfigure": True}},
-        "control_mode": env.made_from.control_mode,
+        "control_mode": env.scenario.control_mode,
         "reward_mode": env.reward_mode,
-        "control_frequency": env.made_from.control_frequency,
+        "control_frequency": env.scenario.control_frequency,
         "robots": {place: p.robot.name for place, p in env.layout.items()},
         "action_split": {place: [s.start, s.stop] for place, s in env.action_split.items()},
         "arrays": LEGEND,

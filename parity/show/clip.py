@@ -176,7 +176,7 @@ class Clip:
             raise MissingPackageError(f"a clip cannot be written: {problem}")
         pixels, shown = PixelCount(), list[Frame]()
         labels, sheet = self._labels(), moments(self.frames)
-        with open_video(folder / f"{NAME}.mp4", self._task.made_from.control_frequency) as append:
+        with open_video(folder / f"{NAME}.mp4", self._task.scenario.control_frequency) as append:
             for frame in frames(self._playback, self._scene, self.frames):
                 append(side_by_side(frame, labels))
                 pixels.add(frame.difference)

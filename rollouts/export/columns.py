@@ -14,8 +14,8 @@ from layouts import Layout, Placement
 from robots import RobotDescriptor
 from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
 from tasks import MultiRobotTask
-from tasks.engine.native_format import articulation_keys
 from tasks.episode import States
+from tasks.native.format import articulation_keys
 
 Floats = NDArray[np.float32]
 Flags = NDArray[np.bool_]

@@ -114,7 +114,7 @@ def _writer(
     from rollouts.export.pictures import draw
 
     text = read_docstring(type(reader.task)).summary
-    fps = wanted.fps or _whole(reader.task.made_from.control_frequency)
+    fps = wanted.fps or _whole(reader.task.scenario.control_frequency)
     with LeRobotWriter(folder, reader, task_text=text, fps=fps, origin=origin) as lerobot:
         yield lambda columns, watch: lerobot.add(
             columns, draw(reader.task, columns) if wanted.video else None, watch

@@ -98,9 +98,9 @@ class RobomimicWriter(DatasetWriter):
             "type": GYM,
             "env_kwargs": {
                 "robots": {place: p.robot.name for place, p in task.layout.items()},
-                "control_mode": task.made_from.control_mode,
+                "control_mode": task.scenario.control_mode,
                 "reward_mode": task.reward_mode,
-                "control_frequency": task.made_from.control_frequency,
+                "control_frequency": task.scenario.control_frequency,
             },
         }
 

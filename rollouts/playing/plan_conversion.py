@@ -21,9 +21,9 @@ class Planner:
     def __init__(self, task: MultiRobotTask, expert: Expert) -> None:
         """Make a task in deltas for the expert to plan for, if this one is in another mode."""
         self._task, self._expert = task, expert
-        self._converts = task.made_from.control_mode != DELTAS
+        self._converts = task.scenario.control_mode != DELTAS
         if self._converts:
-            self._task = type(task)(replace(task.made_from, control_mode=DELTAS))
+            self._task = type(task)(replace(task.scenario, control_mode=DELTAS))
 
     def __call__(self, seed: int) -> NDArray[np.float32]:
         """Return the actions (T, A) of the episode that ``seed`` begins."""
@@ -55,9 +55,9 @@ def as_positions(
     Raises:
         TaskError: If the task is in another control mode.
     """
-    if task.made_from.control_mode != DELTAS:
+    if task.scenario.control_mode != DELTAS:
         raise TaskError(
-            f"actions of {DELTAS} are converted; the task has {task.made_from.control_mode}"
+            f"actions of {DELTAS} are converted; the task has {task.scenario.control_mode}"
         )
     positions = np.array(actions, np.float32)
     task.reset(seed, options=REBUILT)

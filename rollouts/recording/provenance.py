@@ -82,10 +82,10 @@ def describe_layout(layout: Layout) -> dict[str, dict[str, Any]]:
 
 def describe_simulation(task: MultiRobotTask) -> dict[str, Any]:
     """Return a task's physics settings (None: SAPIEN's own) and control frequency (Hz)."""
-    physics = task.made_from.physics
+    physics = task.scenario.physics
     return {
         "physics": None if physics is None else asdict(physics),
-        "control_frequency": task.made_from.control_frequency,
+        "control_frequency": task.scenario.control_frequency,
     }
 
 

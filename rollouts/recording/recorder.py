@@ -28,8 +28,8 @@ from rollouts.recording.episode_files import (
 from rollouts.recording.provenance import describe_layout, describe_simulation, differences, listing
 from rollouts.recording.trajectory_writer import join, read_joined
 from tasks import MultiRobotTask
-from tasks.engine.native_format import observation_keys
 from tasks.episode import Episode
+from tasks.native.format import observation_keys
 
 __all__ = ["Recorder", "describe_layout"]
 
@@ -269,7 +269,7 @@ def _header(task: MultiRobotTask, source: str, source_desc: str | None) -> dict[
             "env_kwargs": {
                 "obs_mode": "none",
                 "reward_mode": task.reward_mode,
-                "control_mode": task.made_from.control_mode,
+                "control_mode": task.scenario.control_mode,
                 "sim_backend": "physx_cpu",
             },
             "max_episode_steps": task.max_episode_steps,
@@ -292,6 +292,6 @@ def _expect_file_or_nothing(path: Path) -> None:
 
 def _control_mode(task: MultiRobotTask) -> str | dict[str, str]:
     """Return the control mode as native writes it: by robot where there are several."""
-    mode = task.made_from.control_mode
+    mode = task.scenario.control_mode
     keys = [key for key in observation_keys(task.layout).values() if key is not None]
     return dict.fromkeys(keys, mode) if keys else mode

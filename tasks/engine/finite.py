@@ -1,4 +1,4 @@
-"""What is said when something that comes out of a step is not finite: a body, a number observed.
+"""Errors for results of a step that are not finite: a body's pose, an observation, a reward.
 
 NaN spreads without a word: through observations into a policy's weights, through rewards into its
 returns. So everything is looked at, which takes about a microsecond a step.

@@ -1,4 +1,4 @@
-"""A task builds no layout whose robots collide, unless told to."""
+"""Refuses layouts whose robots collide, unless `check_layout` is False."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def refuse_collisions(layout: Layout) -> None:
     if collisions:
         raise LayoutError(
             f"the robots of this layout collide:\n{collisions}\n"
-            "check_layout=False builds it all the same; layout.validate() tells more"
+            "check_layout=False builds it all the same; layout.validate() gives the details"
         )
 
 

@@ -18,7 +18,7 @@ from simulation import Camera, Simulation, State
 from simulation.maths import Array, all_finite
 from simulation.rendering.cameras import TEXTURES, RobotCamera
 from tasks.engine.finite import NotFinite
-from tasks.engine.native_format import observation_keys
+from tasks.native.format import observation_keys
 
 if TYPE_CHECKING:
     from simulation.rendering.pictures import Observers, View
@@ -39,7 +39,7 @@ class ObservationMode:
     """What an ``obs_mode`` asks for.
 
     Attributes:
-        textures: What cameras tell of each pixel; none if there are no cameras.
+        textures: What cameras record of each pixel; none if there are no cameras.
         flat: Whether everything but images is one flat part.
         privileged: Whether it includes what only a simulation knows.
         nothing: Whether nothing is observed.
@@ -133,7 +133,7 @@ class Observer:
         if mode.textures and not self.cameras:
             raise TaskError("there is no camera: the task declares none, nor do its robots")
         self._keys, self._robots, self._sensed = observation_keys(layout), tuple(layout), sensed
-        self._eyes: _Eyes | None = None
+        self._rig: _CameraRig | None = None
 
     def observe(self, simulation: Simulation, state: State, parts: Mapping[str, Array]) -> Any:
         """Return an observation of all environments.
@@ -153,15 +153,15 @@ class Observer:
             parts = self._sensible(parts)
         if not self.mode.textures:
             return self._flat(state, parts) if self.mode.flat else self._named(state, parts)
-        if self._eyes is None:
-            self._eyes = _Eyes(simulation, self.cameras, self.mode.textures)
-        images = self._eyes.look()
+        if self._rig is None:
+            self._rig = _CameraRig(simulation, self.cameras, self.mode.textures)
+        images = self._rig.look()
         if self.mode.flat:
             return {**images, "state": self._flat(state, parts)}
         return {**self._named(state, parts), **images}
 
     def senses(self, part: str) -> bool:
-        """Tell whether a part of `tasks.MultiRobotTask.observe` is told beside images."""
+        """Return whether a part of `tasks.MultiRobotTask.observe` is observed beside images."""
         return any(fnmatchcase(part, pattern) for pattern in self._sensed)
 
     def seen_by(self, robot: str) -> list[str]:
@@ -174,12 +174,12 @@ class Observer:
 
     def changed(self, env_ids: Iterable[int]) -> None:
         """Note that these environments do not look any more as they did."""
-        if self._eyes is not None:
-            self._eyes.stale.update(env_ids)
+        if self._rig is not None:
+            self._rig.stale.update(env_ids)
 
     def close(self) -> None:
         """Let the cameras go."""
-        self._eyes = None
+        self._rig = None
 
     def slices(self, state: State, parts: Mapping[str, Array]) -> dict[str, slice]:
         """Return where each named part stands in the flat observation; nothing if there is none."""
@@ -224,7 +224,7 @@ class Observer:
         return {key: x for key, x in parts.items() if self.senses(key)}
 
 
-class _Eyes:
+class _CameraRig:
     """The latest images of every environment; only those that changed are drawn again."""
 
     def __init__(
@@ -233,9 +233,7 @@ class _Eyes:
         cameras: Mapping[str, Camera | RobotCamera],
         textures: Sequence[str],
     ) -> None:
-        from simulation.rendering.pictures import (
-            Observers,  # what draws is loaded by the first picture
-        )
+        from simulation.rendering.pictures import Observers  # loaded with the first picture
 
         self._observers: Observers = Observers(simulation, cameras, textures)
         self._rows: list[dict[str, View]] = [{}] * len(simulation.worlds)
@@ -284,6 +282,6 @@ def space_of(values: Any, *, batched: bool = False) -> Space[Any]:
 
 
 def told_dtype(values: Any) -> Any:
-    """Return the dtype in which an observation is told: of images their own, else float32."""
+    """Return an observation's dtype: that of images their own, else float32."""
     dtype = np.dtype(str(values.dtype).removeprefix("torch."))
     return dtype.type if dtype.name in _IMAGE_DTYPES else np.float32

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from robots.common.bounds import checked_choice, checked_flag, checked_whole, sh
 from simulation import SAPIEN_DEFAULTS, Camera, PhysicsSettings
 from simulation.physics import substeps
 from tasks.engine.observation import read_mode
-
-if TYPE_CHECKING:
-    from tasks.engine.task import MultiRobotTask
 
 SIMULATORS = ("sapien3",)
 RENDER_MODES = (None, "rgb_array")
@@ -35,7 +32,7 @@ class Scenario:
         obs_mode: ``"state"`` (flat), ``"state_dict"`` (named parts), ``"none"``, or what cameras
             see (needs a Vulkan driver): ``"rgb"``, ``"rgbd"``, or any of ``rgb``, ``depth``,
             ``segmentation`` and ``position`` joined by ``+``, and to them ``state`` or
-            ``state_dict``, without which only what a real robot senses is told beside images.
+            ``state_dict``, without which images come only with what a real robot senses.
         reward_mode: One of the task's modes; None takes its first.
         control_mode: ``"pd_joint_delta_pos"``, or ``"pd_joint_pos"`` for actions that are joint
             positions.
@@ -132,16 +129,3 @@ def _check_cameras(cameras: Any) -> None:
 
 class UnknownScenarioField(UnknownNameError, AttributeError):
     """A field that a scenario does not have (also an ``AttributeError``)."""
-
-
-class FreshScenario:
-    """``cls.scenario``: a new scenario at every access, made from the task class's own attributes.
-
-    That of a task that was made is the scenario it was made from.
-    """
-
-    def __get__(self, instance: MultiRobotTask | None, owner: type[MultiRobotTask]) -> Scenario:
-        """Return the class's scenario, or the instance's own."""
-        if instance is not None:
-            return instance.made_from
-        return Scenario(layout=owner.layout, physics=owner.physics)

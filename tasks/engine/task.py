@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, cast
 
 import numpy as np
 import torch
 from gymnasium.spaces import Box
 from gymnasium.vector.utils import batch_space
-from numpy.typing import NDArray
 from torch import Tensor
 
-from layouts import Layout
 from robots import SimulationError, TaskError
-from simulation import Camera, PhysicsSettings, Simulation, State, World
-from simulation.maths import Array, Floats, all_finite
+from simulation import Simulation, State, World
+from simulation.maths import Floats, all_finite
 from tasks.engine.actions import ActionReader
 from tasks.engine.arguments import (
     check_info,
@@ -24,51 +22,34 @@ from tasks.engine.arguments import (
     checked_seeds,
     wants_rebuild,
 )
+from tasks.engine.declaration import Declaration, Info
 from tasks.engine.finite import NotFinite, refuse_observation, refuse_reward, refuse_state
 from tasks.engine.layout_check import refuse_collisions
 from tasks.engine.memory import Memory
-from tasks.engine.native_format import StateDict, StateTape, read_state_dict, write_state_dict
 from tasks.engine.observation import Observer, read_mode, space_of
-from tasks.engine.randomness import EpisodeRandom
 from tasks.engine.remade import Remade
-from tasks.engine.scenario import FreshScenario, Scenario
-from tasks.language.bodies import Declared, Table, WideTable, declared_bodies
-
-FIRST_SEED = 2022  # native seeds environment i with 2022 + i when it is made
-DENSE_MODES = ("normalized_dense", "dense", "sparse", "none")
-SPARSE_MODES = ("sparse", "none")
-
-Info = dict[str, Any]
+from tasks.engine.scenario import Scenario
+from tasks.language.randomness import EpisodeRandom
+from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict
 
 
-class MultiRobotTask(Remade):
-    """Something to achieve, for one robot or many; subclasses say what.
+class _FreshScenario:
+    """``cls.scenario``: a new scenario at every access, made from the class's own attributes."""
 
-    A subclass sets ``layout`` and ``max_episode_steps``, declares its bodies as class attributes
-    (`tasks.language.bodies`), and tells success in `evaluate`. It may say more in `observe` and
-    `dense_reward`, and override `build` and `sample`, which add and place what is declared.
+    def __get__(self, instance: object, owner: type[MultiRobotTask]) -> Scenario:
+        """Return it; a task that was made has its own as an attribute."""
+        return Scenario(layout=owner.layout, physics=owner.physics)
+
+
+class MultiRobotTask(Declaration, Remade):
+    """A task that can be stepped: what users subclass, and what `tasks.make` returns.
+
+    What a subclass sets and defines stands in `tasks.engine.declaration.Declaration`; what follows
+    runs it.
 
     Attributes:
-        task_id: The task's id.
-        native_id: Id of the ManiSkill task that it clones; None for a task of our own.
-        source: Where its numbers come from; of a clone package, version and file.
-        layout: Default layout.
-        table: What the robots stand at, the first of its bodies.
-        bodies: The bodies that its class declares, by name, in the order declared; see
-            `tasks.language.bodies`.
-        robot_counts: How many robots a layout may have, in places called as one likes; None if it
-            takes exactly the places of ``layout``.
-        physics: Solver settings; None keeps SAPIEN's own defaults.
-        max_episode_steps: Control steps until an episode is truncated.
-        reward_modes: Reward modes, the default first.
-        max_reward: What ``normalized_dense`` divides the dense reward by.
-        shared_joint_noise: Whether all robots get the same joint noise at a reset.
-        joint_noise_draws: How often joint noise is drawn at a reset; the last draw counts.
-        rebuilds: Whether every reset builds the worlds anew, with a new `design`.
-        viewpoint: Camera position and target of `render` (m, world).
-        cameras: Cameras that observe, where images are asked for; those of the robots come after.
-        sensed: Which parts of `observe` a real robot knows, so that they are observed beside
-            images; the others are privileged. ``*`` stands for any letters.
+        scenario: A fresh scenario of the class at every access; that of a task that was made is the
+            one it was made from.
         num_envs: Number of environments N.
         single_action_space: Action of one environment, (A,); joint limits (rad) where the control
             mode asks for positions, else [-1, 1].
@@ -79,115 +60,18 @@ class MultiRobotTask(Remade):
         observer: What puts its observations together, and its cameras.
         observation_slices: Where each named part stands in the flat observation.
         start: Observation and info of the first reset, when it was made.
-        made_from: The scenario it was made from.
     """
 
-    task_id: ClassVar[str] = ""
-    native_id: ClassVar[str | None] = None
-    source: ClassVar[str] = ""
-    scenario: ClassVar[Any] = FreshScenario()
-    layout: Layout
-    table: ClassVar[Table | WideTable] = Table()
-    bodies: ClassVar[Mapping[str, Declared]] = {}
-    robot_counts: ClassVar[range | None] = None
-    physics: ClassVar[PhysicsSettings | None] = None
-    max_episode_steps: int
-    reward_modes: ClassVar[tuple[str, ...]] = ()
-    max_reward: ClassVar[float] = 1.0
-    shared_joint_noise: ClassVar[bool] = False
-    joint_noise_draws: ClassVar[int] = 1
-    rebuilds: ClassVar[bool] = False
-    viewpoint: ClassVar[tuple[tuple[float, float, float], tuple[float, float, float]]] = (
-        (0.6, 0.7, 0.6),
-        (0.0, 0.0, 0.35),
-    )
-
-    cameras: ClassVar[tuple[Camera, ...]] = (Camera((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1)),)
-    sensed: ClassVar[tuple[str, ...]] = ("*tcp_pose",)
-
-    def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Collect the declared bodies; offer dense modes if there is a dense reward."""
-        super().__init_subclass__(**kwargs)
-        cls.bodies = declared_bodies(cls)
-        if "reward_modes" not in cls.__dict__:
-            dense = cls.dense_reward is not MultiRobotTask.dense_reward
-            cls.reward_modes = DENSE_MODES if dense else SPARSE_MODES
-
-    # -- what a task says --------------------------------------------------------------------
-
-    def design(self, rng: EpisodeRandom) -> Any:
-        """Draw the geometry of one environment; `build` finds it as ``world.design``."""
-        return None
-
-    def build(self, world: World) -> None:
-        """Add the task's bodies to a world, in the order declared; the robots stand already."""
-        for name, body in self.bodies.items():
-            body.add_to(world, name)
-
-    def sample(self, world: World, rng: EpisodeRandom) -> None:
-        """Place the task's bodies for a new episode; the robots are placed already."""
-        for name, body in self.bodies.items():
-            body.place(world, name, rng)
-
-    def evaluate(self, state: State) -> dict[str, Array]:
-        """Return ``success`` (N,) bool and whatever else describes the state.
-
-        Arrays, as the state gives them: they reach the user as tensors.
-        """
-        raise NotImplementedError
-
-    def observe(self, state: State, info: Info) -> dict[str, Array]:
-        """Return named parts of the observation, each (N, k) or (N,), after the robots' own."""
-        return {}
-
-    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
-        """Return the dense reward, (N,)."""
-        raise NotImplementedError
-
-    def remember(self, state: State) -> Mapping[str, Array]:
-        """Return what later steps look back at, by name, each (N, …), as it is after a reset.
-
-        The task finds it as an attribute of `memory` and may change it there; the rows of
-        environments that are reset are taken anew.
-        """
-        return {}
-
-    def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
-        """Do what a new episode needs besides; called after ``env_ids`` were reset."""
-
-    def respond(self, state: State) -> None:
-        """Move bodies in answer to a control step, before the step is judged.
-
-        Called after every step's physics if a subclass has it; the state is read anew then.
-        Only the environments in ``moving`` take the step.
-        """
-
-    def reset_robots(self, world: World, rng: EpisodeRandom) -> None:
-        """Stand every robot at its placement, with joint noise."""
-        shared = self.shared_joint_noise
-        draws = [rng.joint_noise(world.layout, shared) for _ in range(self.joint_noise_draws)]
-        for name, noise in draws[-1].items():
-            self.stand(world, name, noise)
-
-    def stand(self, world: World, robot: str, noise: NDArray[Any]) -> None:
-        """Stand a robot at its placement, off its keyframe by ``noise``, (dof,) (rad, m).
-
-        Groups without reset noise stay exact. The sum is taken in the type of ``noise``.
-        """
-        placement = world.layout[robot]
-        groups = placement.robot.action_split.groups.values()
-        noisy = [group.reset_noise for group in groups for _ in group.joints]
-        qpos = np.array(placement.start_qpos, noise.dtype)
-        world.robots[robot].reset(np.where(noisy, noise + qpos, qpos))
+    scenario: Scenario = cast(Scenario, _FreshScenario())
 
     # -- making and closing ------------------------------------------------------------------
 
-    def __init__(self, scenario: Scenario, *, first_seed: int = FIRST_SEED) -> None:
-        """Build the worlds and reset them with native's first seeds.
+    def __init__(self, scenario: Scenario, *, first_seed: int | None = None) -> None:
+        """Build the worlds and begin episodes with the class's first seeds.
 
         Args:
             scenario: How to make it; `tasks.make` and ``cls.scenario`` give one to start from.
-            first_seed: Environment i starts with seed ``first_seed + i``.
+            first_seed: Environment i starts with seed ``first_seed + i``; None takes the class's.
 
         Raises:
             TaskError: If the scenario asks for what the task does not offer.
@@ -200,7 +84,7 @@ class MultiRobotTask(Remade):
         check_places(own.__name__, scenario.layout, own.layout, self.robot_counts)
         if scenario.check_layout and scenario.layout != own.layout:
             refuse_collisions(scenario.layout)
-        self.made_from = scenario
+        self.scenario = scenario
         self.layout = scenario.layout.in_control_mode(scenario.control_mode)
         self.num_envs = scenario.num_envs
         self.obs_mode = scenario.obs_mode
@@ -216,7 +100,8 @@ class MultiRobotTask(Remade):
         mode = read_mode(scenario.obs_mode)
         cameras = scenario.cameras or self.cameras if mode.textures else ()
         self.observer = Observer(self.layout, mode, cameras, self.sensed)
-        self._rngs = [EpisodeRandom(first_seed + i) for i in range(self.num_envs)]
+        first = self.first_seed if first_seed is None else first_seed
+        self._rngs = [EpisodeRandom(first + i) for i in range(self.num_envs)]
         self._max_reward = np.array(self.max_reward, np.float32)
         self._elapsed = np.zeros(self.num_envs, np.int32)
         self._everywhere: Sequence[int] = range(self.num_envs)
@@ -231,7 +116,7 @@ class MultiRobotTask(Remade):
             visuals=scenario.draws,
         )
         self._camera: Any = None
-        self._responds = type(self).respond is not MultiRobotTask.respond
+        self._responds = type(self).respond is not Declaration.respond
         self.start = self._begin(list(range(self.num_envs)), reconfigured=True)
         self._describe_observation()
 
@@ -370,7 +255,7 @@ class MultiRobotTask(Remade):
         Raises:
             TaskError: If the task was not made with ``render_mode="rgb_array"``.
         """
-        if self.made_from.render_mode is None:
+        if self.scenario.render_mode is None:
             raise TaskError("this task draws no pictures; make it with render_mode='rgb_array'")
         if self._camera is None:
             from simulation.rendering.pictures import Cameras
@@ -420,8 +305,8 @@ class MultiRobotTask(Remade):
         return state
 
     def _info(self, state: State) -> Info:
-        told = {key: np.asarray(value) for key, value in self.evaluate(state).items()}
-        return {"elapsed_steps": self._elapsed.copy(), **told}
+        evaluated = {key: np.asarray(value) for key, value in self.evaluate(state).items()}
+        return {"elapsed_steps": self._elapsed.copy(), **evaluated}
 
     def _observation(self, state: State, info: Info) -> Any:
         if self.observer.mode.nothing:

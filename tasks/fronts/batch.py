@@ -14,7 +14,7 @@ from robots import TaskError
 from tasks.engine.arguments import RECONFIGURE, SEED
 from tasks.engine.observation import told_dtype
 from tasks.engine.scenario import Scenario
-from tasks.engine.task import FIRST_SEED, MultiRobotTask
+from tasks.engine.task import MultiRobotTask
 from tasks.fronts.board import Arrays, Shapes
 
 OBSERVATION, INFO = "obs", "info"  # what the names of their arrays begin with
@@ -74,7 +74,7 @@ class Batch:
             AssetError: If robot files cannot be found.
         """
         scenario = replace(part.scenario, num_envs=len(part.env_ids))
-        self._task = part.task(scenario, first_seed=FIRST_SEED + part.start)
+        self._task = part.task(scenario, first_seed=part.task.first_seed + part.start)
         self._part = part
         self._over = np.zeros(len(part.env_ids), bool)  # begin anew at the next step
         self._rows: Arrays = {}

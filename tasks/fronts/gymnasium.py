@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from robots import TaskError
 from tasks.engine.arguments import checked_seeds
 from tasks.engine.observation import space_of
-from tasks.engine.randomness import FirstSeeds
 from tasks.engine.remade import Remade
 from tasks.fronts.numbers import info_row, row
+from tasks.language.randomness import FirstSeeds
 from tasks.registry import make
 
 RENDER_MODES = ["rgb_array"]
@@ -56,7 +56,7 @@ class GymnasiumTask(Remade, gymnasium.Env[Any, NDArray[np.float32]]):
         self._first = FirstSeeds(1)
         self._seed = self.task.seeds[0]
         self.render_mode = render_mode
-        frames = round(self.task.made_from.control_frequency)
+        frames = round(self.task.scenario.control_frequency)
         self.metadata = {**self.metadata, "render_fps": frames}  # type: ignore[misc]
         self.action_space = self.task.single_action_space
         self.observation_space = space_of(row(self.task.start[0]))

@@ -14,11 +14,11 @@ from pettingzoo import ParallelEnv
 from robots import TaskError, UnknownNameError
 from robots.common.bounds import shown
 from tasks.engine.arguments import RECONFIGURE, checked_options, checked_seeds
-from tasks.engine.native_format import observation_keys
 from tasks.engine.observation import space_of
-from tasks.engine.randomness import FirstSeeds
 from tasks.engine.remade import Remade
 from tasks.fronts.numbers import info_row, row
+from tasks.language.randomness import FirstSeeds
+from tasks.native.format import observation_keys
 from tasks.registry import make
 
 Observation = Any
@@ -65,7 +65,7 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
             raise TaskError("parallel_env takes no obs_mode='none'; choices: 'state', 'rgb', …")
         self.task = make(task_id, render_mode=render_mode, **fields)
         self.render_mode = render_mode
-        frames = round(self.task.made_from.control_frequency)
+        frames = round(self.task.scenario.control_frequency)
         self.metadata = {**self.metadata, "name": self.task.task_id, "render_fps": frames}  # type: ignore[misc]
         if not (robot_reward is None or callable(robot_reward)):
             raise TaskError(f"robot_reward is {shown(robot_reward)}; a function is needed, or None")

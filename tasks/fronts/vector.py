@@ -19,12 +19,11 @@ from robots import SimulationError, TaskError, unknown_name_message
 from tasks.engine.actions import ActionReader
 from tasks.engine.arguments import RECONFIGURE, checked_options, checked_seeds
 from tasks.engine.observation import space_of
-from tasks.engine.randomness import FirstSeeds
 from tasks.engine.remade import Remade
-from tasks.engine.task import FIRST_SEED
 from tasks.fronts.batch import FINAL, INFO, OBSERVATION, Beginning, Part
 from tasks.fronts.gymnasium import RENDER_MODES
 from tasks.fronts.workers import Failure, InProcess, WorkerError, Workers, WorkersFailed
+from tasks.language.randomness import FirstSeeds
 from tasks.registry import get_task_class, make_scenario
 
 RESET_OPTIONS = (RECONFIGURE, "reset_mask")
@@ -121,7 +120,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         layout = scenario.layout.in_control_mode(scenario.control_mode)
         self.action_split = layout.action_split
         self._reader = ActionReader(layout, num_envs)
-        self._seeds = [FIRST_SEED + i for i in range(num_envs)]
+        self._seeds = [cls.first_seed + i for i in range(num_envs)]
         self._first = FirstSeeds(num_envs)
         self._everywhere = np.ones(num_envs, bool)
         bounds = [(i * num_envs) // max(workers, 1) for i in range(max(workers, 1) + 1)]

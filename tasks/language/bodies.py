@@ -15,7 +15,6 @@ from robots.descriptor import IDENTITY, Quaternion
 from simulation import Box, Friction, Shape, Sphere, World, add_table
 from simulation.shapes import Color, Coordinate, Density, Length, Lengths, Place
 from simulation.world import BodyKind
-from tasks.engine.randomness import EpisodeRandom
 from tasks.language.props import (
     FACE_UP,
     GREEN,
@@ -25,6 +24,7 @@ from tasks.language.props import (
     peg_shapes,
     target_shapes,
 )
+from tasks.language.randomness import EpisodeRandom
 
 Range: TypeAlias = "float | tuple[float, float]"
 """A number, or the smallest and the largest that may be drawn."""

@@ -8,15 +8,24 @@ from typing import Any
 
 from layouts import Layout, Placement
 from robots import RobotRegistry, SimulationError
-from robots.descriptor import Quaternion
-from simulation import Box, Camera, Cylinder, PhysicsSettings, State, World, add_table
-from simulation.maths import Array, concatenate, where, zeros
-from simulation.shapes import Color
-from tasks.engine.randomness import EpisodeRandom
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.props import WHITE
-from tasks.maniskill.outline import near, placed_corners, points_along, side_middles
-from tasks.registry import register_task
+from tasks import (
+    WHITE,
+    Box,
+    Camera,
+    Color,
+    Cylinder,
+    EpisodeRandom,
+    Info,
+    PhysicsSettings,
+    Quaternion,
+    State,
+    World,
+    add_table,
+    register_task,
+)
+from tasks.maniskill.clone import Clone
+from tasks.maths import Array, concatenate, where, zeros
+from tasks.native.outline import near, placed_corners, points_along, side_middles
 
 # mani_skill 3.0.1, envs/tasks/drawing/draw_triangle.py (m, rad)
 MAX_DOTS = 300
@@ -57,7 +66,7 @@ def bars() -> list[Box]:
 
 
 @register_task("DrawTriangle-v1", "maniskill.draw_triangle_native")
-class DrawTriangle(MultiRobotTask):
+class DrawTriangle(Clone):
     """Draw over the outline of a triangle on a canvas, dot by dot, without straying from it.
 
     The triangle lies within 2 cm, turned by any angle. Every step leaves a dot under a stick that

@@ -5,14 +5,20 @@ from __future__ import annotations
 from math import cos, pi, sin
 
 from layouts import single
-from simulation import PhysicsSettings, State, World
-from simulation.maths import Array, Floats, where
-from tasks.engine.randomness import EpisodeRandom
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.bodies import Peg
-from tasks.language.props import DARK_BLUE, DARK_RED
-from tasks.language.shaping import closeness
-from tasks.registry import register_task
+from tasks import (
+    DARK_BLUE,
+    DARK_RED,
+    EpisodeRandom,
+    Info,
+    Peg,
+    PhysicsSettings,
+    State,
+    World,
+    closeness,
+    register_task,
+)
+from tasks.maniskill.clone import Clone
+from tasks.maths import Array, Floats, where
 
 # mani_skill 3.0.1, envs/tasks/tabletop/lift_peg_upright.py (m, rad)
 PEG_HALF_WIDTH = 0.025
@@ -24,7 +30,7 @@ MAX_LIFT = 0.005  # of the peg's centre from half its length
 
 
 @register_task("LiftPegUpright-v1", "maniskill.lift_peg_upright_native")
-class LiftPegUpright(MultiRobotTask):
+class LiftPegUpright(Clone):
     """Stand a square peg, 24 cm long, upright on the table, either end up.
 
     The peg lies along x, its middle drawn from a square of 0.2 m around the origin. Success: the
@@ -47,7 +53,7 @@ class LiftPegUpright(MultiRobotTask):
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: upright and standing on the table."""
-        # Native tells upright from one Euler angle, although that angle is a quarter turn, too,
+        # Native judges uprightness by one Euler angle, although that angle is a quarter turn, too,
         # while the peg lies along y.
         upright = abs(abs(state.last_euler_angle("peg")) - pi / 2) < MAX_TILT
         return {"success": upright & (_lift(state) < MAX_LIFT)}

@@ -5,13 +5,21 @@ from __future__ import annotations
 from typing import ClassVar
 
 from layouts import single
-from robots.descriptor import Vector3
-from simulation import PhysicsSettings, State, World
-from simulation.maths import Array, Floats, norm
-from tasks.engine.randomness import EpisodeRandom
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.bodies import Cube, Target
-from tasks.language.props import DARK_BLUE, FACE_UP, TARGET_HEIGHT
+from tasks import (
+    DARK_BLUE,
+    FACE_UP,
+    TARGET_HEIGHT,
+    Cube,
+    EpisodeRandom,
+    Info,
+    PhysicsSettings,
+    State,
+    Target,
+    Vector3,
+    World,
+)
+from tasks.maniskill.clone import Clone
+from tasks.maths import Array, Floats, norm
 
 # mani_skill 3.0.1, envs/tasks/tabletop/push_cube.py and pull_cube.py (m)
 CUBE_HALF_SIZE = 0.02
@@ -21,7 +29,7 @@ SPAWN_HALF_SIZE = 0.1
 TOUCH_RADIUS = 0.01  # around where the TCP should move the cube from
 
 
-class MovedCube(MultiRobotTask):
+class MovedCube(Clone):
     """Move a cube along x onto a round target.
 
     Attributes:

@@ -6,14 +6,25 @@ from dataclasses import dataclass
 from math import pi
 
 from layouts import single
-from simulation import Box, Camera, PhysicsSettings, State, World, add_table
-from simulation.maths import Array, Floats, concatenate, maximum, norm, tanh, where
-from simulation.shapes import Finish, linear
-from simulation.state import once_per_state
-from tasks.engine.randomness import EpisodeRandom
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.poses import compose, inverse, transform
-from tasks.registry import register_task
+from tasks import (
+    Box,
+    Camera,
+    EpisodeRandom,
+    Finish,
+    Info,
+    PhysicsSettings,
+    State,
+    World,
+    add_table,
+    compose,
+    inverse,
+    linear,
+    once_per_state,
+    register_task,
+    transform,
+)
+from tasks.maniskill.clone import Clone
+from tasks.maths import Array, Floats, concatenate, maximum, norm, tanh, where
 
 # mani_skill 3.0.1, envs/tasks/tabletop/peg_insertion_side.py (m, rad)
 HALF_LENGTH = (0.085, 0.125)  # of the peg, and of the box along the hole: smallest, largest
@@ -86,7 +97,7 @@ class PegDesign:
 
 
 @register_task("PegInsertionSide-v1", "maniskill.peg_insertion_side_native")
-class PegInsertionSide(MultiRobotTask):
+class PegInsertionSide(Clone):
     """Grasp a peg and push its orange head into the hole of a box, which lies across the table.
 
     Every reset draws the peg's length and thickness and the hole's place, and builds both anew.

@@ -5,20 +5,26 @@ from __future__ import annotations
 from typing import ClassVar
 
 from layouts import single
-from simulation import PhysicsSettings, State, World
-from simulation.maths import Array, Floats, where
-from tasks.engine.randomness import EpisodeRandom
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.bodies import Cube, Goal
-from tasks.language.shaping import closeness
-from tasks.registry import register_task
+from tasks import (
+    Cube,
+    EpisodeRandom,
+    Goal,
+    Info,
+    PhysicsSettings,
+    State,
+    World,
+    closeness,
+    register_task,
+)
+from tasks.maniskill.clone import Clone
+from tasks.maths import Array, Floats, where
 
 # mani_skill 3.0.1, envs/tasks/tabletop/pick_cube.py
 STATIC_SPEED = 0.2  # rad/s
 
 
 @register_task("PickCube-v1", "maniskill.pick_cube_native")
-class PickCube(MultiRobotTask):
+class PickCube(Clone):
     """Grasp a cube from the table and hold it still at a goal in the air.
 
     Cube and goal are drawn from a square of 0.2 m around the origin, the goal up to 0.3 m above

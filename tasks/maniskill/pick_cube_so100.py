@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from layouts import single
-from simulation import Camera
-from tasks.language.bodies import Cube, Goal
+from tasks import Camera, Cube, Goal, register_task
 from tasks.maniskill.pick_cube import PickCube
-from tasks.registry import register_task
 
 
 @register_task("PickCubeSO100-v1", "maniskill.pick_cube_so100_native")

@@ -3,15 +3,28 @@
 from __future__ import annotations
 
 from layouts import single
-from simulation import Box, Camera, PhysicsSettings, State, World
-from simulation.maths import Array, Floats, where
-from tasks.engine.randomness import EpisodeRandom
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.bodies import Ball, Compound
-from tasks.language.props import DARK_BLUE, WHITE
-from tasks.language.shaping import closeness, letting_go, stillness
-from tasks.language.stacking import distance_to_top, is_at_rest, lies_on
-from tasks.registry import register_task
+from tasks import (
+    DARK_BLUE,
+    WHITE,
+    Ball,
+    Box,
+    Camera,
+    Compound,
+    EpisodeRandom,
+    Info,
+    PhysicsSettings,
+    State,
+    World,
+    closeness,
+    distance_to_top,
+    is_at_rest,
+    letting_go,
+    lies_on,
+    register_task,
+    stillness,
+)
+from tasks.maniskill.clone import Clone
+from tasks.maths import Array, Floats, where
 
 # mani_skill 3.0.1, envs/tasks/tabletop/place_sphere.py (m)
 RADIUS = 0.02
@@ -39,7 +52,7 @@ def bin_shapes() -> tuple[Box, ...]:
 
 
 @register_task("PlaceSphere-v1", "maniskill.place_sphere_native")
-class PlaceSphere(MultiRobotTask):
+class PlaceSphere(Clone):
     """Put a ball into a shallow bin that does not move, and let go of it.
 
     The ball lies at x in [-0.1, -0.05], the bin at x in [0, 0.1], both with y in [-0.1, 0.1] (m).

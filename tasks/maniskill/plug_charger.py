@@ -5,16 +5,25 @@ from __future__ import annotations
 from math import pi
 
 from layouts import single
-from robots.descriptor import Vector3
-from simulation import Box, PhysicsSettings, State, World
-from simulation.maths import Array, norm
-from simulation.shapes import POLISHED, Finish, linear
-from tasks.engine.randomness import EpisodeRandom
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.bodies import Compound
-from tasks.language.poses import angle_between, compose
-from tasks.language.props import WHITE
-from tasks.registry import register_task
+from tasks import (
+    POLISHED,
+    WHITE,
+    Box,
+    Compound,
+    EpisodeRandom,
+    Finish,
+    Info,
+    PhysicsSettings,
+    State,
+    Vector3,
+    World,
+    angle_between,
+    compose,
+    linear,
+    register_task,
+)
+from tasks.maniskill.clone import Clone
+from tasks.maths import Array, norm
 
 # mani_skill 3.0.1, envs/tasks/tabletop/plug_charger.py (m, rad)
 BODY_HALF_SIZE = (2e-2, 1.5e-2, 1.2e-2)
@@ -84,7 +93,7 @@ def receptacle_shapes() -> tuple[Box, ...]:
 
 
 @register_task("PlugCharger-v1", "maniskill.plug_charger_native")
-class PlugCharger(MultiRobotTask):
+class PlugCharger(Clone):
     """Pick a charger up from the table and plug its two prongs into a receptacle in the air.
 
     The charger lies before the receptacle, turned by up to 60°; the receptacle hangs 0.1 m above

@@ -5,14 +5,23 @@ from __future__ import annotations
 from math import pi
 
 from layouts import single
-from simulation import PhysicsSettings, State, World
-from simulation.maths import Array, Floats, norm, where
-from tasks.engine.randomness import EpisodeRandom
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.bodies import Cube, Peg, Target
-from tasks.language.props import DARK_BLUE, FACE_UP, TARGET_HEIGHT
-from tasks.language.shaping import closeness
-from tasks.registry import register_task
+from tasks import (
+    DARK_BLUE,
+    FACE_UP,
+    TARGET_HEIGHT,
+    Cube,
+    EpisodeRandom,
+    Info,
+    Peg,
+    PhysicsSettings,
+    State,
+    Target,
+    World,
+    closeness,
+    register_task,
+)
+from tasks.maniskill.clone import Clone
+from tasks.maths import Array, Floats, norm, where
 
 # mani_skill 3.0.1, envs/tasks/tabletop/poke_cube.py (m, rad)
 CUBE_HALF_SIZE = 0.02
@@ -30,7 +39,7 @@ MAX_HEAD_DISTANCE = CUBE_HALF_SIZE + 0.005  # between the peg's head and the cub
 
 
 @register_task("PokeCube-v1", "maniskill.poke_cube_native")
-class PokeCube(MultiRobotTask):
+class PokeCube(Clone):
     """Grasp a square peg, 24 cm long, and poke a cube onto a round target with it.
 
     The peg lies along x, its middle drawn from a square of 0.2 m around the origin; the cube lies

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from simulation import Camera, State
-from simulation.maths import Array, Floats, where
-from tasks.engine.task import Info
-from tasks.language.shaping import closeness
+from tasks import Camera, Info, State, closeness, register_task
 from tasks.maniskill.moved_cube import CUBE_HALF_SIZE, TOUCH_RADIUS, MovedCube
-from tasks.registry import register_task
+from tasks.maths import Array, Floats, where
 
 # mani_skill 3.0.1, envs/tasks/tabletop/pull_cube.py (m)
 PULL_OFFSET = CUBE_HALF_SIZE + 2 * 0.005  # from the cube to where the TCP should pull, along x

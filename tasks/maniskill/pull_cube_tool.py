@@ -5,16 +5,25 @@ from __future__ import annotations
 from math import pi
 
 from layouts import single
-from simulation import Box, Camera, PhysicsSettings, State, World
-from simulation.maths import Array, Flags, Floats, floats, norm, tanh, where
-from simulation.shapes import POLISHED
-from simulation.state import once_per_state
-from tasks.engine.randomness import EpisodeRandom
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.bodies import Compound, Cube
-from tasks.language.props import DARK_BLUE, RED
-from tasks.language.shaping import closeness
-from tasks.registry import register_task
+from tasks import (
+    DARK_BLUE,
+    POLISHED,
+    RED,
+    Box,
+    Camera,
+    Compound,
+    Cube,
+    EpisodeRandom,
+    Info,
+    PhysicsSettings,
+    State,
+    World,
+    closeness,
+    once_per_state,
+    register_task,
+)
+from tasks.maniskill.clone import Clone
+from tasks.maths import Array, Flags, Floats, floats, norm, tanh, where
 
 # mani_skill 3.0.1, envs/tasks/tabletop/pull_cube_tool.py (m)
 CUBE_HALF_SIZE = 0.02
@@ -48,7 +57,7 @@ def tool_shapes() -> tuple[Box, Box]:
 
 
 @register_task("PullCubeTool-v1", "maniskill.pull_cube_tool_native")
-class PullCubeTool(MultiRobotTask):
+class PullCubeTool(Clone):
     """Grasp an L-shaped tool and pull a cube with it that is out of the arm's reach.
 
     The tool's end lies at x and y in [-0.3, -0.1], the cube at x in [0.05, 0.25] and y in
@@ -78,7 +87,7 @@ class PullCubeTool(MultiRobotTask):
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: the cube is near the robot.
 
-        Progress and distance are told per environment; native averages them over its batch.
+        Progress and distance are kept per environment; native averages them over its batch.
         """
         success = self._success(state)
         centre = state.base_position("arm") + state.array(_CENTRE)

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from simulation import State
-from simulation.maths import Array, Floats, where
-from tasks.engine.task import Info
-from tasks.language.shaping import closeness
+from tasks import Info, State, closeness, register_task
 from tasks.maniskill.moved_cube import CUBE_HALF_SIZE, TOUCH_RADIUS, MovedCube
-from tasks.registry import register_task
+from tasks.maths import Array, Floats, where
 
 # mani_skill 3.0.1, envs/tasks/tabletop/push_cube.py (m)
 MAX_HEIGHT = CUBE_HALF_SIZE + 5e-3  # of the cube's centre while it counts as on the table

@@ -6,15 +6,24 @@ import math
 from math import pi
 
 from layouts import single
-from simulation import Box, Cylinder, Friction, PhysicsSettings, State, World
-from simulation.maths import Array, Floats, cos, rounded, sqrt, where
-from simulation.shapes import Color
-from tasks.engine.randomness import EpisodeRandom
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.bodies import Compound, Table
-from tasks.language.shaping import closeness
-from tasks.maniskill.pixel_cover import CENTRE_OF_MASS_Y, cover, yaw
-from tasks.registry import register_task
+from tasks import (
+    Box,
+    Color,
+    Compound,
+    Cylinder,
+    EpisodeRandom,
+    Friction,
+    Info,
+    PhysicsSettings,
+    State,
+    Table,
+    World,
+    closeness,
+    register_task,
+)
+from tasks.maniskill.clone import Clone
+from tasks.maths import Array, Floats, cos, rounded, sqrt, where
+from tasks.native.pixel_cover import CENTRE_OF_MASS_Y, cover, yaw
 
 # mani_skill 3.0.1, envs/tasks/tabletop/push_t.py (m, rad)
 BAR_HALF_SIZE = (0.1, 0.025)
@@ -58,7 +67,7 @@ def tee(thickness: float, color: Color, *, collides: bool) -> tuple[Box, ...]:
 
 
 @register_task("PushT-v1", "maniskill.push_t_native")
-class PushT(MultiRobotTask):
+class PushT(Clone):
     """Push a T onto a fixed outline, from a random place and at a random angle.
 
     The T lies within 0.2 m × 0.3 m beside the outline. Success: it covers 90 % of the outline.

@@ -6,13 +6,21 @@ from math import hypot
 
 from layouts import Layout, Placement
 from layouts.placement import load_robot
-from simulation import Camera, PhysicsSettings, State, World
-from simulation.maths import Array, Floats, norm, tanh, where
-from tasks.engine.randomness import EpisodeRandom
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.bodies import Ball, Target
-from tasks.language.props import FACE_UP, TARGET_HEIGHT
-from tasks.registry import register_task
+from tasks import (
+    FACE_UP,
+    TARGET_HEIGHT,
+    Ball,
+    Camera,
+    EpisodeRandom,
+    Info,
+    PhysicsSettings,
+    State,
+    Target,
+    World,
+    register_task,
+)
+from tasks.maniskill.clone import Clone
+from tasks.maths import Array, Floats, norm, tanh, where
 
 # mani_skill 3.0.1, envs/tasks/tabletop/roll_ball.py (m)
 BALL_RADIUS = 0.035
@@ -29,7 +37,7 @@ BASE_QUATERNION = (0.7071 / BASE_LENGTH, 0.0, 0.0, -0.7072 / BASE_LENGTH)
 
 
 @register_task("RollBall-v1", "maniskill.roll_ball_native")
-class RollBall(MultiRobotTask):
+class RollBall(Clone):
     """Roll a ball along the table onto a round target out of the arm's reach.
 
     The arm stands at y = 1 and faces -y; the ball lies at y in [0.5, 0.7], the target at y in

@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 from layouts import single
-from simulation import PhysicsSettings, State, World
-from simulation.maths import Array, Floats, where
-from tasks.engine.randomness import EpisodeRandom
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.bodies import Cube
-from tasks.language.props import GREEN, RED
-from tasks.language.shaping import closeness, letting_go, stillness
-from tasks.language.stacking import diagonal, distance_to_top, is_at_rest, lies_on
-from tasks.registry import register_task
+from tasks import (
+    GREEN,
+    RED,
+    Cube,
+    EpisodeRandom,
+    Info,
+    PhysicsSettings,
+    State,
+    World,
+    closeness,
+    diagonal,
+    distance_to_top,
+    is_at_rest,
+    letting_go,
+    lies_on,
+    register_task,
+    stillness,
+)
+from tasks.maniskill.clone import Clone
+from tasks.maths import Array, Floats, where
 
 # mani_skill 3.0.1, envs/tasks/tabletop/stack_cube.py (m)
 CUBE_HALF_SIZE = 0.02
@@ -22,7 +33,7 @@ GAP = 0.001
 
 
 @register_task("StackCube-v1", "maniskill.stack_cube_native")
-class StackCube(MultiRobotTask):
+class StackCube(Clone):
     """Put the red cube (cubeA) on the green one (cubeB) and let go of it.
 
     Both lie within a region of 0.2 m × 0.4 m, shifted by up to 0.1 m along x and y, and do not

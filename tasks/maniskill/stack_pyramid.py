@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from layouts import single
-from simulation import Camera, PhysicsSettings, State, World
-from simulation.maths import Array, Flags
-from tasks.engine.randomness import EpisodeRandom
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.bodies import Cube
-from tasks.language.props import BLUE, GREEN, RED
-from tasks.language.stacking import diagonal, is_at_rest
-from tasks.registry import register_task
+from tasks import (
+    BLUE,
+    GREEN,
+    RED,
+    Camera,
+    Cube,
+    EpisodeRandom,
+    Info,
+    PhysicsSettings,
+    State,
+    World,
+    diagonal,
+    is_at_rest,
+    register_task,
+)
+from tasks.maniskill.clone import Clone
+from tasks.maths import Array, Flags
 
 # mani_skill 3.0.1, envs/tasks/tabletop/stack_pyramid.py (m)
 CUBE_HALF_SIZE = 0.02
@@ -20,7 +29,7 @@ MIN_HEIGHT = 0.02  # of one origin above another
 
 
 @register_task("StackPyramid-v1", "maniskill.stack_pyramid_native")
-class StackPyramid(MultiRobotTask):
+class StackPyramid(Clone):
     """Push the red cube (cubeA) beside the green one (cubeB), put the blue one (cubeC) on both.
 
     All lie within 0.2 m × 0.4 m around the origin and do not touch. Success: red and green are

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from layouts import face_to_face
-from simulation import Camera, PhysicsSettings, State, World
-from simulation.maths import Array, Floats, floats, maximum, norm, tanh, where
-from tasks.engine.randomness import EpisodeRandom
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.bodies import Cube, Goal
-from tasks.language.shaping import closeness
-from tasks.registry import register_task
+from tasks import (
+    Camera,
+    Cube,
+    EpisodeRandom,
+    Goal,
+    Info,
+    PhysicsSettings,
+    State,
+    World,
+    closeness,
+    register_task,
+)
+from tasks.maniskill.clone import Clone
+from tasks.maths import Array, Floats, floats, maximum, norm, tanh, where
 
 # mani_skill 3.0.1, envs/tasks/tabletop/two_robot_pick_cube.py (m)
 CUBE_HALF_SIZE = 0.02
@@ -18,7 +25,7 @@ STATIC_SPEED = 0.2  # rad/s
 
 
 @register_task("TwoRobotPickCube-v1", "maniskill.two_robot_pick_cube_native")
-class TwoRobotPickCube(MultiRobotTask):
+class TwoRobotPickCube(Clone):
     """Hand a cube over: it starts out of the right arm's reach, the goal is out of the left's.
 
     The cube lies at y in [-0.2, -0.1], the goal at y in [0.1, 0.2], both with x in

@@ -3,15 +3,27 @@
 from __future__ import annotations
 
 from layouts import face_to_face
-from simulation import PhysicsSettings, State, World
-from simulation.maths import Array, Floats, norm, rounded, tanh, where
-from tasks.engine.randomness import EpisodeRandom
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.bodies import Cube, Target
-from tasks.language.props import DARK_BLUE, FACE_UP, GREEN, TARGET_HEIGHT
-from tasks.language.shaping import closeness, letting_go
-from tasks.language.stacking import diagonal, distance_to_top, lies_on
-from tasks.registry import register_task
+from tasks import (
+    DARK_BLUE,
+    FACE_UP,
+    GREEN,
+    TARGET_HEIGHT,
+    Cube,
+    EpisodeRandom,
+    Info,
+    PhysicsSettings,
+    State,
+    Target,
+    World,
+    closeness,
+    diagonal,
+    distance_to_top,
+    letting_go,
+    lies_on,
+    register_task,
+)
+from tasks.maniskill.clone import Clone
+from tasks.maths import Array, Floats, norm, rounded, tanh, where
 
 # mani_skill 3.0.1, envs/tasks/tabletop/two_robot_stack_cube.py (m)
 CUBE_HALF_SIZE = 0.02
@@ -23,7 +35,7 @@ RETREAT_Y = 0.2
 
 
 @register_task("TwoRobotStackCube-v1", "maniskill.two_robot_stack_cube_native")
-class TwoRobotStackCube(MultiRobotTask):
+class TwoRobotStackCube(Clone):
     """Put the right arm's green cube (cubeB) on a target, the left arm's blue one (cubeA) on it.
 
     The blue cube lies at y in [-0.2, -0.1], the green one at y in [0.1, 0.2], the target at

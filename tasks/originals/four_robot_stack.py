@@ -3,16 +3,30 @@
 from __future__ import annotations
 
 from layouts import around_table
-from simulation import Camera, PhysicsSettings, State, World
-from simulation.maths import Array, Flags, Floats, norm, stack, where
-from simulation.shapes import Color
-from tasks.engine.randomness import EpisodeRandom
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.bodies import Cube, Target, WideTable
-from tasks.language.props import BLUE, FACE_UP, GREEN, RED, TARGET_HEIGHT
-from tasks.language.shaping import closeness
-from tasks.language.stacking import diagonal, is_at_rest, lies_on
-from tasks.registry import register_task
+from tasks import (
+    BLUE,
+    FACE_UP,
+    GREEN,
+    RED,
+    TARGET_HEIGHT,
+    Camera,
+    Color,
+    Cube,
+    EpisodeRandom,
+    Info,
+    MultiRobotTask,
+    PhysicsSettings,
+    State,
+    Target,
+    WideTable,
+    World,
+    closeness,
+    diagonal,
+    is_at_rest,
+    lies_on,
+    register_task,
+)
+from tasks.maths import Array, Flags, Floats, norm, stack, where
 
 # m; the arms stand 0.78 m from the middle
 CUBE_HALF_SIZE = 0.02

@@ -8,22 +8,27 @@ from math import sqrt
 
 from layouts import Layout, ring
 from robots import TaskError
-from robots.descriptor import Vector3
-from simulation import Box, Camera, PhysicsSettings, State, World
-from simulation.maths import Array, Floats, copy, floats, minimum, norm, rounded, stack, where
-from tasks.engine.randomness import EpisodeRandom
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.props import (
+from tasks import (
     DARK_BLUE,
     FACE_UP,
     TARGET_HEIGHT,
+    Box,
+    Camera,
+    EpisodeRandom,
+    Info,
+    MultiRobotTask,
+    PhysicsSettings,
+    State,
+    Vector3,
+    World,
     add_goal,
     add_target,
     add_wide_table,
+    closeness,
+    is_at_rest,
+    register_task,
 )
-from tasks.language.shaping import closeness
-from tasks.language.stacking import is_at_rest
-from tasks.registry import register_task
+from tasks.maths import Array, Floats, copy, floats, minimum, norm, rounded, stack, where
 
 # Of the baton (m): a square frame, which the tip of a stick, closed fingers or a jaw take along
 # from inside, and which a gripper can also hold by a side.
@@ -32,7 +37,7 @@ INNER_HALF_WIDTH, SIDE_HALF_WIDTH, HALF_HEIGHT = 0.035, 0.008, 0.015
 ZONE_RADIUS = 0.05  # m
 START_OFFSET = 0.02  # of the baton from the middle of the last zone, along x and y (m)
 BEACON_HEIGHT = 0.1  # over the zone that is next; twice that when all were visited (m)
-WORKING_REACH = 0.65  # share of a robot's reach at which it likes to work
+WORKING_REACH = 0.65  # share of a robot's reach within which it works well
 FARTHEST_REACH = 0.9  # share of a robot's reach at which a zone may be
 ROBOTS = range(3, 9)
 
@@ -78,7 +83,7 @@ class Relay(MultiRobotTask):
         world.set_pose("beacon", self._stations[0])
 
     def respond(self, state: State) -> None:
-        """Move the beacon on when the baton is in its zone: so the state tells the progress."""
+        """Move the beacon on when the baton is in its zone: so the state holds the progress."""
         visited = self._visited(state)
         away = state.position("baton") - self._next_zone(state, visited)
         arrived = (visited < len(self._zones)) & (norm(copy(away[:, :2])) <= ZONE_RADIUS)

@@ -5,14 +5,22 @@ from __future__ import annotations
 from math import cos, pi, radians
 
 from layouts import face_to_face
-from simulation import Box, Camera, PhysicsSettings, State
-from simulation.maths import Array, Flags, Floats, arccos, clip, maximum, norm, where
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.bodies import Area, Compound
-from tasks.language.poses import transform
-from tasks.language.props import DARK_BLUE, RED
-from tasks.language.shaping import closeness
-from tasks.registry import register_task
+from tasks import (
+    DARK_BLUE,
+    RED,
+    Area,
+    Box,
+    Camera,
+    Compound,
+    Info,
+    MultiRobotTask,
+    PhysicsSettings,
+    State,
+    closeness,
+    register_task,
+    transform,
+)
+from tasks.maths import Array, Flags, Floats, arccos, clip, maximum, norm, where
 
 # Of the bar, along its own x axis (m): two thin ends and a middle wider than a Panda's gripper
 # opens, which is 0.08 m.

@@ -5,13 +5,21 @@ from __future__ import annotations
 from math import pi
 
 from layouts import face_to_face
-from simulation import Camera, Friction, PhysicsSettings, State
-from simulation.maths import Array, Floats, maximum, norm, where
-from tasks.engine.task import Info, MultiRobotTask
-from tasks.language.bodies import Area, Cube, Goal
-from tasks.language.props import DARK_RED
-from tasks.language.shaping import closeness
-from tasks.registry import register_task
+from tasks import (
+    DARK_RED,
+    Area,
+    Camera,
+    Cube,
+    Friction,
+    Goal,
+    Info,
+    MultiRobotTask,
+    PhysicsSettings,
+    State,
+    closeness,
+    register_task,
+)
+from tasks.maths import Array, Floats, maximum, norm, where
 
 # m; the picker's base is at y = 0.7, and a Panda that points down reaches about 0.8 m
 CUBE_HALF_SIZE = 0.02

@@ -66,7 +66,7 @@ def test_a_process_killed_while_writing_leaves_no_half_file(store, physics, tmp_
     script = tmp_path / "killed.py"
     script.write_text(
         "import os, signal\n"
-        "from robots import asset_store, UrdfLocator\n"
+        "from robots import UrdfLocator\n"
         "from robots.assets.sources import InstalledManiSkill\n"
         "import robots.assets.fetching\n"
         "robots.assets.fetching.default_sources = lambda: [InstalledManiSkill()]\n"

@@ -10,7 +10,6 @@ import gymnasium
 
 from robots import TaskError
 from tasks import registry
-from tasks.engine.task import FIRST_SEED
 from tasks.maniskill.push_cube import PushCube
 from tasks.registry import register_task
 
@@ -62,8 +61,8 @@ class Breaks(PushCube):
 
     hook, way, late = "", "ValueError", False
 
-    def __init__(self, scenario, *, first_seed=FIRST_SEED):
-        self._first = first_seed == FIRST_SEED
+    def __init__(self, scenario, *, first_seed=None):
+        self._first = first_seed in (None, self.first_seed)
         super().__init__(scenario, first_seed=first_seed)
 
     def meets(self, hook):

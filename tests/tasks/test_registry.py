@@ -159,7 +159,7 @@ def test_a_user_can_declare_a_task(monkeypatch: pytest.MonkeyPatch):
     env = tasks.make("test.STILL", num_envs=2)
     assert "Still-v0" in tasks.list_tasks()
     assert env.reward_modes == ("sparse", "none")
-    assert env.made_from.physics is None
+    assert env.scenario.physics is None
     obs, info = env.reset(seed=0)
     assert obs.shape == (2, 18)
     assert set(info) == {"elapsed_steps", "success", "reconfigure"}

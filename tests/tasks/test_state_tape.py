@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import tasks
-from tasks.engine import native_format
+from tasks.native import format as native_format
 
 
 @pytest.mark.parametrize("task_id", tasks.list_tasks())

@@ -8,8 +8,8 @@ import pytest
 
 import tasks
 from robots import TaskError
-from tasks.engine.randomness import FirstSeeds
 from tasks.fronts.vector import VectorTask
+from tasks.language.randomness import FirstSeeds
 
 TASK = "PushCube-v1"
 STILL = np.zeros(8, np.float32)

@@ -102,7 +102,9 @@ class EpisodeRandom:
         """Draw ``count`` numbers of mean 0 from the numpy stream (unit of ``std``)."""
         return self.numpy.normal(0, std, count)
 
-    def joint_noise(self, layout: Layout, shared: bool) -> dict[str, NDArray[np.float64]]:
+    def joint_noise(
+        self, layout: Layout, *, shared: bool = False
+    ) -> dict[str, NDArray[np.float64]]:
         """Draw the joint noise of each robot, (dof,) (rad, m), from the numpy stream.
 
         Args:

@@ -1,0 +1,142 @@
+"""What a task says of itself: what a user's class sets and defines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from layouts import Layout
+from simulation import Camera, PhysicsSettings, State, World
+from simulation.maths import Array, Floats
+from tasks.language.bodies import Declared, Table, WideTable, declared_bodies
+from tasks.language.randomness import EpisodeRandom
+
+Info = dict[str, Any]
+
+DENSE_MODES = ("normalized_dense", "dense", "sparse", "none")
+SPARSE_MODES = ("sparse", "none")
+
+
+class Declaration:
+    """Something to achieve, for one robot or many.
+
+    `tasks.MultiRobotTask` runs it; users subclass that one. A class sets ``layout`` and
+    ``max_episode_steps``, declares its bodies as class attributes (`tasks.language.bodies`), and
+    defines success in `evaluate`. It may define `observe` and `dense_reward` as well, and override
+    `build` and `sample`, which add and place the declared bodies.
+
+    Attributes:
+        task_id: The task's id.
+        native_id: Id of the ManiSkill task that it clones; None for a task of our own.
+        source: Where its numbers come from; of a clone package, version and file.
+        layout: Default layout.
+        table: What the robots stand at, the first of its bodies.
+        bodies: The bodies that its class declares, by name, in the order declared; see
+            `tasks.language.bodies`.
+        robot_counts: How many robots a layout may have, in places of any names; None if it takes
+            exactly the places of ``layout``.
+        physics: Solver settings; None keeps SAPIEN's own defaults.
+        max_episode_steps: Control steps until an episode is truncated.
+        reward_modes: Reward modes, the default first.
+        max_reward: What ``normalized_dense`` divides the dense reward by.
+        first_seed: Environment i starts with seed ``first_seed + i`` when it is made.
+        rebuilds: Whether every reset builds the worlds anew, with a new `design`.
+        viewpoint: Camera position and target of `render` (m, world).
+        cameras: Cameras that observe, where images are asked for; those of the robots come after.
+        sensed: Which parts of `observe` a real robot knows, so that they are observed beside
+            images; the others are privileged. ``*`` stands for any letters.
+    """
+
+    task_id: ClassVar[str] = ""
+    native_id: ClassVar[str | None] = None
+    source: ClassVar[str] = ""
+    layout: Layout
+    table: ClassVar[Table | WideTable] = Table()
+    bodies: ClassVar[Mapping[str, Declared]] = {}
+    robot_counts: ClassVar[range | None] = None
+    physics: ClassVar[PhysicsSettings | None] = None
+    max_episode_steps: int
+    reward_modes: ClassVar[tuple[str, ...]] = ()
+    max_reward: ClassVar[float] = 1.0
+    first_seed: ClassVar[int] = 0
+    rebuilds: ClassVar[bool] = False
+    viewpoint: ClassVar[tuple[tuple[float, float, float], tuple[float, float, float]]] = (
+        (0.6, 0.7, 0.6),
+        (0.0, 0.0, 0.35),
+    )
+    cameras: ClassVar[tuple[Camera, ...]] = (Camera((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1)),)
+    sensed: ClassVar[tuple[str, ...]] = ("*tcp_pose",)
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        """Collect the declared bodies; offer dense modes if there is a dense reward."""
+        super().__init_subclass__(**kwargs)
+        cls.bodies = declared_bodies(cls)
+        if "reward_modes" not in cls.__dict__:
+            dense = cls.dense_reward is not Declaration.dense_reward
+            cls.reward_modes = DENSE_MODES if dense else SPARSE_MODES
+
+    def design(self, rng: EpisodeRandom) -> Any:
+        """Draw the geometry of one environment; `build` finds it as ``world.design``."""
+        return None
+
+    def build(self, world: World) -> None:
+        """Add the task's bodies to a world, in the order declared; the robots stand already."""
+        for name, body in self.bodies.items():
+            body.add_to(world, name)
+
+    def sample(self, world: World, rng: EpisodeRandom) -> None:
+        """Place the task's bodies for a new episode; the robots are placed already."""
+        for name, body in self.bodies.items():
+            body.place(world, name, rng)
+
+    def evaluate(self, state: State) -> dict[str, Array]:
+        """Return ``success`` (N,) bool and whatever else describes the state.
+
+        Arrays, as the state gives them: they reach the user as tensors.
+        """
+        raise NotImplementedError
+
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
+        """Return named parts of the observation, each (N, k) or (N,), after the robots' own."""
+        return {}
+
+    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
+        """Return the dense reward, (N,)."""
+        raise NotImplementedError
+
+    def remember(self, state: State) -> Mapping[str, Array]:
+        """Return what later steps look back at, by name, each (N, …), as it is after a reset.
+
+        The task finds it as an attribute of `memory` and may change it there; the rows of
+        environments that are reset are taken anew.
+        """
+        return {}
+
+    def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
+        """Do what a new episode needs besides; called after ``env_ids`` were reset."""
+
+    def respond(self, state: State) -> None:
+        """Move bodies in answer to a control step, before the step is judged.
+
+        Called after every step's physics if a subclass has it; the state is read anew then.
+        Only the environments in ``moving`` take the step.
+        """
+
+    def reset_robots(self, world: World, rng: EpisodeRandom) -> None:
+        """Stand every robot at its placement, with joint noise."""
+        for name, noise in rng.joint_noise(world.layout).items():
+            self.stand(world, name, noise)
+
+    def stand(self, world: World, robot: str, noise: NDArray[Any]) -> None:
+        """Stand a robot at its placement, off its keyframe by ``noise``, (dof,) (rad, m).
+
+        Groups without reset noise stay exact. The sum is taken in the type of ``noise``.
+        """
+        placement = world.layout[robot]
+        groups = placement.robot.action_split.groups.values()
+        noisy = [group.reset_noise for group in groups for _ in group.joints]
+        qpos = np.array(placement.start_qpos, noise.dtype)
+        world.robots[robot].reset(np.where(noisy, noise + qpos, qpos))

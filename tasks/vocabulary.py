@@ -1,0 +1,116 @@
+"""Every name that a task's file may need; `from tasks import` takes them from here.
+
+Functions of arrays are in `tasks.maths`, presets of layouts in `layouts`.
+"""
+
+from robots.descriptor import Quaternion, Vector3
+from simulation import (
+    Box,
+    Camera,
+    Capsule,
+    Cylinder,
+    Friction,
+    Mesh,
+    PhysicsSettings,
+    Plane,
+    Shape,
+    Sphere,
+    State,
+    World,
+    add_table,
+)
+from simulation.shapes import POLISHED, Color, Finish, linear
+from simulation.state import once_per_state
+from tasks.engine.declaration import Info
+from tasks.engine.scenario import Scenario
+from tasks.engine.task import MultiRobotTask
+from tasks.language.bodies import (
+    Area,
+    Ball,
+    Compound,
+    Cube,
+    Cuboid,
+    Goal,
+    Peg,
+    Table,
+    Target,
+    WideTable,
+)
+from tasks.language.poses import angle_between, compose, inverse, transform
+from tasks.language.props import (
+    BLUE,
+    DARK_BLUE,
+    DARK_RED,
+    FACE_UP,
+    GREEN,
+    RED,
+    TARGET_HEIGHT,
+    WHITE,
+    add_goal,
+    add_target,
+    add_wide_table,
+)
+from tasks.language.randomness import EpisodeRandom
+from tasks.language.shaping import closeness, letting_go, stillness
+from tasks.language.stacking import diagonal, distance_to_top, is_at_rest, lies_on
+from tasks.registry import register_task
+
+__all__ = [
+    "Area",
+    "BLUE",
+    "Ball",
+    "Box",
+    "Camera",
+    "Capsule",
+    "Color",
+    "Compound",
+    "Cube",
+    "Cuboid",
+    "Cylinder",
+    "DARK_BLUE",
+    "DARK_RED",
+    "EpisodeRandom",
+    "FACE_UP",
+    "Finish",
+    "Friction",
+    "GREEN",
+    "Goal",
+    "Info",
+    "Mesh",
+    "MultiRobotTask",
+    "POLISHED",
+    "Peg",
+    "PhysicsSettings",
+    "Plane",
+    "Quaternion",
+    "RED",
+    "Scenario",
+    "Shape",
+    "Sphere",
+    "State",
+    "TARGET_HEIGHT",
+    "Table",
+    "Target",
+    "Vector3",
+    "WHITE",
+    "WideTable",
+    "World",
+    "add_goal",
+    "add_table",
+    "add_target",
+    "add_wide_table",
+    "angle_between",
+    "closeness",
+    "compose",
+    "diagonal",
+    "distance_to_top",
+    "inverse",
+    "is_at_rest",
+    "letting_go",
+    "lies_on",
+    "linear",
+    "once_per_state",
+    "register_task",
+    "stillness",
+    "transform",
+]
