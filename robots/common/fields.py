@@ -236,7 +236,7 @@ def _describe(hint: Any) -> str:
         return _describe_sequence(typing.get_args(hint))
     if not isinstance(hint, type):
         return str(hint)
-    return f"{'an' if hint.__name__[0] in 'AEIOU' else 'a'} {hint.__name__}"
+    return f"{'an' if hint.__name__[0] in 'AEIO' else 'a'} {hint.__name__}"
 
 
 def _describe_sequence(hints: Sequence[Any]) -> str:

@@ -99,8 +99,7 @@ def check_places(task: str, layout: Layout, own: Layout, robot_counts: range | N
         task: The task's name.
         layout: The layout.
         own: The task's own layout.
-        robot_counts: How many robots it may have, in places of any names; None for those of
-            ``own``.
+        robot_counts: How many robots it may have, under any names; None for the places of ``own``.
 
     Raises:
         TaskError: If the places are wrong.
