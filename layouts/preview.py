@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kinematics.quaternions import forward, yaw_degrees
 from layouts.description import action_text, decimal, facing_text, headline
 from layouts.files import written_whole
 from layouts.frames import table_outlines
-from layouts.orientation import forward, yaw_degrees
 from robots import LayoutError, MissingPackageError
 
 if TYPE_CHECKING:

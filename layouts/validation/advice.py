@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from kinematics.rotations import Floats
 from layouts.layout import Layout
 from layouts.placement import Placement
 from layouts.validation.collisions import Approach, Postures, nearer_than
-from layouts.validation.kinematics import Floats
 from layouts.validation.report import TargetReach, length_text
 
 NARROW = 0.02  # m; less clearance than this is worth a warning

@@ -9,6 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
+from kinematics.rotations import Floats
 from layouts.frames import table_outlines
 from layouts.layout import Layout
 from layouts.placement import Placement
@@ -29,7 +30,6 @@ from layouts.validation.collisions import (
     stand,
     touching,
 )
-from layouts.validation.kinematics import Floats
 from layouts.validation.reach import Reach, Solution, Workspace
 from layouts.validation.report import (
     Clearance,

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kinematics.rotations import Floats
 from layouts.description import decimal, headline
 from layouts.files import written_whole
 from layouts.preview import COLOURS, FAINT, INK, LONGEST_NAME, SUPPORTED, TABLE, blank_figure
-from layouts.validation.kinematics import Floats
 from layouts.validation.report import Clearance, Report, length_text
 from robots import LayoutError
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from math import cos, isfinite, sin
 from typing import ClassVar, Literal, TypeAlias
 
-from layouts.orientation import multiplied
+from kinematics.quaternions import multiplied
 from robots import TaskError
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 from simulation import Box, Friction, Shape, Sphere, World, add_table

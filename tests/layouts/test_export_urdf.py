@@ -10,9 +10,9 @@ import yourdfpy
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from kinematics.quaternions import normalised, rpy_quaternion
 from layouts import Layout, Placement, face_to_face, single
 from layouts.export.urdf import rpy
-from layouts.orientation import normalised, rpy_quaternion
 from layouts.validation.kinematics import pose_matrix
 from robots import AssetError, LayoutError, LocalUrdf, RobotRegistry
 from robots.urdf.summary import read_references

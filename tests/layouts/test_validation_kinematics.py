@@ -14,7 +14,7 @@ from layouts.validation.bodies import load_model
 from layouts.validation.kinematics import Kinematics, pose_matrix
 from layouts.validation.reach import Reach, rotation_vectors
 from robots import DescriptorError, RobotRegistry, UnknownNameError
-from robots.urdf.model import read_model
+from robots.urdf.reading import read_model
 from simulation import World
 from tests.layouts.small_robots import joint, link, turntable, urdf
 

@@ -13,8 +13,8 @@ from robots import ActionNumber, RobotRegistry
 from robots.assets.sources import find_mani_skill
 from robots.from_urdf import guess_descriptor
 from robots.registry import CATALOGUE
-from robots.urdf.model import read_model
 from robots.urdf.reach import link_frame
+from robots.urdf.reading import read_model
 from robots.urdf.summary import parse_urdf
 from simulation import PhysicsSettings, Simulation
 from simulation.controller import JointPositionController
