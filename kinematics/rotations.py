@@ -119,6 +119,20 @@ def pose_matrix(position: ArrayLike, quaternion: ArrayLike) -> Floats:
     return pose
 
 
+def rpy_pose(position: ArrayLike, rpy: Sequence[float]) -> Floats:
+    """Return the pose that a URDF's origin describes, (4, 4).
+
+    Args:
+        position: (3,) (m).
+        rpy: Turns about the fixed axes x, y and z, in that order, (3,) (rad).
+    """
+    pose = np.eye(4)
+    for axis, angle in zip(np.eye(3).tolist(), rpy, strict=True):
+        pose[:3, :3] = rotation_about(axis, angle) @ pose[:3, :3]
+    pose[:3, 3] = position
+    return pose
+
+
 def inverse_pose(pose: Floats) -> Floats:
     """Return the poses of the surrounding frame in the frames that poses describe, (…, 4, 4)."""
     back = np.swapaxes(pose[..., :3, :3], -1, -2)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinematics.rotations import Floats, rotation_vector, transform
 from kinematics.tree import Tree
@@ -60,7 +61,7 @@ class Solutions:
     qpos: Floats
     missing: Floats
     turn_missing: Floats
-    solved: Floats
+    solved: NDArray[np.bool_]
 
     def ranked(self, near: Floats) -> list[int]:
         """Return the solutions, the one first whose farthest coordinate has the shortest way.
@@ -120,7 +121,9 @@ def _errors(tree: Tree, goal: Goal, qpos: Floats, free: Sequence[int]) -> tuple[
     """Return what is missing to the goal, (n, 3 or 6), and its slopes by the free coordinates."""
     poses = tree.forward(qpos)
     place = poses[:, goal.links][..., :3, 3].mean(axis=1)
-    slopes = sum(tree.jacobian(poses, link, free)[:, :3] for link in goal.links) / len(goal.links)
+    slopes = np.zeros((len(qpos), 3, len(free)))
+    for link in goal.links:
+        slopes += tree.jacobian(poses, link, free)[:, :3] / len(goal.links)
     if goal.rotation is None:
         return goal.position - place, slopes
     turn = rotation_vector(goal.rotation @ poses[:, goal.turned, :3, :3].transpose(0, 2, 1))
@@ -142,7 +145,9 @@ def scattered(limits: Floats, count: int) -> Floats:
     return np.random.default_rng(SEED).uniform(low, high, (count, len(limits)))
 
 
-def nearby(qpos: Floats, moving: Sequence[int] | Floats, count: int, spread: float) -> Floats:
+def nearby(
+    qpos: Floats, moving: Sequence[int] | NDArray[np.intp], count: int, spread: float
+) -> Floats:
     """Return the same few places around joint positions for every request, (count, joints).
 
     Args:

@@ -190,7 +190,7 @@ class Tree:
                 angular[:, i] += axis
                 linear[:, i] += np.cross(poses[:, at, :3, 3], axis)
         linear += np.cross(angular, poses[:, link, None, :3, 3])
-        return np.concatenate([linear, angular], axis=-1).transpose(0, 2, 1)
+        return np.concatenate([linear.transpose(0, 2, 1), angular.transpose(0, 2, 1)], axis=1)
 
     @cached_property
     def _index(self) -> dict[str, int]:

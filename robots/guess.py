@@ -269,7 +269,7 @@ def _reach(model: UrdfModel, anatomy: Anatomy, rest: dict[str, float]) -> tuple[
     starts = _postures(tree, start, moving)
     free = [tree.coordinates.index(joint.name) for joint in moving]
     limits = tree.limits.copy()
-    limits[free] = [joint.span for joint in moving]
+    limits[free] = np.array([joint.span for joint in moving]).reshape(-1, 2)
     found = farthest(replace(tree, limits=limits), palm, tool, starts, free)
     if found < 0.01 or len(moving) < len(anatomy.arm):
         return 1.0, "reach: 1 m, without ground, as nothing stands fixed or nothing reaches out"

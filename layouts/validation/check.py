@@ -30,19 +30,19 @@ from layouts.validation.collisions import (
     stand,
     touching,
 )
-from layouts.validation.reach import Reach, Solution, Workspace
-from layouts.validation.report import (
+from layouts.validation.findings import (
     Clearance,
     Finding,
     LinkPair,
     Point,
-    Report,
     SharedWorkspace,
     TargetReach,
     length_text,
     links_text,
     reach_text,
 )
+from layouts.validation.reach import Reach, Solution, Workspace
+from layouts.validation.report import Report
 from robots import LayoutError
 from robots.common.commands import notice
 

@@ -3,7 +3,8 @@
 This is the one place at which a URDF is given to yourdfpy, and it is given only what a model holds
 and `robots.urdf.text_checks` let through: left to itself it takes for a number what C does not,
 repairs broken text by guesses, and ends in any error at what it does not expect. It has no
-capsules; they go to it as cylinders, with their kind as the shape's name.
+capsules; they go to it as cylinders, with their kind as the shape's name. Roll, pitch and yaw are
+not kept by it, only matrices with last digits of its own, so poses are composed in `kinematics`.
 """
 
 from __future__ import annotations
@@ -12,20 +13,16 @@ import io
 import math
 from collections.abc import Iterable
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
-import numpy as np
-
+from kinematics.rotations import Floats, rpy_pose
 from robots.common.errors import AssetError
 from robots.urdf.model import ModelJoint, UrdfModel
-from robots.urdf.numbers import shown
+from robots.urdf.numbers import numbers_of, shown
 from robots.urdf.shapes import SIZES, UrdfShape
 from robots.urdf.summary import parse_urdf
 from robots.urdf.text_checks import JOINT_NUMBERS, expect_readable, link_of
-
-if TYPE_CHECKING:
-    from kinematics.rotations import Floats
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 DRIVEN_TYPES = ("revolute", "continuous", "prismatic")
@@ -64,12 +61,13 @@ def _read(root: Element, urdf: str) -> UrdfModel:
     except Exception as error:  # a reader that raises whatever it meets
         reason = str(error) or type(error).__name__
         raise AssetError(f"yourdfpy cannot read {urdf}: {reason}") from error
-    shapes = [
-        {link.name: made for link in robot.links if (made := _shapes(link, kind, urdf))}
-        for kind in ("collisions", "visuals")
-    ]
-    links = tuple(link.name for link in robot.links)
-    return UrdfModel(robot.name, links, tuple(map(_joint, robot.joints)), *shapes)
+    return UrdfModel(
+        name=robot.name,
+        links=tuple(link.name for link in robot.links),
+        joints=tuple(map(_joint, robot.joints, root.iterfind("joint"))),
+        collisions=_by_link(robot, root, "collision", urdf),
+        visuals=_by_link(robot, root, "visual", urdf),
+    )
 
 
 def _plain(root: Element) -> Element:
@@ -86,7 +84,6 @@ def _plain(root: Element) -> Element:
 def _plain_shape(element: Element) -> Element:
     (shape,) = element.iterfind("geometry/*")
     plain = Element(element.tag, name=shape.tag)
-    _copy(element, plain, "origin", ("xyz", "rpy"))
     kept = (*SIZES[shape.tag], "filename", "scale")
     numbers = {key: value for key, value in shape.items() if key in kept}
     SubElement(SubElement(plain, "geometry"), READ_AS.get(shape.tag, shape.tag), numbers)
@@ -97,7 +94,7 @@ def _plain_joint(joint: Element) -> Element:
     plain = Element("joint", name=joint.get("name", ""), type=joint.get("type", ""))
     for end in ("parent", "child"):
         SubElement(plain, end, link=link_of(joint, end))
-    for part in ("origin", "axis", "limit", "mimic"):
+    for part in ("axis", "limit", "mimic"):
         _copy(joint, plain, part, ("joint", *JOINT_NUMBERS[part]))
     return plain
 
@@ -109,7 +106,7 @@ def _copy(element: Element, plain: Element, part: str, attributes: Iterable[str]
         SubElement(plain, part, kept)
 
 
-def _joint(joint: Any) -> ModelJoint:
+def _joint(joint: Any, text: Element) -> ModelJoint:
     limit, mimic = joint.limit, joint.mimic
     bounded = joint.type in ("revolute", "prismatic")
     length = math.hypot(*joint.axis) or 1.0
@@ -119,7 +116,7 @@ def _joint(joint: Any) -> ModelJoint:
         type=joint.type,
         parent=joint.parent,
         child=joint.child,
-        origin=_origin(joint),
+        origin=_origin(text),
         axis=(x, y, z),
         lower=(limit and limit.lower) or 0.0 if bounded else None,
         upper=(limit and limit.upper) or 0.0 if bounded else None,
@@ -131,17 +128,26 @@ def _joint(joint: Any) -> ModelJoint:
     )
 
 
-def _shapes(link: Any, kind: str, urdf: str) -> tuple[UrdfShape, ...]:
-    where = f"{urdf}, link {link.name!r}"
+def _by_link(robot: Any, root: Element, kind: str, urdf: str) -> dict[str, tuple[UrdfShape, ...]]:
+    """Return the shapes of every link that has some, of the kind ``collision`` or ``visual``."""
+    shapes: dict[str, tuple[UrdfShape, ...]] = {}
+    for link, text in zip(robot.links, root.iterfind("link"), strict=True):
+        where = f"{urdf}, link {link.name!r}"
+        if made := _shapes(getattr(link, f"{kind}s"), text.iterfind(kind), where):
+            shapes[link.name] = made
+    return shapes
+
+
+def _shapes(shapes: Iterable[Any], texts: Iterable[Element], where: str) -> tuple[UrdfShape, ...]:
     return tuple(
         UrdfShape(
             kind=shape.name,
             sizes=_sizes(shape.geometry),
             file="" if shape.geometry.mesh is None else shape.geometry.mesh.filename,
-            origin=_origin(shape),
+            origin=_origin(text),
             where=where,
         )
-        for shape in getattr(link, kind)
+        for shape, text in zip(shapes, texts, strict=True)
     )
 
 
@@ -156,8 +162,10 @@ def _sizes(geometry: Any) -> tuple[float, ...]:
     return (geometry.cylinder.radius, geometry.cylinder.length)
 
 
-def _origin(element: Any) -> Floats:
-    return np.eye(4) if element.origin is None else element.origin
+def _origin(text: Element) -> Floats:
+    origin = text.find("origin")
+    xyz, rpy = (numbers_of(origin, key, (0.0, 0.0, 0.0), "") for key in ("xyz", "rpy"))
+    return rpy_pose(xyz, rpy)
 
 
 def _expect_possible(joint: ModelJoint, leaders: dict[str, ModelJoint], urdf: str) -> None:
