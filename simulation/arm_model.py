@@ -2,7 +2,7 @@
 
 `kinematics.tree` says the same in double precision; experts plan with SAPIEN's model, whose poses
 are of single precision, because their recordings are equal to the last bit only so, and because it
-solves for a pose in a twentieth of the time.
+solves for a pose in a tenth of the time.
 """
 
 from __future__ import annotations
