@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from experts.geometry import Floats
+from kinematics.rotations import Floats
 from robots import JointGroup, RobotDescriptor
 
 GAIN = 2.0  # of the joint error; PhysX's drive follows about 0.4 of a target in one step

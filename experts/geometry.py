@@ -1,37 +1,18 @@
-"""Rotations that grasps are made of; quaternions are wxyz, angles rad, lengths m."""
+"""Headings and grasps as rotations; quaternions are wxyz, angles rad, lengths m."""
 
 from __future__ import annotations
 
-from math import cos, hypot, pi, sin
+from math import hypot, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-
-
-def multiply(a: Floats, b: Floats) -> Floats:
-    """Return the rotation ``b`` followed by ``a``, (4,)."""
-    w, x, y, z = a
-    left = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
-    return left @ b
-
-
-def rotate(quaternion: Floats, vector: Floats) -> Floats:
-    """Return a vector (3,) turned by a rotation."""
-    return multiply(multiply(quaternion, np.array([0.0, *vector])), inverse(quaternion))[1:]
-
-
-def inverse(quaternion: Floats) -> Floats:
-    """Return the rotation that undoes another, (4,)."""
-    return quaternion * (1.0, -1.0, -1.0, -1.0)
+from kinematics import quaternions
+from kinematics.rotations import Floats, multiply, rotate
 
 
 def turn(axis: str, angle: float) -> Floats:
     """Return the rotation by ``angle`` about ``"x"``, ``"y"`` or ``"z"``, (4,)."""
-    quaternion = np.array([cos(angle / 2), 0.0, 0.0, 0.0])
-    quaternion["xyz".index(axis) + 1] = sin(angle / 2)
-    return quaternion
+    return np.array(quaternions.turn(axis, angle))
 
 
 def backed_off(pose: tuple[Floats, Floats], distance: float) -> tuple[Floats, Floats]:

@@ -8,19 +8,9 @@ from math import pi
 
 import numpy as np
 
-from experts.geometry import (
-    Floats,
-    backed_off,
-    gripper_facing,
-    heading,
-    inverse,
-    multiply,
-    rotate,
-    squared,
-    turn,
-    yaw_of,
-)
+from experts.geometry import backed_off, gripper_facing, heading, squared, turn, yaw_of
 from experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
+from kinematics.rotations import Floats, inverse, multiply, rotate
 from robots import TaskError
 from tasks import MultiRobotTask
 

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experts.driver import ArmDriver
-from experts.geometry import Floats, heading, inverse, rotate
+from experts.geometry import heading
 from experts.script import OPEN, Pose, Scene, Script, Waypoint
+from kinematics.rotations import Floats, inverse, rotate
 from robots import TaskError, UnknownNameError
 from simulation.kinematics import InverseKinematics
 from simulation.reach import PointReach

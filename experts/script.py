@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.geometry import Floats
+from kinematics.rotations import Floats
 from simulation import State
 from tasks import MultiRobotTask
 

@@ -1,9 +1,9 @@
 """Which robots stand where: placements, presets, checks and pictures."""
 
+from kinematics.quaternions import rpy_quaternion, yaw_quaternion
 from layouts.frames import Frame, Pose, ceiling, table, wall
 from layouts.layout import Layout
 from layouts.maniskill import from_maniskill
-from layouts.orientation import rpy_quaternion, yaw_quaternion
 from layouts.placement import Placement
 from layouts.presets import around_table, face_to_face, grid, ring, side_by_side, single
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from layouts.orientation import yaw_degrees
+from kinematics.quaternions import yaw_degrees
 
 if TYPE_CHECKING:
     from layouts.layout import Layout

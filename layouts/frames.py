@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from layouts.orientation import multiplied, normalised, rotated, rpy_quaternion
+from kinematics.quaternions import multiplied, normalised, rotated, rpy_quaternion
 from robots import LayoutError, UnknownNameError
 from robots.common.bounds import FAR, as_float, checked_numbers, shown
 from robots.descriptor import IDENTITY, Quaternion, Vector3

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, TypeVar
 
+from kinematics.quaternions import yaw_quaternion
 from layouts.description import describe
 from layouts.frames import (
     ORIGIN,
@@ -19,7 +20,6 @@ from layouts.frames import (
     numbers,
     resolve,
 )
-from layouts.orientation import yaw_quaternion
 from layouts.placement import Placement, RobotLike, placed
 from robots import LayoutError, UnknownNameError
 from robots.common.bounds import FAR, checked_number, shown

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from kinematics.quaternions import inverted, multiplied, normalised
 from layouts.frames import ORIGIN, Pose, check_pose, declared_quaternion
-from layouts.orientation import inverted, multiplied, normalised
 from robots import LayoutError, RobotDescriptor, RobotRegistry
 from robots.common.bounds import as_float, shown
 from robots.descriptor import IDENTITY, Quaternion, Vector3

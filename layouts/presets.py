@@ -15,11 +15,11 @@ from inspect import signature
 from itertools import pairwise
 from typing import Literal, TypeGuard, cast
 
+from kinematics.quaternions import yaw_quaternion
 from layouts.distances import apart, centred, gaps, ring_of, share_at_table, table_for
 from layouts.frames import EDGES, check_positive
 from layouts.frames import table as table_frames
 from layouts.layout import Layout
-from layouts.orientation import yaw_quaternion
 from layouts.placement import Placement, RobotLike, check_robots, faced, load_robot
 from robots import LayoutError, RobotDescriptor, UnknownNameError
 from robots.common.bounds import checked_whole, shown

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kinematics.quaternions import forward, yaw_degrees
 from layouts.description import action_text, decimal, facing_text, headline
 from layouts.frames import table_outlines
-from layouts.orientation import forward, yaw_degrees
 from robots import LayoutError, MissingPackageError
 from robots.common.writing import written_whole
 

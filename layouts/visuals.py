@@ -11,12 +11,13 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from layouts.validation.kinematics import Floats, origin_matrix
+from kinematics.rotations import Floats
 from robots import AssetError, MissingPackageError
 from robots.urdf.mesh_files import load_scene
 from robots.urdf.numbers import numbers_of
 from robots.urdf.paths import resolve
-from robots.urdf.shapes import UrdfShape, read_shape
+from robots.urdf.reading import read_model
+from robots.urdf.shapes import UrdfShape
 from robots.urdf.summary import parse_urdf, read_urdf
 
 Rgba = tuple[float, float, float, float]  # 0 … 1
@@ -51,14 +52,16 @@ def read_visuals(urdf: Path) -> dict[str, tuple[Part, ...]]:
         MissingPackageError: If trimesh is not installed.
     """
     require_trimesh("drawing a robot")
-    root = parse_urdf(read_urdf(urdf), str(urdf))
+    contents = read_urdf(urdf)
+    root, model = parse_urdf(contents, str(urdf)), read_model(contents, str(urdf))
     colours = dict(_named_colours(root, urdf))
     drawn: dict[str, tuple[Part, ...]] = {}
     for link in root.iterfind("link"):
+        shapes = model.visuals.get(link.get("name", ""), ())
         parts = tuple(
             part
-            for visual in link.iterfind("visual")
-            for part in _visual_parts(visual, f"{urdf}, link {link.get('name')!r}", urdf, colours)
+            for shape, visual in zip(shapes, link.iterfind("visual"), strict=True)
+            for part in _visual_parts(shape, _colour(visual, urdf, colours), urdf)
         )
         if parts:
             drawn[link.get("name", "")] = parts
@@ -126,20 +129,21 @@ def _rgba(color: Element, urdf: Path) -> Rgba:
     return (red, green, blue, alpha)
 
 
-def _visual_parts(
-    visual: Element, where: str, urdf: Path, colours: Mapping[str, Rgba]
-) -> Iterator[Part]:
-    shape = read_shape(visual, where)
+def _colour(visual: Element, urdf: Path, colours: Mapping[str, Rgba]) -> Rgba | None:
+    """Return the colour that a visual has or names, or None if it has none."""
     material = visual.find("material")
-    rgba = None if material is None else colours.get(material.get("name", ""))
-    if material is not None and (color := material.find("color")) is not None:
-        rgba = _rgba(color, urdf)
-    pose = origin_matrix(shape.xyz, shape.rpy)
+    if material is None:
+        return None
+    color = material.find("color")
+    return colours.get(material.get("name", "")) if color is None else _rgba(color, urdf)
+
+
+def _visual_parts(shape: UrdfShape, rgba: Rgba | None, urdf: Path) -> Iterator[Part]:
     if shape.kind == "mesh":
-        yield from _mesh_parts(shape, urdf, pose @ np.diag([*shape.sizes, 1.0]), rgba)
+        yield from _mesh_parts(shape, urdf, shape.origin @ np.diag([*shape.sizes, 1.0]), rgba)
         return
     mesh = _primitive(shape)
-    mesh.apply_transform(pose)
+    mesh.apply_transform(shape.origin)
     yield coloured(mesh, rgba or GREY)
 
 

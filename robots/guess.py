@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import random
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from kinematics.rotations import Floats, inverse_pose, transform
+from kinematics.solve import farthest
+from kinematics.tree import Tree
 from robots.assets.locator import LocalUrdf
 from robots.common.errors import DescriptorError
 from robots.descriptor import (
@@ -18,13 +24,15 @@ from robots.descriptor import (
     RobotDescriptor,
 )
 from robots.urdf.anatomy import FARTHEST_SLIDE, Anatomy, find_anatomy
-from robots.urdf.model import ModelJoint, UrdfModel, read_model
-from robots.urdf.reach import link_frame, reach
+from robots.urdf.model import ModelJoint, UrdfModel
+from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
+from robots.urdf.tree import kinematic_tree
 
 STIFFNESS, DAMPING, FORCE = 1e3, 1e2, 100.0  # what ManiSkill gives its Panda
 STEP = 0.1  # of an arm joint, per control step (rad, m)
 SQUEEZE = 0.01  # by how much a parallel gripper is told to close beyond closed (m)
+REACH_STARTS = 8  # of the search for the largest distance
 
 
 @dataclass(frozen=True)
@@ -251,18 +259,35 @@ def _middle(joint: ModelJoint) -> float:
 
 
 def _reach(model: UrdfModel, anatomy: Anatomy, rest: dict[str, float]) -> tuple[float, str]:
-    palm = link_frame(model, anatomy.palm, rest)
-    points = anatomy.tips or (anatomy.tcp,)
-    places = [palm.of(link_frame(model, link, rest).position) for link in points]
-    x, y, z = (sum(axis) / len(places) for axis in zip(*places, strict=True))
+    tree = kinematic_tree(model)
+    start = np.array([rest.get(joint, 0.0) for joint in tree.coordinates])
+    poses = tree.forward(start[None])[0]
+    palm = tree.link(anatomy.palm)
+    tips = [tree.link(link) for link in anatomy.tips or (anatomy.tcp,)]
+    tool = transform(inverse_pose(poses[palm]), poses[tips, :3, 3]).mean(axis=0)
     moving = [joint for joint in anatomy.arm if not _flies(joint)]
-    found = reach(model, anatomy.palm, _names(moving), rest, (x, y, z))
+    starts = _postures(tree, start, moving)
+    free = [tree.coordinates.index(joint.name) for joint in moving]
+    limits = tree.limits.copy()
+    limits[free] = np.array([joint.span for joint in moving]).reshape(-1, 2)
+    found = farthest(replace(tree, limits=limits), palm, tool, starts, free)
     if found < 0.01 or len(moving) < len(anatomy.arm):
         return 1.0, "reach: 1 m, without ground, as nothing stands fixed or nothing reaches out"
     return round(found, 3), (
         "reach: the TCP's largest distance from the base's z axis within the joint limits;"
         " data sheets, which measure to the flange, give less"
     )
+
+
+def _postures(tree: Tree, rest: Floats, moving: Sequence[ModelJoint]) -> Floats:
+    """Return where the search for the reach starts: in the joints' middle, and in random places."""
+    starts = np.tile(rest, (REACH_STARTS, 1))
+    generator = random.Random(0)  # the same answer every time
+    for i, start in enumerate(starts):
+        for joint in moving:
+            position = generator.uniform(*joint.span) if i else sum(joint.span) / 2
+            start[tree.coordinates.index(joint.name)] = position
+    return starts
 
 
 def _flies(joint: ModelJoint) -> bool:

@@ -6,6 +6,8 @@ import argparse
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from robots.assets.locator import LocalUrdf, UrdfLocator
 from robots.assets.manifest import AssetFile, AssetPackage, load_manifest
 from robots.assets.progress import size
@@ -15,9 +17,10 @@ from robots.common.commands import exit_code, print_error, start
 from robots.descriptor import JointGroup, RobotDescriptor
 from robots.fetch_assets import describe_file
 from robots.registry import RobotRegistry
-from robots.urdf.model import read_model
-from robots.urdf.reach import link_frame
-from robots.urdf.summary import UrdfJoint, read_joints, read_urdf
+from robots.urdf.model import ModelJoint
+from robots.urdf.reading import read_model
+from robots.urdf.summary import read_urdf
+from robots.urdf.tree import kinematic_tree, link_index
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -113,20 +116,20 @@ def _joints(robot: RobotDescriptor, urdf: Path | None) -> Iterable[str]:
         joint: name for name, group in robot.action_split.groups.items() for joint in group.joints
     }
     rows = [("joint", "type", "limits", "effort", "speed", "driven by")]
-    for joint in read_joints(read_urdf(urdf), urdf.name):
+    for joint in read_model(read_urdf(urdf), urdf.name).moving:
         driven = groups.get(joint.name, "nothing")
         mimics = f" (URDF: mimics {joint.mimics})" if joint.mimics else ""
         rows.append((joint.name, joint.type, _limits(joint), *_bounds(joint), driven + mimics))
     return _table(rows)
 
 
-def _limits(joint: UrdfJoint) -> str:
+def _limits(joint: ModelJoint) -> str:
     if joint.lower is None or joint.upper is None:
         return "none"
     return f"{joint.lower:g} … {joint.upper:g} {joint.unit}"
 
 
-def _bounds(joint: UrdfJoint) -> tuple[str, str]:
+def _bounds(joint: ModelJoint) -> tuple[str, str]:
     force = "N" if joint.unit == "m" else "N·m"
     return (
         "none" if joint.effort is None else f"{joint.effort:g} {force}",
@@ -171,10 +174,12 @@ def _keyframes(robot: RobotDescriptor, urdf: Path | None) -> Iterator[str]:
 def _tcp_places(robot: RobotDescriptor, urdf: Path) -> dict[str, Sequence[float]]:
     """Return the TCP link's position at each keyframe, in the base frame (m)."""
     model = read_model(read_urdf(urdf), urdf.name)
-    return {
-        name: link_frame(model, robot.tcp_link, dict(zip(robot.joints, qpos, strict=True))).position
-        for name, qpos in robot.keyframes.items()
-    }
+    others = [joint.name for joint in model.moving if joint.name not in robot.joints]
+    tree = kinematic_tree(model, [*robot.joints, *others])
+    qpos = np.zeros((len(robot.keyframes), len(tree.coordinates)))
+    qpos[:, : robot.dof] = list(robot.keyframes.values())
+    places = tree.forward(qpos)[:, link_index(tree, robot.tcp_link), :3, 3]
+    return dict(zip(robot.keyframes, places.tolist(), strict=True))
 
 
 def _gripper(robot: RobotDescriptor) -> Iterator[str]:

@@ -1,4 +1,9 @@
-"""Where a robot's arm joints bring its tool centre point, by the URDF alone."""
+"""Where a robot's arm joints bring its tool centre point, by SAPIEN's own model of the robot.
+
+`kinematics.tree` says the same in double precision; experts plan with SAPIEN's model, whose poses
+are of single precision, because their recordings are equal to the last bit only so, and because it
+solves for a pose in a tenth of the time.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +11,9 @@ from typing import Any
 
 import numpy as np
 import sapien
-from numpy.typing import NDArray
 
+from kinematics.rotations import Floats
 from simulation.world import World
-
-Floats = NDArray[np.float64]
 
 
 class ArmModel:

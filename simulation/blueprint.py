@@ -19,8 +19,9 @@ from sapien.wrapper.urdf_loader import URDFLoader
 
 from robots import AssetError, RobotDescriptor
 from robots.urdf.mesh_files import load_scene, read_corners
-from robots.urdf.model import UrdfModel, read_model
+from robots.urdf.model import UrdfModel
 from robots.urdf.paths import resolve
+from robots.urdf.reading import read_model
 from robots.urdf.shapes import UrdfShape
 from robots.urdf.srdf import ExcludedPair, read_excluded_pairs
 from robots.urdf.summary import parse_urdf, read_urdf

@@ -9,11 +9,12 @@ import numpy as np
 import sapien
 from numpy.typing import NDArray
 
+from kinematics.rotations import Floats
+from kinematics.solve import nearby, nearest, turned_within
 from robots import SimulationError
 from simulation.arm_model import ArmModel
 from simulation.world import World
 
-Floats = NDArray[np.float64]
 Numbers = Sequence[float] | NDArray[np.floating[Any]]
 
 _MAX_ITERATIONS = 200  # converges in 40 … 80 where a solution exists
@@ -21,7 +22,6 @@ _STEP = 0.3  # of the way to the linearised solution, per iteration
 _DAMPING = 1e-6
 _CONVERGED = 1e-4  # norm of the pose error (m and rad together)
 _NEARBY_STARTS, _SPREAD = 16, 0.5  # number, standard deviation (rad)
-_SEED = 0  # the nearby starts are the same for every request
 
 
 class InverseKinematics:
@@ -85,11 +85,10 @@ class InverseKinematics:
                 dt=_STEP,
                 damp=_DAMPING,
             )
-            arm = self._within_limits(qpos[self._arm.index])
+            arm = turned_within(qpos[self._arm.index], self._arm.low, self._arm.high)
             if converged and arm is not None:
                 found.append(arm)
-        now = all_joints[self._arm.index]
-        return min(found, key=lambda arm: np.abs(arm - now).max(), default=None)
+        return nearest(found, all_joints[self._arm.index])
 
     def forward(self, arm_qpos: Numbers) -> tuple[Floats, Floats]:
         """Return where arm joints bring the TCP: position (3,) (m) and quaternion (4,) wxyz, world.
@@ -102,15 +101,4 @@ class InverseKinematics:
     def _starts(self, qpos: Floats) -> Iterator[Floats]:
         yield qpos
         yield from self._keyframes
-        random = np.random.default_rng(_SEED)
-        for _ in range(_NEARBY_STARTS):
-            start = qpos.copy()
-            start[self._arm.index] += random.normal(0, _SPREAD, len(self.joints))
-            yield start
-
-    def _within_limits(self, arm: Floats) -> Floats | None:
-        """Turn joints by whole turns into their limits, or return None."""
-        low, high = self._arm.low, self._arm.high
-        turns = np.ceil((low - arm) / (2 * np.pi))
-        arm = np.where((arm < low) | (arm > high), arm + turns * 2 * np.pi, arm)
-        return arm if ((arm >= low) & (arm <= high)).all() else None
+        yield from nearby(qpos, self._arm.index, _NEARBY_STARTS, _SPREAD)

@@ -5,17 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from kinematics.rotations import Floats
+from kinematics.solve import descend_by_differences
 from robots import UnknownNameError
 from simulation.arm_model import ArmModel
 from simulation.world import World
 
-Floats = NDArray[np.float64]
-
-_MAX_ITERATIONS = 40
-_DIFFERENCE = 1e-4  # of a joint, for the derivative (rad)
-_LONGEST_STEP = 0.3  # of a joint, per iteration (rad)
 _CONVERGED = 1e-3  # m
 _SHORT_WAY, _LONG_WAY = 0.001, 0.5  # m of error that a joint's way of so many rad is worth
 
@@ -88,18 +84,7 @@ class PointReach:
             way = _SHORT_WAY * ((arm - start)[free] / _LONG_WAY) ** 3  # the longest counts most
             return np.concatenate([self.place_of(point, arm) - place, way])
 
-        arm = start.astype(float)
-        for _ in range(_MAX_ITERATIONS):
-            error = errors(arm)
-            slopes = np.zeros((len(error), len(free)))
-            for column, joint in enumerate(free):
-                moved = arm.copy()
-                moved[joint] += _DIFFERENCE
-                slopes[:, column] = (errors(moved) - error) / _DIFFERENCE
-            step = np.linalg.lstsq(slopes, -error, rcond=None)[0]
-            arm[free] += np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
-            if np.abs(step).max() < _DIFFERENCE:
-                break
+        arm = descend_by_differences(errors, start, free)
         arm = np.clip(arm, self._model.low, self._model.high)
         away = np.linalg.norm(self.place_of(point, arm) - place)
         return arm if away < _CONVERGED else None

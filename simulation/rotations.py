@@ -1,4 +1,8 @@
-"""Rotation matrices and angles of quaternions, with the operations of native's helpers."""
+"""Rotation matrices and angles of quaternions, with the operations of native's helpers.
+
+Their order decides the last bits of observations and rewards, so they stand apart from
+`kinematics.rotations`.
+"""
 
 from __future__ import annotations
 

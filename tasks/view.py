@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinematics.rotations import Floats, pose_matrix
 from layouts.viewer import Cell, Motion, Thing
 from layouts.visuals import Part, coloured, load_meshes
 from robots import TaskError
-from robots.descriptor import Quaternion
 from simulation import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
 from simulation.world import World
 from tasks.engine.task import MultiRobotTask
@@ -19,8 +19,6 @@ from tasks.native.format import articulation_keys
 
 PLANE_SIZE = 6.0  # m, of what is drawn of an infinite plane
 ROOT = 13  # numbers of a row before the joints: the root's pose and velocities
-
-Floats = NDArray[np.float64]
 
 
 def task_cell(task: MultiRobotTask, title: str, motion: Motion | None = None) -> Cell:
@@ -89,8 +87,7 @@ def body_parts(shapes: tuple[Shape, ...]) -> tuple[Part, ...]:
 
 
 def _parts(shape: Shape) -> list[Part]:
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = _rotation(shape.quaternion), shape.position
+    pose = pose_matrix(shape.position, shape.quaternion)
     meshes = _meshes(shape)
     for mesh in meshes:
         mesh.apply_transform(pose)
@@ -122,9 +119,3 @@ def _meshes(shape: Shape) -> list[Any]:
             return [mesh.apply_scale(shape.scale) for mesh in meshes]
         case _:
             raise TypeError(f"no picture for {type(shape).__name__}")
-
-
-def _rotation(quaternion: Quaternion) -> Floats:
-    from trimesh.transformations import quaternion_matrix
-
-    return quaternion_matrix(quaternion)[:3, :3]

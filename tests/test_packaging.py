@@ -17,6 +17,7 @@ else:
 
 ROOT = Path(__file__).parent.parent
 ROOMS = (
+    "kinematics",
     "robots",
     "layouts",
     "simulation",
@@ -118,7 +119,9 @@ class TestDependencies:
         used = {module for room in ROOMS for module in imports_of(room, everywhere=True)}
         assert distributions(used) <= declared
 
-    @pytest.mark.parametrize("room", ["robots", "layouts", "simulation", "tasks", "rollouts"])
+    @pytest.mark.parametrize(
+        "room", ["kinematics", "robots", "layouts", "simulation", "tasks", "rollouts"]
+    )
     def test_importing_a_room_needs_no_extra(self, room):
         assert distributions(imports_of(room, everywhere=False)) <= names_of(
             PROJECT["dependencies"]

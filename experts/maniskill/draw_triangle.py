@@ -8,9 +8,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.geometry import Floats, gripper_facing, rotate, turn, yaw_of
+from experts.geometry import gripper_facing, turn, yaw_of
 from experts.rehearsal import first_success
 from experts.script import Pose, Scene, Script, Waypoint
+from kinematics.rotations import Floats, rotate
 from tasks import MultiRobotTask
 from tasks.maniskill.draw_triangle import CANVAS_TOP, SIDE
 

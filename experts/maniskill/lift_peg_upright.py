@@ -9,10 +9,11 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.geometry import Floats, backed_off, gripper_facing, heading, rotate
+from experts.geometry import backed_off, gripper_facing, heading
 from experts.grasps import need_fingers
 from experts.rehearsal import first_success
 from experts.script import OPEN, Pose, Scene, Script, Waypoint
+from kinematics.rotations import Floats, rotate
 from tasks import MultiRobotTask
 from tasks.maniskill.lift_peg_upright import PEG_HALF_LENGTH
 

@@ -12,10 +12,11 @@ from math import pi, radians
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.geometry import Floats, backed_off, gripper_facing, rotate, yaw_of
+from experts.geometry import backed_off, gripper_facing, yaw_of
 from experts.grasps import bringing, need_fingers
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
+from kinematics.rotations import Floats, rotate
 from tasks import MultiRobotTask
 from tasks.maniskill.peg_insertion_side import INSERTED, PegDesign
 

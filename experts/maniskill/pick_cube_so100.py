@@ -14,10 +14,11 @@ from math import cos, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.geometry import Floats, nearest_quarter_turn, yaw_of
+from experts.geometry import nearest_quarter_turn, yaw_of
 from experts.grasps import need_fingers
 from experts.rehearsal import Attempt, Rehearsal, search
 from experts.script import Scene, Script, Waypoint
+from kinematics.rotations import Floats
 from robots import TaskError
 from simulation.reach import PointReach
 from tasks import MultiRobotTask

@@ -9,18 +9,11 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.geometry import (
-    Floats,
-    backed_off,
-    gripper_facing,
-    heading,
-    multiply,
-    turn,
-    yaw_of,
-)
+from experts.geometry import backed_off, gripper_facing, heading, turn, yaw_of
 from experts.grasps import holding, need_fingers
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
+from kinematics.rotations import Floats, multiply
 from tasks import MultiRobotTask
 from tasks.maniskill.poke_cube import CUBE_HALF_SIZE, PEG_HALF_LENGTH, PEG_HALF_WIDTH
 

@@ -10,20 +10,11 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.geometry import (
-    Floats,
-    backed_off,
-    gripper_facing,
-    heading,
-    multiply,
-    planar_distance,
-    rotate,
-    turn,
-    yaw_of,
-)
+from experts.geometry import backed_off, gripper_facing, heading, planar_distance, turn, yaw_of
 from experts.grasps import holding, need_fingers
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
+from kinematics.rotations import Floats, multiply, rotate
 from tasks import MultiRobotTask
 from tasks.maniskill.pull_cube_tool import (
     CUBE_HALF_SIZE,

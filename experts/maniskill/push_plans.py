@@ -8,8 +8,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.geometry import Floats
 from experts.maniskill.sliding import SlidingBody
+from kinematics.rotations import Floats
 
 PUSHES, STROKES = 2, 2  # of a plan; strokes of one push share their contact
 STEEPEST = np.radians(48)  # force off the normal; friction of 1.65 would hold 59°

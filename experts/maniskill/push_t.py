@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experts.driver import ArmDriver
-from experts.geometry import Floats, gripper_facing, heading, yaw_of
+from experts.geometry import gripper_facing, heading, yaw_of
 from experts.maniskill.push_plans import APPROACH, Push, PushPlanner, Situation
 from experts.maniskill.sliding import SlidingBody, to_body
 from experts.rehearsal import Attempt, Rehearsal, search
 from experts.script import OPEN, Scene
+from kinematics.rotations import Floats
 from simulation.kinematics import InverseKinematics
 from tasks import MultiRobotTask
 from tasks.maniskill.push_t import BAR_HALF_SIZE, CENTRE_OF_MASS_Y, STEM_HALF_SIZE

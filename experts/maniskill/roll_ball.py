@@ -10,16 +10,10 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.geometry import (
-    Floats,
-    gripper_facing,
-    heading,
-    multiply,
-    planar_distance,
-    turn,
-)
+from experts.geometry import gripper_facing, heading, planar_distance, turn
 from experts.rehearsal import Attempt, Rehearsal, search
 from experts.script import CLOSED, Pose, Scene, Script, Waypoint
+from kinematics.rotations import Floats, multiply
 from simulation.kinematics import InverseKinematics
 from tasks import MultiRobotTask
 

@@ -9,9 +9,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.geometry import Floats, gripper_facing, heading
+from experts.geometry import gripper_facing, heading
 from experts.rehearsal import first_success
 from experts.script import CLOSED, Pose, Scene, Script, Waypoint
+from kinematics.rotations import Floats
 from tasks import MultiRobotTask
 
 ARM, CUBE, TARGET = "arm", "cube", "goal_region"

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experts.geometry import Floats
+from kinematics.rotations import Floats
 
 SUBSTEPS = 6  # of each stroke
 

@@ -11,7 +11,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.geometry import Floats, backed_off, gripper_facing, yaw_of
+from experts.geometry import backed_off, gripper_facing, yaw_of
 from experts.grasps import (
     QUARTERS,
     YAWS,
@@ -24,6 +24,7 @@ from experts.grasps import (
 )
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
+from kinematics.rotations import Floats
 from tasks import MultiRobotTask
 from tasks.maniskill.stack_pyramid import CUBE_HALF_SIZE
 

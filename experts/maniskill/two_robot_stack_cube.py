@@ -10,7 +10,7 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.geometry import Floats, backed_off
+from experts.geometry import backed_off
 from experts.grasps import (
     YAWS,
     cube_grip_from,
@@ -22,6 +22,7 @@ from experts.grasps import (
 )
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
+from kinematics.rotations import Floats
 from tasks import MultiRobotTask
 from tasks.maniskill.two_robot_stack_cube import CUBE_HALF_SIZE
 

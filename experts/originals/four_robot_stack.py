@@ -10,10 +10,11 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.geometry import Floats, backed_off
+from experts.geometry import backed_off
 from experts.grasps import YAWS, cube_grip_from, held_at, need_fingers, pick
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
+from kinematics.rotations import Floats
 from tasks import MultiRobotTask
 from tasks.originals.four_robot_stack import CUBE_HALF_SIZE, ORDER
 

@@ -10,9 +10,10 @@ from math import copysign, pi, radians, remainder
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.geometry import Floats, gripper_facing, heading, planar_distance
+from experts.geometry import gripper_facing, heading, planar_distance
 from experts.rehearsal import first_success
 from experts.script import CLOSED, Pose, Scene, Script, Waypoint
+from kinematics.rotations import Floats
 from layouts import Placement
 from tasks import MultiRobotTask
 from tasks.originals.relay import find_zones

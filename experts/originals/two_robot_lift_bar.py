@@ -9,10 +9,11 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.geometry import gripper_facing, rotate, turn, yaw_of
+from experts.geometry import gripper_facing, turn, yaw_of
 from experts.grasps import bringing, need_fingers, pick
 from experts.rehearsal import first_success
 from experts.script import CLOSED, Pose, Scene, Script, Waypoint
+from kinematics.rotations import rotate
 from tasks import MultiRobotTask
 from tasks.originals.two_robot_lift_bar import GRIP, HALF_THICKNESS, HEIGHT
 

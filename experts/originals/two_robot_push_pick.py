@@ -9,10 +9,11 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.geometry import Floats, gripper_facing, heading
+from experts.geometry import gripper_facing, heading
 from experts.grasps import cube_grips, held_at, need_fingers, pick
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
+from kinematics.rotations import Floats
 from tasks import MultiRobotTask
 
 PUSHER, PICKER, CUBE, GOAL = "pusher", "picker", "cube", "goal_site"

@@ -12,7 +12,8 @@ from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
 import yaml
 
-from layouts.export.urdf import base_link, rpy
+from kinematics.quaternions import quaternion_rpy
+from layouts.export.urdf import base_link
 from layouts.visuals import Part, load_meshes, read_visuals, require_trimesh, simplified
 from robots import LayoutError, RobotDescriptor
 from robots.common.writing import write_whole, written_whole
@@ -67,7 +68,7 @@ def _directives(place: str, placement: Placement, urdf: Path) -> Iterator[dict[s
             "default_joint_positions": {joint: [float(value)] for joint, value in start},
         }
     }
-    turn = [math.degrees(angle) for angle in rpy(placement.base_quaternion)]
+    turn = [math.degrees(angle) for angle in quaternion_rpy(placement.base_quaternion)]
     yield {
         "add_weld": {
             "parent": "world",

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
+from kinematics.quaternions import quaternion_rpy
 from robots import LayoutError
 from robots.common.writing import written_whole
-from robots.descriptor import Quaternion, Vector3
-from robots.urdf.model import read_model
+from robots.descriptor import Vector3
 from robots.urdf.paths import resolve
+from robots.urdf.reading import read_model
 from robots.urdf.srdf import srdf_beside
 from robots.urdf.summary import parse_urdf, read_urdf
 
@@ -58,26 +58,11 @@ def base_link(file: Path) -> str:
     return read_model(read_urdf(file), str(file)).root
 
 
-def rpy(quaternion: Quaternion) -> Vector3:
-    """Return roll, pitch and yaw (rad) of a rotation (wxyz, unit length), as a URDF means them.
-
-    Where the pitch is a right angle, only roll ± yaw matters, and the roll is 0.
-    """
-    w, x, y, z = quaternion
-    cos_yaw, sin_yaw = 1 - 2 * (y * y + z * z), 2 * (x * y + w * z)  # times cos(pitch)
-    cos_pitch = math.hypot(cos_yaw, sin_yaw)
-    pitch = math.atan2(2 * (w * y - x * z), cos_pitch)
-    if cos_pitch < 1e-7:
-        return (0.0, pitch, math.atan2(2 * (w * z - x * y), 1 - 2 * (x * x + z * z)))
-    roll = math.atan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
-    return (roll, pitch, math.atan2(sin_yaw, cos_yaw))
-
-
 def _fixed_to_world(place: str, placement: Placement, file: Path) -> Element:
     joint = Element("joint", name=f"{place}/base", type="fixed")
     SubElement(joint, "parent", link=WORLD)
     SubElement(joint, "child", link=f"{place}/{base_link(file)}")
-    turn = rpy(placement.base_quaternion)
+    turn = quaternion_rpy(placement.base_quaternion)
     SubElement(joint, "origin", xyz=_text(placement.base_position), rpy=_text(turn))
     return joint
 

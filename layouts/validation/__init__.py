@@ -1,14 +1,14 @@
 """Checks of a layout before anything moves, from the robots' real collision shapes."""
 
 from layouts.validation.check import validate
-from layouts.validation.report import (
+from layouts.validation.findings import (
     Clearance,
     Finding,
     LinkPair,
-    Report,
     SharedWorkspace,
     TargetReach,
 )
+from layouts.validation.report import Report
 
 __all__ = [
     "Clearance",

@@ -12,14 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from layouts.validation.kinematics import Floats, Kinematics, origin_matrix
+from kinematics.rotations import Floats
+from kinematics.tree import Tree
 from robots import AssetError, MissingPackageError, RobotDescriptor
 from robots.urdf.mesh_files import has_volume, read_corners
-from robots.urdf.model import read_model
 from robots.urdf.paths import resolve
+from robots.urdf.reading import read_model
 from robots.urdf.shapes import UrdfShape
 from robots.urdf.srdf import read_excluded_pairs
 from robots.urdf.summary import read_urdf
+from robots.urdf.tree import kinematic_tree
 
 SIDES = 32  # of the polygon that stands for a circle; 0.5 % of the radius is lost
 
@@ -50,7 +52,7 @@ class RobotModel:
             each other, and the SRDF beside the URDF does not excuse them.
     """
 
-    kinematics: Kinematics
+    kinematics: Tree
     hulls: tuple[Hull, ...]
     self_pairs: tuple[tuple[int, int], ...]
 
@@ -104,7 +106,7 @@ def slab_hull(top: Floats, depth: float, name: str) -> Hull:
 @lru_cache(maxsize=64)
 def _load(urdf: Path, joints: tuple[str, ...], _modified: int) -> RobotModel:
     model = read_model(read_urdf(urdf), str(urdf))
-    kinematics = Kinematics(model, joints)
+    kinematics = kinematic_tree(model, joints)
     hulls = tuple(
         _shape_hull(kinematics.link(link), shape, urdf)
         for link in model.links
@@ -119,7 +121,7 @@ def _load(urdf: Path, joints: tuple[str, ...], _modified: int) -> RobotModel:
     return RobotModel(kinematics, hulls, pairs)
 
 
-def _may_touch(kinematics: Kinematics, one: int, other: int, excused: set[frozenset[str]]) -> bool:
+def _may_touch(kinematics: Tree, one: int, other: int, excused: set[frozenset[str]]) -> bool:
     """Tell whether two links can move into each other, and it would matter."""
     first, second = kinematics.bodies[one], kinematics.bodies[other]
     adjacent = kinematics.carrier(first) == second or kinematics.carrier(second) == first
@@ -128,8 +130,7 @@ def _may_touch(kinematics: Kinematics, one: int, other: int, excused: set[frozen
 
 
 def _shape_hull(link: int, shape: UrdfShape, urdf: Path) -> Hull:
-    pose = origin_matrix(shape.xyz, shape.rpy)
-    corners = _corners(shape, urdf) @ pose[:3, :3].T + pose[:3, 3]
+    corners = _corners(shape, urdf) @ shape.origin[:3, :3].T + shape.origin[:3, 3]
     return _hull(link, corners, shape.where)
 
 

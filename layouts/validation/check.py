@@ -9,6 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
+from kinematics.rotations import Floats
 from layouts.frames import table_outlines
 from layouts.layout import Layout
 from layouts.placement import Placement
@@ -29,20 +30,19 @@ from layouts.validation.collisions import (
     stand,
     touching,
 )
-from layouts.validation.kinematics import Floats
-from layouts.validation.reach import Reach, Solution, Workspace
-from layouts.validation.report import (
+from layouts.validation.findings import (
     Clearance,
     Finding,
     LinkPair,
     Point,
-    Report,
     SharedWorkspace,
     TargetReach,
     length_text,
     links_text,
     reach_text,
 )
+from layouts.validation.reach import Reach, Solution, Workspace
+from layouts.validation.report import Report
 from robots import LayoutError
 from robots.common.commands import notice
 

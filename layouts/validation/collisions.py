@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinematics.rotations import Floats, pose_matrix
 from layouts import Placement
 from layouts.validation.bodies import Hull, RobotModel
-from layouts.validation.kinematics import Floats, pose_matrix
 
 Pairs = NDArray[np.intp]  # (n, 2): indices of hulls
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kinematics.rotations import Floats
 from layouts.description import decimal, headline
 from layouts.preview import COLOURS, FAINT, INK, LONGEST_NAME, SUPPORTED, TABLE, blank_figure
-from layouts.validation.kinematics import Floats
-from layouts.validation.report import Clearance, Report, length_text
+from layouts.validation.findings import Clearance, Results, length_text
 from robots import LayoutError
 from robots.common.writing import written_whole
 
@@ -27,7 +27,7 @@ GAP = 10  # points, between what is drawn and its name
 SHOWN_FINDINGS = 3
 
 
-def save_picture(report: Report, path: str | os.PathLike[str]) -> Path:
+def save_picture(report: Results, path: str | os.PathLike[str]) -> Path:
     """Draw a report and save the picture, whole or not at all; see `Report.picture`."""
     target = Path(path)
     if target.suffix.lower() not in SUPPORTED:
@@ -41,7 +41,7 @@ def save_picture(report: Report, path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def draw(report: Report) -> Figure:
+def draw(report: Results) -> Figure:
     """Return the figure that `save_picture` saves.
 
     Raises:
@@ -66,7 +66,7 @@ def draw(report: Report) -> Figure:
     return figure
 
 
-def _draw_tables(plan: Axes, report: Report) -> None:
+def _draw_tables(plan: Axes, report: Results) -> None:
     from matplotlib.patches import Polygon
 
     for corners in report.tables.values():
@@ -74,7 +74,7 @@ def _draw_tables(plan: Axes, report: Report) -> None:
         plan.add_patch(Polygon(outline, facecolor=TABLE, edgecolor="#C9B99B", zorder=0.5))
 
 
-def _draw_robot(plan: Axes, report: Report, index: int, name: str) -> None:
+def _draw_robot(plan: Axes, report: Results, index: int, name: str) -> None:
     """Draw each hull's outline from above, the base, and the name below it."""
     from matplotlib.patches import Polygon
 
@@ -89,7 +89,7 @@ def _draw_robot(plan: Axes, report: Report, index: int, name: str) -> None:
     _write(plan, place, behind, _shortened(name, LONGEST_NAME), colour, size=11, weight="bold")
 
 
-def _behind(report: Report, name: str) -> tuple[Floats, Floats]:
+def _behind(report: Results, name: str) -> tuple[Floats, Floats]:
     """Return the end of a robot's back (m), and the direction from its base to there."""
     base = np.array(report.layout[name].base_position[:2])
     corners = np.array([c[:2] for hull in report.outlines[name] for c in hull]) - base
@@ -99,7 +99,7 @@ def _behind(report: Report, name: str) -> tuple[Floats, Floats]:
     return base + behind * float((corners @ behind).max()), behind
 
 
-def _nearest_neighbours(report: Report) -> list[Clearance]:
+def _nearest_neighbours(report: Results) -> list[Clearance]:
     """Return, without repetition, the least clearance that each robot has from another."""
     chosen: list[Clearance] = []
     for name in report.layout:
@@ -123,7 +123,7 @@ def _draw_clearance(plan: Axes, clearance: Clearance, centre: Floats) -> None:
     _write(plan, middle, beside, length_text(clearance.distance), colour, size=9)
 
 
-def _draw_overlaps(plan: Axes, report: Report) -> None:
+def _draw_overlaps(plan: Axes, report: Results) -> None:
     for finding in report.findings:
         for number, pair in enumerate(finding.links):
             x, y, _ = pair.point
@@ -140,7 +140,7 @@ def _draw_overlaps(plan: Axes, report: Report) -> None:
             )
 
 
-def _draw_target(plan: Axes, report: Report, name: str, position: tuple[float, ...]) -> None:
+def _draw_target(plan: Axes, report: Results, name: str, position: tuple[float, ...]) -> None:
     told = [reach for reach in report.reaches if reach.target == name]
     reached = any(reach.reached for reach in told)
     colour = GOOD if reached else BAD
@@ -181,7 +181,7 @@ def _write(
     )
 
 
-def _frame(plan: Axes, report: Report) -> None:
+def _frame(plan: Axes, report: Results) -> None:
     """Show robots and targets with a margin, to scale, under a title with the verdict."""
     points = [corner[:2] for hulls in report.outlines.values() for hull in hulls for corner in hull]
     points += [position[:2] for position in report.targets.values()]
@@ -207,7 +207,7 @@ def _frame(plan: Axes, report: Report) -> None:
         spine.set_color("#BBBBBB")
 
 
-def _captions(report: Report) -> list[tuple[str, str]]:
+def _captions(report: Results) -> list[tuple[str, str]]:
     """Return the first findings and what the marks mean, each with its colour."""
     lines = [
         (_shortened(finding.what), BAD if finding.serious else NARROW)

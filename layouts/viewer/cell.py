@@ -8,10 +8,10 @@ from itertools import combinations
 
 import numpy as np
 
+from kinematics.rotations import Floats
 from layouts.layout import Layout
 from layouts.validation.bodies import RobotModel, load_model
 from layouts.validation.collisions import stand, touching
-from layouts.validation.kinematics import Floats
 from layouts.viewer.text import printable
 from layouts.visuals import Part, read_visuals
 from robots import AssetError, LayoutError

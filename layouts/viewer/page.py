@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from layouts.validation.kinematics import Floats
+from kinematics.rotations import Floats
 from layouts.viewer.cell import Cell, Contact
 from layouts.viewer.guard import is_loopback
 from layouts.viewer.scene import OVERLAYS, Scene

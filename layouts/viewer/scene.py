@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from kinematics.rotations import Floats, quaternion_of
 from layouts.frames import table_outlines
 from layouts.preview import COLOURS
-from layouts.validation.kinematics import Floats
 from layouts.viewer.cell import Cell, Contact
 from layouts.viewer.text import node
 from layouts.visuals import Part, simplified
+from robots.urdf.tree import link_index
 
 # What can be shown and hidden, and whether it is shown at first.
 OVERLAYS: Mapping[str, bool] = {
@@ -131,7 +132,7 @@ class Scene:
     def _draw_frames(self, name: str) -> None:
         kinematics = self._cell.models[name].kinematics
         robot = self._cell.layout[name].robot
-        bodies = sorted({*kinematics.bodies, kinematics.link(robot.tcp_link)})
+        bodies = sorted({*kinematics.bodies, link_index(kinematics, robot.tcp_link)})
         for link in bodies:
             length = robot.reach * (BASE_FRAME_LENGTH if link == 0 else FRAME_LENGTH)
             handle = self._api.add_frame(
@@ -212,9 +213,7 @@ def _joined(hulls: Sequence[Floats]) -> tuple[Any, Any]:
 
 
 def _wxyz(rotation: Floats) -> tuple[float, ...]:
-    from scipy.spatial.transform import Rotation
-
-    x, y, z, w = Rotation.from_matrix(rotation).as_quat().tolist()
+    w, x, y, z = quaternion_of(rotation).tolist()
     return (w, x, y, z)
 
 

@@ -78,10 +78,10 @@ class LocalUrdf:
 
         Raises:
             AssetError: If the URDF or a mesh is missing, it describes no robot (see
-                `robots.urdf.model.read_model`), or refers to files that it may not refer to (see
+                `robots.urdf.reading.read_model`), or refers to files that it may not refer to (see
                 `robots.urdf.paths`).
         """
-        from robots.urdf.model import read_model
+        from robots.urdf.reading import read_model
         from robots.urdf.summary import read_references, read_urdf
 
         path = Path(self.path).expanduser().absolute()

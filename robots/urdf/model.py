@@ -1,27 +1,20 @@
-"""The links and joints of a URDF as a tree, refused in clear words if they are none."""
+"""The links and joints of a robot, as its URDF gives them."""
 
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from xml.etree import ElementTree
+from typing import TYPE_CHECKING
 
-from robots.common.errors import AssetError, closest_match
-from robots.urdf.inertia import expect_inertia
-from robots.urdf.numbers import Vector3, numbers_of, shown
-from robots.urdf.shapes import UrdfShape, read_shape
-from robots.urdf.summary import parse_urdf, read_joint
+from robots.urdf.shapes import UrdfShape
 
-MAX_LINKS = 255  # of an articulation in PhysX 5, tried: with one more it has no joints, or crashes
-LONGEST_NAME = 200  # characters
-JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-DRIVEN_TYPES = ("revolute", "continuous", "prismatic")
+if TYPE_CHECKING:
+    from kinematics.rotations import Floats
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ModelJoint:
     """A joint of any type.
 
@@ -30,12 +23,12 @@ class ModelJoint:
         type: ``revolute``, ``continuous``, ``prismatic``, ``fixed``, …
         parent: Link that carries it.
         child: Link that it carries.
-        xyz: Place of the joint in the parent link's frame (m).
-        rpy: Its orientation there, fixed-axis roll, pitch, yaw (rad).
+        origin: Pose of the joint in the parent link's frame, (4, 4) (m).
         axis: Axis of motion in the joint's frame, of length 1.
         lower: Lower limit (rad or m), or None if it has none.
         upper: Upper limit (rad or m), or None if it has none.
         effort: Largest effort (N·m or N), or None.
+        velocity: Largest speed (rad/s or m/s), or None.
         mimics: Joint that it follows, or None.
         multiplier: Factor from that joint's position to this one's.
         offset: Added to it (rad or m).
@@ -45,13 +38,13 @@ class ModelJoint:
     type: str
     parent: str
     child: str
-    xyz: Vector3 = (0.0, 0.0, 0.0)
-    rpy: Vector3 = (0.0, 0.0, 0.0)
-    axis: Vector3 = (1.0, 0.0, 0.0)
-    lower: float | None = None
-    upper: float | None = None
-    effort: float | None = None
-    mimics: str | None = None
+    origin: Floats
+    axis: tuple[float, float, float]
+    lower: float | None
+    upper: float | None
+    effort: float | None
+    velocity: float | None
+    mimics: str | None
     multiplier: float = 1.0
     offset: float = 0.0
 
@@ -73,7 +66,7 @@ class ModelJoint:
         return (self.lower, self.upper)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class UrdfModel:
     """The tree of links and joints.
 
@@ -165,172 +158,3 @@ class UrdfModel:
         for near in found:
             found += self.moving_on(near.child)
         return tuple(found)
-
-
-def read_model(xml: bytes, urdf: str) -> UrdfModel:
-    """Return the tree that a URDF describes.
-
-    Args:
-        xml: The URDF's contents.
-        urdf: Its path, for messages.
-
-    Raises:
-        AssetError: If it is no URDF, it has more links than PhysX can join, names are missing,
-            repeated or unknown, its joints make no tree or have impossible limits, a link that
-            moves has no mass or inertia, or a shape has no size or is of no known kind.
-    """
-    root = parse_urdf(xml, urdf)
-    elements = root.findall("link")
-    links = tuple(link.get("name", "") for link in elements)
-    _expect_few(urdf, len(links))
-    _expect_names(urdf, "link", links)
-    _expect_names(urdf, "joint", [joint.get("name", "") for joint in root.iterfind("joint")])
-    joints = tuple(_read(joint, urdf) for joint in root.iterfind("joint"))
-    shapes = [dict(_shapes(elements, kind, urdf)) for kind in ("collision", "visual")]
-    model = UrdfModel(root.get("name", ""), links, joints, *shapes)
-    _expect_tree(model, urdf)
-    leaders = {joint.name: joint for joint in model.moving}
-    for joint in model.moving:
-        _expect_possible(joint, leaders, urdf)
-    moved = {joint.child for joint in model.moving}
-    for link in elements:
-        where = f"{urdf}: link {link.get('name')!r}"
-        expect_inertia(link, where, moves=link.get("name") in moved)
-    return model
-
-
-def _expect_few(urdf: str, links: int) -> None:
-    if links > MAX_LINKS:
-        raise AssetError(
-            f"{urdf} has {links} links; PhysX joins {MAX_LINKS} at most. Links that are fixed to"
-            " each other can be made one"
-        )
-
-
-def _shapes(
-    links: Iterable[ElementTree.Element], kind: str, urdf: str
-) -> Iterable[tuple[str, tuple[UrdfShape, ...]]]:
-    for link in links:
-        where = f"{urdf}, link {link.get('name')!r}"
-        if shapes := tuple(read_shape(element, where) for element in link.iterfind(kind)):
-            yield link.get("name", ""), shapes
-
-
-def _read(element: ElementTree.Element, urdf: str) -> ModelJoint:
-    about = read_joint(element, urdf)
-    origin, axis, mimic = (element.find(part) for part in ("origin", "axis", "mimic"))
-    where = f"{urdf}: joint {about.name!r}"
-    dynamics = element.find("dynamics")
-    for key in ("damping", "friction"):
-        numbers_of(dynamics, key, (0.0,), where)
-    return ModelJoint(
-        name=about.name,
-        type=about.type,
-        parent=_link_of(element, "parent"),
-        child=_link_of(element, "child"),
-        xyz=numbers_of(origin, "xyz", (0.0, 0.0, 0.0), where),
-        rpy=numbers_of(origin, "rpy", (0.0, 0.0, 0.0), where),
-        axis=_unit_axis(numbers_of(axis, "xyz", (1.0, 0.0, 0.0), where), about.type, where),
-        lower=about.lower,
-        upper=about.upper,
-        effort=about.effort,
-        mimics=about.mimics,
-        multiplier=numbers_of(mimic, "multiplier", (1.0,), where)[0],
-        offset=numbers_of(mimic, "offset", (0.0,), where)[0],
-    )
-
-
-def _link_of(joint: ElementTree.Element, part: str) -> str:
-    element = joint.find(part)
-    return "" if element is None else element.get("link", "")
-
-
-def _unit_axis(axis: Vector3, kind: str, where: str) -> Vector3:
-    length = math.hypot(*axis)
-    if length == 0 and kind != "fixed":
-        raise AssetError(f"{where} has the axis 0 0 0; an axis needs a direction")
-    x, y, z = (number / (length or 1.0) for number in axis)
-    return (x, y, z)
-
-
-def _expect_names(urdf: str, kind: str, found: Iterable[str]) -> None:
-    counts = Counter(found)
-    if "" in counts:
-        raise AssetError(f"{urdf} has a {kind} without a name")
-    for name in counts:
-        if not name.isprintable() or len(name) > LONGEST_NAME:
-            raise AssetError(
-                f"{urdf} has a {kind} called {shown(name)}; names have at most {LONGEST_NAME}"
-                " characters, all of them printable"
-            )
-    twice = sorted(name for name, count in counts.items() if count > 1)
-    if twice:
-        raise AssetError(
-            f"{urdf} has more than one {kind} called {', '.join(map(repr, twice))};"
-            f" every {kind} needs a name of its own"
-        )
-
-
-def _expect_tree(model: UrdfModel, urdf: str) -> None:
-    if not model.links:
-        raise AssetError(f"{urdf} has no link")
-    known = set(model.links)
-    for joint in model.joints:
-        for part in (joint.parent, joint.child):
-            if part not in known:
-                raise AssetError(f"{urdf}: joint {joint.name!r} names {_unknown_link(part, model)}")
-    carried = Counter(joint.child for joint in model.joints)
-    twice = sorted(link for link, count in carried.items() if count > 1)
-    if twice:
-        raise AssetError(
-            f"{urdf}: more than one joint carries the link {twice[0]!r}; a URDF is a tree"
-        )
-    roots = [link for link in model.links if link not in carried]
-    if len(roots) != 1:
-        what = f"links {roots} are" if roots else "no link is"
-        raise AssetError(f"{urdf}: {what} without a joint that carries it; a tree has one root")
-    reached = {model.root}
-    for _ in model.joints:
-        reached |= {joint.child for joint in model.joints if joint.parent in reached}
-    lost = [link for link in model.links if link not in reached]
-    if lost:
-        raise AssetError(f"{urdf}: the joints of links {lost} go in a circle")
-
-
-def _unknown_link(name: str, model: UrdfModel) -> str:
-    match = closest_match(name, model.links)
-    return f"the link {shown(name)}, which does not exist" + (
-        f"; did you mean {match!r}?" if match else ""
-    )
-
-
-def _expect_possible(joint: ModelJoint, leaders: dict[str, ModelJoint], urdf: str) -> None:
-    where = f"{urdf}: joint {joint.name!r}"
-    if joint.type not in DRIVEN_TYPES:
-        known = ", ".join(JOINT_TYPES)
-        more = "" if joint.type in JOINT_TYPES else f" (the types are {known})"
-        raise AssetError(
-            f"{where} is {shown(joint.type)}{more}; only revolute, continuous, prismatic and fixed"
-            " joints can be driven or left alone"
-        )
-    if joint.lower is not None and joint.upper is not None and not joint.lower < joint.upper:
-        raise AssetError(
-            f"{where} has the limits {joint.lower:g} … {joint.upper:g} {joint.unit}, which leave"
-            " no way to go; give it <limit lower= upper=>, or make it continuous or fixed"
-        )
-    if joint.mimics is not None:
-        if joint.mimics not in leaders:
-            raise AssetError(f"{where} mimics {shown(joint.mimics)}, which is no joint that moves")
-        if joint.multiplier == 0:
-            raise AssetError(f"{where} mimics with multiplier 0, so it never moves; make it fixed")
-        _leader(joint, leaders, where)
-
-
-def _leader(joint: ModelJoint, leaders: dict[str, ModelJoint], where: str) -> None:
-    seen = [joint.name]
-    leader = leaders.get(joint.mimics or "")
-    while leader is not None:
-        if leader.name in seen:
-            raise AssetError(f"{where} mimics itself, by way of {' and '.join(seen)}")
-        seen.append(leader.name)
-        leader = leaders.get(leader.mimics or "")

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from typing import Any
 from xml.etree.ElementTree import Element
 
 from robots.common.errors import AssetError
-
-Vector3 = tuple[float, float, float]
 
 # Beyond it, squares and quotients leave the range of single precision, in which physics computes.
 LARGEST = 1e18
@@ -70,6 +69,22 @@ def required_numbers(
             " amount that makes sense"
         )
     return numbers
+
+
+def expect_numbers(element: Element, counts: Mapping[str, Mapping[str, int]], where: str) -> None:
+    """Refuse attributes of an element's parts that are not so many finite numbers.
+
+    Args:
+        element: The element.
+        counts: For each of its parts, how many numbers each attribute has; all may be left out.
+        where: What the element belongs to, for messages.
+
+    Raises:
+        AssetError: As `numbers_of`.
+    """
+    for part, attributes in counts.items():
+        for attribute, count in attributes.items():
+            numbers_of(element.find(part), attribute, (0.0,) * count, where)
 
 
 def shown(text: str) -> str:

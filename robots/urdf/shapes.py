@@ -5,10 +5,20 @@ from __future__ import annotations
 import posixpath
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element
 
 from robots.common.errors import AssetError
-from robots.urdf.numbers import LARGEST_LENGTH, Vector3, numbers_of, required_numbers, shown
+from robots.urdf.numbers import (
+    LARGEST_LENGTH,
+    expect_numbers,
+    numbers_of,
+    required_numbers,
+    shown,
+)
+
+if TYPE_CHECKING:
+    from kinematics.rotations import Floats
 
 SMALLEST_SIZE = 1e-5  # m; PhysX's own tolerances are larger
 
@@ -20,9 +30,10 @@ SIZES: Mapping[str, Mapping[str, int]] = {
     "capsule": {"radius": 1, "length": 1},
     "mesh": {},
 }
+ORIGIN: Mapping[str, Mapping[str, int]] = {"origin": {"xyz": 3, "rpy": 3}}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class UrdfShape:
     """A shape of a link.
 
@@ -31,21 +42,19 @@ class UrdfShape:
         sizes: Of a box its extents, of a sphere its radius, of a cylinder and a capsule radius
             and length (m); of a mesh the scale along x, y and z.
         file: Of a mesh what the URDF refers to, else empty.
-        xyz: Where it is in the link's frame (m).
-        rpy: How it is turned there, fixed-axis roll, pitch, yaw (rad).
+        origin: Its pose in the link's frame, (4, 4) (m).
         where: The URDF and the link, for messages.
     """
 
     kind: str
     sizes: tuple[float, ...]
     file: str
-    xyz: Vector3
-    rpy: Vector3
+    origin: Floats
     where: str
 
 
-def read_shape(element: Element, where: str) -> UrdfShape:
-    """Return the shape of a ``<collision>`` or ``<visual>``.
+def expect_shape(element: Element, where: str) -> None:
+    """Refuse a ``<collision>`` or ``<visual>`` that is no shape.
 
     Args:
         element: The element.
@@ -70,44 +79,32 @@ def read_shape(element: Element, where: str) -> UrdfShape:
         raise AssetError(
             f"{where}: {what} of shape {shown(shape.tag)}; choices: {', '.join(SIZES)}"
         )
-    origin = element.find("origin")
-    xyz, rpy = (numbers_of(origin, key, (0.0, 0.0, 0.0), where) for key in ("xyz", "rpy"))
-    return UrdfShape(
-        kind=shape.tag,
-        sizes=_scale(shape, where) if shape.tag == "mesh" else _sizes(shape, what, where),
-        file=_file(shape, where) if shape.tag == "mesh" else "",
-        xyz=xyz,
-        rpy=rpy,
-        where=where,
-    )
+    expect_numbers(element, ORIGIN, where)
+    if shape.tag == "mesh":
+        _expect_mesh(shape, where)
+    else:
+        _expect_sizes(shape, what, where)
 
 
-def _sizes(shape: Element, what: str, where: str) -> tuple[float, ...]:
-    found: list[float] = []
+def _expect_sizes(shape: Element, what: str, where: str) -> None:
+    sizes: list[float] = []
     for attribute, count in SIZES[shape.tag].items():
-        found += required_numbers(shape, attribute, count, where, LARGEST_LENGTH)
-    if what == "a collision" and min(found) < SMALLEST_SIZE:
+        sizes += required_numbers(shape, attribute, count, where, LARGEST_LENGTH)
+    if what == "a collision" and min(sizes) < SMALLEST_SIZE:
         raise AssetError(
             f"{where}: a collision shape without a volume: a {shape.tag} with {_listing(shape)};"
             f" sizes are {SMALLEST_SIZE:g} m and more"
         )
-    if min(found) < 0:
+    if min(sizes) < 0:
         raise AssetError(f"{where}: {what} of a {shape.tag} with {_listing(shape)}, below 0")
-    return tuple(found)
 
 
-def _scale(mesh: Element, where: str) -> tuple[float, ...]:
-    scale = numbers_of(mesh, "scale", (1.0, 1.0, 1.0), where)
-    if 0.0 in scale:
+def _expect_mesh(mesh: Element, where: str) -> None:
+    if 0.0 in numbers_of(mesh, "scale", (1.0, 1.0, 1.0), where):
         raise AssetError(f"{where}: a mesh with {_listing(mesh)} has no volume; leave no factor 0")
-    return scale
-
-
-def _file(mesh: Element, where: str) -> str:
     file = mesh.get("filename", "")
     if not file.strip() or posixpath.basename(file) == "":
         raise AssetError(f"{where}: a mesh with filename={file!r}; it takes the path of a file")
-    return file
 
 
 def _listing(shape: Element) -> str:

@@ -1,4 +1,4 @@
-"""What a URDF says of its joints, links and meshes, read from its XML alone."""
+"""The text of a URDF as XML, and the files that it refers to."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from xml.etree import ElementTree
 
 from robots.common.errors import AssetError, UnreadableFileError
 from robots.common.files import read_regular
-from robots.urdf.numbers import numbers_of, shown
 from robots.urdf.paths import Exists, resolve
 from robots.urdf.xml_text import parse_xml
 
@@ -28,53 +27,6 @@ class UrdfReferences:
 
     collision: tuple[str, ...]
     visual: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class UrdfJoint:
-    """A joint that can move, as the URDF declares it.
-
-    Attributes:
-        name: Joint name.
-        type: ``revolute``, ``continuous``, ``prismatic``, …
-        lower: Lower limit (rad or m), or None if it has none.
-        upper: Upper limit (rad or m), or None if it has none.
-        effort: Largest effort (N·m or N), or None.
-        velocity: Largest speed (rad/s or m/s), or None.
-        mimics: Joint that it follows, or None.
-    """
-
-    name: str
-    type: str
-    lower: float | None
-    upper: float | None
-    effort: float | None
-    velocity: float | None
-    mimics: str | None
-
-    @property
-    def unit(self) -> str:
-        """``m`` for a prismatic joint, else ``rad``."""
-        return "m" if self.type == "prismatic" else "rad"
-
-
-def read_joints(xml: bytes, urdf: str) -> tuple[UrdfJoint, ...]:
-    """Return the joints that are not fixed, in the URDF's order.
-
-    Raises:
-        AssetError: If it is no URDF.
-    """
-    joints = parse_urdf(xml, urdf).iterfind("joint")
-    return tuple(read_joint(joint, urdf) for joint in joints if joint.get("type") != "fixed")
-
-
-def read_links(xml: bytes, urdf: str) -> tuple[str, ...]:
-    """Return the names of all links, in the URDF's order.
-
-    Raises:
-        AssetError: If it is no URDF.
-    """
-    return tuple(link.get("name", "") for link in parse_urdf(xml, urdf).iterfind("link"))
 
 
 def read_urdf(path: Path) -> bytes:
@@ -127,31 +79,3 @@ def parse_urdf(xml: bytes, urdf: str) -> ElementTree.Element:
     if any(_XACRO in element.tag for element in root.iter()):
         raise AssetError(f"{urdf} is a xacro template; `xacro {urdf} > robot.urdf` makes a URDF")
     return root
-
-
-def read_joint(joint: ElementTree.Element, urdf: str) -> UrdfJoint:
-    """Return what a ``<joint>`` element says of a joint.
-
-    Raises:
-        AssetError: If a limit is no number, or an effort or velocity is below 0.
-    """
-    limit, mimic = joint.find("limit"), joint.find("mimic")
-    where = f"{urdf}: joint {shown(joint.get('name', ''))}"
-    given = [] if limit is None else [key for key in limit.keys() if key in _LIMITS]
-    numbers = {key: numbers_of(limit, key, (0.0,), where)[0] for key in given}
-    for key in ("effort", "velocity"):
-        if numbers.get(key, 0.0) < 0:
-            raise AssetError(f"{where} has {key}={numbers[key]:g} in <limit>, below 0")
-    bounded = joint.get("type") in ("revolute", "prismatic")
-    return UrdfJoint(
-        name=joint.get("name", ""),
-        type=joint.get("type", ""),
-        lower=numbers.get("lower", 0.0) if bounded else None,
-        upper=numbers.get("upper", 0.0) if bounded else None,
-        effort=numbers.get("effort"),
-        velocity=numbers.get("velocity"),
-        mimics=mimic.get("joint", "") if mimic is not None else None,
-    )
-
-
-_LIMITS = ("lower", "upper", "effort", "velocity")

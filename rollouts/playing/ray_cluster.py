@@ -25,7 +25,7 @@ from robots.assets.manifest import load_manifest
 from rollouts.playing.events import WorkerError
 from rollouts.playing.transport import is_installed
 
-ROOMS = ("robots", "layouts", "simulation", "tasks", "experts", "rollouts")
+ROOMS = ("kinematics", "robots", "layouts", "simulation", "tasks", "experts", "rollouts")
 
 _CONNECT_SECONDS = 10.0  # that a port may take to accept
 _JOIN_SECONDS = 60.0  # that all of joining may take, the import of Ray included

@@ -18,6 +18,7 @@ from tasks.processes.process import Sendable
 
 _CHECKOUT = Path(__file__).parents[2]
 _ROOMS = (
+    "kinematics",
     "robots",
     "layouts",
     "simulation",

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from math import cos, isfinite, sin
 from typing import ClassVar, Literal, TypeAlias, TypedDict
 
-from layouts.orientation import multiplied
+from kinematics.quaternions import multiplied
 from robots import TaskError
 from robots.common.fields import settle_fields
 from robots.descriptor import IDENTITY, Quaternion

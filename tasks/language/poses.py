@@ -1,6 +1,7 @@
 """Products, inverses and angles of poses, in the order of operations of native's ``Pose``.
 
-Poses are position (m) and quaternion (wxyz), float32, (N, 7).
+Poses are position (m) and quaternion (wxyz), float32, (N, 7). Native's order decides the last bits
+of observations and rewards, so these stand apart from `kinematics.rotations`.
 """
 
 from __future__ import annotations

@@ -5,10 +5,10 @@ import pytest
 
 import tasks
 from experts import find_expert
-from experts.geometry import rotate
 from experts.grasps import cube_grips, held_at, is_near
 from experts.rehearsal import Rehearsal, first_success
 from experts.script import Scene, Waypoint
+from kinematics.rotations import rotate
 from layouts import Layout, Placement
 from robots import RobotRegistry, TaskError
 from tasks.episode import play

@@ -5,8 +5,8 @@ import pytest
 
 import tasks
 from experts import find_expert
-from experts.geometry import rotate
 from experts.maniskill import push_t as push_t_module
+from kinematics.rotations import rotate
 from layouts import Layout, Placement
 from robots import TaskError
 from tasks.episode import play

@@ -5,7 +5,7 @@ import pytest
 
 import tasks
 from experts import find_expert
-from experts.geometry import rotate
+from kinematics.rotations import rotate
 from layouts import Layout, Placement
 from robots import TaskError
 from tasks.episode import play

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 import tasks
-from experts.geometry import gripper_facing, nearest_quarter_turn, rotate, turn, yaw_of
+from experts.geometry import gripper_facing, nearest_quarter_turn, turn, yaw_of
 from experts.rehearsal import Attempt, Rehearsal, first_success, search
 from experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
+from kinematics.rotations import rotate
 from robots import TaskError, UnknownNameError
 from tasks.episode import play
 

@@ -10,10 +10,9 @@ import yourdfpy
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from kinematics.quaternions import normalised, quaternion_rpy, rpy_quaternion
+from kinematics.rotations import pose_matrix
 from layouts import Layout, Placement, face_to_face, single
-from layouts.export.urdf import rpy
-from layouts.orientation import normalised, rpy_quaternion
-from layouts.validation.kinematics import pose_matrix
 from robots import AssetError, LayoutError, LocalUrdf, RobotRegistry
 from robots.urdf.summary import read_references
 from tests.layouts.cells import hung, link_poses, mixed_cell, random_positions, skeleton
@@ -168,7 +167,7 @@ angles = st.floats(-math.pi, math.pi)
 @example(1.0, 1 - 1e-8, 2.0)
 def test_roll_pitch_and_yaw_are_the_quaternion(roll, share, yaw):
     quaternion = normalised(rpy_quaternion((roll, share * math.pi / 2, yaw)))
-    again = rpy_quaternion(rpy(quaternion))
+    again = rpy_quaternion(quaternion_rpy(quaternion))
     origin = (0.0, 0.0, 0.0)
     np.testing.assert_allclose(
         pose_matrix(origin, again), pose_matrix(origin, quaternion), rtol=0, atol=1e-7

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from kinematics.quaternions import forward, inverted, multiplied, rotated, upward
 from layouts import (
     Frame,
     Layout,
@@ -22,7 +23,6 @@ from layouts import (
     yaw_quaternion,
 )
 from layouts.frames import EDGES, table_outlines
-from layouts.orientation import forward, inverted, multiplied, rotated, upward
 from robots import LayoutError
 
 numbers = st.floats(-10, 10)

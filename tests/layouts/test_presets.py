@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from kinematics.quaternions import forward, multiplied, rotated, upward, yaw_degrees
 from layouts import (
     Layout,
     around_table,
@@ -19,7 +20,6 @@ from layouts import (
 )
 from layouts.distances import HAND_OVER, ROUND_CORNERS
 from layouts.frames import EDGES, table_outlines
-from layouts.orientation import forward, multiplied, rotated, upward, yaw_degrees
 from layouts.presets import PRESETS
 from robots import LayoutError, RobotRegistry, UnknownNameError
 

@@ -13,7 +13,9 @@ import pytest
 from robots import AssetError, RobotDescriptor, RobotRegistry, UrdfLocator
 from robots.assets.manifest import AssetPackage, load_manifest
 from robots.registry import CATALOGUE
-from robots.urdf.summary import UrdfJoint, read_joints, read_links, read_references
+from robots.urdf.model import ModelJoint
+from robots.urdf.reading import read_model
+from robots.urdf.summary import read_references
 from tests.robots.conftest import contents
 
 ROBOTS = tuple(CATALOGUE)
@@ -25,7 +27,7 @@ class Robot:
 
     descriptor: RobotDescriptor
     package: AssetPackage
-    joints: dict[str, UrdfJoint]
+    joints: dict[str, ModelJoint]
     links: tuple[str, ...]
     references: tuple[tuple[str, ...], tuple[str, ...]]
 
@@ -37,13 +39,14 @@ def robot(request) -> Robot:
     package = load_manifest().package(descriptor.urdf.package)
     name = descriptor.urdf.file
     xml = contents(next(file for file in package.files if file.path == name))
-    joints = {joint.name: joint for joint in read_joints(xml, name)}
+    model = read_model(xml, name)
+    joints = {joint.name: joint for joint in model.moving}
     references = read_references(xml, name, {file.path for file in package.files}.__contains__)
     return Robot(
         descriptor,
         package,
         joints,
-        read_links(xml, name),
+        model.links,
         (references.collision, references.visual),
     )
 

@@ -8,7 +8,17 @@ import sys
 from pathlib import Path
 
 CHECKOUT = Path(__file__).parents[2]
-HEAVY = ("sapien", "torch", "mani_skill", "huggingface_hub", "yourdfpy", "trimesh", "rich", "numpy")
+HEAVY = (
+    "sapien",
+    "torch",
+    "mani_skill",
+    "huggingface_hub",
+    "yourdfpy",
+    "lxml",
+    "trimesh",
+    "rich",
+    "numpy",
+)
 
 AUDIT = """
 import sys
@@ -38,7 +48,7 @@ def run(code: str, **variables: str) -> list[str]:
 
 def test_importing_robots_and_layouts_loads_nothing_heavy_and_opens_no_socket():
     code = f"""
-import robots, layouts
+import kinematics, robots, layouts
 print(*[name for name in {HEAVY!r} if name in sys.modules])
 print(*[event for event, path in seen if event.startswith("socket.")])
 print("ran")

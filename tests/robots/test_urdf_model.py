@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from robots import AssetError, DescriptorError, LocalUrdf, RobotDescriptor
-from robots.urdf.model import read_model
+from robots.urdf.reading import read_model
 
 CHECKOUT = Path(__file__).parents[2]
 

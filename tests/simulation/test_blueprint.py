@@ -8,7 +8,7 @@ import trimesh
 
 from layouts import Layout, Placement
 from robots import AssetError
-from robots.urdf.model import MAX_LINKS
+from robots.urdf.text_checks import MAX_LINKS
 from simulation.blueprint import read_blueprint
 from simulation.world import World
 from tests.faults.toy_robots import descriptor, joint, link, mesh, robot, toy, write_mesh

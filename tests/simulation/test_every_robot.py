@@ -13,8 +13,6 @@ from robots import ActionNumber, RobotRegistry
 from robots.assets.sources import find_mani_skill
 from robots.from_urdf import guess_descriptor
 from robots.registry import CATALOGUE
-from robots.urdf.model import read_model
-from robots.urdf.reach import link_frame
 from robots.urdf.summary import parse_urdf
 from simulation import PhysicsSettings, Simulation
 from simulation.controller import JointPositionController
@@ -104,20 +102,6 @@ def test_an_action_number_moves_its_own_joints_and_no_others(robot, number):
     own, others = moved[mine], np.delete(moved, mine)
     assert (own > 0.003).all()
     assert others.max(initial=0.0) < 0.4 * max(own.max(), 0.02)
-
-
-@pytest.mark.parametrize("robot", ROBOTS)
-def test_links_are_where_the_urdf_alone_says(robot):
-    simulation, start = stand(robot)
-    descriptor, arm = simulation.layout["arm"].robot, simulation.worlds[0].robots["arm"]
-    arm.articulation.set_root_pose(sapien.Pose())
-    model = read_model(descriptor.urdf.locate().read_bytes(), robot)
-    positions = dict(zip(descriptor.joints, start, strict=True))
-    for name, link in arm.links.items():
-        frame, pose = link_frame(model, name, positions), link.entity_pose
-        np.testing.assert_allclose(frame.position, pose.p, atol=2e-6, err_msg=name)
-        matrix = pose.to_transformation_matrix()[:3, :3]
-        np.testing.assert_allclose(frame.rotation, matrix, atol=5e-6, err_msg=name)
 
 
 @pytest.mark.parametrize("robot", ["panda", "koch", "xarm7"])

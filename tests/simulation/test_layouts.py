@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from kinematics.quaternions import inverted, rotated
 from layouts import Layout, Placement, around_table, ceiling, grid, ring, side_by_side, wall
-from layouts.orientation import inverted, rotated
 from simulation import PhysicsSettings, Simulation, World
 
 MIXED = ("panda", "panda_stick", "so100")

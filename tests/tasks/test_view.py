@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import tasks
+from kinematics.rotations import pose_matrix
 from layouts import single
-from layouts.validation.kinematics import pose_matrix
 from layouts.viewer.saved import NO_SLIDERS, save_html
 from simulation import Box, Capsule, Cylinder, Sphere, World
 from tasks.__main__ import main
