@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import pi, remainder
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from experts.script import OPEN, Pose, Scene, Script, Waypoint
 from robots import TaskError, UnknownNameError
 from simulation.kinematics import InverseKinematics
 from simulation.reach import PointReach
+from simulation.sapien3.backend import worlds_below
 from tasks import MultiRobotTask
 from tasks.episode import REBUILT
 
@@ -98,9 +100,9 @@ class _Player:
     def __init__(
         self, task: MultiRobotTask, robot: str, waypoints: Sequence[Waypoint], scene: Scene
     ) -> None:
-        world = task.simulation.worlds[0]
+        world: Any = worlds_below(task.simulation)[0]
         self._robot, self._waypoints = robot, list(waypoints)
-        self._driver = ArmDriver(task.layout[robot].robot, world.robots[robot].active_index)
+        self._driver = ArmDriver(task.layout[robot].robot)
         if any(waypoint.to is not None for waypoint in waypoints):
             self._kinematics = InverseKinematics(world, robot)
         if any(waypoint.at is not None for waypoint in waypoints):

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from math import cos, sin
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from experts.rehearsal import Attempt, Rehearsal, search
 from experts.script import Scene, Script, Waypoint
 from robots import TaskError
 from simulation.reach import PointReach
+from simulation.sapien3.backend import worlds_below
 from tasks import MultiRobotTask
 from tasks.maniskill.pick_cube_so100 import PickCubeSO100
 
@@ -110,7 +112,8 @@ def pick_small_cube(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
     def attempts(rehearsal: Rehearsal) -> Iterator[Attempt]:
         for style in STYLES:
             scene = rehearsal.begin(seed)
-            reach = PointReach(rehearsal.task.simulation.worlds[0], ARM)
+            world: Any = worlds_below(rehearsal.task.simulation)[0]
+            reach = PointReach(world, ARM)
             yield rehearsal.play(_Pick(style, reach, scene).script())
 
     return search(task, seed, attempts)

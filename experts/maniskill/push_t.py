@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from experts.maniskill.sliding import SlidingBody, to_body
 from experts.rehearsal import Attempt, Rehearsal, search
 from experts.script import OPEN, Scene
 from simulation.kinematics import InverseKinematics
+from simulation.sapien3.backend import worlds_below
 from tasks import MultiRobotTask
 from tasks.maniskill.push_t import BAR_HALF_SIZE, CENTRE_OF_MASS_Y, STEM_HALF_SIZE
 
@@ -66,10 +68,10 @@ class _Pusher:
     """One attempt: pushes the T in a private task, from its present state."""
 
     def __init__(self, task: MultiRobotTask, scene: Scene, random: np.random.Generator) -> None:
-        world = task.simulation.worlds[0]
+        world: Any = worlds_below(task.simulation)[0]
         self._task, self._scene = task, scene
         self._kinematics = InverseKinematics(world, ARM)
-        self._driver = ArmDriver(task.layout[ARM].robot, world.robots[ARM].active_index)
+        self._driver = ArmDriver(task.layout[ARM].robot)
         self._base = np.array(task.layout[ARM].base_position)
         self._contacts = contacts()
         self._planner = PushPlanner(

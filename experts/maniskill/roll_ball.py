@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from math import radians
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from experts.geometry import (
 from experts.rehearsal import Attempt, Rehearsal, search
 from experts.script import CLOSED, Pose, Scene, Script, Waypoint
 from simulation.kinematics import InverseKinematics
+from simulation.sapien3.backend import worlds_below
 from tasks import MultiRobotTask
 
 ARM, BALL, TARGET = "arm", "ball", "goal_region"
@@ -76,7 +78,8 @@ def roll(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
 
 def _shots(rehearsal: Rehearsal, seed: int) -> Iterator[Attempt]:
     """Shoot in every style, a few times each, the aim corrected by where the ball went."""
-    kinematics = InverseKinematics(rehearsal.task.simulation.worlds[0], ARM)
+    world: Any = worlds_below(rehearsal.task.simulation)[0]
+    kinematics = InverseKinematics(world, ARM)
     for style in STYLES:
         aim, correction, last_error = 0.0, CORRECTION, 0.0
         for _ in range(SHOTS):

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from layouts import Layout
 from robots import TaskError, unknown_name_message
 from simulation import Camera, Simulation, State
-from simulation.maths import Array, all_finite
-from simulation.rendering.cameras import TEXTURES, RobotCamera
+from simulation.cameras import TEXTURES, RobotCamera
+from simulation.maths import Array, Floats, all_finite
+from simulation.readout import ReadoutIndex
 from tasks.engine.finite import NotFinite
-from tasks.engine.native_format import observation_keys
+from tasks.engine.native_format import native_joints, observation_keys
 
 if TYPE_CHECKING:
     from simulation.rendering.pictures import Observers, View
@@ -30,6 +31,9 @@ OBS_MODES = (*PLAIN_MODES, "rgb", "rgbd", "rgb+depth+state", "depth", "rgb+segme
 """Examples of observation modes; images and a form of state are joined in any order."""
 
 _IMAGE_DTYPES = ("uint8", "int16")
+
+Joints = Mapping[str, tuple[Floats, Floats]]
+"""Positions and velocities of each robot's joints, in native's order."""
 
 _tensor = torch.from_numpy
 
@@ -152,13 +156,12 @@ class Observer:
         if not self.mode.privileged:
             parts = self._sensible(parts)
         if not self.mode.textures:
-            return self._flat(state, parts) if self.mode.flat else self._named(state, parts)
+            return self._state(simulation.index, state, parts)
         if self._eyes is None:
             self._eyes = _Eyes(simulation, self.cameras, self.mode.textures)
         images = self._eyes.look()
-        if self.mode.flat:
-            return {**images, "state": self._flat(state, parts)}
-        return {**self._named(state, parts), **images}
+        seen = self._state(simulation.index, state, parts)
+        return {**images, "state": seen} if self.mode.flat else {**seen, **images}
 
     def senses(self, part: str) -> bool:
         """Tell whether a part of `tasks.MultiRobotTask.observe` is told beside images."""
@@ -197,23 +200,32 @@ class Observer:
 
     # -- inside ------------------------------------------------------------------------------
 
-    def _flat(self, state: State, parts: Mapping[str, Array]) -> torch.Tensor:
-        joined = [part for name in self._robots for part in (state.qpos(name), state.qvel(name))]
+    def _state(self, index: ReadoutIndex, state: State, parts: Mapping[str, Array]) -> Any:
+        joints = {
+            name: (
+                native_joints(index, name, state.qpos(name)),
+                native_joints(index, name, state.qvel(name)),
+            )
+            for name in self._robots
+        }
+        return self._flat(joints, parts) if self.mode.flat else self._named(joints, parts)
+
+    def _flat(self, joints: Joints, parts: Mapping[str, Array]) -> torch.Tensor:
+        joined = [part for own in joints.values() for part in own]
         joined.extend(part if part.ndim == 2 else part[:, None] for part in parts.values())
         flat = np.concatenate(joined, 1, dtype=np.float32)
         if not all_finite(flat):
             raise NotFinite
         return _tensor(flat)
 
-    def _named(self, state: State, parts: Mapping[str, Array]) -> dict[str, Any]:
-        if not all(map(all_finite, (state.joint_velocities, *parts.values()))):
+    def _named(self, joints: Joints, parts: Mapping[str, Array]) -> dict[str, Any]:
+        velocities = [qvel for _, qvel in joints.values()]
+        if not all(map(all_finite, (*velocities, *parts.values()))):
             raise NotFinite
         agent: dict[str, Any] = {}
         for name, key in self._keys.items():
-            own = {
-                "qpos": _tensor(state.qpos(name).copy()),
-                "qvel": _tensor(state.qvel(name).copy()),
-            }
+            qpos, qvel = joints[name]
+            own = {"qpos": _tensor(qpos.copy()), "qvel": _tensor(qvel.copy())}
             agent.update(own if key is None else {key: own})
         return {"agent": agent, "extra": {key: _tensor(x.copy()) for key, x in parts.items()}}
 
@@ -238,8 +250,8 @@ class _Eyes:
         )
 
         self._observers: Observers = Observers(simulation, cameras, textures)
-        self._rows: list[dict[str, View]] = [{}] * len(simulation.worlds)
-        self.stale = set(range(len(simulation.worlds)))
+        self._rows: list[dict[str, View]] = [{}] * simulation.num_envs
+        self.stale = set(range(simulation.num_envs))
 
     def look(self) -> dict[str, Any]:
         for env in sorted(self.stale):

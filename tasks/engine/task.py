@@ -178,7 +178,7 @@ class MultiRobotTask(Remade):
         groups = placement.robot.action_split.groups.values()
         noisy = [group.reset_noise for group in groups for _ in group.joints]
         qpos = np.array(placement.start_qpos, noise.dtype)
-        world.robots[robot].reset(np.where(noisy, noise + qpos, qpos))
+        world.stand(robot, np.where(noisy, noise + qpos, qpos))
 
     # -- making and closing ------------------------------------------------------------------
 
@@ -387,9 +387,9 @@ class MultiRobotTask(Remade):
         rng.restart_numpy()
 
     def _begin(self, ids: list[int], *, reconfigured: bool) -> tuple[Any, Info]:
-        for i in ids:
+        self.simulation.clear(ids)
+        for i in ids:  # all that is placed here reaches the simulator in one go
             world = self.simulation.worlds[i]
-            world.clear()
             self.reset_robots(world, self._rngs[i])
             self.sample(world, self._rngs[i])
         if reconfigured:

@@ -15,7 +15,7 @@ from layouts.validation.kinematics import Kinematics, pose_matrix
 from layouts.validation.reach import Reach, rotation_vectors
 from robots import DescriptorError, RobotRegistry, UnknownNameError
 from robots.urdf.model import read_model
-from simulation import World
+from simulation.sapien3.world import BuiltWorld
 from tests.layouts.small_robots import joint, link, turntable, urdf
 
 BASE = (0.3, -0.4, 0.1), (0.8, 0.0, 0.0, 0.6)
@@ -30,7 +30,7 @@ def placement(robot):
 
 @functools.cache
 def world(robot):
-    return World(Layout({"arm": placement(robot)}))
+    return BuiltWorld(Layout({"arm": placement(robot)}))
 
 
 def engine(robot):

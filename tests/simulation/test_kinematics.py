@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from layouts import Layout, Placement
 from robots import RobotRegistry, SimulationError, UnknownNameError
-from simulation import World
 from simulation.kinematics import InverseKinematics
+from simulation.sapien3.world import BuiltWorld
 
 # Robots whose TCP is a link; the others are refused, as a test below says.
 ROBOTS = [n for n in RobotRegistry.names() if not RobotRegistry.load(n).tcp_position_links]
@@ -19,10 +19,10 @@ BASE = Placement("panda", position=(0.3, -0.4, 0.1), quaternion=(0.8, 0.0, 0.0, 
 
 
 @functools.cache
-def world_of(robot: str) -> World:
+def world_of(robot: str) -> BuiltWorld:
     """Make a world with one robot that neither stands at the origin nor faces along x."""
     placement = Placement(RobotRegistry.load(robot), BASE.position, BASE.quaternion)
-    return World(Layout({"arm": placement}))
+    return BuiltWorld(Layout({"arm": placement}))
 
 
 def rest(robot: str) -> np.ndarray:
@@ -126,7 +126,7 @@ def test_the_same_request_has_the_same_answer():
 
 
 def test_a_tcp_between_links_is_refused(monkeypatch):
-    world = World(Layout({"arm": Placement("panda")}))
+    world = BuiltWorld(Layout({"arm": Placement("panda")}))
     descriptor = world.layout["arm"].robot
     object.__setattr__(world.layout["arm"], "robot", _between_fingers(descriptor))
     with pytest.raises(SimulationError, match="mean of panda_leftfinger, panda_rightfinger"):

@@ -7,18 +7,18 @@ import pytest
 
 from layouts import Layout, Placement
 from robots import RobotRegistry, UnknownNameError
-from simulation import World
 from simulation.reach import PointReach
+from simulation.sapien3.world import BuiltWorld
 
 ROBOTS = RobotRegistry.names()
 POINT = np.array([0.01, -0.02, 0.03])
 
 
 @functools.cache
-def world_of(robot: str) -> World:
+def world_of(robot: str) -> BuiltWorld:
     """Make a world with one robot that neither stands at the origin nor faces along x."""
     base = ((0.3, -0.4, 0.1), (0.8, 0.0, 0.0, 0.6))
-    return World(Layout({"arm": Placement(RobotRegistry.load(robot), *base)}))
+    return BuiltWorld(Layout({"arm": Placement(RobotRegistry.load(robot), *base)}))
 
 
 def start_of(robot: str) -> np.ndarray:
