@@ -101,8 +101,7 @@ class Simulation:
             joint_positions: Joint positions before the step, shape (N, dof) (rad, m).
             env_ids: Which worlds; all if None. The others stand still.
         """
-        moving = self._drive(action, joint_positions, env_ids)
-        self._backend.step(moving, self.substeps)
+        self._backend.step(self._drive(action, joint_positions, env_ids), self.substeps)
 
     def timed_step(
         self, action: NDArray[np.float32], clock: Callable[[], float] = perf_counter

@@ -350,7 +350,8 @@ class State:
         if place >= len(self._offsets):
             pairs = self._index.pairs
             ways = self.all_poses.take(pairs.ends, 0) - self.all_poses.take(pairs.starts, 0)
-            ways[pairs.planar, :, 2] = 0.0  # exact: a zero adds nothing to a norm
+            if len(pairs.planar):
+                ways[pairs.planar, :, 2] = 0.0  # exact: a zero adds nothing to a norm
             self._offsets = ways[:, :, :3]
         return self._offsets
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -48,7 +48,7 @@ class Placements:
     """
 
     bodies: dict[str, dict[int, list[float]]] = field(default_factory=dict)
-    robots: dict[str, dict[int, Sequence[float]]] = field(default_factory=dict)
+    robots: dict[str, dict[int, list[float]]] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
         """Tell whether there is anything to place."""

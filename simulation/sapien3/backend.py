@@ -46,6 +46,7 @@ class SapienBackend:
         ]
         self._packers = [world.scene.pack_poses for world in self.worlds]
         self._steps = [world.system.step for world in self.worlds]
+        self._places = _pose_places(len(self.worlds), len(self.worlds[0].scene.entities))
         self._order = _declared_order(self.worlds[0])
         self._forces: dict[tuple[Pair, ...], PairForces] = {}
         self._movers: dict[tuple[Velocity, ...], list[tuple[Any, str]]] = {}
@@ -67,9 +68,8 @@ class SapienBackend:
 
     def drive(self, targets: Floats, env_ids: Sequence[int]) -> None:
         """Set drive targets; see `Backend`."""
-        rows = targets.tolist()
         for i in env_ids:
-            for set_target, target in zip(self._setters[i], rows[i], strict=True):
+            for set_target, target in zip(self._setters[i], targets[i].tolist(), strict=True):
                 set_target(target)
 
     def step(self, env_ids: Sequence[int], substeps: int) -> None:
@@ -81,17 +81,12 @@ class SapienBackend:
 
     def read(self) -> Readout:
         """Return poses and joints; see `Backend`."""
-        count = len(self.worlds)
-        packed = b"".join([pack() for pack in self._packers])
-        entities = np.frombuffer(packed, np.float32).reshape(count, -1, 7).transpose(1, 0, 2)
-        poses = np.empty(entities.shape, np.float32)
-        poses[:, :, :3] = entities[:, :, 4:]  # SAPIEN packs the quaternion first
-        poses[:, :, 3:] = entities[:, :, :4]
-        qpos = np.concatenate([robot.qpos for robot in self._articulations]).reshape(count, -1)
-        qvel = np.concatenate([robot.qvel for robot in self._articulations]).reshape(count, -1)
+        packed = np.frombuffer(b"".join([pack() for pack in self._packers]), np.float32)
+        qpos = self._rows([robot.qpos for robot in self._articulations])
+        qvel = self._rows([robot.qvel for robot in self._articulations])
         if self._order is not None:
             qpos, qvel = qpos.take(self._order, 1), qvel.take(self._order, 1)
-        return Readout(poses, qpos, qvel)
+        return Readout(packed[self._places], qpos, qvel)
 
     def velocities(self, wanted: tuple[Velocity, ...]) -> Floats:
         """Return velocities of bodies; see `Backend`."""
@@ -147,6 +142,12 @@ class SapienBackend:
         """Return what a body collides with; see `Backend`."""
         return described_shapes(self.worlds[env].bodies[body].component)
 
+    def _rows(self, joints: list[Floats]) -> Floats:
+        """Return joints of all robots of all worlds as one row for each world."""
+        if len(joints) == 1:
+            return joints[0][None]
+        return np.concatenate(joints).reshape(len(self.worlds), -1)
+
     def _find_movers(self, wanted: tuple[Velocity, ...]) -> list[tuple[Any, str]]:
         return [
             (body.component if body.declared.kind == "dynamic" else None, f"{kind}_velocity")
@@ -167,6 +168,15 @@ def _inventory(world: BuiltWorld) -> Built:
     }
     bodies = {name: place[body.entity] for name, body in world.bodies.items()}
     return Built(len(place), bodies, robots)
+
+
+def _pose_places(worlds: int, frames: int) -> NDArray[np.intp]:
+    """Return where each number of the pose table, (F, N, 7), stands in what SAPIEN packs.
+
+    It packs one world after the other, and the quaternion before the position.
+    """
+    packed = np.arange(worlds * frames * 7).reshape(worlds, frames, 7).swapaxes(0, 1)
+    return np.ascontiguousarray(packed[:, :, [4, 5, 6, 0, 1, 2, 3]])
 
 
 def _declared_order(world: BuiltWorld) -> NDArray[np.intp] | None:

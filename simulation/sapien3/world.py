@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import sapien
@@ -135,7 +134,7 @@ class BuiltWorld:
             if body.declared.anchored:
                 body.entity.set_pose(body.start_pose)
 
-    def set_pose(self, name: str, row: Sequence[float]) -> None:
+    def set_pose(self, name: str, row: list[float]) -> None:
         """Move a body to a position (m) and quaternion (wxyz), (7,)."""
         self.bodies[name].entity.set_pose(sapien.Pose(row[:3], row[3:]))
 

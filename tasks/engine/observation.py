@@ -32,9 +32,6 @@ OBS_MODES = (*PLAIN_MODES, "rgb", "rgbd", "rgb+depth+state", "depth", "rgb+segme
 
 _IMAGE_DTYPES = ("uint8", "int16")
 
-Joints = Mapping[str, tuple[Floats, Floats]]
-"""Positions and velocities of each robot's joints, in native's order."""
-
 _tensor = torch.from_numpy
 
 
@@ -201,30 +198,24 @@ class Observer:
     # -- inside ------------------------------------------------------------------------------
 
     def _state(self, index: ReadoutIndex, state: State, parts: Mapping[str, Array]) -> Any:
-        joints = {
-            name: (
-                native_joints(index, name, state.qpos(name)),
-                native_joints(index, name, state.qvel(name)),
-            )
-            for name in self._robots
-        }
+        joints: list[Floats] = []
+        for name in self._robots:
+            joints.append(native_joints(index, name, state.qpos(name)))
+            joints.append(native_joints(index, name, state.qvel(name)))
         return self._flat(joints, parts) if self.mode.flat else self._named(joints, parts)
 
-    def _flat(self, joints: Joints, parts: Mapping[str, Array]) -> torch.Tensor:
-        joined = [part for own in joints.values() for part in own]
+    def _flat(self, joined: list[Floats], parts: Mapping[str, Array]) -> torch.Tensor:
         joined.extend(part if part.ndim == 2 else part[:, None] for part in parts.values())
         flat = np.concatenate(joined, 1, dtype=np.float32)
         if not all_finite(flat):
             raise NotFinite
         return _tensor(flat)
 
-    def _named(self, joints: Joints, parts: Mapping[str, Array]) -> dict[str, Any]:
-        velocities = [qvel for _, qvel in joints.values()]
-        if not all(map(all_finite, (*velocities, *parts.values()))):
+    def _named(self, joints: list[Floats], parts: Mapping[str, Array]) -> dict[str, Any]:
+        if not all(map(all_finite, (*joints, *parts.values()))):
             raise NotFinite
         agent: dict[str, Any] = {}
-        for name, key in self._keys.items():
-            qpos, qvel = joints[name]
+        for key, qpos, qvel in zip(self._keys.values(), joints[::2], joints[1::2], strict=True):
             own = {"qpos": _tensor(qpos.copy()), "qvel": _tensor(qvel.copy())}
             agent.update(own if key is None else {key: own})
         return {"agent": agent, "extra": {key: _tensor(x.copy()) for key, x in parts.items()}}

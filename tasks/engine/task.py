@@ -318,9 +318,14 @@ class MultiRobotTask(Remade):
             TaskError: If the task's reward or observation is not finite.
         """
         flat = self._reader.read(action)
-        self.moving = self._everywhere if env_ids is None else checked_ids(env_ids, self.num_envs)
-        self.simulation.step(flat, self._state.joint_positions, self.moving)
-        self._elapsed[slice(None) if env_ids is None else self.moving] += 1
+        if env_ids is None:
+            self.moving = self._everywhere
+            self.simulation.step(flat, self._state.joint_positions)
+            self._elapsed += 1
+        else:
+            self.moving = checked_ids(env_ids, self.num_envs)
+            self.simulation.step(flat, self._state.joint_positions, self.moving)
+            self._elapsed[self.moving] += 1
         state = self._read()
         if self._responds:
             self.respond(state)
