@@ -6,7 +6,7 @@ simulator calls its scenes, bodies and joints is known only below, today in `sim
 Conventions, whatever the simulator's own are: joints in the order of each robot's descriptor, the
 robots in that of the layout; poses as position (m) and quaternion (wxyz) in the world frame; the
 first axis of a row-wise argument counts the entries of ``env_ids``, that of a result is named with
-it. Arrays are float32, NumPy's or torch's; states and tasks compute with whichever they are given.
+it. Arrays are float32, NumPy's of today's backend.
 
 How a GPU simulation stands behind it: every result is one tensor per quantity for all N worlds, as
 such simulations keep them, and none of the verbs is called once per world.
@@ -17,6 +17,10 @@ such simulations keep them, and none of the verbs is called once per world.
   applies them.
 - `drive` writes the tensor of drive targets and `step` advances. Worlds that are not in ``env_ids``
   are to stand still; a simulation that can only advance all of them saves and restores theirs.
+- Tasks compute with NumPy's arrays and torch's tensors alike, so tensors may be returned as they
+  are. What lies between still takes NumPy's and is to learn of tensors then, none of it in a task:
+  `simulation.controller`, `simulation.grasps`, `simulation.rotations`, and `State` where it reduces
+  (`is_static`, `gripper_opening`) or picks rows of poses.
 - `read` returns what nearly every task reads: poses and joints. `velocities` and `forces` are read
   only if asked for. Their arguments are *declared on first use*: a state asks for all velocities
   and pairs that were ever asked for, always as the same tuple until another one joins, and the

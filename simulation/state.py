@@ -192,13 +192,13 @@ class State:
         """Euclidean norm of a body's angular velocity, shape (N,) (rad/s)."""
         return self._speed(body, "angular")
 
-    def velocities(self, bodies: Sequence[str]) -> Floats:
+    def velocities(self, bodies: tuple[str, ...]) -> Floats:
         """Linear and angular velocities of bodies, (bodies, 2, N, 3) (m/s and rad/s, world)."""
         self._index.bodies.expect(*bodies)
-        wanted = tuple(Velocity(body, kind) for body in bodies for kind in ("linear", "angular"))
-        if not wanted:
+        if not bodies:
             return np.empty((0, 2, self.num_envs, 3), np.float32)
-        return self._moment.velocities(wanted).reshape(len(bodies), 2, self.num_envs, 3)
+        both = self._moment.velocities(_both_velocities(bodies))
+        return both.reshape(len(bodies), 2, self.num_envs, 3)
 
     def root_velocities(self) -> Floats:
         """Linear and angular velocity of each robot's root, (robots, N, 6) (m/s, rad/s)."""
@@ -395,6 +395,11 @@ def with_means(poses: Floats, means: Sequence[tuple[int, list[int]]]) -> Floats:
     for row, (_, points) in zip(between, means, strict=True):
         row[:, :3] = sum(poses[point, :, :3] for point in points) / len(points)
     return concatenate((poses, between))
+
+
+@cache  # asked for with every state that is recorded
+def _both_velocities(bodies: tuple[str, ...]) -> tuple[Velocity, ...]:
+    return tuple(Velocity(body, kind) for body in bodies for kind in ("linear", "angular"))
 
 
 @cache  # making one checks it, which is too slow for every step

@@ -97,9 +97,10 @@ def _joined(*parts: Floats) -> Tensor:
     return torch.from_numpy(np.concatenate(parts, 1))
 
 
-def _moving(simulation: Simulation) -> list[str]:
+def _moving(simulation: Simulation) -> tuple[str, ...]:
     """Return the names of the bodies that a state dict holds."""
-    return [name for name, body in simulation.worlds[0].bodies.items() if body.kind != "static"]
+    bodies = simulation.worlds[0].bodies.values()
+    return tuple(body.name for body in bodies if body.kind != "static")
 
 
 class StateTape:
@@ -117,7 +118,7 @@ class StateTape:
         frames = [self._index.bodies[name] for name in self._bodies]
         frames += [self._index.bases[name] for name in self._keys]
         self._frames = np.array(frames, np.intp)
-        self._dynamic = [name for name in self._bodies if world.bodies[name].kind == "dynamic"]
+        self._dynamic = tuple(n for n in self._bodies if world.bodies[n].kind == "dynamic")
         self._count = count = simulation.num_envs
         poses, joints, velocities = 7 * count * len(frames), count * self._index.dof, 6 * count
         widths = poses, joints, joints, velocities * len(self._dynamic)
