@@ -6,6 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from layouts import Layout
 from robots import SimulationError, UnknownNameError
 from robots.descriptor import IDENTITY, Quaternion, Vector3
@@ -48,7 +51,7 @@ class Placements:
     """
 
     bodies: dict[str, dict[int, list[float]]] = field(default_factory=dict)
-    robots: dict[str, dict[int, list[float]]] = field(default_factory=dict)
+    robots: dict[str, dict[int, NDArray[np.float64]]] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
         """Tell whether there is anything to place."""
@@ -56,10 +59,9 @@ class Placements:
 
     def forget(self, env_ids: Iterable[int]) -> None:
         """Leave out what was meant for some worlds."""
-        numbers = set(env_ids)
-        for group in (self.bodies, self.robots):
-            for name, rows in list(group.items()):
-                group[name] = {env: row for env, row in rows.items() if env not in numbers}
+        for env in env_ids:
+            for rows in (*self.bodies.values(), *self.robots.values()):
+                rows.pop(env, None)
 
 
 class World:
@@ -176,7 +178,9 @@ class World:
             UnknownNameError: If the layout has no such robot.
             SimulationError: If there are more numbers than joints, or fewer.
         """
-        joints = _floats(qpos, self.layout[robot].robot.dof, f"qpos of {robot}")
+        joints, dof = np.array(qpos, float), self.layout[robot].robot.dof
+        if joints.shape != (dof,):
+            raise SimulationError(f"qpos of {robot} is {qpos!r}; it must be {dof} numbers")
         self._placements.robots.setdefault(robot, {})[self._number] = joints
 
 
