@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -15,19 +15,14 @@ GAIN = 2.0  # of the joint error; PhysX's drive follows about 0.4 of a target in
 class ArmDriver:
     """Drives one robot's arm towards a goal; generated from its action split."""
 
-    def __init__(self, descriptor: RobotDescriptor, active_index: Sequence[int]) -> None:
-        """Take a robot.
-
-        Args:
-            descriptor: What it is.
-            active_index: For each joint of the descriptor, its place in qpos.
-        """
-        self._place = dict(zip(descriptor.joints, active_index, strict=True))
+    def __init__(self, descriptor: RobotDescriptor) -> None:
+        """Take a robot."""
+        self._place = {joint: i for i, joint in enumerate(descriptor.joints)}
         self._arm_joints = descriptor.arm_joints
         self._groups = dict(descriptor.action_split.groups)
 
     def arm(self, qpos: Floats) -> Floats:
-        """Pick the arm's joints out of all joints in SAPIEN's order, (dof,)."""
+        """Pick the arm's joints out of all joints in the descriptor's order, (dof,)."""
         return qpos[[self._place[joint] for joint in self._arm_joints]]
 
     def action(self, goal: Floats, gripper: float, qpos: Floats) -> Floats:
@@ -36,7 +31,7 @@ class ArmDriver:
         Args:
             goal: Arm joints to reach, in the descriptor's order (rad).
             gripper: Action number of the gripper, if there is one.
-            qpos: All joints now, in SAPIEN's order, (dof,) (rad, m).
+            qpos: All joints now, in the descriptor's order, (dof,) (rad, m).
         """
         goals = dict(zip(self._arm_joints, goal, strict=True))
         parts: list[Floats] = []

@@ -14,8 +14,6 @@ from experts.geometry import heading
 from experts.script import OPEN, Pose, Scene, Script, Waypoint
 from kinematics.rotations import Floats, inverse, rotate
 from robots import TaskError, UnknownNameError
-from simulation.kinematics import InverseKinematics
-from simulation.reach import PointReach
 from tasks import MultiRobotTask
 from tasks.episode import REBUILT
 
@@ -99,13 +97,12 @@ class _Player:
     def __init__(
         self, task: MultiRobotTask, robot: str, waypoints: Sequence[Waypoint], scene: Scene
     ) -> None:
-        world = task.simulation.worlds[0]
         self._robot, self._waypoints = robot, list(waypoints)
-        self._driver = ArmDriver(task.layout[robot].robot, world.robots[robot].active_index)
+        self._driver = ArmDriver(task.layout[robot].robot)
         if any(waypoint.to is not None for waypoint in waypoints):
-            self._kinematics = InverseKinematics(world, robot)
+            self._kinematics = task.simulation.inverse_kinematics(robot)
         if any(waypoint.at is not None for waypoint in waypoints):
-            self._reach = PointReach(world, robot)
+            self._reach = task.simulation.point_reach(robot)
             self._base = np.array(task.layout[robot].base_position)
         self._goal = self._driver.arm(scene.qpos(robot))
         self._gripper = OPEN

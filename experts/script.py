@@ -39,7 +39,7 @@ class Scene:
         return _split(self._state.tcp_pose(robot)[0])
 
     def qpos(self, robot: str) -> Floats:
-        """Return all joints of a robot in SAPIEN's order, shape (dof,) (rad, m)."""
+        """Return all joints of a robot in its descriptor's order, shape (dof,) (rad, m)."""
         return self._state.qpos(robot)[0].astype(float)
 
     def grasps(self, robot: str, body: str) -> bool:

@@ -1,10 +1,11 @@
-"""A SAPIEN world: a layout's robots plus objects, physics settings, control, contacts.
+"""Worlds of a layout's robots plus objects: physics settings, control, contacts, pictures.
 
-The only room that imports sapien.
+The only room that imports sapien, which lives in `simulation.sapien3`, below the seam that
+`simulation.backend` describes.
 """
 
+from simulation.cameras import Camera
 from simulation.physics import SAPIEN_DEFAULTS, Friction, PhysicsSettings
-from simulation.rendering.cameras import Camera
 from simulation.scene import build_scene
 from simulation.shapes import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
 from simulation.simulation import Simulation

@@ -1,12 +1,10 @@
-"""Physics settings of a world, and how they reach SAPIEN's process-wide configuration."""
+"""Physics settings of a world."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from typing import Any
-
-import sapien.physx as physx
 
 from robots import SimulationError
 from robots.common.bounds import (
@@ -168,30 +166,3 @@ def substeps(settings: PhysicsSettings, control_frequency: Any) -> int:
             f" {nearest[0]:.8g} and {nearest[1]:.8g} Hz"
         )
     return round(steps)
-
-
-def apply(settings: PhysicsSettings) -> None:
-    """Write the settings into SAPIEN's process-wide configuration.
-
-    They bind when a scene, a body or a shape is made, so this runs before every build: another
-    world's build may have changed them since.
-    """
-    physx.set_shape_config(contact_offset=settings.contact_offset, rest_offset=settings.rest_offset)
-    physx.set_body_config(
-        solver_position_iterations=settings.position_iterations,
-        solver_velocity_iterations=settings.velocity_iterations,
-        sleep_threshold=settings.sleep_threshold,
-    )
-    gravity: Any = settings.gravity  # SAPIEN takes any sequence
-    physx.set_scene_config(
-        gravity=gravity,
-        bounce_threshold=settings.bounce_threshold,
-        enable_pcm=settings.persistent_contacts,
-        enable_tgs=settings.temporal_gauss_seidel,
-        enable_ccd=settings.continuous_collision,
-        enable_enhanced_determinism=settings.enhanced_determinism,
-        enable_friction_every_iteration=settings.friction_every_iteration,
-        cpu_workers=0,  # more workers are slower for scenes this small
-    )
-    friction = settings.friction
-    physx.set_default_material(friction.static, friction.dynamic, friction.restitution)

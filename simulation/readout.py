@@ -1,15 +1,19 @@
-"""Where each frame and joint of a world stands in a read-out."""
+"""Where each frame and joint of a world stands in a read-out, and what is read later."""
 
 from __future__ import annotations
 
-from typing import TypeVar
+from collections.abc import Hashable
+from typing import Generic, Literal, TypeVar
 
 import numpy as np
 
-from robots import Fingers, UnknownNameError
-from simulation.world import World
+from layouts import Layout
+from robots import Fingers, RobotDescriptor, SimulationError, UnknownNameError
+from simulation.backend import Backend, Built, BuiltRobot, Pair, Velocity
+from simulation.maths import Floats
 
 Place = TypeVar("Place")
+Key = TypeVar("Key", bound=Hashable)
 
 
 class Places(dict[str, Place]):
@@ -31,14 +35,70 @@ class Places(dict[str, Place]):
                 self.__missing__(name)
 
 
+class Declared(Generic[Key]):
+    """What somebody asks for after every step, numbered in the order in which it was first asked.
+
+    Attributes:
+        keys: All of it; the same tuple until something new joins.
+    """
+
+    def __init__(self) -> None:
+        """Begin with nothing."""
+        self.keys: tuple[Key, ...] = ()
+        self._numbers: dict[Key, int] = {}
+
+    def number(self, key: Key) -> int:
+        """Return the number of something, adding it if it is new."""
+        found = self._numbers.get(key)
+        if found is None:
+            found = self._numbers[key] = len(self.keys)
+            self.keys = (*self.keys, key)
+        return found
+
+
+class Moment:
+    """What can be read of a simulation until it moves on.
+
+    Attributes:
+        past: Whether it has moved on.
+    """
+
+    __slots__ = ("_backend", "past")
+
+    def __init__(self, backend: Backend) -> None:
+        """Begin with the present."""
+        self._backend = backend
+        self.past = False
+
+    def velocities(self, wanted: tuple[Velocity, ...]) -> Floats:
+        """Return velocities, (K, N, 3); see `Backend`."""
+        return self._present().velocities(wanted)
+
+    def root_velocities(self) -> Floats:
+        """Return velocities of the robots' roots, (R, N, 6); see `Backend`."""
+        return self._present().root_velocities()
+
+    def forces(self, pairs: tuple[Pair, ...]) -> Floats | None:
+        """Return contact forces, (P, N, 3), or None; see `Backend`."""
+        return self._present().forces(pairs)
+
+    def _present(self) -> Backend:
+        if self.past:
+            raise SimulationError(
+                "velocities and contacts were asked of a state that is no longer the present one;"
+                " read them before the next step or reset"
+            )
+        return self._backend
+
+
 class ReadoutIndex:
     """Places of bodies, links, tool centre points and joints, the same in a batch's every world.
 
-    A frame is anything with a pose: SAPIEN's entities in their own order, then the tool centre
-    points that lie between links.
+    The frames are the backend's, then the tool centre points that lie between links. The joints of
+    each robot are in the order of its descriptor.
 
     Attributes:
-        entities: Number of entities.
+        robots: What is known of each robot, in layout order.
         frames: Number of frames.
         dof: Number of joints of all robots.
         bodies: Frame of each body.
@@ -49,19 +109,21 @@ class ReadoutIndex:
         fingers: Each robot's grasping links.
         grippers: Places of each robot's gripper joints, and the sum of their upper limits (m).
         bases: Frame of each robot's root link.
-        mean_frames: For each frame that lies between links: itself, the frame that orients it,
-            and the frames whose mean is its origin.
+        loaded_order: For each robot `BuiltRobot.loaded_order`, or None if it is the descriptor's.
+        mean_frames: For each frame that lies between links: the frame that orients it, and the
+            frames whose mean is its origin.
         pairs: Pairs of frames whose distance was asked for.
-        velocities: Bodies and which of their velocities was asked for, with their numbers: from
-            the second step on a state reads all at once.
+        velocities: Velocities of bodies that were asked for.
+        forces: Pairs whose contact force was asked for.
     """
 
-    def __init__(self, world: World) -> None:
-        """Index one world."""
-        place = {entity: i for i, entity in enumerate(world.scene.entities)}
-        self.entities = self.frames = len(place)
-        self.dof = 0
+    def __init__(self, layout: Layout, built: Built) -> None:
+        """Index worlds that were built alike."""
+        self.robots: Places[BuiltRobot] = Places(_ROBOT)
+        self.robots.update(built.robots)
+        self.frames, self.dof = built.frames, 0
         self.bodies: Places[int] = Places("body of this world")
+        self.bodies.update(built.bodies)
         self.links: Places[Places[int]] = Places(_ROBOT)
         self.tcps: Places[int] = Places(_ROBOT)
         self.joints: Places[slice] = Places(_ROBOT)
@@ -69,47 +131,59 @@ class ReadoutIndex:
         self.fingers: Places[Fingers | None] = Places(_ROBOT)
         self.grippers: Places[tuple[list[int], np.float32]] = Places(_ROBOT)
         self.bases: Places[int] = Places(_ROBOT)
-        self.mean_frames: list[tuple[int, int, list[int]]] = []
+        self.loaded_order: Places[list[int] | None] = Places(_ROBOT)
+        self.mean_frames: list[tuple[int, list[int]]] = []
         self.pairs = FramePairs()
-        self.velocities: dict[tuple[str, str], int] = {}
-        self.bodies.update({name: place[body.entity] for name, body in world.bodies.items()})
-        for name, robot in world.robots.items():
-            descriptor = robot.descriptor
-            links: Places[int] = Places(f"link of {name}")
-            self.links[name] = links
-            links.update({link: place[part.entity] for link, part in robot.links.items()})
-            driven = zip(descriptor.joints, robot.active_index, strict=True)
-            self.arm_joints[name] = _as_slice(
-                sorted(self.dof + i for joint, i in driven if joint in descriptor.arm_joints)
-            )
-            self.grippers[name] = self._gripper(name, world)
-            self.bases[name] = place[robot.articulation.links[0].entity]
-            self.joints[name] = slice(self.dof, self.dof + len(robot.joints))
-            self.dof += len(robot.joints)
-            self.fingers[name] = descriptor.fingers
-            self.tcps[name] = self._tcp_frame(name, world)
+        self.velocities: Declared[Velocity] = Declared()
+        self.forces: Declared[Pair] = Declared()
+        self._grasps: dict[tuple[str, str], list[int]] = {}
+        for name, placement in layout.items():
+            self._add_robot(name, placement.robot, built.robots[name])
 
-    def velocity(self, body: str, which: str) -> int:
-        """Return the number of a body's velocity, adding it if it is new."""
+    def velocity(self, body: str, kind: Literal["linear", "angular"]) -> int:
+        """Return the number of a body's velocity, declaring it if it is new."""
         self.bodies.expect(body)
-        return self.velocities.setdefault((body, which), len(self.velocities))
+        return self.velocities.number(Velocity(body, kind))
 
-    def _gripper(self, name: str, world: World) -> tuple[list[int], np.float32]:
-        robot = world.robots[name]
-        joints = {
-            self.dof + i: joint.limits[0, 1]
-            for i, joint in enumerate(robot.joints)
-            if joint.name not in robot.descriptor.arm_joints
-        }
-        return list(joints), np.float32(sum(joints.values()))
+    def force(self, robot: str, link: str, body: str) -> int:
+        """Return the number of the force of a body on a link, declaring it if it is new."""
+        self.links[robot].expect(link)
+        self.bodies.expect(body)
+        return self.forces.number(Pair(robot, link, body))
 
-    def _tcp_frame(self, name: str, world: World) -> int:
-        descriptor = world.robots[name].descriptor
-        orientation = self.links[name][descriptor.tcp_link]
+    def grasp(self, robot: str, body: str) -> list[int]:
+        """Return the numbers of the forces of a body on both fingers of a robot that has some."""
+        found = self._grasps.get((robot, body))
+        if found is None:
+            fingers = self.fingers[robot]
+            links = () if fingers is None else fingers.links
+            found = [self.force(robot, link, body) for link in links]
+            self._grasps[robot, body] = found
+        return found
+
+    def _add_robot(self, name: str, descriptor: RobotDescriptor, built: BuiltRobot) -> None:
+        links: Places[int] = Places(f"link of {name}")
+        links.update(built.links)
+        self.links[name] = links
+        arm, gripper = list[int](), list[int]()
+        for i, joint in enumerate(descriptor.joints, self.dof):
+            (arm if joint in descriptor.arm_joints else gripper).append(i)
+        self.arm_joints[name] = _as_slice(arm)
+        widest = sum(built.limits[i - self.dof, 1] for i in gripper)
+        self.grippers[name] = gripper, np.float32(widest)
+        order = list(built.loaded_order)
+        self.loaded_order[name] = None if order == sorted(order) else order
+        self.bases[name] = links[built.root]
+        self.joints[name] = slice(self.dof, self.dof + descriptor.dof)
+        self.dof += descriptor.dof
+        self.fingers[name] = descriptor.fingers
+        self.tcps[name] = self._tcp_frame(links, descriptor)
+
+    def _tcp_frame(self, links: Places[int], descriptor: RobotDescriptor) -> int:
+        orientation = links[descriptor.tcp_link]
         if not descriptor.tcp_position_links:
             return orientation
-        points = [self.links[name][link] for link in descriptor.tcp_position_links]
-        self.mean_frames.append((self.frames, orientation, points))
+        self.mean_frames.append((orientation, [links[x] for x in descriptor.tcp_position_links]))
         self.frames += 1
         return self.frames - 1
 

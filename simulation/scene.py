@@ -6,7 +6,7 @@ import sapien
 
 from layouts import Layout
 from simulation.physics import PhysicsSettings
-from simulation.world import World
+from simulation.sapien3.world import BuiltWorld
 
 
 def build_scene(
@@ -26,7 +26,7 @@ def build_scene(
         AssetError: If a robot's files cannot be found.
         SimulationError: If pictures are wanted and there is no Vulkan driver.
     """
-    world = World(layout, physics, visuals=visuals)
+    world = BuiltWorld(layout, physics, visuals=visuals)
     world.settle()
     for name, robot in world.robots.items():
         robot.articulation.name = name

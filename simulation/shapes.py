@@ -1,13 +1,10 @@
-"""Shapes that bodies are made of: data, and the one place that turns it into collision shapes."""
+"""Shapes that bodies are made of, as data."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
-
-import sapien
-import sapien.physx as physx
+from typing import Annotated
 
 from robots import SimulationError
 from robots.common.bounds import FAR
@@ -178,42 +175,3 @@ class Floor(Shape):
     size: Annotated[int, Within(1, FAR, "m", "whole number")] = 100
     tile: Length = 4.0
     collides: bool = field(default=False, kw_only=True)
-
-
-def add_collision(builder: Any, shape: Shape) -> None:
-    """Add a shape to a SAPIEN actor builder, if it takes part in contacts."""
-    if not shape.collides:
-        return
-    pose = sapien.Pose(list(shape.position), list(shape.quaternion))
-    material = (
-        None
-        if shape.friction is None
-        else physx.PhysxMaterial(
-            static_friction=shape.friction.static,
-            dynamic_friction=shape.friction.dynamic,
-            restitution=shape.friction.restitution,
-        )
-    )
-    common: dict[str, Any] = {"pose": pose, "material": material}
-    match shape:
-        case Plane():
-            builder.add_plane_collision(**common)
-            return
-        case Box():
-            add, sizes = builder.add_box_collision, {"half_size": list(shape.half_size)}
-        case Sphere():
-            add, sizes = builder.add_sphere_collision, {"radius": shape.radius}
-        case Cylinder():
-            add, sizes = builder.add_cylinder_collision, _round_sizes(shape)
-        case Capsule():
-            add, sizes = builder.add_capsule_collision, _round_sizes(shape)
-        case Mesh():
-            add = builder.add_convex_collision_from_file
-            sizes = {"filename": str(shape.file), "scale": list(shape.scale)}
-        case _:
-            raise TypeError(f"no collision for {type(shape).__name__}")
-    add(density=shape.density, **common, **sizes)
-
-
-def _round_sizes(shape: Cylinder | Capsule) -> dict[str, float]:
-    return {"radius": shape.radius, "half_length": shape.half_length}

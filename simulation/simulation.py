@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +12,15 @@ from numpy.typing import NDArray
 from layouts import Layout
 from robots import RobotDescriptor
 from robots.descriptor import IDENTITY, Quaternion
-from simulation.blueprint import Blueprint
+from simulation.backend import Backend, PointSolver, PoseSolver, Rows
+from simulation.cameras import AnyCamera, View
 from simulation.controller import JointPositionController
-from simulation.maths import Array
+from simulation.maths import Array, Flags, Floats
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, substeps
-from simulation.readout import ReadoutIndex
+from simulation.readout import Moment, ReadoutIndex
+from simulation.sapien3.backend import SapienBackend
 from simulation.state import State
-from simulation.world import World
+from simulation.world import Placements, World
 
 
 class Simulation:
@@ -25,10 +28,12 @@ class Simulation:
 
     Attributes:
         layout: The layout of every world.
-        worlds: The worlds.
+        num_envs: Number of worlds N.
+        worlds: What each of them holds.
         substeps: Physics steps per control step.
-        stamp: Counts every change, so that a stale `State` can tell that it is stale.
         index: Where each frame and joint stands in a read-out.
+        drive_targets: What the joints were last driven to, robots in layout order, joints in the
+            descriptors', (N, dof) (rad, m).
     """
 
     def __init__(
@@ -40,6 +45,7 @@ class Simulation:
         *,
         control_frequency: float = 20.0,
         visuals: bool = False,
+        backend: Callable[[], Backend] = SapienBackend,
     ) -> None:
         """Build the worlds.
 
@@ -50,18 +56,23 @@ class Simulation:
             physics: Solver settings; None keeps SAPIEN's own defaults.
             control_frequency: Control steps per second (Hz).
             visuals: Whether to build what pictures need.
+            backend: Makes what simulates them.
 
         Raises:
             SimulationError: If a control step is not a whole number of physics steps.
             AssetError: If robot files cannot be found.
         """
         self.substeps = substeps(physics or SAPIEN_DEFAULTS, control_frequency)
-        self.layout = layout
+        self.layout, self.num_envs = layout, num_envs
+        self._everywhere: Sequence[int] = range(num_envs)
         self._physics, self._visuals = physics, visuals
-        self._blueprints: dict[str, Blueprint] = {}
-        self.stamp = 0
-        self.worlds = [self._build_world(i, build) for i in range(num_envs)]
-        self._after_build()
+        self._backend = backend()
+        self._moment = Moment(self._backend)
+        self._placements = Placements()
+        self._controller = JointPositionController(layout)
+        self.drive_targets: Floats = np.zeros((num_envs, self._controller.dof), np.float32)
+        self.worlds: list[World] = []
+        self._build(self._everywhere, build)
 
     def rebuild(self, env_ids: Sequence[int], build: Callable[[World, int], None]) -> None:
         """Build some worlds anew; what PhysX remembered of their past is gone.
@@ -71,9 +82,7 @@ class Simulation:
             build: As when the simulation was made. It is not kept from then: a task's own would
                 keep the task, and with it these worlds, until Python looks for circles.
         """
-        for i in env_ids:
-            self.worlds[i] = self._build_world(i, build)
-        self._after_build()
+        self._build(env_ids, build)
 
     def descriptor(self, robot: str) -> RobotDescriptor:
         """Return what the robot of that name is."""
@@ -92,15 +101,7 @@ class Simulation:
             joint_positions: Joint positions before the step, shape (N, dof) (rad, m).
             env_ids: Which worlds; all if None. The others stand still.
         """
-        targets = self._controller.targets(action, joint_positions)
-        moving = range(len(self.worlds)) if env_ids is None else list(env_ids)
-        for i in moving:  # all before any physics, which drives this code out of the caches
-            self._controller.drive(targets, i)
-        for i in moving:
-            step = self.worlds[i].system.step
-            for _ in range(self.substeps):
-                step()
-        self.stamp += 1
+        self._backend.step(self._drive(action, joint_positions, env_ids), self.substeps)
 
     def timed_step(
         self, action: NDArray[np.float32], clock: Callable[[], float] = perf_counter
@@ -113,16 +114,15 @@ class Simulation:
             action: Shape (N, A), finite.
             clock: Tells the time (s).
         """
-        targets = self._controller.targets(action, self.read().joint_positions)
-        seconds = 0.0
-        for i, world in enumerate(self.worlds):
-            self._controller.drive(targets, i)
-            start = clock()
-            for _ in range(self.substeps):
-                world.system.step()
-            seconds += clock() - start
-        self.stamp += 1
-        return seconds
+        moving = self._drive(action, self.read().joint_positions, None)
+        start = clock()
+        self._backend.step(moving, self.substeps)
+        return clock() - start
+
+    def clear(self, env_ids: Sequence[int]) -> None:
+        """Begin a reset of some worlds: everything rests, and anchored bodies are put back."""
+        self._change()
+        self._backend.clear(env_ids)
 
     def place(
         self,
@@ -139,31 +139,112 @@ class Simulation:
             positions: Shape (N, 3) (m, world).
             quaternion: How it is turned, wxyz.
             where: In which worlds, (N,) bool.
+
+        Raises:
+            UnknownNameError: If there is no such body.
         """
-        names = [bodies] * len(self.worlds) if isinstance(bodies, str) else bodies
+        names = [bodies] * self.num_envs if isinstance(bodies, str) else bodies
         rows = zip(self.worlds, names, positions.tolist(), where.tolist(), strict=True)
         for world, name, position, moved in rows:
             if moved:
                 world.set_pose(name, position, quaternion)
-        self.stamp += 1
+
+    def write(self, env_ids: Sequence[int], bodies: Rows, robots: Rows) -> None:
+        """Put worlds into a state; see `simulation.backend.Backend.write`."""
+        self._change()
+        self._backend.write(env_ids, bodies, robots)
 
     def read(self) -> State:
         """Return what all worlds look like now."""
-        return State(self)
+        if self._placements:
+            self._change()
+        return State(self._backend.read(), self.index, self._moment)
 
     def touched(self) -> None:
-        """Note that a world was changed by hand, so that earlier states count as stale."""
-        self.stamp += 1
+        """Note that a world was changed by hand, so that earlier states count as past."""
+        self._change()
 
-    def _build_world(self, index: int, build: Callable[[World, int], None]) -> World:
+    def look(
+        self, env: int, cameras: Mapping[str, AnyCamera], textures: Sequence[str], *, markers: bool
+    ) -> list[View]:
+        """Return what cameras see in a world now; see `simulation.backend.Backend.look`."""
+        if self._placements:
+            self._change()
+        return self._backend.look(env, cameras, textures, markers=markers)
+
+    def inverse_kinematics(self, robot: str) -> PoseSolver:
+        """Return a solver for poses of a robot's TCP, where it stands in the first environment.
+
+        Raises:
+            UnknownNameError: If the layout has no such robot.
+            SimulationError: If the robot's TCP is not a link but a mean of several.
+        """
+        return self._backend.inverse_kinematics(robot)
+
+    def point_reach(self, robot: str) -> PointSolver:
+        """Return a solver for points of a robot's TCP link, likewise.
+
+        Raises:
+            UnknownNameError: If the layout has no such robot.
+        """
+        return self._backend.point_reach(robot)
+
+    def contact_counts(self) -> NDArray[np.int64]:
+        """Return how many pairs of bodies touch or are about to, (N,)."""
+        return self._backend.contact_counts()
+
+    def touching(self) -> Flags:
+        """Tell where a robot pressed on a movable object in the last step of physics, (N,)."""
+        return self._backend.touching()
+
+    def collision_shapes(self, env: int, body: str) -> list[tuple[Any, ...]]:
+        """Return the kind, pose and sizes of what a body collides with, as it was built.
+
+        Raises:
+            UnknownNameError: If there is no such body.
+        """
+        return self._backend.collision_shapes(env, self.worlds[env].body(body).name)
+
+    # -- inside ------------------------------------------------------------------------------
+
+    def _drive(
+        self, action: Floats, joint_positions: Floats, env_ids: Iterable[int] | None
+    ) -> Sequence[int]:
+        """Set the drive targets of worlds, and return which."""
+        self._change()
+        targets = self._controller.targets(action, joint_positions)
+        if env_ids is None:
+            moving, self.drive_targets = self._everywhere, targets
+        else:
+            moving = list(env_ids)
+            self.drive_targets[moving] = targets[moving]
+        self._backend.drive(targets, moving)
+        return moving
+
+    def _change(self) -> None:
+        """Place what is to be placed, and let states that were read be past."""
+        if self._placements:
+            self._backend.place(self._placements)
+            self._placements.bodies.clear()
+            self._placements.robots.clear()
+        self._moment.past = True
+        self._moment = Moment(self._backend)
+
+    def _describe(self, index: int, build: Callable[[World, int], None]) -> World:
         world = World(
-            self.layout, self._physics, visuals=self._visuals, blueprints=self._blueprints
+            self.layout,
+            self._physics,
+            visuals=self._visuals,
+            number=index,
+            placements=self._placements,
         )
         build(world, index)
-        world.settle()
         return world
 
-    def _after_build(self) -> None:
-        self.index = ReadoutIndex(self.worlds[0])
-        self._controller = JointPositionController(self.layout, self.worlds)
-        self.stamp += 1
+    def _build(self, env_ids: Sequence[int], build: Callable[[World, int], None]) -> None:
+        fresh = {i: self._describe(i, build) for i in env_ids}
+        self._placements.forget(env_ids)
+        built = self._backend.build(fresh)
+        self.worlds = [fresh.get(i) or self.worlds[i] for i in self._everywhere]
+        self.index = ReadoutIndex(self.layout, built)
+        self._change()

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cache, wraps
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, Literal, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots import Fingers, SimulationError
-from simulation.contacts import LinkTouch, grasped, link_touches, pairwise_forces
-from simulation.maths import Array, Flags, Floats, counted, full, like, norm
+from simulation.backend import Readout, Velocity
+from simulation.grasps import grasped
+from simulation.maths import Array, Flags, Floats, concatenate, counted, full, like, norm
+from simulation.readout import Moment, ReadoutIndex
 from simulation.rotations import last_euler_angle, rotation_matrix
 
-if TYPE_CHECKING:
-    from simulation.simulation import Simulation
-
 _NOTHING = np.empty(0, np.float32)
-_STILL = np.zeros(3, np.float32)
 _Arguments = ParamSpec("_Arguments")
 _Owner = TypeVar("_Owner")
 _Value = TypeVar("_Value")
@@ -77,11 +75,11 @@ class State:
 
     __slots__ = (
         "_distances",
+        "_forces",
         "_index",
+        "_moment",
         "_offsets",
-        "_simulation",
         "_speeds",
-        "_stamp",
         "_velocities",
         "all_poses",
         "joint_positions",
@@ -90,29 +88,21 @@ class State:
         "num_envs",
     )
 
-    def __init__(self, simulation: Simulation) -> None:
-        """Read poses and joints of every world."""
-        self._simulation = simulation
-        self._stamp = simulation.stamp
-        self._index = index = simulation.index
+    def __init__(self, readout: Readout, index: ReadoutIndex, moment: Moment) -> None:
+        """Take what was read.
+
+        Args:
+            readout: Poses and joints.
+            index: Where what stands in them.
+            moment: Reads the rest.
+        """
+        poses, self.joint_positions, self.joint_velocities = readout
+        self._index, self._moment = index, moment
         self.memo: dict[Any, Any] = {}
-        self._offsets = _NOTHING
-        self._distances = _NOTHING
-        self._velocities = _NOTHING
-        self._speeds = _NOTHING
-        worlds = simulation.worlds
-        self.num_envs = count = len(worlds)
-        packed = b"".join([world.scene.pack_poses() for world in worlds])
-        entities = np.frombuffer(packed, np.float32).reshape(count, -1, 7).transpose(1, 0, 2)
-        self.all_poses = poses = np.empty((index.frames, count, 7), np.float32)
-        poses[: index.entities, :, :3] = entities[:, :, 4:]  # SAPIEN packs the quaternion first
-        poses[: index.entities, :, 3:] = entities[:, :, :4]
-        robots = [articulation for world in worlds for articulation in world.articulations]
-        self.joint_positions = _rows([robot.qpos for robot in robots], count)
-        self.joint_velocities = _rows([robot.qvel for robot in robots], count)
-        for frame, orientation, points in index.mean_frames:
-            poses[frame, :, :3] = sum(poses[point, :, :3] for point in points) / len(points)
-            poses[frame, :, 3:] = poses[orientation, :, 3:]
+        self._offsets = self._distances = self._velocities = self._speeds = _NOTHING
+        self._forces: tuple[int, Floats | None] = 0, None  # of so many pairs
+        self.num_envs = len(self.joint_positions)
+        self.all_poses = with_means(poses, index.mean_frames) if index.mean_frames else poses
 
     def lost(self) -> tuple[str, int] | None:
         """Return the first robot or body with numbers that are not finite, and its world's number.
@@ -188,28 +178,40 @@ class State:
 
     def linear_velocity(self, body: str) -> Floats:
         """Linear velocity of a body in the world frame, shape (N, 3) (m/s)."""
-        return self._velocity(body, "linear_velocity")
+        return self._velocity(body, "linear")
 
     def angular_velocity(self, body: str) -> Floats:
         """Angular velocity of a body in the world frame, shape (N, 3) (rad/s)."""
-        return self._velocity(body, "angular_velocity")
+        return self._velocity(body, "angular")
 
     def speed(self, body: str) -> Floats:
         """Euclidean norm of a body's linear velocity, shape (N,) (m/s)."""
-        return self._speed(body, "linear_velocity")
+        return self._speed(body, "linear")
 
     def spin(self, body: str) -> Floats:
         """Euclidean norm of a body's angular velocity, shape (N,) (rad/s)."""
-        return self._speed(body, "angular_velocity")
+        return self._speed(body, "angular")
+
+    def velocities(self, bodies: tuple[str, ...]) -> Floats:
+        """Linear and angular velocities of bodies, (bodies, 2, N, 3) (m/s and rad/s, world)."""
+        self._index.bodies.expect(*bodies)
+        if not bodies:
+            return np.empty((0, 2, self.num_envs, 3), np.float32)
+        both = self._moment.velocities(_both_velocities(bodies))
+        return both.reshape(len(bodies), 2, self.num_envs, 3)
+
+    def root_velocities(self) -> Floats:
+        """Linear and angular velocity of each robot's root, (robots, N, 6) (m/s, rad/s)."""
+        return self._moment.root_velocities()
 
     # -- robots ------------------------------------------------------------------------------
 
     def qpos(self, robot: str) -> Floats:
-        """Joint positions of a robot in SAPIEN's joint order, shape (N, dof) (rad, m)."""
+        """Joint positions of a robot in the order of its descriptor, shape (N, dof) (rad, m)."""
         return self.joint_positions[:, self._index.joints[robot]]
 
     def qvel(self, robot: str) -> Floats:
-        """Joint velocities of a robot in SAPIEN's joint order, shape (N, dof) (rad/s, m/s)."""
+        """Joint velocities of a robot, ordered likewise, shape (N, dof) (rad/s, m/s)."""
         return self.joint_velocities[:, self._index.joints[robot]]
 
     def arm_qvel(self, robot: str) -> Floats:
@@ -223,6 +225,10 @@ class State:
     def link_position(self, robot: str, link: str) -> Floats:
         """Position of a link, shape (N, 3) (m)."""
         return self.all_poses[self._index.links[robot][link], :, :3]
+
+    def base_pose(self, robot: str) -> Floats:
+        """Pose of a robot's root link, shape (N, 7)."""
+        return self.all_poses[self._index.bases[robot]]
 
     def base_position(self, robot: str) -> Floats:
         """Position of a robot's root link, shape (N, 3) (m)."""
@@ -277,11 +283,11 @@ class State:
 
     # -- contacts ----------------------------------------------------------------------------
 
-    @_remembered
     def contact_force(self, robot: str, link: str, body: str) -> Floats:
         """Sum of the contact forces of a body on a link, shape (N, 3) (N, world frame)."""
-        forces = self._contact_forces(robot, (link,), body)
-        return np.zeros((self.num_envs, 3), np.float32) if forces is None else forces[:, 0]
+        number = self._index.force(robot, link, body)
+        forces = self._all_forces(number)
+        return np.zeros((self.num_envs, 3), np.float32) if forces is None else forces[number]
 
     @_remembered
     def is_grasping(self, robot: str, body: str, max_angle: float | None = None) -> Flags:
@@ -296,12 +302,14 @@ class State:
         fingers = self._index.fingers[robot]
         if fingers is None:
             return np.zeros(self.num_envs, bool)
-        forces = self._contact_forces(robot, fingers.links, body)
+        pairs = self._index.grasp(robot, body)
+        forces = self._all_forces(pairs[-1])
         if forces is None:
             return np.zeros(self.num_envs, bool)
         if max_angle is not None:
             fingers = _within(fingers, max_angle)
-        return grasped(fingers, forces, [self.link_pose(robot, link) for link in fingers.links])
+        poses = [self.link_pose(robot, link) for link in fingers.links]
+        return grasped(fingers, forces[pairs], poses)
 
     # -- distances ---------------------------------------------------------------------------
 
@@ -342,16 +350,17 @@ class State:
         if place >= len(self._offsets):
             pairs = self._index.pairs
             ways = self.all_poses.take(pairs.ends, 0) - self.all_poses.take(pairs.starts, 0)
-            ways[pairs.planar, :, 2] = 0.0  # exact: a zero adds nothing to a norm
+            if len(pairs.planar):
+                ways[pairs.planar, :, 2] = 0.0  # exact: a zero adds nothing to a norm
             self._offsets = ways[:, :, :3]
         return self._offsets
 
-    def _velocity(self, body: str, which: str) -> Floats:
-        place = self._index.velocity(body, which)
+    def _velocity(self, body: str, kind: Literal["linear", "angular"]) -> Floats:
+        place = self._index.velocity(body, kind)
         return self._all_velocities(place)[place]
 
-    def _speed(self, body: str, which: str) -> Floats:
-        place = self._index.velocity(body, which)
+    def _speed(self, body: str, kind: Literal["linear", "angular"]) -> Floats:
+        place = self._index.velocity(body, kind)
         if place >= len(self._speeds):
             self._speeds = norm(self._all_velocities(place))
         return self._speeds[place]
@@ -359,46 +368,38 @@ class State:
     def _all_velocities(self, place: int) -> Floats:
         """Velocities that were ever asked for, (K, N, 3), at least up to ``place``."""
         if place >= len(self._velocities):
-            self._expect_current()
-            worlds = self._simulation.worlds
-            rows: list[Floats] = []
-            for body, which in self._index.velocities:
-                bodies = [world.bodies[body] for world in worlds]
-                moves = bodies[0].kind == "dynamic"
-                rows += [getattr(b.component, which) if moves else _STILL for b in bodies]
-            self._velocities = np.concatenate(rows).reshape(-1, self.num_envs, 3)
+            self._velocities = self._moment.velocities(self._index.velocities.keys)
         return self._velocities
 
-    def _contact_forces(self, robot: str, links: tuple[str, ...], body: str) -> Floats | None:
-        """Forces of a body on some links, (N, L, 3), or None if nothing touches anywhere."""
-        self._expect_current()
-        self._index.links[robot].expect(*links)
-        self._index.bodies.expect(body)
-        forces: Floats | None = None
-        for i, touches in self._touches():
-            found = pairwise_forces(self._simulation.worlds[i], touches, robot, links, body)
-            for link, force in found.items():
-                if forces is None:
-                    forces = np.zeros((self.num_envs, len(links), 3), np.float32)
-                forces[i, links.index(link)] = force
+    def _all_forces(self, place: int) -> Floats | None:
+        """Forces of pairs that were ever asked for, (P, N, 3), at least up to ``place``.
+
+        None if there are none anywhere.
+        """
+        count, forces = self._forces
+        if place >= count:
+            pairs = self._index.forces.keys
+            forces = self._moment.forces(pairs)
+            self._forces = len(pairs), forces
         return forces
 
-    @_remembered
-    def _touches(self) -> list[tuple[int, list[LinkTouch]]]:
-        """Number of each world in which links touch something, and what they touch."""
-        touches = [link_touches(world) for world in self._simulation.worlds]
-        return [(i, found) for i, found in enumerate(touches) if found]
 
-    def _expect_current(self) -> None:
-        if self._stamp != self._simulation.stamp:
-            raise SimulationError(
-                "velocities and contacts were asked of a state that is no longer the present one;"
-                " read them before the next step or reset"
-            )
+def with_means(poses: Floats, means: Sequence[tuple[int, list[int]]]) -> Floats:
+    """Return poses, (F, N, 7), and after them those of frames that lie between others.
+
+    Args:
+        poses: Of the frames between which they lie.
+        means: For each, the frame that orients it, and the frames whose mean is its origin.
+    """
+    between = poses[[orientation for orientation, _ in means]]
+    for row, (_, points) in zip(between, means, strict=True):
+        row[:, :3] = sum(poses[point, :, :3] for point in points) / len(points)
+    return concatenate((poses, between))
 
 
-def _rows(parts: list[Floats], count: int) -> Floats:
-    return np.concatenate(parts).reshape(count, -1)
+@cache  # asked for with every state that is recorded
+def _both_velocities(bodies: tuple[str, ...]) -> tuple[Velocity, ...]:
+    return tuple(Velocity(body, kind) for body in bodies for kind in ("linear", "angular"))
 
 
 @cache  # making one checks it, which is too slow for every step

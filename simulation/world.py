@@ -1,49 +1,67 @@
-"""One environment's world: a SAPIEN scene with a layout's robots and a task's bodies."""
+"""What a task puts into a world, as plain data that a backend builds."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
-import sapien
-import sapien.physx as physx
+import numpy as np
+from numpy.typing import NDArray
 
 from layouts import Layout
 from robots import SimulationError, UnknownNameError
 from robots.descriptor import IDENTITY, Quaternion, Vector3
-from simulation.blueprint import Blueprint, read_blueprint
-from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, apply
-from simulation.rendering.device import expect_render_device, outlive_forks
-from simulation.robot import SimulatedRobot
-from simulation.shapes import Shape, add_collision
+from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
+from simulation.shapes import Shape
 
 BodyKind = Literal["dynamic", "kinematic", "static"]
 
 
 @dataclass(frozen=True)
-class SimulatedBody:
-    """A body that a task put into the world.
+class Body:
+    """A body that a task puts into the world.
 
     Attributes:
         name: Its name, also in the state dict.
-        entity: SAPIEN's entity.
-        component: Its physics component.
+        shapes: What it is made of, in its own frame.
         kind: Whether physics, only the task, or nothing moves it.
-        start_pose: Pose it was built at.
-        anchored: Whether every reset puts it back to ``start_pose``.
-        shapes: What it is made of.
-        marker: Whether cameras that observe do not see it.
+        position: Where it is built (m, world).
+        quaternion: How it is turned there, wxyz.
+        anchored: Whether every reset puts it back there.
+        marker: Whether it is there for people only: cameras that observe do not see it.
     """
 
     name: str
-    entity: sapien.Entity
-    component: Any
-    kind: BodyKind
-    start_pose: sapien.Pose
-    anchored: bool
-    shapes: tuple[Shape, ...] = ()
+    shapes: tuple[Shape, ...]
+    kind: BodyKind = "dynamic"
+    position: Vector3 = (0.0, 0.0, 0.0)
+    quaternion: Quaternion = IDENTITY
+    anchored: bool = False
     marker: bool = False
+
+
+@dataclass
+class Placements:
+    """What is to be placed, in any number of worlds at once.
+
+    Attributes:
+        bodies: By name, then by world: position (m) and quaternion (wxyz), seven numbers.
+        robots: Likewise: joint positions in the descriptor's order, (dof,) (rad, m).
+    """
+
+    bodies: dict[str, dict[int, list[float]]] = field(default_factory=dict)
+    robots: dict[str, dict[int, NDArray[np.float64]]] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        """Tell whether there is anything to place."""
+        return bool(self.bodies or self.robots)
+
+    def forget(self, env_ids: Iterable[int]) -> None:
+        """Leave out what was meant for some worlds."""
+        for env in env_ids:
+            for rows in (*self.bodies.values(), *self.robots.values()):
+                rows.pop(env, None)
 
 
 class World:
@@ -52,14 +70,12 @@ class World:
     The order of dynamic bodies decides the order in which PhysX solves contacts, so it is part of
     what a task declares.
 
+    What is placed takes effect, in all worlds in one go, before a simulation next steps or is read.
+
     Attributes:
         layout: Which robots stand where.
-        physics: Settings the world was built with.
-        scene: SAPIEN's scene.
-        system: Its physics system.
-        robots: Robot by name in the layout.
-        articulations: The robots' articulations, in layout order.
-        links: Robot and link name of each link, by the identity of its component.
+        physics: Settings it is built with.
+        visuals: Whether what pictures need is built.
         bodies: Body by name.
         design: Geometry drawn for the coming episodes, if the task draws any.
     """
@@ -70,46 +86,25 @@ class World:
         physics: PhysicsSettings | None = None,
         *,
         visuals: bool = False,
-        blueprints: dict[str, Blueprint] | None = None,
+        number: int = 0,
+        placements: Placements | None = None,
     ) -> None:
-        """Build the robots of a layout.
+        """Begin without bodies.
 
         Args:
             layout: Which robots stand where.
             physics: Solver settings; None keeps SAPIEN's own defaults.
             visuals: Whether to build what pictures need (a Vulkan driver must be present).
-            blueprints: What was read of the robots for an earlier world that is like this one,
-                by name; what is missing is read and added.
-
-        Raises:
-            AssetError: If a robot's files cannot be found.
-            SimulationError: If pictures are wanted and there is no Vulkan driver.
+            number: Its number among the worlds of a simulation.
+            placements: Where that simulation looks for what is placed.
         """
         self.layout = layout
         self.physics = SAPIEN_DEFAULTS if physics is None else physics
         self.visuals = visuals
-        apply(self.physics)
-        self.system = physx.PhysxCpuSystem()
-        systems: list[Any] = [self.system]
-        if visuals:
-            systems.append(_render_system())
-            outlive_forks(self)
-        self.scene = sapien.Scene(systems)
-        self.system.timestep = self.physics.timestep
-        blueprints = {} if blueprints is None else blueprints
-        self.robots: dict[str, SimulatedRobot] = {}
-        for name, placement in layout.items():
-            if name not in blueprints:
-                blueprints[name] = read_blueprint(placement.robot, visuals=visuals)
-            self.robots[name] = SimulatedRobot(self.scene, name, placement, blueprints[name])
-        self.articulations = [robot.articulation for robot in self.robots.values()]
-        self.links = {
-            id(link): (name, link_name)
-            for name, robot in self.robots.items()
-            for link_name, link in robot.links.items()
-        }
-        self.bodies: dict[str, SimulatedBody] = {}
+        self.bodies: dict[str, Body] = {}
         self.design: Any = None
+        self._number = number
+        self._placements = Placements() if placements is None else placements
 
     def add(
         self,
@@ -120,7 +115,7 @@ class World:
         quaternion: Quaternion = IDENTITY,
         anchored: bool = False,
         marker: bool = False,
-    ) -> SimulatedBody:
+    ) -> Body:
         """Add a body made of shapes.
 
         Args:
@@ -137,25 +132,11 @@ class World:
         """
         if name in self.bodies:
             raise SimulationError(f"this world already has a body called {name!r}")
-        builder = self.scene.create_actor_builder()
-        for shape in shapes:
-            add_collision(builder, shape)
-        builder.set_physx_body_type(kind)
-        pose = sapien.Pose(list(position), list(quaternion))
-        builder.set_initial_pose(pose)
-        entity = builder.build(name)
-        if self.visuals:
-            _draw(entity, shapes)
-        component = entity.find_component_by_type(
-            physx.PhysxRigidStaticComponent
-            if kind == "static"
-            else physx.PhysxRigidDynamicComponent
-        )
-        body = SimulatedBody(name, entity, component, kind, pose, anchored, shapes, marker)
+        body = Body(name, shapes, kind, position, quaternion, anchored, marker)
         self.bodies[name] = body
         return body
 
-    def body(self, name: str) -> SimulatedBody:
+    def body(self, name: str) -> Body:
         """Return a body by name.
 
         Raises:
@@ -165,29 +146,6 @@ class World:
             raise UnknownNameError("body of this world", name, self.bodies)
         return self.bodies[name]
 
-    def settle(self) -> None:
-        """End the build: set every start pose once more, as native does."""
-        for body in self.bodies.values():
-            if body.kind != "static":
-                body.entity.set_pose(body.start_pose)
-        for robot in self.robots.values():
-            robot.articulation.set_root_pose(robot.base_pose)
-
-    def clear(self) -> None:
-        """Begin a reset: zero every velocity and force, and put anchored bodies back.
-
-        PhysX keeps its contact caches: a reset world remembers, a rebuilt one does not.
-        """
-        for body in self.bodies.values():
-            if body.kind == "dynamic":
-                body.component.set_linear_velocity([0.0, 0.0, 0.0])
-                body.component.set_angular_velocity([0.0, 0.0, 0.0])
-        for robot in self.robots.values():
-            robot.stop()
-        for body in self.bodies.values():
-            if body.anchored:
-                body.entity.set_pose(body.start_pose)
-
     def set_pose(self, name: str, position: Any, quaternion: Any = IDENTITY) -> None:
         """Move a body.
 
@@ -195,36 +153,39 @@ class World:
             name: Body name.
             position: Three numbers (m, world).
             quaternion: Four numbers, wxyz.
+
+        Raises:
+            UnknownNameError: If the world has no such body.
+            SimulationError: If there are more numbers than that, or fewer.
         """
         self.set_poses((name,), position, quaternion)
 
     def set_poses(self, names: Iterable[str], position: Any, quaternion: Any = IDENTITY) -> None:
         """Move several bodies to the same pose; see `set_pose`."""
-        pose = sapien.Pose(_floats(position), _floats(quaternion))
+        pose = [*_floats(position, 3, "position"), *_floats(quaternion, 4, "quaternion")]
+        rows = self._placements.bodies
         for name in names:
-            self.body(name).entity.set_pose(pose)
+            rows.setdefault(self.body(name).name, {})[self._number] = pose
+
+    def stand(self, robot: str, qpos: Any) -> None:
+        """Stand a robot at its base pose, at rest.
+
+        Args:
+            robot: Its name in the layout.
+            qpos: Joint positions in the order of the descriptor's joints, (dof,) (rad, m).
+
+        Raises:
+            UnknownNameError: If the layout has no such robot.
+            SimulationError: If there are more numbers than joints, or fewer.
+        """
+        joints, dof = np.array(qpos, float), self.layout[robot].robot.dof
+        if joints.shape != (dof,):
+            raise SimulationError(f"qpos of {robot} is {qpos!r}; it must be {dof} numbers")
+        self._placements.robots.setdefault(robot, {})[self._number] = joints
 
 
-def _floats(values: Any) -> list[float]:
-    return values.tolist() if hasattr(values, "tolist") else [float(x) for x in values]
-
-
-def _draw(entity: sapien.Entity, shapes: tuple[Shape, ...]) -> None:
-    from simulation.rendering.visuals import visual_component
-
-    component = visual_component(shapes)
-    if component is not None:
-        entity.add_component(component)
-
-
-def _render_system() -> Any:
-    from sapien.render import RenderSystem
-
-    expect_render_device()
-    try:
-        return RenderSystem()
-    except RuntimeError as error:
-        raise SimulationError(
-            f"pictures need a Vulkan driver, and none works here ({error}); without pictures"
-            " (render_mode=None, obs_mode='state') everything else works"
-        ) from error
+def _floats(values: Any, count: int, what: str) -> list[float]:
+    floats = values.tolist() if hasattr(values, "tolist") else [float(x) for x in values]
+    if not isinstance(floats, list) or len(floats) != count:
+        raise SimulationError(f"{what} is {values!r}; it must be {count} numbers")
+    return floats

@@ -18,7 +18,7 @@ from rich.table import Table
 from layouts import Layout
 from robots import TaskError
 from simulation import Camera
-from simulation.rendering.cameras import RobotCamera
+from simulation.cameras import RobotCamera
 from tasks.engine.observation import cameras_of
 from tasks.engine.task import MultiRobotTask
 from tasks.registry import get_task_class, make, other_names

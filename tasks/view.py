@@ -13,9 +13,8 @@ from layouts.viewer import Cell, Motion, Thing
 from layouts.visuals import Part, coloured, load_meshes
 from robots import TaskError
 from simulation import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
-from simulation.world import World
 from tasks.engine.task import MultiRobotTask
-from tasks.native.format import articulation_keys
+from tasks.native.format import articulation_keys, declared_joints
 
 PLANE_SIZE = 6.0  # m, of what is drawn of an infinite plane
 ROOT = 13  # numbers of a row before the joints: the root's pose and velocities
@@ -39,7 +38,7 @@ def task_cell(task: MultiRobotTask, title: str, motion: Motion | None = None) ->
         for name, body in world.bodies.items()
         if (parts := body_parts(body.shapes))
     }
-    start = {name: in_declared_order(world, name, state.qpos(name)[0]) for name in task.layout}
+    start = {name: state.qpos(name)[0].astype(float) for name in task.layout}
     return Cell(title, task.layout, things, motion, start)
 
 
@@ -58,27 +57,17 @@ def recorded_motion(
     world = task.simulation.worlds[0]
     qpos: dict[str, Floats] = {}
     for name, key in articulation_keys(task.layout).items():
-        rows, joints = states.get("articulations", {}).get(key), len(world.robots[name].joints)
+        rows, joints = states.get("articulations", {}).get(key), task.layout[name].robot.dof
         if rows is None or rows.shape[1] != ROOT + 2 * joints:
             raise TaskError(f"the states have no row of {ROOT + 2 * joints} numbers for {key!r}")
-        qpos[name] = in_declared_order(world, name, rows[:, ROOT : ROOT + joints])
+        own = declared_joints(task.simulation.index, name, rows[:, ROOT : ROOT + joints])
+        qpos[name] = own.astype(float)
     poses = {
         name: rows[:, :7].astype(float)
         for name, rows in states.get("actors", {}).items()
         if name in world.bodies and body_parts(world.bodies[name].shapes)
     }
     return Motion(1 / task.scenario.control_frequency, qpos, poses)
-
-
-def in_declared_order(world: World, robot: str, qpos: NDArray[Any]) -> Floats:
-    """Return joint positions in the order of the descriptor's joints.
-
-    Args:
-        world: The robot's world.
-        robot: Its name in the layout.
-        qpos: In SAPIEN's order, (…, dof) (rad, m).
-    """
-    return qpos[..., world.robots[robot].active_index].astype(float)
 
 
 def body_parts(shapes: tuple[Shape, ...]) -> tuple[Part, ...]:

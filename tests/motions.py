@@ -11,7 +11,8 @@ from math import atan2, cos, pi, sin
 import numpy as np
 
 import tasks
-from simulation.kinematics import InverseKinematics
+from simulation.sapien3.backend import worlds_below
+from simulation.sapien3.inverse_kinematics import InverseKinematics
 from tasks.episode import Episode
 
 OPEN, CLOSED = 1.0, -1.0
@@ -24,7 +25,7 @@ class Puppeteer:
     def __init__(self, task_id: str, seed: int) -> None:
         self.env = tasks.make(task_id)
         self.env.reset(seed=seed)
-        self.world = self.env.simulation.worlds[0]
+        self.world = worlds_below(self.env.simulation)[0]
         self.seed = seed
         self.actions: list[np.ndarray] = []
 
@@ -86,7 +87,7 @@ class Puppeteer:
 
     def place(self, body: str) -> tuple[np.ndarray, float]:
         """Position (m) and yaw (rad) of a body."""
-        pose = self.world.body(body).entity.pose
+        pose = self.world.bodies[body].entity.pose
         return np.array(pose.p), yaw_of(pose.q)
 
 
@@ -190,7 +191,9 @@ def push_t(puppeteer: Puppeteer) -> None:
 
 def touch_something(puppeteer: Puppeteer) -> None:
     """Reach for the first movable body with every robot in turn; for tasks not listed below."""
-    bodies = [b.name for b in puppeteer.world.bodies.values() if b.kind == "dynamic"]
+    bodies = [
+        b.name for b in puppeteer.env.simulation.worlds[0].bodies.values() if b.kind == "dynamic"
+    ]
     for robot, placement in puppeteer.env.layout.items():
         if bodies:
             yaw_at_rest = yaw_of(placement.base_quaternion)

@@ -20,7 +20,7 @@ from experts.rehearsal import Attempt, Rehearsal, search
 from experts.script import Scene, Script, Waypoint
 from kinematics.rotations import Floats
 from robots import TaskError
-from simulation.reach import PointReach
+from simulation.backend import PointSolver
 from tasks import MultiRobotTask
 from tasks.maniskill.pick_cube_so100 import PickCubeSO100
 
@@ -111,7 +111,7 @@ def pick_small_cube(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
     def attempts(rehearsal: Rehearsal) -> Iterator[Attempt]:
         for style in STYLES:
             scene = rehearsal.begin(seed)
-            reach = PointReach(rehearsal.task.simulation.worlds[0], ARM)
+            reach = rehearsal.task.simulation.point_reach(ARM)
             yield rehearsal.play(_Pick(style, reach, scene).script())
 
     return search(task, seed, attempts)
@@ -120,7 +120,7 @@ def pick_small_cube(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
 class _Pick:
     """One pick: where the arm's joints go, worked out from the first scene."""
 
-    def __init__(self, style: Style, reach: PointReach, scene: Scene) -> None:
+    def __init__(self, style: Style, reach: PointSolver, scene: Scene) -> None:
         self.style, self.reach = style, reach
         self.cube, quaternion = scene.body(CUBE)
         self.goal, _ = scene.body(GOAL)

@@ -15,7 +15,6 @@ from experts.maniskill.sliding import SlidingBody, to_body
 from experts.rehearsal import Attempt, Rehearsal, search
 from experts.script import OPEN, Scene
 from kinematics.rotations import Floats
-from simulation.kinematics import InverseKinematics
 from tasks import MultiRobotTask
 from tasks.maniskill.push_t import BAR_HALF_SIZE, CENTRE_OF_MASS_Y, STEM_HALF_SIZE
 
@@ -67,10 +66,9 @@ class _Pusher:
     """One attempt: pushes the T in a private task, from its present state."""
 
     def __init__(self, task: MultiRobotTask, scene: Scene, random: np.random.Generator) -> None:
-        world = task.simulation.worlds[0]
         self._task, self._scene = task, scene
-        self._kinematics = InverseKinematics(world, ARM)
-        self._driver = ArmDriver(task.layout[ARM].robot, world.robots[ARM].active_index)
+        self._kinematics = task.simulation.inverse_kinematics(ARM)
+        self._driver = ArmDriver(task.layout[ARM].robot)
         self._base = np.array(task.layout[ARM].base_position)
         self._contacts = contacts()
         self._planner = PushPlanner(

@@ -14,7 +14,7 @@ from experts.geometry import gripper_facing, heading, planar_distance, turn
 from experts.rehearsal import Attempt, Rehearsal, search
 from experts.script import CLOSED, Pose, Scene, Script, Waypoint
 from kinematics.rotations import Floats, multiply
-from simulation.kinematics import InverseKinematics
+from simulation.backend import PoseSolver
 from tasks import MultiRobotTask
 
 ARM, BALL, TARGET = "arm", "ball", "goal_region"
@@ -70,7 +70,7 @@ def roll(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
 
 def _shots(rehearsal: Rehearsal, seed: int) -> Iterator[Attempt]:
     """Shoot in every style, a few times each, the aim corrected by where the ball went."""
-    kinematics = InverseKinematics(rehearsal.task.simulation.worlds[0], ARM)
+    kinematics = rehearsal.task.simulation.inverse_kinematics(ARM)
     for style in STYLES:
         aim, correction, last_error = 0.0, CORRECTION, 0.0
         for _ in range(SHOTS):
@@ -89,9 +89,7 @@ def _shots(rehearsal: Rehearsal, seed: int) -> Iterator[Attempt]:
 class _Shot:
     """One swing, worked out from where ball and target are."""
 
-    def __init__(
-        self, style: Style, kinematics: InverseKinematics, scene: Scene, aim: float
-    ) -> None:
+    def __init__(self, style: Style, kinematics: PoseSolver, scene: Scene, aim: float) -> None:
         self.style, self.kinematics = style, kinematics
         self.ball, target = scene.body(BALL)[0], scene.body(TARGET)[0]
         self.direction = heading(self.ball, target) + aim

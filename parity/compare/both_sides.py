@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from parity.compare.native_env import make_native, native_action, native_action_dim, quiet
 from parity.compare.snapshot import Snapshot, select, stack, take
 from robots import CONTROL_MODES
+from simulation.sapien3.contacts import presses_on_object
 from tasks import MultiRobotTask
 
 Floats = NDArray[np.float32]
@@ -72,9 +73,7 @@ class OurSide:
 
     def touching(self) -> NDArray[np.bool_]:
         """Tell where a robot touched a movable object; see `Side`."""
-        return np.array(
-            [_touches_object(w.system.get_contacts()) for w in self.env.simulation.worlds]
-        )
+        return self.env.simulation.touching()
 
 
 class NativeSide:
@@ -113,7 +112,7 @@ class NativeSide:
 
     def touching(self) -> NDArray[np.bool_]:
         """Tell where a robot touched a movable object; see `Side`."""
-        return np.array([_touches_object(env.scene.px.get_contacts()) for env in self.envs])
+        return np.array([presses_on_object(env.scene.px.get_contacts()) for env in self.envs])
 
     def close(self) -> None:
         """Let the environments go."""
@@ -124,18 +123,3 @@ class NativeSide:
     def _step(env: Any, action: Floats) -> Snapshot:
         obs, reward, terminated, _, info = env.step(native_action(env, action))
         return take(env, 1, obs, info, reward, terminated)
-
-
-def _touches_object(contacts: Sequence[Any]) -> bool:
-    """Tell whether a contact that carries force joins a link and a body that physics moves."""
-    return any(
-        sorted(map(_kind, contact.bodies)) == ["link", "movable"]
-        and any(np.any(point.impulse) for point in contact.points)
-        for contact in contacts
-    )
-
-
-def _kind(body: Any) -> str:
-    if hasattr(body, "articulation"):
-        return "link"
-    return "fixed" if getattr(body, "kinematic", True) else "movable"

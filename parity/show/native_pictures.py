@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 from parity.compare.native_env import quiet
 from parity.compare.snapshot import Snapshot, state_dict
 from robots import RobotLayoutsError
+from simulation.sapien3.collision import described_shapes
 from tasks import MultiRobotTask
 
 Picture = NDArray[np.uint8]  # (H, W, 3), red, green, blue
-
-# What a collision shape may have, besides its place in the body.
-_SHAPE = ("half_size", "radius", "half_length", "scale", "vertices", "triangles")
 
 
 class PictureError(RobotLayoutsError, RuntimeError):
@@ -83,27 +81,13 @@ def expect_same_shapes(env: Any, task: MultiRobotTask) -> None:
     bodies = task.simulation.worlds[0].bodies
     for name, actor in env.scene.state_dict_registry.actors.items():
         if name in bodies:
-            theirs, ours = _shapes(actor._bodies[0]), _shapes(bodies[name].component)
+            theirs = described_shapes(actor._bodies[0])
+            ours = task.simulation.collision_shapes(0, name)
             if theirs != ours:
                 raise PictureError(
                     f"{name} has other shapes in native than here, which a picture drawn in"
                     f" native's scene would not show: {theirs} there, {ours} here"
                 )
-
-
-def _shapes(body: Any) -> list[tuple[Any, ...]]:
-    return [
-        (
-            type(shape).__name__,
-            *np.concatenate([shape.local_pose.p, shape.local_pose.q]).tolist(),
-            *(
-                np.asarray(getattr(shape, field)).tolist()
-                for field in _SHAPE
-                if hasattr(shape, field)
-            ),
-        )
-        for shape in body.collision_shapes
-    ]
 
 
 def difference(first: Picture, second: Picture) -> Picture:

@@ -15,7 +15,7 @@ from robots import RobotDescriptor
 from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
 from tasks import MultiRobotTask
 from tasks.episode import States
-from tasks.native.format import articulation_keys
+from tasks.native.format import articulation_keys, declared_joints
 
 Floats = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -87,7 +87,7 @@ class ColumnReader:
         ]
         self.body_names = [f"{body}.{number}" for body in self.bodies for number in POSE]
         self._keys = articulation_keys(task.layout)
-        self._order = {place: robot.active_index for place, robot in world.robots.items()}
+        self._dof = {place: p.robot.dof for place, p in placements}
         self._judged: tuple[bool, bool] | None = None
 
     def read(self, trajectory: Trajectory) -> Columns:
@@ -99,14 +99,14 @@ class ColumnReader:
         """
         states = self._checked(trajectory)
         rows = {place: states["articulations"][key] for place, key in self._keys.items()}
-        order, none = self._order, np.empty((len(trajectory.actions) + 1, 0), np.float32)
+        dof, none = self._dof, np.empty((len(trajectory.actions) + 1, 0), np.float32)
         poses = [states["actors"][body][:, : len(POSE)] for body in self.bodies]
         return Columns(
             episode_id=trajectory.episode_id,
             seed=trajectory.seed,
             actions=trajectory.actions,
-            qpos={n: row[:, ROW : ROW + len(order[n])][:, order[n]] for n, row in rows.items()},
-            qvel={n: row[:, ROW + len(order[n]) :][:, order[n]] for n, row in rows.items()},
+            qpos={n: self._joints(n, row[:, ROW : ROW + dof[n]]) for n, row in rows.items()},
+            qvel={n: self._joints(n, row[:, ROW + dof[n] :]) for n, row in rows.items()},
             bodies=np.concatenate([none, *poses], 1),
             states=states,
             rewards=trajectory.rewards,
@@ -128,6 +128,9 @@ class ColumnReader:
                 found.append(state.tcp_pose(place)[0].copy())
         return {place: np.stack(found) for place, found in poses.items()}
 
+    def _joints(self, place: str, rows: Floats) -> Floats:
+        return declared_joints(self.task.simulation.index, place, rows)
+
     def _checked(self, trajectory: Trajectory) -> States:
         states = trajectory.states
         if not states:
@@ -137,7 +140,7 @@ class ColumnReader:
             )
         widths = dict.fromkeys((("actors", body) for body in self.bodies), ROW)
         for place, key in self._keys.items():
-            widths["articulations", key] = ROW + 2 * len(self._order[place])
+            widths["articulations", key] = ROW + 2 * self._dof[place]
         for (kind, name), width in widths.items():
             rows = states.get(kind, {}).get(name)
             if rows is None or rows.shape[1] != width:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from experts.registry import Expert
-from robots import CONTROL_MODES, TaskError
+from robots import CONTROL_MODES, RobotDescriptor, TaskError
 from tasks import MultiRobotTask
 from tasks.episode import follow, moments
 
@@ -63,15 +64,17 @@ def as_positions(
     happening = moments(task, seed, follow(positions), len(positions))
     next(happening)
     for row, _ in zip(positions, happening, strict=True):
+        targets = iter(task.simulation.drive_targets[0].tolist())
         for robot, part in task.action_split.items():
-            _write_targets(task, robot, row[part])
+            _write_targets(task.layout[robot].robot, targets, row[part])
     return positions
 
 
-def _write_targets(task: MultiRobotTask, robot: str, numbers: NDArray[np.float32]) -> None:
-    driven = iter(task.simulation.worlds[0].robots[robot].driven)
-    split = task.layout[robot].robot.action_split
-    for name, group in split.groups.items():
-        targets = [float(next(driven).drive_target[0]) for _ in group.joints]
+def _write_targets(
+    robot: RobotDescriptor, targets: Iterator[float], numbers: NDArray[np.float32]
+) -> None:
+    """Write what a robot's joints were driven to over the numbers of its relative groups."""
+    for name, group in robot.action_split.groups.items():
+        driven = [next(targets) for _ in group.joints]
         if group.delta:
-            numbers[split[name]] = targets[: group.size]
+            numbers[robot.action_split[name]] = driven[: group.size]

@@ -139,4 +139,4 @@ class Declaration:
         groups = placement.robot.action_split.groups.values()
         noisy = [group.reset_noise for group in groups for _ in group.joints]
         qpos = np.array(placement.start_qpos, noise.dtype)
-        world.robots[robot].reset(np.where(noisy, noise + qpos, qpos))
+        world.stand(robot, np.where(noisy, noise + qpos, qpos))

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from layouts import Layout
 from robots import TaskError, unknown_name_message
 from simulation import Camera, Simulation, State
-from simulation.maths import Array, all_finite
-from simulation.rendering.cameras import TEXTURES, RobotCamera
+from simulation.cameras import TEXTURES, RobotCamera
+from simulation.maths import Array, Floats, all_finite
+from simulation.readout import ReadoutIndex
 from tasks.engine.finite import NotFinite
-from tasks.native.format import observation_keys
+from tasks.native.format import native_joints, observation_keys
 
 if TYPE_CHECKING:
     from simulation.rendering.pictures import Observers, View
@@ -149,13 +150,12 @@ class Observer:
         if not self.mode.privileged:
             parts = self._sensible(parts)
         if not self.mode.textures:
-            return self._flat(state, parts) if self.mode.flat else self._named(state, parts)
+            return self._state(simulation.index, state, parts)
         if self._rig is None:
             self._rig = _CameraRig(simulation, self.cameras, self.mode.textures)
         images = self._rig.look()
-        if self.mode.flat:
-            return {**images, "state": self._flat(state, parts)}
-        return {**self._named(state, parts), **images}
+        seen = self._state(simulation.index, state, parts)
+        return {**images, "state": seen} if self.mode.flat else {**seen, **images}
 
     def senses(self, part: str) -> bool:
         """Return whether a part of `tasks.MultiRobotTask.observe` is observed beside images."""
@@ -194,20 +194,26 @@ class Observer:
 
     # -- inside ------------------------------------------------------------------------------
 
-    def _flat(self, state: State, parts: Mapping[str, Array]) -> NDArray[np.float32]:
-        joined = [part for name in self._robots for part in (state.qpos(name), state.qvel(name))]
+    def _state(self, index: ReadoutIndex, state: State, parts: Mapping[str, Array]) -> Any:
+        joints: list[Floats] = []
+        for name in self._robots:
+            joints.append(native_joints(index, name, state.qpos(name)))
+            joints.append(native_joints(index, name, state.qvel(name)))
+        return self._flat(joints, parts) if self.mode.flat else self._named(joints, parts)
+
+    def _flat(self, joined: list[Floats], parts: Mapping[str, Array]) -> Floats:
         joined.extend(part if part.ndim == 2 else part[:, None] for part in parts.values())
         flat = np.concatenate(joined, 1, dtype=np.float32)
         if not all_finite(flat):
             raise NotFinite
         return flat
 
-    def _named(self, state: State, parts: Mapping[str, Array]) -> dict[str, Any]:
-        if not all(map(all_finite, (state.joint_velocities, *parts.values()))):
+    def _named(self, joints: list[Floats], parts: Mapping[str, Array]) -> dict[str, Any]:
+        if not all(map(all_finite, (*joints, *parts.values()))):
             raise NotFinite
         agent: dict[str, Any] = {}
-        for name, key in self._keys.items():
-            own = {"qpos": state.qpos(name).copy(), "qvel": state.qvel(name).copy()}
+        for key, qpos, qvel in zip(self._keys.values(), joints[::2], joints[1::2], strict=True):
+            own = {"qpos": qpos.copy(), "qvel": qvel.copy()}
             agent.update(own if key is None else {key: own})
         return {"agent": agent, "extra": {key: x.copy() for key, x in parts.items()}}
 
@@ -230,8 +236,8 @@ class _CameraRig:
         from simulation.rendering.pictures import Observers  # loaded with the first picture
 
         self._observers: Observers = Observers(simulation, cameras, textures)
-        self._rows: list[dict[str, View]] = [{}] * len(simulation.worlds)
-        self.stale = set(range(len(simulation.worlds)))
+        self._rows: list[dict[str, View]] = [{}] * simulation.num_envs
+        self.stale = set(range(simulation.num_envs))
 
     def look(self) -> dict[str, Any]:
         for env in sorted(self.stale):

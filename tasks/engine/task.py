@@ -212,9 +212,14 @@ class MultiRobotTask(Declaration, Remade):
     ) -> tuple[Any, Floats, NDArray[np.bool_], NDArray[np.bool_], Info]:
         """Do what `step` does, and return NumPy arrays where it returns tensors."""
         flat = self._reader.read(action)
-        self.moving = self._everywhere if env_ids is None else checked_ids(env_ids, self.num_envs)
-        self.simulation.step(flat, self._state.joint_positions, self.moving)
-        self._elapsed[slice(None) if env_ids is None else self.moving] += 1
+        if env_ids is None:
+            self.moving = self._everywhere
+            self.simulation.step(flat, self._state.joint_positions)
+            self._elapsed += 1
+        else:
+            self.moving = checked_ids(env_ids, self.num_envs)
+            self.simulation.step(flat, self._state.joint_positions, self.moving)
+            self._elapsed[self.moving] += 1
         state = self._read()
         if self._responds:
             self.respond(state)
@@ -284,9 +289,9 @@ class MultiRobotTask(Declaration, Remade):
         rng.restart_numpy()
 
     def _begin(self, ids: list[int], *, reconfigured: bool) -> tuple[Any, Info]:
-        for i in ids:
+        self.simulation.clear(ids)
+        for i in ids:  # all that is placed here reaches the simulator in one go
             world = self.simulation.worlds[i]
-            world.clear()
             self.reset_robots(world, self._rngs[i])
             self.sample(world, self._rngs[i])
         if reconfigured:

@@ -16,6 +16,7 @@ from robots import TaskError, unknown_name_message
 from robots.common.bounds import FAR, shown
 from simulation import Simulation, State
 from simulation.maths import Floats
+from simulation.readout import ReadoutIndex
 from tasks.arrays import array_of
 
 StateDict = dict[str, dict[str, Tensor]]
@@ -49,20 +50,45 @@ def articulation_keys(layout: Layout) -> dict[str, str]:
     return {name: f"{p.robot.name}-agent-{i}" for i, (name, p) in enumerate(layout.items())}
 
 
+def native_joints(index: ReadoutIndex, robot: str, rows: NDArray[Any]) -> NDArray[Any]:
+    """Return joints that are in the order of a robot's descriptor in native's, which is SAPIEN's.
+
+    Args:
+        index: Knows both orders.
+        robot: Its name in the layout.
+        rows: Shape (…, dof).
+    """
+    order = index.loaded_order[robot]
+    return rows if order is None else rows[..., order]
+
+
+def declared_joints(index: ReadoutIndex, robot: str, rows: NDArray[Any]) -> NDArray[Any]:
+    """Return joints that are in native's order in that of a robot's descriptor; see above."""
+    order = index.loaded_order[robot]
+    return rows if order is None else rows[..., np.argsort(order)]
+
+
 def read_state_dict(simulation: Simulation, state: State) -> StateDict:
     """Return every pose and velocity as rows in native's format.
 
     Bodies that can move are rows of 13: position (m), quaternion (wxyz), linear (m/s) and angular
     velocity (rad/s). Robots are the same of their root, then qpos and qvel.
     """
+    index = simulation.index
+    moving = _moving(simulation)
     actors = {
-        name: _joined(state.pose(name), state.linear_velocity(name), state.angular_velocity(name))
-        for name, body in simulation.worlds[0].bodies.items()
-        if body.kind != "static"
+        name: _joined(state.pose(name), *velocities)
+        for name, velocities in zip(moving, state.velocities(moving), strict=True)
     }
+    keys, roots = articulation_keys(simulation.layout), state.root_velocities()
     articulations = {
-        key: _joined(*_root_rows(simulation, state, name), state.qpos(name), state.qvel(name))
-        for name, key in articulation_keys(simulation.layout).items()
+        key: _joined(
+            state.base_pose(name),
+            root,
+            native_joints(index, name, state.qpos(name)),
+            native_joints(index, name, state.qvel(name)),
+        )
+        for (name, key), root in zip(keys.items(), roots, strict=True)
     }
     return {"actors": actors, "articulations": articulations}
 
@@ -71,48 +97,33 @@ def _joined(*parts: Floats) -> Tensor:
     return torch.from_numpy(np.concatenate(parts, 1))
 
 
-def _root_rows(simulation: Simulation, state: State, robot: str) -> list[Floats]:
-    roots = [world.robots[robot].articulation.links[0] for world in simulation.worlds]
-    return [
-        state.link_pose(robot, roots[0].name),
-        np.stack([root.linear_velocity for root in roots]),
-        np.stack([root.angular_velocity for root in roots]),
-    ]
+def _moving(simulation: Simulation) -> tuple[str, ...]:
+    """Return the names of the bodies that a state dict holds."""
+    bodies = simulation.worlds[0].bodies.values()
+    return tuple(body.name for body in bodies if body.kind != "static")
 
 
 class StateTape:
     """What `read_state_dict` returns, for many moments: cheap to write, put together at the end.
 
-    A tape is for one episode, as it keeps hold of the worlds' bodies: begin it after a reset, or
-    after states were set. A moment is one row of numbers, so that nothing is left over for Python
-    to collect: poses, qpos, qvel, velocities of the bodies, velocities of the robots' roots.
+    A moment is one row of numbers, so that nothing is left over for Python to collect: poses, qpos,
+    qvel, velocities of the bodies that physics moves, velocities of the robots' roots.
     """
 
     def __init__(self, simulation: Simulation) -> None:
         """Find what has to be read."""
-        world, index = simulation.worlds[0], simulation.index
-        moving = [name for name, body in world.bodies.items() if body.kind != "static"]
-        frames = [index.bodies[name] for name in moving]
-        frames += [index.bases[name] for name in world.robots]
+        world, self._index = simulation.worlds[0], simulation.index
+        self._bodies = _moving(simulation)
+        self._keys = articulation_keys(simulation.layout)
+        frames = [self._index.bodies[name] for name in self._bodies]
+        frames += [self._index.bases[name] for name in self._keys]
         self._frames = np.array(frames, np.intp)
-        self._bodies = moving
-        self._dynamic = [name for name in moving if world.bodies[name].kind == "dynamic"]
-        self._joints = {
-            key: index.joints[name] for name, key in articulation_keys(simulation.layout).items()
-        }
-        self._components: list[Any] = [
-            world.bodies[name].component for world in simulation.worlds for name in self._dynamic
-        ]
-        self._roots: list[Any] = [
-            robot.articulation.links[0]
-            for world in simulation.worlds
-            for robot in world.robots.values()
-        ]
-        self._count = count = len(simulation.worlds)
-        poses, joints, velocities = 7 * count * len(frames), count * index.dof, 6 * count
+        self._dynamic = tuple(n for n in self._bodies if world.bodies[n].kind == "dynamic")
+        self._count = count = simulation.num_envs
+        poses, joints, velocities = 7 * count * len(frames), count * self._index.dof, 6 * count
         widths = poses, joints, joints, velocities * len(self._dynamic)
         self._ends: list[int] = np.cumsum(widths).tolist()
-        width = self._ends[-1] + velocities * len(self._joints)
+        width = self._ends[-1] + velocities * len(self._keys)
         self._rows: Floats = np.zeros((_MOMENTS, width), np.float32)
         self._length = 0
 
@@ -121,38 +132,42 @@ class StateTape:
         if self._length == len(self._rows):
             self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
         row = self._rows[self._length]
-        parts = [state.poses(self._frames), state.joint_positions, state.joint_velocities]
-        for body in self._components:
-            parts += (body.linear_velocity, body.angular_velocity)
+        parts = (
+            state.poses(self._frames),
+            state.joint_positions,
+            state.joint_velocities,
+            state.velocities(self._dynamic),
+        )
         np.concatenate(parts, axis=None, out=row[: self._ends[-1]])
         if not self._length:  # roots are fixed: after a step they have no velocity
-            velocities = [(root.linear_velocity, root.angular_velocity) for root in self._roots]
-            row[self._ends[-1] :] = np.ravel(velocities)
+            row[self._ends[-1] :] = state.root_velocities().ravel()
         self._length += 1
 
     def read(self) -> dict[str, dict[str, NDArray[np.float32]]]:
         """Return every entry of the state dict with all moments, each (moments, N, k)."""
         moments, count = self._length, self._count
-        poses, qpos, qvel, velocities, roots = np.split(self._rows[:moments], self._ends, 1)
+        poses, qpos, qvel, moved, roots = np.split(self._rows[:moments], self._ends, 1)
         frames = poses.reshape(moments, -1, count, 7).swapaxes(0, 1)
-        moved, fixed = (
-            rows.reshape(moments, count, -1, 6).transpose(2, 0, 1, 3)
-            for rows in (velocities, roots)
-        )
+        moved = moved.reshape(moments, -1, 2, count, 3).transpose(1, 0, 3, 2, 4)
+        moved = moved.reshape(-1, moments, count, 6)
+        fixed = roots.reshape(moments, -1, count, 6).swapaxes(0, 1)
         qpos, qvel = (rows.reshape(moments, count, -1) for rows in (qpos, qvel))
         velocity = dict(zip(self._dynamic, moved, strict=True))
         still = np.zeros((moments, count, 6), np.float32)
-        bases = zip(self._joints.items(), frames[len(self._bodies) :], fixed, strict=True)
+        bases = zip(self._keys.items(), frames[len(self._bodies) :], fixed, strict=True)
         return {
             "actors": {
                 name: np.concatenate([pose, velocity.get(name, still)], 2)
                 for name, pose in zip(self._bodies, frames, strict=False)
             },
             "articulations": {
-                key: np.concatenate([pose, root, qpos[..., joints], qvel[..., joints]], 2)
-                for (key, joints), pose, root in bases
+                key: np.concatenate([pose, root, self._own(qpos, name), self._own(qvel, name)], 2)
+                for (name, key), pose, root in bases
             },
         }
+
+    def _own(self, joints: Floats, robot: str) -> Floats:
+        return native_joints(self._index, robot, joints[..., self._index.joints[robot]])
 
 
 def write_state_dict(
@@ -176,17 +191,14 @@ def write_state_dict(
             in which entry and environment. Nothing is changed then.
     """
     rows = _checked_rows(simulation, state, env_ids)
-    robots = {key: name for name, key in articulation_keys(simulation.layout).items()}
-    for row, env in enumerate(env_ids):
-        world = simulation.worlds[env]
-        for name, values in rows["actors"].items():
-            world.set_pose(name, values[row, :3], values[row, 3:7])
-            if world.bodies[name].kind == "dynamic":
-                world.bodies[name].component.set_linear_velocity(values[row, 7:10])
-                world.bodies[name].component.set_angular_velocity(values[row, 10:13])
-        for key, values in rows["articulations"].items():
-            world.robots[robots[key]].restore(values[row])
-    simulation.touched()
+    robots: dict[str, Floats] = {}
+    for name, key in articulation_keys(simulation.layout).items():
+        if key in rows["articulations"]:
+            row = rows["articulations"][key]
+            pose, qpos, qvel = np.split(row, (13, 13 + simulation.layout[name].robot.dof), 1)
+            joints = (declared_joints(simulation.index, name, part) for part in (qpos, qvel))
+            robots[name] = np.concatenate([pose, *joints], 1)
+    simulation.write(env_ids, rows["actors"], robots)
 
 
 class _Entry(NamedTuple):
@@ -217,20 +229,20 @@ def _checked_rows(
 
 def _entries(simulation: Simulation) -> dict[str, dict[str, _Entry]]:
     """Return what a state dict of these worlds holds."""
-    world = simulation.worlds[0]
     pose = _Entry(_POSE, np.full(13, -FAR), np.full(13, FAR))
     articulations: dict[str, _Entry] = {}
     for name, key in articulation_keys(simulation.layout).items():
-        joints = world.robots[name].joints
-        low, high = np.concatenate([joint.limits for joint in joints]).T
+        built, declared = simulation.index.robots[name], simulation.layout[name].robot.joints
+        joints = [declared[i] for i in built.loaded_order]
+        low, high = built.limits[list(built.loaded_order)].T
         fastest = np.full(len(joints), FAR)
         articulations[key] = _Entry(
-            (*_POSE, *(f"{what} of {joint.name}" for what in ("qpos", "qvel") for joint in joints)),
+            (*_POSE, *(f"{what} of {joint}" for what in ("qpos", "qvel") for joint in joints)),
             np.concatenate([pose.lowest, np.maximum(low - _BEYOND_LIMITS, -FAR), -fastest]),
             np.concatenate([pose.highest, np.minimum(high + _BEYOND_LIMITS, FAR), fastest]),
         )
     return {
-        "actors": {name: pose for name, body in world.bodies.items() if body.kind != "static"},
+        "actors": dict.fromkeys(_moving(simulation), pose),
         "articulations": articulations,
     }
 

@@ -264,7 +264,9 @@ def _lost(obs_mode: str, folder: Path) -> None:
 
 def _lose(task: Any) -> None:
     """Push a body so that physics cannot follow."""
-    cube = task.simulation.worlds[1].bodies["cube"].component
+    from simulation.sapien3.backend import worlds_below
+
+    cube = worlds_below(task.simulation)[1].bodies["cube"].component
     cube.set_linear_velocity([math.inf, 0.0, 0.0])
 
 

@@ -73,9 +73,9 @@ def check(urdf: Path) -> None:
 
 def build(urdf: Path) -> None:
     """Build a world and see that every link has the shape that its URDF gives it."""
-    from simulation.world import World
+    from simulation.sapien3.world import BuiltWorld
 
-    world = World(Layout({"toy": Placement(descriptor(urdf))}))
+    world = BuiltWorld(Layout({"toy": Placement(descriptor(urdf))}))
     for link_name, made in world.robots["toy"].links.items():
         assert len(made.collision_shapes) == 1, f"{link_name} has no shape"
 

@@ -13,7 +13,7 @@ from layouts import Layout, Placement
 from layouts.validation.bodies import load_model
 from layouts.validation.reach import Reach
 from robots import RobotRegistry, UnknownNameError
-from simulation import World
+from simulation.sapien3.world import BuiltWorld
 from tests.layouts.small_robots import turntable
 
 BASE = (0.3, -0.4, 0.1), (0.8, 0.0, 0.0, 0.6)
@@ -28,7 +28,7 @@ def placement(robot):
 
 @functools.cache
 def world(robot):
-    return World(Layout({"arm": placement(robot)}))
+    return BuiltWorld(Layout({"arm": placement(robot)}))
 
 
 def engine(robot):

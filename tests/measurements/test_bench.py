@@ -24,6 +24,7 @@ from measurements.bench.worlds import crowd, make_pile
 from robots import MissingPackageError, SimulationError
 from rollouts.__main__ import main
 from rollouts.progress import LiveLine
+from simulation.sapien3.backend import worlds_below
 
 TINY = Settings(
     rounds=2,
@@ -131,8 +132,8 @@ class TestWhatIsTimed:
         env = make_pile(cubes)
         for _ in range(40):
             env.step(np.zeros((1, 8), np.float32))
-        world = env.simulation.worlds[0]
-        bodies = [world.body(name) for name in ("cube", *(f"pile{i}" for i in range(cubes)))]
+        world = worlds_below(env.simulation)[0]
+        bodies = [world.bodies[name] for name in ("cube", *(f"pile{i}" for i in range(cubes)))]
         assert not any(body.component.is_sleeping for body in bodies)
         assert env.touching() >= pairs
 

@@ -11,7 +11,8 @@ from parity.compare.both_sides import NativeSide, OurSide
 from parity.compare.episodes import random_episodes
 from parity.compare.lockstep import EpisodeResult, compare
 from robots import RobotDescriptor, RobotRegistry
-from simulation import State, World
+from simulation import State
+from simulation.sapien3.world import BuiltWorld
 from tasks.episode import Episode
 from tests.motions import touching_episode
 from tests.native import NATIVE, against_native, complaints, pair
@@ -99,7 +100,7 @@ def test_arms_that_swapped_their_actions(monkeypatch):
 @pytest.mark.parametrize("task_id", MUTATED)
 def test_velocities_that_outlive_a_reset(task_id, monkeypatch):
     """Only in reused worlds, and only where the episode before ended in motion."""
-    monkeypatch.setattr(World, "clear", _forgets_to_stop)
+    monkeypatch.setattr(BuiltWorld, "clear", _forgets_to_stop)
     both = against_native(task_id, tasks.make(task_id))
     in_motion = [
         Episode(seed, touching_episode(task_id, seed).actions[:cut])
@@ -114,9 +115,9 @@ def test_velocities_that_outlive_a_reset(task_id, monkeypatch):
     assert wrong.first_difference.step == 0, "a reset returns velocities"
 
 
-def _forgets_to_stop(world: World) -> None:
+def _forgets_to_stop(world: BuiltWorld) -> None:
     for body in world.bodies.values():
-        if body.anchored:
+        if body.declared.anchored:
             body.entity.set_pose(body.start_pose)
 
 

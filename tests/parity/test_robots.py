@@ -11,6 +11,7 @@ import sapien
 from layouts import Layout, Placement
 from robots import RobotDescriptor, RobotRegistry
 from simulation import PhysicsSettings, Simulation
+from simulation.sapien3.backend import worlds_below
 from tests.native import NATIVE
 
 pytestmark = NATIVE
@@ -62,7 +63,7 @@ def ours(robot: str | RobotDescriptor) -> Simulation:
 
 
 def active(name: str) -> list[str]:
-    return [joint.name for joint in ours(name).worlds[0].robots["arm"].joints]
+    return [joint.name for joint in worlds_below(ours(name))[0].robots["arm"].joints]
 
 
 def start(name: str) -> np.ndarray:
@@ -74,7 +75,7 @@ def start(name: str) -> np.ndarray:
 
 def our_motion(robot: str | RobotDescriptor, actions: np.ndarray) -> np.ndarray:
     simulation = ours(robot)
-    arm = simulation.worlds[0].robots["arm"]
+    arm = worlds_below(simulation)[0].robots["arm"]
     arm.reset(next(iter(arm.descriptor.keyframes.values())))
     arm.articulation.set_root_pose(sapien.Pose([0.0, 0.0, HEIGHT]))  # built elsewhere, as native
     simulation.touched()

@@ -9,13 +9,13 @@ import trimesh
 from layouts import Layout, Placement
 from robots import AssetError
 from robots.urdf.text_checks import MAX_LINKS
-from simulation.blueprint import read_blueprint
-from simulation.world import World
+from simulation.sapien3.blueprint import read_blueprint
+from simulation.sapien3.world import BuiltWorld
 from tests.faults.toy_robots import descriptor, joint, link, mesh, robot, toy, write_mesh
 
 
 def world(urdf):
-    return World(Layout({"toy": Placement(descriptor(urdf))}))
+    return BuiltWorld(Layout({"toy": Placement(descriptor(urdf))}))
 
 
 def shapes(urdf):
@@ -73,7 +73,7 @@ def test_checks_and_physics_refuse_the_same_files_in_the_same_words(urdf):
     flat.export(urdf.parent / "arm.stl")
     layout = Layout({"toy": Placement(descriptor(urdf))})
     with pytest.raises(AssetError) as of_physics:
-        World(layout)
+        BuiltWorld(layout)
     with pytest.raises(AssetError) as of_checks:
         layout.validate()
     assert str(of_physics.value) == str(of_checks.value)

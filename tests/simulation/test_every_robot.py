@@ -16,6 +16,7 @@ from robots.registry import CATALOGUE
 from robots.urdf.summary import parse_urdf
 from simulation import PhysicsSettings, Simulation
 from simulation.controller import JointPositionController
+from simulation.sapien3.backend import worlds_below
 
 ROBOTS = tuple(CATALOGUE)
 STEPS = 5
@@ -32,15 +33,14 @@ def stand(robot: str, keyframe: str | None = None) -> tuple[Simulation, np.ndarr
     placement = simulation.layout["arm"]
     start = np.array(placement.robot.keyframe(keyframe) if keyframe else placement.start_qpos)
     for world in simulation.worlds:
-        world.robots["arm"].reset(start)
-    simulation.touched()
+        world.stand("arm", start)
+    simulation.touched()  # what is below the seam moves now
     return simulation, start
 
 
 def qpos(simulation: Simulation) -> np.ndarray:
     """Joint positions in the descriptor's order."""
-    order = simulation.worlds[0].robots["arm"].active_index
-    return simulation.read().joint_positions[0, order]
+    return simulation.read().joint_positions[0]
 
 
 def play(simulation: Simulation, action: np.ndarray, steps: int) -> np.ndarray:
@@ -69,7 +69,7 @@ def numbers() -> list[tuple[str, ActionNumber]]:
 def test_every_collision_shape_of_its_urdf_is_there(robot):
     root = parse_urdf(RobotRegistry.load(robot).urdf.locate().read_bytes(), robot)
     expected = {str(e.get("name")): len(e.findall("collision")) for e in root.iterfind("link")}
-    links = simulation_of(robot).worlds[0].robots["arm"].links
+    links = worlds_below(simulation_of(robot))[0].robots["arm"].links
     assert {name: len(link.collision_shapes) for name, link in links.items()} == expected
     assert sum(expected.values()) > 0
 
@@ -87,13 +87,12 @@ def test_an_action_number_moves_its_own_joints_and_no_others(robot, number):
     simulation, start = stand(robot)
     still = staying(robot, start)
     mine = [simulation.layout["arm"].robot.joints.index(joint) for joint in number.joints]
-    joints = simulation.worlds[0].robots["arm"].driven
-    low, high = np.concatenate([joints[i].limits for i in mine]).min(0)
+    low, high = simulation.index.robots["arm"].limits[mine].min(0)
     room_above = high - start[mine[0]] > start[mine[0]] - low
     action = still.copy()
     action[number.index] = 0.8 if room_above else -0.8
 
-    controller = JointPositionController(simulation.layout, simulation.worlds)
+    controller = JointPositionController(simulation.layout)
     now = simulation.read().joint_positions
     change = controller.targets(action[None], now) - controller.targets(still[None], now)
     assert np.flatnonzero(change[0]).tolist() == mine
@@ -108,7 +107,7 @@ def test_an_action_number_moves_its_own_joints_and_no_others(robot, number):
 def test_no_pose_is_farther_than_the_reach_and_some_come_near(robot):
     found = guess_descriptor(RobotRegistry.load(robot).urdf.locate()).descriptor
     simulation, _ = stand(robot)
-    arm = simulation.worlds[0].robots["arm"]
+    arm = worlds_below(simulation)[0].robots["arm"]
     arm.articulation.set_root_pose(sapien.Pose())
     limits = np.concatenate([joint.limits for joint in arm.joints])
     rng = np.random.default_rng(0)
@@ -132,8 +131,7 @@ def test_a_robot_that_was_only_guessed_stands_and_moves(robot):
         path = RobotRegistry.load(robot).urdf.locate()
     guessed = guess_descriptor(path, "guessed").descriptor
     simulation = Simulation(single({"arm": guessed}), lambda world, _: None, 1, PhysicsSettings())
-    simulation.worlds[0].robots["arm"].reset(guessed.keyframe("rest"))
-    simulation.touched()
+    simulation.worlds[0].stand("arm", guessed.keyframe("rest"))
     before = qpos(simulation)
     action = np.full(guessed.action_dim, 0.3, np.float32)
     after = play(simulation, action, STEPS)

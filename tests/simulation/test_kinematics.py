@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from layouts import Layout, Placement
 from robots import RobotRegistry, SimulationError, UnknownNameError
-from simulation import World
-from simulation.kinematics import InverseKinematics
+from simulation.sapien3.inverse_kinematics import InverseKinematics
+from simulation.sapien3.world import BuiltWorld
 
 # Robots whose TCP is a link; the others are refused, as a test below says.
 ROBOTS = [n for n in RobotRegistry.names() if not RobotRegistry.load(n).tcp_position_links]
@@ -19,41 +19,39 @@ BASE = Placement("panda", position=(0.3, -0.4, 0.1), quaternion=(0.8, 0.0, 0.0, 
 
 
 @functools.cache
-def world_of(robot: str) -> World:
+def world_of(robot: str) -> BuiltWorld:
     """Make a world with one robot that neither stands at the origin nor faces along x."""
     placement = Placement(RobotRegistry.load(robot), BASE.position, BASE.quaternion)
-    return World(Layout({"arm": placement}))
+    return BuiltWorld(Layout({"arm": placement}))
 
 
 def rest(robot: str) -> np.ndarray:
-    """All joints of a keyframe, in SAPIEN's order."""
-    simulated = world_of(robot).robots["arm"]
-    qpos = np.zeros(len(simulated.joints))
-    qpos[simulated.active_index] = world_of(robot).layout["arm"].start_qpos
-    return qpos
+    """All joints of a keyframe."""
+    return np.array(world_of(robot).layout["arm"].start_qpos)
 
 
 def reference(robot: str, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """TCP pose as the physics engine has it."""
     simulated = world_of(robot).robots["arm"]
-    simulated.articulation.set_qpos(qpos)
+    simulated.reset(qpos)
     pose = simulated.links[simulated.descriptor.tcp_link].entity_pose
     return np.array(pose.p), np.array(pose.q)
 
 
 def with_arm(robot: str, qpos: np.ndarray, arm: np.ndarray) -> np.ndarray:
-    simulated = world_of(robot).robots["arm"]
     moved = qpos.copy()
-    names = [joint.name for joint in simulated.joints]
-    moved[[names.index(joint) for joint in simulated.descriptor.arm_joints]] = arm
+    moved[arm_places(robot)] = arm
     return moved
 
 
 def arm_of(robot: str, qpos: np.ndarray) -> np.ndarray:
-    """Pick the arm's joints out of all in SAPIEN's order."""
-    simulated = world_of(robot).robots["arm"]
-    names = [joint.name for joint in simulated.joints]
-    return qpos[[names.index(joint) for joint in simulated.descriptor.arm_joints]]
+    """Pick the arm's joints out of all."""
+    return qpos[arm_places(robot)]
+
+
+def arm_places(robot: str) -> list[int]:
+    descriptor = RobotRegistry.load(robot)
+    return [descriptor.joints.index(joint) for joint in descriptor.arm_joints]
 
 
 def limits(robot: str, joints: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
@@ -126,7 +124,7 @@ def test_the_same_request_has_the_same_answer():
 
 
 def test_a_tcp_between_links_is_refused(monkeypatch):
-    world = World(Layout({"arm": Placement("panda")}))
+    world = BuiltWorld(Layout({"arm": Placement("panda")}))
     descriptor = world.layout["arm"].robot
     object.__setattr__(world.layout["arm"], "robot", _between_fingers(descriptor))
     with pytest.raises(SimulationError, match="mean of panda_leftfinger, panda_rightfinger"):

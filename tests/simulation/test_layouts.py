@@ -8,6 +8,7 @@ import pytest
 from kinematics.quaternions import inverted, rotated
 from layouts import Layout, Placement, around_table, ceiling, grid, ring, side_by_side, wall
 from simulation import PhysicsSettings, Simulation, World
+from simulation.sapien3.world import BuiltWorld
 
 MIXED = ("panda", "panda_stick", "so100")
 NINE = {f"arm_{i}": MIXED[i % len(MIXED)] for i in range(9)}
@@ -22,8 +23,7 @@ def nothing(world: World, _: int = 0) -> None:
 def stand(simulation: Simulation) -> None:
     for world in simulation.worlds:
         for name, placement in world.layout.items():
-            world.robots[name].reset(placement.start_qpos)
-    simulation.touched()
+            world.stand(name, placement.start_qpos)
 
 
 def built(layout: Layout) -> Simulation:
@@ -73,7 +73,7 @@ def test_each_robot_of_a_ring_of_eight_is_driven_and_seen_alone(eight: Simulatio
     ids=["ring", "ring of three", "table", "full table", "grid", "row"],
 )
 def test_at_automatic_distances_no_robot_touches_another(layout: Layout):
-    world = World(layout, PhysicsSettings())
+    world = BuiltWorld(layout, PhysicsSettings())
     for name, placement in layout.items():
         world.robots[name].reset(placement.start_qpos)
     world.scene.step()

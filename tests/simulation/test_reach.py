@@ -7,33 +7,30 @@ import pytest
 
 from layouts import Layout, Placement
 from robots import RobotRegistry, UnknownNameError
-from simulation import World
-from simulation.reach import PointReach
+from simulation.sapien3.point_reach import PointReach
+from simulation.sapien3.world import BuiltWorld
 
 ROBOTS = RobotRegistry.names()
 POINT = np.array([0.01, -0.02, 0.03])
 
 
 @functools.cache
-def world_of(robot: str) -> World:
+def world_of(robot: str) -> BuiltWorld:
     """Make a world with one robot that neither stands at the origin nor faces along x."""
     base = ((0.3, -0.4, 0.1), (0.8, 0.0, 0.0, 0.6))
-    return World(Layout({"arm": Placement(RobotRegistry.load(robot), *base)}))
+    return BuiltWorld(Layout({"arm": Placement(RobotRegistry.load(robot), *base)}))
 
 
 def start_of(robot: str) -> np.ndarray:
-    """All joints of a keyframe, in SAPIEN's order."""
-    simulated = world_of(robot).robots["arm"]
-    qpos = np.zeros(len(simulated.joints))
-    qpos[simulated.active_index] = world_of(robot).layout["arm"].start_qpos
-    return qpos
+    """All joints of a keyframe."""
+    return np.array(world_of(robot).layout["arm"].start_qpos)
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_forward_agrees_with_the_physics_engine(robot):
     simulated = world_of(robot).robots["arm"]
     qpos = start_of(robot)
-    simulated.articulation.set_qpos(qpos)
+    simulated.reset(qpos)
     pose = simulated.links[simulated.descriptor.tcp_link].entity_pose
     reach = PointReach(world_of(robot), "arm")
     position, quaternion = reach.forward(reach.arm(qpos))

@@ -7,7 +7,7 @@ import sapien.physx as physx
 from sapien.wrapper.urdf_loader import URDFLoader
 
 from robots import RobotRegistry
-from simulation import World
+from simulation.sapien3.world import BuiltWorld
 from simulation.scene import build_scene
 from tests.layouts.cells import hung, link_poses, mixed_cell, random_positions
 
@@ -24,7 +24,7 @@ def set_positions(articulation, positions: dict[str, float]) -> None:
 
 
 def test_links_are_where_the_urdfs_and_the_simulation_put_them(cell):
-    scene, world = build_scene(cell), World(cell)
+    scene, world = build_scene(cell), BuiltWorld(cell)
     robots = {robot.name: robot for robot in scene.get_all_articulations()}
     assert list(robots) == list(cell)
     random = np.random.default_rng(0)

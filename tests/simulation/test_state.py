@@ -5,6 +5,7 @@ import torch
 import tasks
 from robots import SimulationError, UnknownNameError
 from simulation import State
+from simulation.sapien3.backend import worlds_below
 from tasks import MultiRobotTask
 
 
@@ -41,9 +42,9 @@ def test_base_positions_are_where_the_layout_says(env: MultiRobotTask):
 
 
 def test_speed_and_spin_are_norms(env: MultiRobotTask):
-    for world in env.simulation.worlds:
-        world.body("cube").component.set_linear_velocity([0.3, 0.0, 0.4])
-        world.body("cube").component.set_angular_velocity([0.0, 2.0, 0.0])
+    for world in worlds_below(env.simulation):
+        world.bodies["cube"].component.set_linear_velocity([0.3, 0.0, 0.4])
+        world.bodies["cube"].component.set_angular_velocity([0.0, 2.0, 0.0])
     env.simulation.touched()
     state = state_of(env)
     np.testing.assert_allclose(state.speed("cube"), [0.5, 0.5], rtol=1e-6)
@@ -51,9 +52,9 @@ def test_speed_and_spin_are_norms(env: MultiRobotTask):
 
 
 def test_velocities_are_those_of_the_body_asked_for(env: MultiRobotTask):
-    for world in env.simulation.worlds:
-        world.body("cube").component.set_linear_velocity([0.0, 0.0, 4.0])
-        world.body("cube").component.set_angular_velocity([0.0, 2.0, 0.0])
+    for world in worlds_below(env.simulation):
+        world.bodies["cube"].component.set_linear_velocity([0.0, 0.0, 4.0])
+        world.bodies["cube"].component.set_angular_velocity([0.0, 2.0, 0.0])
     env.simulation.touched()
     for order in (["goal_site", "cube"], ["cube", "goal_site"], ["cube"]):
         state = state_of(env)

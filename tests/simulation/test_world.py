@@ -15,9 +15,12 @@ from robots import (
 )
 from robots.descriptor import ActionSplit
 from simulation import Box, PhysicsSettings, Simulation, Sphere, World, add_table
-from simulation.blueprint import read_blueprint
 from simulation.controller import JointPositionController
+from simulation.sapien3.backend import worlds_below
+from simulation.sapien3.blueprint import read_blueprint
+from simulation.sapien3.world import BuiltWorld
 from simulation.shapes import Capsule, Cylinder
+from simulation.world import Body
 
 HALF = 0.02
 
@@ -30,8 +33,7 @@ def with_cube(world: World, _: int = 0) -> None:
 def stand(simulation: Simulation) -> None:
     for world in simulation.worlds:
         for name, placement in world.layout.items():
-            world.robots[name].reset(placement.start_qpos)
-    simulation.touched()
+            world.stand(name, placement.start_qpos)
 
 
 def test_names_are_unique_and_unknown_ones_are_refused():
@@ -44,7 +46,13 @@ def test_names_are_unique_and_unknown_ones_are_refused():
     with pytest.raises(
         UnknownNameError, match="link of panda 'panda_hnd'. Did you mean 'panda_hand'"
     ):
-        world.robots["arm"].link("panda_hnd")
+        BuiltWorld(world.layout).robots["arm"].link("panda_hnd")
+    with pytest.raises(SimulationError, match=r"position is \(0, 0\); it must be 3 numbers"):
+        world.set_pose("cube", (0, 0))
+    with pytest.raises(SimulationError, match="qpos of arm is .*; it must be 9 numbers"):
+        world.stand("arm", np.zeros(7))
+    with pytest.raises(UnknownNameError, match="Did you mean 'arm'"):
+        world.stand("arn", np.zeros(9))
 
 
 @pytest.mark.parametrize(
@@ -56,15 +64,15 @@ def test_names_are_unique_and_unknown_ones_are_refused():
     ],
 )
 def test_mass_comes_from_density(shape: Box | Sphere | Capsule, volume: float):
-    world = World(single({"arm": "panda"}))
+    world = BuiltWorld(single({"arm": "panda"}))
     for density in (1000.0, 500.0):
-        body = world.add(f"at {density}", dataclasses.replace(shape, density=density))
+        body = world.add(Body(f"at {density}", (dataclasses.replace(shape, density=density),)))
         assert body.component.mass == pytest.approx(density * volume, rel=1e-4)
 
 
 def test_a_cylinder_lies_along_its_x_axis():
-    world = World(single({"arm": "panda"}))
-    body = world.add("rod", Cylinder(radius=0.01, half_length=0.1))
+    world = BuiltWorld(single({"arm": "panda"}))
+    body = world.add(Body("rod", (Cylinder(radius=0.01, half_length=0.1),)))
     low, high = body.component.compute_global_aabb_tight()
     assert high - low == pytest.approx([0.2, 0.02, 0.02], abs=1e-3)
 
@@ -103,11 +111,8 @@ def test_grasp_and_forces():
     simulation = Simulation(single({"arm": "panda"}), with_cube, 2, PhysicsSettings())
     stand(simulation)
     tcp = simulation.read().tcp_position("arm")[0]
-    held = simulation.worlds[0]
-    held.set_pose("cube", tcp)
-    for body in held.bodies.values():
-        if body.kind == "dynamic":
-            body.component.disable_gravity = True
+    simulation.worlds[0].set_pose("cube", tcp)
+    worlds_below(simulation)[0].bodies["cube"].component.disable_gravity = True
     action = np.zeros((2, 8), np.float32)
     action[:, 7] = -1.0  # close
     for _ in range(20):
@@ -131,7 +136,7 @@ def test_a_robot_without_fingers_never_grasps():
 
 def test_targets_follow_the_action_split():
     layout = face_to_face({"left": "panda", "right": "panda_stick"}, spacing=1.5)
-    controller = JointPositionController(layout, [World(layout)])
+    controller = JointPositionController(layout)
     qpos = np.arange(16, dtype=np.float32)[None]
     action = np.zeros((1, 15), np.float32)
     action[0, 0], action[0, 7], action[0, 8] = 1.0, -5.0, 0.5
@@ -158,7 +163,7 @@ def test_joints_in_another_order_are_mapped_by_name():
         stand(simulation)
         simulation.step(number, simulation.read().joint_positions)
         moved.append(simulation.read().qpos("arm"))
-    assert np.array_equal(*moved)
+    assert np.array_equal(moved[0], moved[1][:, [*range(6, -1, -1), 7, 8]])
     assert moved[0][0, 0] > 0.01
 
 
@@ -169,10 +174,10 @@ def test_a_descriptor_that_contradicts_its_urdf_is_refused():
         panda, action_split=ActionSplit(arm=arm), keyframes={"rest": panda.keyframe("rest")[:7]}
     )
     with pytest.raises(DescriptorError, match="panda_finger_joint1.*in no joint group"):
-        World(single({"arm": only_arm}))
+        BuiltWorld(single({"arm": only_arm}))
     ghost = dataclasses.replace(arm, joints=(*arm.joints[:6], "ghost"))
     with pytest.raises(DescriptorError, match=r"has no active joints \['ghost'\]"):
-        World(
+        BuiltWorld(
             single(
                 {
                     "arm": dataclasses.replace(
@@ -187,11 +192,12 @@ def test_a_rebuilt_world_has_no_past():
     simulation = Simulation(single({"arm": "panda"}), with_cube, 2, PhysicsSettings())
     stand(simulation)
     simulation.step(np.zeros((2, 8), np.float32), simulation.read().joint_positions)
-    assert simulation.worlds[1].system.get_contacts()
-    kept = simulation.worlds[0]
+    assert simulation.contact_counts().all()
+    kept, built = simulation.worlds[0], worlds_below(simulation)[0]
     simulation.rebuild([1], with_cube)
     assert simulation.worlds[0] is kept
-    assert not simulation.worlds[1].system.get_contacts()
+    assert worlds_below(simulation)[0] is built
+    assert (simulation.contact_counts() > 0).tolist() == [True, False]
 
 
 def test_a_rebuilt_world_is_the_same_to_the_last_bit():
@@ -218,7 +224,7 @@ def test_a_urdf_is_read_once_for_all_worlds_and_keeps_none_of_them_alive(monkeyp
         read.append((descriptor.name, blueprint))
         return blueprint
 
-    monkeypatch.setattr("simulation.world.read_blueprint", reading)
+    monkeypatch.setattr("simulation.sapien3.world.read_blueprint", reading)
     layout = side_by_side({"left": "panda", "right": "panda_stick"}, spacing=1.0)
     simulation = Simulation(layout, with_cube, 3)
     simulation.rebuild([1, 2], with_cube)
@@ -227,23 +233,24 @@ def test_a_urdf_is_read_once_for_all_worlds_and_keeps_none_of_them_alive(monkeyp
 
 
 def test_anchored_bodies_return_and_velocities_vanish():
-    world = World(single({"arm": "panda"}), PhysicsSettings())
-    with_cube(world)
-    world.settle()
-    world.set_pose("table-workspace", (0.0, 0.0, -3.0))
-    world.body("cube").component.set_linear_velocity([1.0, 2.0, 3.0])
+    simulation = Simulation(single({"arm": "panda"}), with_cube, 1, PhysicsSettings())
+    simulation.worlds[0].set_pose("table-workspace", (0.0, 0.0, -3.0))
+    assert simulation.read().position("table-workspace")[0, 2] == -3.0
+    (world,) = worlds_below(simulation)
+    world.bodies["cube"].component.set_linear_velocity([1.0, 2.0, 3.0])
     world.robots["arm"].articulation.set_qvel(np.ones(9, np.float32))
-    world.clear()
-    assert world.body("table-workspace").entity.pose.p == pytest.approx([-0.12, 0, -0.9196429])
-    assert not world.body("cube").component.linear_velocity.any()
-    assert not world.robots["arm"].articulation.qvel.any()
+    simulation.clear([0])
+    state = simulation.read()
+    assert state.position("table-workspace")[0] == pytest.approx([-0.12, 0, -0.9196429])
+    assert not state.linear_velocity("cube").any()
+    assert not state.qvel("arm").any()
 
 
 def test_several_placements_of_one_robot_are_separate_articulations():
     layout = Layout(
         {f"r{i}": Placement("panda", (0.0, float(i), 0.0), (1, 0, 0, 0), "rest") for i in range(4)}
     )
-    world = World(layout)
+    world = BuiltWorld(layout)
     assert len({id(a) for a in world.articulations}) == 4
 
 
@@ -255,15 +262,12 @@ def controlled(**changes) -> tuple[Simulation, JointPositionController]:
     layout = single({"arm": dataclasses.replace(panda, action_split=split)})
     simulation = Simulation(layout, lambda world, _: None, 2, PhysicsSettings())
     stand(simulation)
-    return simulation, JointPositionController(layout, simulation.worlds)
+    return simulation, JointPositionController(layout)
 
 
 def targets(simulation: Simulation, controller: JointPositionController, number: float):
     action = np.full((2, controller.action_dim), number, np.float32)
-    found = controller.targets(action, simulation.read().joint_positions)
-    for i in range(2):
-        controller.drive(found, i)
-    return found[:, 7:]
+    return controller.targets(action, simulation.read().joint_positions)[:, 7:]
 
 
 def test_mimic_joints_follow_with_their_multipliers_and_offsets():

@@ -39,7 +39,7 @@ def test_states_need_nothing_that_draws():
         "import sys, tasks\n"
         "for mode in ('state', 'state_dict', 'none'):\n"
         "    tasks.make('PickCube-v1', obs_mode=mode).reset(seed=0)\n"
-        "drawing = ('simulation.rendering.pictures', 'simulation.rendering.visuals')\n"
+        "drawing = ('simulation.rendering.pictures', 'simulation.sapien3.visuals')\n"
         "print([m for m in drawing if m in sys.modules])\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -9,7 +9,7 @@ from parity.compare.episodes import random_episodes
 from parity.compare.lockstep import HISTORIES
 from robots import CONTROL_MODES, DescriptorError, RobotRegistry, TaskError, UnknownNameError
 from rollouts.playing.plan_conversion import as_positions
-from simulation.world import World
+from simulation.sapien3.world import BuiltWorld
 from tasks.episode import Episode, play
 from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, complaints, pair
@@ -89,7 +89,7 @@ def test_positions_move_everything_as_the_deltas_they_come_from(task_id):
 
 @pytest.mark.parametrize("robot", RobotRegistry.names())
 def test_the_limits_are_those_of_the_robot_files(robot):
-    simulated = World(single({"arm": robot})).robots["arm"]
+    simulated = BuiltWorld(single({"arm": robot})).robots["arm"]
     limits = {j.name: j.limits[0] for j in simulated.driven}
     descriptor = simulated.descriptor
     relative = [g for g in descriptor.action_split.groups.values() if g.delta]

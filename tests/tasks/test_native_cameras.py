@@ -104,15 +104,15 @@ def test_another_camera_is_noticed(pick: Look, mutant: Camera, part: str):
 
 @pytest.mark.parametrize("what", ["light", "markers", "colour", "privileged"])
 def test_another_scene_is_noticed(pick: Look, what: str, monkeypatch: pytest.MonkeyPatch):
-    from simulation.rendering.pictures import pictures as rendering
+    from simulation.sapien3 import studio as rendering
 
     part = "sensor_data/base_camera/rgb"
     if what == "light":
         monkeypatch.setattr(rendering, "SKY", (0.31, 0.3, 0.3))
     elif what == "markers":
-        looked = rendering._Studio.look
+        looked = rendering.Studio.look
         monkeypatch.setattr(
-            rendering._Studio, "look", lambda self, c, t, *, markers: looked(self, c, t, markers=1)
+            rendering.Studio, "look", lambda self, c, t, *, markers: looked(self, c, t, markers=1)
         )
     elif what == "colour":
         cls = tasks.get_task_class("PickCube-v1")
@@ -144,7 +144,7 @@ def test_a_camera_is_turned_as_native_turns_it():
     with quiet():
         import mani_skill.envs  # noqa: F401
         from mani_skill.utils.sapien_utils import look_at as natively
-    from simulation.rendering.pictures import look_at
+    from simulation.sapien3.studio import look_at
 
     for eye, target in np.random.default_rng(0).uniform(-1, 1, (500, 2, 3)).round(2).tolist():
         theirs, ours = natively(eye, target).sp, look_at(tuple(eye), tuple(target))

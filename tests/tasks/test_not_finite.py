@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from robots import SimulationError, TaskError
+from simulation.sapien3.backend import worlds_below
 from tasks.maniskill.pick_cube import PickCube
 
 STILL = np.zeros((2, 8), np.float32)
@@ -111,7 +112,7 @@ def test_an_observation_that_is_not_finite(obs_mode):
 @pytest.mark.parametrize("obs_mode", ["state", "state_dict", "none"])
 def test_physics_that_diverges(obs_mode):
     env, other = make(obs_mode=obs_mode), make(obs_mode=obs_mode)
-    cube = env.simulation.worlds[1].bodies["cube"].component
+    cube = worlds_below(env.simulation)[1].bodies["cube"].component
     cube.set_linear_velocity([math.nan, 0.0, 0.0])
     with pytest.raises(SimulationError, match="body 'cube' .* in environment 1 at step 1"):
         env.step(STILL)

@@ -2,6 +2,7 @@ import pytest
 import torch
 
 import tasks
+from simulation.sapien3.backend import worlds_below
 from tasks.maniskill.peg_insertion_side import HALF_LENGTH, RADIUS, PegDesign
 
 
@@ -29,11 +30,12 @@ def test_what_is_built_and_what_is_observed_are_the_design():
     obs, _ = env.reset(seed=1)
     half_sizes = obs[:, env.observation_slices["peg_half_size"]]
     assert not torch.equal(half_sizes[0], half_sizes[1])
-    for world, observed in zip(env.simulation.worlds, half_sizes, strict=True):
-        (shape,) = world.body("peg").component.collision_shapes
+    below = worlds_below(env.simulation)
+    for world, built, observed in zip(env.simulation.worlds, below, half_sizes, strict=True):
+        (shape,) = built.bodies["peg"].component.collision_shapes
         assert shape.half_size.tolist() == observed.tolist()
         assert observed[0].item() == pytest.approx(world.design.half_length)
-        assert len(world.body("box_with_hole").component.collision_shapes) == 4
+        assert len(built.bodies["box_with_hole"].component.collision_shapes) == 4
 
 
 def test_a_partial_reset_leaves_the_other_peg_alone():

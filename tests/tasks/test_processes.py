@@ -21,6 +21,7 @@ import tasks
 from measurements.soak.process_resources import read_level
 from robots import RobotLayoutsError, SimulationError, TaskError
 from simulation.rendering.pictures import vulkan_problem
+from simulation.sapien3.backend import worlds_below
 from tasks.fronts.vector import VectorTask
 from tasks.fronts.workers import WorkerError
 from tasks.processes import forks
@@ -75,7 +76,7 @@ def no_collector():
 def test_closing_frees_the_worlds_at_once(front):
     with no_collector():
         env = FRONTS[front]()
-        world = weakref.ref(task_of(env).simulation.worlds[0])
+        world = weakref.ref(worlds_below(task_of(env).simulation)[0])
         env.reset()
         env.close()
         assert world() is None
@@ -85,7 +86,7 @@ def test_closing_frees_the_worlds_at_once(front):
 def test_what_nobody_holds_is_freed_unclosed(front):
     with no_collector():
         env = FRONTS[front]()
-        world = weakref.ref(task_of(env).simulation.worlds[0])
+        world = weakref.ref(worlds_below(task_of(env).simulation)[0])
         del env
         assert world() is None
 

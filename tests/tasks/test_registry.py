@@ -10,6 +10,7 @@ import tasks
 from layouts import single
 from robots import TaskError, UnknownNameError
 from simulation import Friction, PhysicsSettings, State, World
+from simulation.sapien3.backend import worlds_below
 from tasks.registry import TASKS
 
 
@@ -180,7 +181,7 @@ def test_without_physics_sapiens_own_defaults_hold_whatever_was_built_before():
     import sapien.physx as physx
 
     def shape_of(scenario: tasks.Scenario):
-        link = Still(scenario).simulation.worlds[0].robots["arm"].link("panda_link1")
+        link = worlds_below(Still(scenario).simulation)[0].robots["arm"].link("panda_link1")
         return link.collision_shapes[0]
 
     tasks.make("PickCube-v1")  # writes ManiSkill's settings into the process

@@ -3,6 +3,7 @@ import pytest
 import torch
 
 import tasks
+from simulation.sapien3.backend import worlds_below
 from tasks import MultiRobotTask
 
 HALF = 0.02
@@ -12,7 +13,6 @@ def put(env: MultiRobotTask, **places: tuple[float, float, float]) -> dict[str, 
     """Put bodies somewhere and return what the task tells of them."""
     for name, position in places.items():
         env.simulation.worlds[0].set_pose(name, position)
-    env.simulation.touched()
     return env.evaluate(env.simulation.read())
 
 
@@ -37,7 +37,7 @@ def test_a_stack_must_be_at_rest():
     env = tasks.make("StackCube-v1")
     stack = {"cubeB": (0.0, 0.0, HALF), "cubeA": (0.0, 0.0, 3 * HALF)}
     assert put(env, **stack)["success"].all()
-    cube = env.simulation.worlds[0].body("cubeA").component
+    cube = worlds_below(env.simulation)[0].bodies["cubeA"].component
     cube.set_angular_velocity([0.0, 0.0, 0.6])
     assert not put(env, **stack)["success"].any()
 
@@ -76,7 +76,9 @@ def test_the_lower_cube_must_reach_its_target():
 
 
 def test_the_handle_of_the_tool_is_lighter_than_its_hook():
-    tool = tasks.make("PullCubeTool-v1").simulation.worlds[0].body("l_shape_tool").component
+    tool = (
+        worlds_below(tasks.make("PullCubeTool-v1").simulation)[0].bodies["l_shape_tool"].component
+    )
     handle, hook = 500 * 0.2 * 0.05 * 0.05, 1000 * 0.05 * 0.1 * 0.05
     assert tool.mass == pytest.approx(handle + hook)
 

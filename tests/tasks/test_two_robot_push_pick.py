@@ -7,7 +7,8 @@ import tasks
 from experts import find_expert
 from experts.geometry import gripper_facing
 from experts.script import Scene
-from simulation.kinematics import InverseKinematics
+from simulation.sapien3.backend import worlds_below
+from simulation.sapien3.inverse_kinematics import InverseKinematics
 from tests.tasks.own import look, make, put
 
 TASK = "TwoRobotPushPick-v1"
@@ -17,7 +18,7 @@ TASK = "TwoRobotPushPick-v1"
 def test_the_cube_starts_where_only_the_pusher_reaches_it(seed: int):
     env = tasks.make(TASK)
     env.reset(seed)
-    scene, world = Scene(env), env.simulation.worlds[0]
+    scene, world = Scene(env), worlds_below(env.simulation)[0]
     cube, goal = scene.body("cube")[0], scene.body("goal_site")[0]
 
     def reaches(robot: str, place: np.ndarray, forward: float) -> bool:

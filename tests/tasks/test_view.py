@@ -7,7 +7,9 @@ import tasks
 from kinematics.rotations import pose_matrix
 from layouts import single
 from layouts.viewer.saved import NO_SLIDERS, save_html
-from simulation import Box, Capsule, Cylinder, Sphere, World
+from simulation import Box, Capsule, Cylinder, Sphere
+from simulation.sapien3.world import BuiltWorld
+from simulation.world import Body
 from tasks.__main__ import main
 from tasks.view import body_parts, task_cell
 from tests.pages import served
@@ -25,11 +27,11 @@ TURNED = (0.5, 0.5, -0.5, 0.5)
     ],
 )
 def test_a_body_is_drawn_where_it_collides(shape):
-    world = World(single({"arm": "so100"}))
-    body = world.add("body", shape)
+    body = Body("body", (shape,))
+    built = BuiltWorld(single({"arm": "so100"})).add(body)
     (part,) = body_parts(body.shapes)
     corners = part.mesh.vertices
-    low, high = body.component.compute_global_aabb_tight()
+    low, high = built.component.compute_global_aabb_tight()
     np.testing.assert_allclose(corners.min(0), low, atol=2e-3)
     np.testing.assert_allclose(corners.max(0), high, atol=2e-3)
     assert part.rgba == shape.color

@@ -13,7 +13,7 @@ import numpy as np
 import sapien
 
 from kinematics.rotations import Floats
-from simulation.world import World
+from simulation.sapien3.world import BuiltWorld
 
 
 class ArmModel:
@@ -21,8 +21,7 @@ class ArmModel:
 
     Attributes:
         joints: The arm's joints, in the order of everything here.
-        index: Where they are among all joints in SAPIEN's order.
-        dof: Number of all joints.
+        places: Where they are among all joints in the descriptor's order.
         low: Their lower limits (rad).
         high: Their upper limits (rad).
         base: Pose of the robot's base in the world.
@@ -30,7 +29,7 @@ class ArmModel:
         tcp: The model's number of the TCP link.
     """
 
-    def __init__(self, world: World, robot: str) -> None:
+    def __init__(self, world: BuiltWorld, robot: str) -> None:
         """Take the robot's kinematic model.
 
         Args:
@@ -45,16 +44,15 @@ class ArmModel:
         self.base = simulated.base_pose
         self.model: Any = simulated.articulation.create_pinocchio_model()
         self.tcp = simulated.articulation.links.index(simulated.link(descriptor.tcp_link))
-        names = [joint.name for joint in simulated.joints]
-        self.index = np.array([names.index(joint) for joint in self.joints])
-        self.dof = len(names)
+        self.places = np.array([descriptor.joints.index(joint) for joint in self.joints])
+        self._order = np.array(simulated.active_index)  # of the descriptor's joints in SAPIEN's
         limits = np.concatenate([joint.limits for joint in simulated.joints])
-        self.low, self.high = limits[self.index].astype(float).T
+        self.low, self.high = limits[self._order[self.places]].astype(float).T
 
     def tcp_pose(self, arm: Any) -> sapien.Pose:
         """Return where arm joints, (arm joints,) (rad), bring the TCP link, in the world."""
-        qpos = np.zeros(self.dof)
-        qpos[self.index] = arm
+        qpos = np.zeros(len(self._order))
+        qpos[self._order[self.places]] = arm
         self.model.compute_forward_kinematics(qpos)
         return self.base * self.model.get_link_pose(self.tcp)
 
@@ -62,3 +60,20 @@ class ArmModel:
         """Return where arm joints bring the TCP link: position (3,) (m), quaternion (4,) wxyz."""
         pose = self.tcp_pose(arm)
         return np.array(pose.p, float), np.array(pose.q, float)
+
+    def descend(self, target: sapien.Pose, start: Floats, **settings: float) -> Floats | None:
+        """Return the arm joints at which SAPIEN's descent ends, or None if it does not converge.
+
+        Args:
+            target: Of the TCP link, in the frame of the robot's base.
+            start: All joints in the descriptor's order, (dof,) (rad, m); those that are not the
+                arm's stay there.
+            settings: What ``compute_inverse_kinematics`` takes besides.
+        """
+        initial, mask = np.empty(len(self._order)), np.zeros(len(self._order), np.int32)
+        initial[self._order] = start
+        mask[self._order[self.places]] = 1
+        qpos, converged, _ = self.model.compute_inverse_kinematics(
+            self.tcp, target, initial_qpos=initial, active_qmask=mask, **settings
+        )
+        return qpos[self._order[self.places]] if converged else None

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from kinematics.rotations import Floats
 from kinematics.solve import nearby, nearest, turned_within
 from robots import SimulationError
-from simulation.arm_model import ArmModel
-from simulation.world import World
+from simulation.sapien3.arm_model import ArmModel
+from simulation.sapien3.world import BuiltWorld
 
 Numbers = Sequence[float] | NDArray[np.floating[Any]]
 
@@ -31,7 +31,7 @@ class InverseKinematics:
         joints: The arm's joints, in the order of the solutions.
     """
 
-    def __init__(self, world: World, robot: str) -> None:
+    def __init__(self, world: BuiltWorld, robot: str) -> None:
         """Take the robot's kinematic model.
 
         Args:
@@ -42,7 +42,7 @@ class InverseKinematics:
             UnknownNameError: If the layout has no such robot, or the robot no such TCP link.
             SimulationError: If the robot's TCP is not a link but a mean of several.
         """
-        descriptor, simulated = world.layout[robot].robot, world.robots[robot]
+        descriptor = world.layout[robot].robot
         if descriptor.tcp_position_links:
             raise SimulationError(
                 f"inverse kinematics needs a TCP that is a link; that of {descriptor.name} is the"
@@ -50,10 +50,7 @@ class InverseKinematics:
             )
         self._arm = arm = ArmModel(world, robot)
         self.joints = arm.joints
-        self._mask = np.isin(np.arange(arm.dof), arm.index).astype(np.int32)
-        keyframes = np.zeros((len(descriptor.keyframes), arm.dof))
-        keyframes[:, simulated.active_index] = list(descriptor.keyframes.values())
-        self._keyframes = keyframes
+        self._keyframes = np.array([*descriptor.keyframes.values()], float)
 
     def solve(self, position: Numbers, quaternion: Numbers, start_qpos: Numbers) -> Floats | None:
         """Return arm joints that bring the TCP to a pose, or None if none were found.
@@ -65,7 +62,7 @@ class InverseKinematics:
         Args:
             position: Of the TCP in the world (m).
             quaternion: Of the TCP in the world, wxyz.
-            start_qpos: All joints in SAPIEN's order, shape (dof,) (rad, m); the solution is
+            start_qpos: All joints in the descriptor's order, (dof,) (rad, m); the solution is
                 sought near them.
 
         Returns:
@@ -75,20 +72,19 @@ class InverseKinematics:
         all_joints = np.asarray(start_qpos, float)
         found: list[Floats] = []
         for start in self._starts(all_joints):
-            qpos, converged, _ = self._arm.model.compute_inverse_kinematics(
-                self._arm.tcp,
+            arm = self._arm.descend(
                 target,
-                initial_qpos=start,
-                active_qmask=self._mask,
+                start,
                 eps=_CONVERGED,
                 max_iterations=_MAX_ITERATIONS,
                 dt=_STEP,
                 damp=_DAMPING,
             )
-            arm = turned_within(qpos[self._arm.index], self._arm.low, self._arm.high)
-            if converged and arm is not None:
+            if arm is not None:
+                arm = turned_within(arm, self._arm.low, self._arm.high)
+            if arm is not None:
                 found.append(arm)
-        return nearest(found, all_joints[self._arm.index])
+        return nearest(found, all_joints[self._arm.places])
 
     def forward(self, arm_qpos: Numbers) -> tuple[Floats, Floats]:
         """Return where arm joints bring the TCP: position (3,) (m) and quaternion (4,) wxyz, world.
@@ -101,4 +97,4 @@ class InverseKinematics:
     def _starts(self, qpos: Floats) -> Iterator[Floats]:
         yield qpos
         yield from self._keyframes
-        yield from nearby(qpos, self._arm.index, _NEARBY_STARTS, _SPREAD)
+        yield from nearby(qpos, self._arm.places, _NEARBY_STARTS, _SPREAD)

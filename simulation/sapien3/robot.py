@@ -10,7 +10,7 @@ import sapien
 
 from layouts import Placement
 from robots import DescriptorError, RobotDescriptor, UnknownNameError
-from simulation.blueprint import Blueprint
+from simulation.sapien3.blueprint import Blueprint
 
 
 class SimulatedRobot:
@@ -21,9 +21,11 @@ class SimulatedRobot:
         descriptor: What it is.
         articulation: SAPIEN's articulation.
         links: Link by name.
-        joints: Active joints, in SAPIEN's order, which is the order of qpos and qvel.
+        joints: Active joints, in SAPIEN's order, which is that of the articulation's qpos and qvel.
         driven: Active joints in the order of the descriptor's joints.
-        active_index: For each joint of the descriptor, its place in qpos.
+        active_index: For each joint of the descriptor, its place in SAPIEN's order.
+        loaded_order: For each active joint in SAPIEN's order, its place in the descriptor.
+        root: The root link.
     """
 
     def __init__(
@@ -35,7 +37,7 @@ class SimulatedRobot:
             scene: SAPIEN's scene.
             name: Its name in the layout.
             placement: What it is and where it stands.
-            blueprint: What `simulation.blueprint.read_blueprint` made of it.
+            blueprint: What `simulation.sapien3.blueprint.read_blueprint` made of it.
 
         Raises:
             AssetError: If SAPIEN left out a collision shape.
@@ -48,6 +50,8 @@ class SimulatedRobot:
         self.links = {link.name: link for link in self.articulation.links}
         self.joints: list[Any] = list(self.articulation.active_joints)
         self.active_index = _active_index(descriptor, [joint.name for joint in self.joints])
+        self.loaded_order = [descriptor.joints.index(joint.name) for joint in self.joints]
+        self.root: Any = self.articulation.links[0]
         self.driven = [self.joints[i] for i in self.active_index]
         self._set_drives()
         for link in self.links.values():
@@ -83,14 +87,16 @@ class SimulatedRobot:
 
         Args:
             row: Root pose (m, wxyz), linear (m/s) and angular velocity (rad/s), qpos and qvel in
-                SAPIEN's joint order; shape (13 + 2 · dof,).
+                the order of the descriptor's joints; shape (13 + 2 · dof,).
         """
         dof = len(self.joints)
+        qpos, qvel = np.empty((2, dof), row.dtype)
+        qpos[self.active_index], qvel[self.active_index] = row[13 : 13 + dof], row[13 + dof :]
         self.articulation.set_root_pose(sapien.Pose(row[:3].tolist(), row[3:7].tolist()))
         self.articulation.set_root_linear_velocity(row[7:10])
         self.articulation.set_root_angular_velocity(row[10:13])
-        self.articulation.set_qpos(row[13 : 13 + dof])
-        self.articulation.set_qvel(row[13 + dof :])
+        self.articulation.set_qpos(qpos)
+        self.articulation.set_qvel(qvel)
 
     def stop(self) -> None:
         """Zero every velocity and force, leaving positions alone."""

@@ -6,6 +6,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from robots import SimulationError
 from robots.common.bounds import FAR, checked_number, checked_numbers, checked_whole, shown
 from robots.descriptor import CameraMount, Vector3
@@ -83,3 +86,26 @@ class RobotCamera:
 
     robot: str
     mount: CameraMount
+
+
+AnyCamera = Camera | RobotCamera
+
+Texture = NDArray[np.uint8] | NDArray[np.int16]  # (H, W, 3) or (H, W, 1)
+
+
+@dataclass(frozen=True)
+class View:
+    """What one camera tells of one world.
+
+    Attributes:
+        images: Texture → image: ``rgb`` (H, W, 3) uint8, ``depth`` (H, W, 1) int16 (mm),
+            ``segmentation`` (H, W, 1) int16, ``position`` (H, W, 3) int16 (mm).
+        extrinsic_cv: World to camera, which looks along +z with y down, (3, 4).
+        cam2world_gl: Camera, which looks along -z with y up, to world, (4, 4).
+        intrinsic_cv: Camera to pixels, (3, 3).
+    """
+
+    images: dict[str, Texture]
+    extrinsic_cv: NDArray[np.float32]
+    cam2world_gl: NDArray[np.float32]
+    intrinsic_cv: NDArray[np.float32]

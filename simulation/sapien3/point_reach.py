@@ -9,8 +9,8 @@ import numpy as np
 from kinematics.rotations import Floats
 from kinematics.solve import descend_by_differences
 from robots import UnknownNameError
-from simulation.arm_model import ArmModel
-from simulation.world import World
+from simulation.sapien3.arm_model import ArmModel
+from simulation.sapien3.world import BuiltWorld
 
 _CONVERGED = 1e-3  # m
 _SHORT_WAY, _LONG_WAY = 0.001, 0.5  # m of error that a joint's way of so many rad is worth
@@ -23,7 +23,7 @@ class PointReach:
         joints: The arm's joints, in the order of the solutions.
     """
 
-    def __init__(self, world: World, robot: str) -> None:
+    def __init__(self, world: BuiltWorld, robot: str) -> None:
         """Take the robot's kinematic model.
 
         Args:
@@ -37,8 +37,8 @@ class PointReach:
         self.joints = self._model.joints
 
     def arm(self, qpos: Floats) -> Floats:
-        """Pick the arm's joints, in the order of ``joints``, out of all in SAPIEN's order."""
-        return qpos[self._model.index]
+        """Pick the arm's joints out of all in the descriptor's order."""
+        return qpos[self._model.places]
 
     def forward(self, arm: Floats) -> tuple[Floats, Floats]:
         """Return where arm joints bring the TCP link: position (3,) (m), quaternion (4,) wxyz.

@@ -1,0 +1,250 @@
+"""The seam between this library and a simulator: what a backend has to do, in batched verbs.
+
+Everything above it (`Simulation`, `State`, `World`, tasks) is plain data and arithmetic; what a
+simulator calls its scenes, bodies and joints is known only below, today in `simulation.sapien3`.
+
+Conventions, whatever the simulator's own are: joints in the order of each robot's descriptor, the
+robots in that of the layout; poses as position (m) and quaternion (wxyz) in the world frame; the
+first axis of a row-wise argument counts the entries of ``env_ids``, that of a result is named with
+it. Arrays are float32, NumPy's of today's backend.
+
+How a GPU simulation stands behind it: every result is one tensor per quantity for all N worlds, as
+such simulations keep them, and none of the verbs is called once per world.
+
+- `build` is called with all worlds at first. They describe the same bodies in the same order, so a
+  frame's number is its row in the pose tensor. Later calls name the worlds that are built anew.
+- `place` gets what a reset placed in every world at once; it scatters rows into pose tensors and
+  applies them.
+- `drive` writes the tensor of drive targets and `step` advances. Worlds that are not in ``env_ids``
+  are to stand still; a simulation that can only advance all of them saves and restores theirs.
+- Tasks compute with NumPy's arrays and torch's tensors alike, so tensors may be returned as they
+  are. What lies between still takes NumPy's and is to learn of tensors then, none of it in a task:
+  `simulation.controller`, `simulation.grasps`, `simulation.rotations`, and `State` where it reduces
+  (`is_static`, `gripper_opening`) or picks rows of poses.
+- `read` returns what nearly every task reads: poses and joints. `velocities` and `forces` are read
+  only if asked for. Their arguments are *declared on first use*: a state asks for all velocities
+  and pairs that were ever asked for, always as the same tuple until another one joins, and the
+  first reset asks for what a task looks at. So a contact query is made once for each new tuple and
+  read once per step, in the order of the tuple.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulation.cameras import AnyCamera, View
+from simulation.maths import Flags, Floats
+from simulation.world import Placements, World
+
+Rows = Mapping[str, Floats]
+"""State rows by name, a row for each world that is meant."""
+
+Joints = NDArray[np.float64]
+Numbers = Sequence[float] | NDArray[np.floating[Any]]
+
+
+class Readout(NamedTuple):
+    """What is read after every step.
+
+    Attributes:
+        poses: Of every frame, (F, N, 7).
+        joint_positions: Of all robots, (N, dof) (rad, m).
+        joint_velocities: Likewise (rad/s, m/s).
+    """
+
+    poses: Floats
+    joint_positions: Floats
+    joint_velocities: Floats
+
+
+class Velocity(NamedTuple):
+    """A velocity of a body, in the world frame (m/s or rad/s)."""
+
+    body: str
+    kind: Literal["linear", "angular"]
+
+
+class Pair(NamedTuple):
+    """A link and a body, and the contact force of the body on the link (N, world frame)."""
+
+    robot: str
+    link: str
+    body: str
+
+
+@dataclass(frozen=True)
+class BuiltRobot:
+    """What is known of a robot once it is built.
+
+    Attributes:
+        links: Frame of each link by name, the root first.
+        limits: Lower and upper limit of each joint, (dof, 2) (rad, m).
+        loaded_order: For each joint in the order in which SAPIEN's loader numbers those of the
+            robot's file, which is native's, its place among the descriptor's.
+    """
+
+    links: Mapping[str, int]
+    limits: NDArray[np.float32]
+    loaded_order: tuple[int, ...]
+
+    @property
+    def root(self) -> str:
+        """Name of the root link."""
+        return next(iter(self.links))
+
+
+@dataclass(frozen=True)
+class Built:
+    """Where everything stands in the read-outs of worlds that were built alike.
+
+    A frame is anything with a pose.
+
+    Attributes:
+        frames: Number of frames F.
+        bodies: Frame of each body.
+        robots: Robot by name, in layout order.
+    """
+
+    frames: int
+    bodies: Mapping[str, int]
+    robots: Mapping[str, BuiltRobot]
+
+
+class PoseSolver(Protocol):
+    """Solves for the arm joints, in the order of ``joints``, that bring a TCP to a pose."""
+
+    joints: tuple[str, ...]
+
+    def forward(self, arm_qpos: Numbers, /) -> tuple[Joints, Joints]:
+        """Return where arm joints bring the TCP: position (3,) (m), quaternion (4,) wxyz, world."""
+        ...
+
+    def solve(
+        self, position: Numbers, quaternion: Numbers, start_qpos: Numbers, /
+    ) -> Joints | None:
+        """Return arm joints near all joints ``start_qpos``, or None if none were found."""
+        ...
+
+
+class PointSolver(Protocol):
+    """Solves for the arm joints, in the order of ``joints``, that bring a point of a TCP link."""
+
+    joints: tuple[str, ...]
+
+    def arm(self, qpos: Joints, /) -> Joints:
+        """Pick the arm's joints out of all in the descriptor's order."""
+        ...
+
+    def forward(self, arm: Joints, /) -> tuple[Joints, Joints]:
+        """Return where arm joints bring the TCP link: position (3,) (m), quaternion (4,) wxyz."""
+        ...
+
+    def place_of(self, point: Joints, arm: Joints, /) -> Joints:
+        """Return where arm joints bring a point of the TCP link, (3,) (m), world."""
+        ...
+
+    def solve(
+        self, point: Joints, place: Joints, start: Joints, fixed: Sequence[str] = ()
+    ) -> Joints | None:
+        """Return arm joints near ``start`` that bring a point to a place, or None if none do."""
+        ...
+
+
+class Backend(Protocol):
+    """N worlds of one layout in a simulator."""
+
+    def build(self, worlds: Mapping[int, World]) -> Built:
+        """Build some worlds, anew where they stand already, and forget their past.
+
+        Args:
+            worlds: What each is to hold, by its number; all of them at the first call.
+
+        Raises:
+            AssetError: If a robot's or a body's files cannot be found or read.
+            DescriptorError: If a descriptor names joints or links that its file lacks.
+            SimulationError: If pictures are wanted and cannot be drawn.
+        """
+        ...
+
+    def clear(self, env_ids: Sequence[int]) -> None:
+        """Begin a reset: zero all velocities and forces, and put anchored bodies back."""
+        ...
+
+    def place(self, placements: Placements) -> None:
+        """Stand robots at their base pose and given joints, at rest, and move bodies."""
+        ...
+
+    def drive(self, targets: Floats, env_ids: Sequence[int]) -> None:
+        """Set every joint's drive target; ``targets`` has a row for each world, (N, dof)."""
+        ...
+
+    def step(self, env_ids: Sequence[int], substeps: int) -> None:
+        """Advance worlds by some steps of physics."""
+        ...
+
+    def read(self) -> Readout:
+        """Return poses and joints of all worlds; they stay as they are when the worlds move on."""
+        ...
+
+    def velocities(self, wanted: tuple[Velocity, ...]) -> Floats:
+        """Return velocities, (K, N, 3); those of bodies that physics does not move are zero."""
+        ...
+
+    def root_velocities(self) -> Floats:
+        """Return linear and angular velocity of each robot's root, (R, N, 6) (m/s, rad/s)."""
+        ...
+
+    def forces(self, pairs: tuple[Pair, ...]) -> Floats | None:
+        """Return contact forces of the last step of physics, (P, N, 3); None if all are zero."""
+        ...
+
+    def write(self, env_ids: Sequence[int], bodies: Rows, robots: Rows) -> None:
+        """Put worlds into a state.
+
+        Args:
+            env_ids: Which worlds.
+            bodies: Pose, linear and angular velocity, (K, 13); only dynamic ones take velocities.
+            robots: The same of the root, then joint positions and velocities, (K, 13 + 2 · dof).
+        """
+        ...
+
+    def look(
+        self, env: int, cameras: Mapping[str, AnyCamera], textures: Sequence[str], *, markers: bool
+    ) -> list[View]:
+        """Return what each camera sees in one world now, all at the same moment.
+
+        Args:
+            env: Which world.
+            cameras: Camera by name.
+            textures: What to tell of each pixel, some of `simulation.cameras.TEXTURES`.
+            markers: Whether bodies that are there for people only are seen.
+
+        Raises:
+            SimulationError: If this process is a fork of one that drew.
+        """
+        ...
+
+    def inverse_kinematics(self, robot: str) -> PoseSolver:
+        """Return a solver for poses of a robot's TCP, where it stands in the first environment."""
+        ...
+
+    def point_reach(self, robot: str) -> PointSolver:
+        """Return a solver for points of a robot's TCP link, likewise."""
+        ...
+
+    def contact_counts(self) -> NDArray[np.int64]:
+        """Return how many pairs of bodies touch or are about to, (N,)."""
+        ...
+
+    def touching(self) -> Flags:
+        """Tell where a link pressed on a dynamic body in the last step of physics, (N,)."""
+        ...
+
+    def collision_shapes(self, env: int, body: str) -> list[tuple[str | float | list[float], ...]]:
+        """Return the kind, pose and sizes of what a body collides with, as it was built."""
+        ...

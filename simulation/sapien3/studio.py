@@ -1,0 +1,144 @@
+"""Pictures of one world of SAPIEN's, all lit alike."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import sapien
+import torch
+
+from robots import SimulationError
+from robots.descriptor import Vector3
+from simulation.cameras import AnyCamera, RobotCamera, View
+from simulation.rotations import quaternion
+from simulation.sapien3.device import expect_render_device
+from simulation.sapien3.world import BuiltWorld
+
+# mani_skill 3.0.1, envs/sapien_env.py, _load_lighting: red, green, blue; directions point away
+# from the lamp.
+SKY = (0.3, 0.3, 0.3)
+LAMPS = (((1.0, 1.0, -1.0), (1.0, 1.0, 1.0)), ((0.0, 0.0, -1.0), (1.0, 1.0, 1.0)))
+
+# mani_skill 3.0.1, render/shaders.py, "minimal": what each image holds
+_SHADERS = "minimal"
+_FORMATS = {"Color": "r8g8b8a8unorm", "PositionSegmentation": "r16g16b16a16sint"}
+_IMAGES = {
+    "rgb": "Color",
+    "depth": "PositionSegmentation",
+    "segmentation": "PositionSegmentation",
+    "position": "PositionSegmentation",
+}
+
+
+def look(
+    world: BuiltWorld,
+    cameras: Mapping[str, AnyCamera],
+    textures: Sequence[str],
+    *,
+    markers: bool,
+) -> list[View]:
+    """Return what cameras see in a world now; see `simulation.backend.Backend.look`."""
+    expect_render_device()
+    if world.studio is None:
+        world.studio = Studio(world)
+    return world.studio.look(cameras, textures, markers=markers)
+
+
+class Studio:
+    """The cameras and the lights of one world, made once: a render system takes few lights.
+
+    They live in a scene of their own beside the world's, so that looking changes nothing in it.
+    """
+
+    def __init__(self, world: BuiltWorld) -> None:
+        """Set up the lights."""
+        self._world = weakref.proxy(world)
+        self._scene = sapien.Scene([world.scene.render_system])
+        self._scene.set_ambient_light(list(SKY))
+        for direction, color in LAMPS:
+            self._scene.add_directional_light(list(direction), list(color))
+        self._cameras: dict[tuple[Any, ...], Any] = {}
+        self._markers: list[Any] = [
+            body.entity.find_component_by_type(sapien.render.RenderBodyComponent)
+            for body in world.bodies.values()
+            if body.declared.marker
+        ]
+
+    def look(
+        self, cameras: Mapping[str, AnyCamera], textures: Sequence[str], *, markers: bool
+    ) -> list[View]:
+        """Take pictures with all cameras at the same moment."""
+        for marker in self._markers:
+            marker.visibility = float(markers)
+        placed = [self._placed(name, camera) for name, camera in cameras.items()]
+        self._scene.update_render()
+        for camera in placed:
+            camera.take_picture()
+        return [_view(camera, textures) for camera in placed]
+
+    def _placed(self, name: str, camera: AnyCamera) -> Any:
+        lens = camera.mount if isinstance(camera, RobotCamera) else camera
+        key = name, lens.width, lens.height, lens.fov, lens.near, lens.far
+        if key not in self._cameras:
+            self._cameras[key] = self._add_camera(*key)
+        placed = self._cameras[key]
+        if isinstance(camera, RobotCamera):
+            link = self._world.robots[camera.robot].link(camera.mount.link)
+            mount = camera.mount
+            placed.entity.set_pose(link.entity_pose)
+            placed.local_pose = sapien.Pose(list(mount.position), list(mount.quaternion))
+        else:
+            placed.local_pose = look_at(camera.eye, camera.target)
+        return placed
+
+    def _add_camera(
+        self, name: str, width: int, height: int, fov: float, near: float, far: float
+    ) -> Any:
+        # Process-wide, bound when a camera is made; others in this process may have changed them.
+        sapien.render.set_camera_shader_dir(_SHADERS)
+        for image, pixels in _FORMATS.items():
+            sapien.render.set_picture_format(image, pixels)
+        return self._scene.add_camera(name, width, height, fov, near, far)
+
+
+def _view(camera: Any, textures: Sequence[str]) -> View:
+    found = {image: camera.get_picture(image) for image in {_IMAGES[t] for t in textures}}
+    pixels = {texture: found[_IMAGES[texture]] for texture in textures}
+    channels = {
+        "rgb": lambda x: x[..., :3],
+        "depth": lambda x: -x[..., 2:3],
+        "segmentation": lambda x: x[..., 3:],
+        "position": lambda x: x[..., :3],
+    }
+    return View(
+        {texture: channels[texture](x) for texture, x in pixels.items()},
+        camera.get_extrinsic_matrix(),
+        camera.get_model_matrix(),
+        camera.get_intrinsic_matrix(),
+    )
+
+
+def look_at(eye: Vector3, target: Vector3) -> sapien.Pose:
+    """Return the pose of a camera at ``eye`` that looks at ``target`` with z up (m, world).
+
+    A camera looks along its own +x, with +z up. Float32, in the order of native's own operations.
+
+    Raises:
+        SimulationError: If the two points coincide.
+    """
+    start, end = torch.tensor([eye, target], dtype=torch.float32)
+    if torch.equal(start, end):
+        raise SimulationError(f"a camera at {eye} cannot look at the point where it is")
+    forward = _unit((end - start)[None])
+    up = torch.tensor([[0.0, 0.0, 1.0]])
+    if torch.linalg.vector_norm(torch.linalg.cross(up, forward)) < 1e-6:
+        up = torch.tensor([[1.0, 0.0, 0.0]])  # straight down or up: +x is up in the picture
+    left = _unit(torch.linalg.cross(up, forward))
+    axes = torch.stack([forward, left, torch.linalg.cross(forward, left)], dim=-1)
+    return sapien.Pose(start.tolist(), quaternion(axes[0]).tolist())
+
+
+def _unit(rows: torch.Tensor) -> torch.Tensor:
+    return rows / torch.linalg.vector_norm(rows, dim=-1, keepdim=True)

@@ -1,0 +1,169 @@
+"""One world in SAPIEN: a scene with a layout's robots and a task's bodies."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import sapien
+import sapien.physx as physx
+
+from layouts import Layout
+from robots import SimulationError
+from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
+from simulation.sapien3.blueprint import Blueprint, read_blueprint
+from simulation.sapien3.collision import add_collision
+from simulation.sapien3.device import expect_render_device, outlive_forks
+from simulation.sapien3.robot import SimulatedRobot
+from simulation.sapien3.settings import apply
+from simulation.shapes import Shape
+from simulation.world import Body, World
+
+
+class BuiltBody(NamedTuple):
+    """A body in SAPIEN.
+
+    Attributes:
+        declared: What the task declared.
+        entity: SAPIEN's entity.
+        component: Its physics component.
+        start_pose: Pose it was built at.
+    """
+
+    declared: Body
+    entity: sapien.Entity
+    component: Any
+    start_pose: sapien.Pose
+
+
+class BuiltWorld:
+    """Robots first, in the layout's order, then bodies in the order declared.
+
+    Attributes:
+        layout: Which robots stand where.
+        physics: Settings it was built with.
+        visuals: Whether it has what pictures need.
+        scene: SAPIEN's scene.
+        system: Its physics system.
+        robots: Robot by name in the layout.
+        articulations: The robots' articulations, in layout order.
+        bodies: Body by name.
+        studio: Its cameras and lights, once a picture was taken.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        physics: PhysicsSettings | None = None,
+        *,
+        visuals: bool = False,
+        blueprints: dict[str, Blueprint] | None = None,
+    ) -> None:
+        """Build the robots of a layout.
+
+        Args:
+            layout: Which robots stand where.
+            physics: Solver settings; None keeps SAPIEN's own defaults.
+            visuals: Whether to build what pictures need (a Vulkan driver must be present).
+            blueprints: What was read of the robots for an earlier world that is like this one,
+                by name; what is missing is read and added.
+
+        Raises:
+            AssetError: If a robot's files cannot be found.
+            SimulationError: If pictures are wanted and there is no Vulkan driver.
+        """
+        self.layout = layout
+        self.physics = SAPIEN_DEFAULTS if physics is None else physics
+        self.visuals = visuals
+        apply(self.physics)
+        self.system = physx.PhysxCpuSystem()
+        systems: list[Any] = [self.system]
+        if visuals:
+            systems.append(_render_system())
+            outlive_forks(self)
+        self.scene = sapien.Scene(systems)
+        self.system.timestep = self.physics.timestep
+        blueprints = {} if blueprints is None else blueprints
+        self.robots: dict[str, SimulatedRobot] = {}
+        for name, placement in layout.items():
+            if name not in blueprints:
+                blueprints[name] = read_blueprint(placement.robot, visuals=visuals)
+            self.robots[name] = SimulatedRobot(self.scene, name, placement, blueprints[name])
+        self.articulations = [robot.articulation for robot in self.robots.values()]
+        self.bodies: dict[str, BuiltBody] = {}
+        self.studio: Any = None  # as long as this world lives, also in a fork
+
+    def add(self, body: Body) -> BuiltBody:
+        """Build a body."""
+        builder = self.scene.create_actor_builder()
+        for shape in body.shapes:
+            add_collision(builder, shape)
+        builder.set_physx_body_type(body.kind)
+        pose = sapien.Pose(list(body.position), list(body.quaternion))
+        builder.set_initial_pose(pose)
+        entity = builder.build(body.name)
+        if self.visuals:
+            _draw(entity, body.shapes)
+        component = entity.find_component_by_type(
+            physx.PhysxRigidStaticComponent
+            if body.kind == "static"
+            else physx.PhysxRigidDynamicComponent
+        )
+        built = self.bodies[body.name] = BuiltBody(body, entity, component, pose)
+        return built
+
+    def settle(self) -> None:
+        """End the build: set every start pose once more, as native does."""
+        for body in self.bodies.values():
+            if body.declared.kind != "static":
+                body.entity.set_pose(body.start_pose)
+        for robot in self.robots.values():
+            robot.articulation.set_root_pose(robot.base_pose)
+
+    def clear(self) -> None:
+        """Begin a reset: zero every velocity and force, and put anchored bodies back.
+
+        PhysX keeps its contact caches: a reset world remembers, a rebuilt one does not.
+        """
+        for body in self.bodies.values():
+            if body.declared.kind == "dynamic":
+                body.component.set_linear_velocity([0.0, 0.0, 0.0])
+                body.component.set_angular_velocity([0.0, 0.0, 0.0])
+        for robot in self.robots.values():
+            robot.stop()
+        for body in self.bodies.values():
+            if body.declared.anchored:
+                body.entity.set_pose(body.start_pose)
+
+    def set_pose(self, name: str, row: list[float]) -> None:
+        """Move a body to a position (m) and quaternion (wxyz), (7,)."""
+        self.bodies[name].entity.set_pose(sapien.Pose(row[:3], row[3:]))
+
+
+def build_world(world: World, blueprints: dict[str, Blueprint]) -> BuiltWorld:
+    """Build what a task declared; see `BuiltWorld` for the arguments and errors."""
+    built = BuiltWorld(world.layout, world.physics, visuals=world.visuals, blueprints=blueprints)
+    for body in world.bodies.values():
+        built.add(body)
+    built.settle()
+    return built
+
+
+def _draw(entity: sapien.Entity, shapes: tuple[Shape, ...]) -> None:
+    from simulation.sapien3.visuals import visual_component
+
+    component = visual_component(shapes)
+    if component is not None:
+        entity.add_component(component)
+
+
+def _render_system() -> Any:
+    from sapien.render import RenderSystem
+
+    expect_render_device()
+    try:
+        return RenderSystem()
+    except RuntimeError as error:
+        raise SimulationError(
+            f"pictures need a Vulkan driver, and none works here ({error}); without pictures"
+            " (render_mode=None, obs_mode='state') everything else works"
+        ) from error
