@@ -60,6 +60,11 @@ def browser_problem() -> str | None:
 PROBLEMS = {"native": lambda: native_problem(), "browser": lambda: browser_problem()}
 
 
+def pytest_xdist_auto_num_workers() -> int:
+    """One process more than there are cores, because tests also wait: for deadlines, say."""
+    return len(os.sched_getaffinity(0)) + 1
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
     for marker, find_problem in PROBLEMS.items():
         if item.get_closest_marker(marker) and (problem := find_problem()):

@@ -30,9 +30,10 @@ from tests.faults.tiny_files import (
     fetch,
     settings,
 )
+from tests.process_trees import children_of
 from tests.robots import hub_server
 from tests.robots.hub_server import COMMIT, HubServer, headers, page, redirect, status
-from tests.robots.processes import children_of, is_alive
+from tests.robots.processes import is_alive
 from tests.robots.wheel_index import WHEEL, WheelIndex, build_wheel
 
 AREA = "fetching"

@@ -20,8 +20,9 @@ from robots.from_urdf import main as from_urdf
 from robots.inspect import main as inspect
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.tiny_files import run_main, settings
+from tests.process_trees import children_of
 from tests.robots.hub_server import HubServer, stall
-from tests.robots.processes import children_of, is_alive, wait_until
+from tests.robots.processes import is_alive, wait_until
 
 AREA = "robot commands"
 CHECKOUT = Path(__file__).parents[2]

@@ -9,7 +9,7 @@ from layouts import Layout, Placement
 from robots import RobotRegistry
 from robots.urdf.reading import read_model
 from robots.urdf.tree import kinematic_tree
-from simulation import World
+from simulation.sapien3.world import BuiltWorld
 
 
 @functools.cache
@@ -20,9 +20,10 @@ def tree_of(robot: str) -> Tree:
 
 
 @functools.cache
-def world_of(robot: str) -> World:
+def world_of(robot: str) -> BuiltWorld:
     """Make a world with the robot's base at the origin."""
-    return World(Layout({"arm": Placement(RobotRegistry.load(robot), (0, 0, 0), (1, 0, 0, 0))}))
+    placement = Placement(RobotRegistry.load(robot), (0, 0, 0), (1, 0, 0, 0))
+    return BuiltWorld(Layout({"arm": placement}))
 
 
 def simulated(robot: str):

@@ -99,9 +99,10 @@ def test_a_saved_page_shows_the_robots_and_asks_for_nothing(tmp_path):
         assert asked == [file.as_uri()]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "names",
-    [("127.0.0.1",), pytest.param(("127.0.0.1", "localhost", EVIL), marks=pytest.mark.long)],
+    [("127.0.0.1",), ("127.0.0.1", "localhost", EVIL)],
 )
 def test_only_the_page_with_the_token_steers(names):
     rebound = f"--host-resolver-rules=MAP {EVIL} 127.0.0.1"

@@ -27,6 +27,7 @@ def soaked(task_id: str, leaking: type | None = None) -> tuple[int, list[str]]:
     return code, printed.getvalue().splitlines()
 
 
+@pytest.mark.long
 def test_a_healthy_task_passes():
     code, printed = in_fresh_process(soaked, "maniskill.push_cube_native")
     assert code == 0
@@ -39,7 +40,7 @@ def test_a_healthy_task_passes():
     ("leaking", "quantity"),
     [
         (leaking_tasks.HoardsMemory, "memory"),
-        (leaking_tasks.LeavesFilesOpen, "descriptors"),
+        pytest.param(leaking_tasks.LeavesFilesOpen, "descriptors", marks=pytest.mark.long),
     ],
 )
 def test_a_task_that_leaks_is_told(leaking, quantity):

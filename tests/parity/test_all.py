@@ -170,6 +170,7 @@ class TestComparing:
         assert sum("PushT-v1" in line for line in markdown(record)) == 1
         assert str(tmp_path) not in record_file.read_text()
 
+    @pytest.mark.long
     def test_a_difference_is_recorded_too(self, capsys, monkeypatch, tmp_path):
         record_file = tmp_path / "results.json"
         monkeypatch.setattr("parity.compare.command.RESULTS", record_file)

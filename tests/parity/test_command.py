@@ -63,20 +63,17 @@ class TestComparing:
     def test_every_way_of_playing_is_a_row(self, capsys, tmp_path):
         json_file = tmp_path / "result.json"
         code = run(
-            *("--task", "PushT-v1", "--task", "maniskill.pick_cube_native", "--num-envs", 2),
+            *("--task", "maniskill.pick_cube_native", "--num-envs", 2),
             *("--seeds", 3, "--steps", 3, "--history", "fresh", "reused"),
-            *("--reward-mode", "dense", "none", "--json", json_file),
+            *("--reward-mode", "dense", "--json", json_file),
         )
         assert code == 0
         runs = json.loads(json_file.read_text())["runs"]
         assert [(r["task"], r["history"], r["reward_mode"]) for r in runs] == [
-            (task, history, mode)
-            for task in ("PushT-v1", "PickCube-v1")
-            for history in ("fresh", "reused")
-            for mode in ("dense", "none")
+            ("PickCube-v1", history, "dense") for history in ("fresh", "reused")
         ]
         assert {(r["episodes"], r["steps"], r["num_envs"]) for r in runs} == {(3, 9, 2)}
-        assert capsys.readouterr().out.count("reused") == 4
+        assert capsys.readouterr().out.count("reused") == 1
 
     def test_different(self, capsys, tmp_path, monkeypatch):
         task = tasks.get_task_class("PickCube-v1")

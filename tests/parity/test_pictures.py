@@ -69,7 +69,7 @@ def expect_honest(task_id: str) -> None:
 class TestDrawing:
     pytestmark = NATIVE
 
-    @pytest.mark.parametrize("task_id", ["PickCube-v1", "TwoRobotPickCube-v1", "DrawTriangle-v1"])
+    @pytest.mark.parametrize("task_id", ["TwoRobotPickCube-v1", "DrawTriangle-v1"])
     def test_what_is_drawn_is_what_native_shows(self, task_id):
         expect_honest(task_id)
 

@@ -33,6 +33,7 @@ from robots import TaskError, UnknownNameError
 from rollouts.recording.recorder import Recorder
 from tasks.episode import Episode, play
 from tests.native import NATIVE
+from tests.process_trees import workers_of
 from tests.rollouts.clusters import running_cluster
 
 ROOT = Path(__file__).parents[2]
@@ -188,13 +189,6 @@ class TestSummary:
         assert not is_done(entry, Plan(TASK, ("a.h5",), 2, tmp_path, False))
 
 
-def children_of(process: int) -> list[int]:
-    """Return the processes that a process has started, and those that they have."""
-    path = Path(f"/proc/{process}/task/{process}/children")
-    own = [int(child) for child in path.read_text().split()] if path.exists() else []
-    return [*own, *(grandchild for child in own for grandchild in children_of(child))]
-
-
 def is_running(process: int) -> bool:
     stat = Path(f"/proc/{process}/stat")
     try:
@@ -265,7 +259,7 @@ class TestSweeping:
         command = [sys.executable, "-m", "parity", "sweep", *words]
         with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as parent:
             deadline = time.monotonic() + 120
-            while not (children := children_of(parent.pid)) and time.monotonic() < deadline:
+            while not (children := workers_of(parent.pid)) and time.monotonic() < deadline:
                 time.sleep(0.1)
             while not (tmp_path / TASK / LOG).exists() and time.monotonic() < deadline:
                 time.sleep(0.1)

@@ -7,12 +7,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 
-def children_of(process: int) -> list[int]:
-    """Return the processes that any thread of a process has started and that are not reaped."""
-    tasks = Path(f"/proc/{process}/task").glob("*/children")
-    return [int(child) for task in tasks for child in task.read_text().split()]
-
-
 def is_alive(process: int) -> bool:
     """Return whether a process exists and is no zombie."""
     try:

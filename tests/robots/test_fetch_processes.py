@@ -74,7 +74,7 @@ def test_a_process_killed_while_writing_leaves_no_half_file(store, physics, tmp_
         "def fsync(descriptor):\n"
         "    calls.append(descriptor)\n"
         "    if len(calls) == 12:\n"
-        "        os.ftruncate(descriptor, 10)\n"
+        "        os.truncate(f'/proc/self/fd/{descriptor}', 10)\n"
         "        os.kill(os.getpid(), signal.SIGKILL)\n"
         "    real(descriptor)\n"
         "os.fsync = fsync\n"

@@ -42,8 +42,16 @@ def test_other_files_do_not_count(copy):
     assert asset_fingerprint(LocalUrdf(copy)) == before
 
 
-def test_robots_differ():
-    prints = [asset_fingerprint(RobotRegistry.load(name).urdf) for name in RobotRegistry.names()]
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("panda", "panda_stick", "so100"),
+        pytest.param(RobotRegistry.names(), marks=pytest.mark.long),
+    ],
+    ids=["some", "all"],
+)
+def test_robots_differ(names):
+    prints = [asset_fingerprint(RobotRegistry.load(name).urdf) for name in names]
     assert len(set(prints)) == len(prints)
     assert all(len(text) == 64 for text in prints)
 

@@ -19,6 +19,7 @@ from robots.assets.fetching import ensure
 from robots.assets.hub_source import HubSource
 from robots.assets.sources import InstalledManiSkill
 from robots.assets.store import FileState
+from tests.process_trees import children_of
 from tests.robots.conftest import PANDA, contents
 from tests.robots.hub_server import (
     COMMIT,
@@ -35,7 +36,7 @@ from tests.robots.hub_server import (
     truncate,
     without_length,
 )
-from tests.robots.processes import children_of, is_alive, wait_until
+from tests.robots.processes import is_alive, wait_until
 
 CHECKOUT = Path(__file__).parents[2]
 HAND = "franka_description/meshes/collision/hand.stl"

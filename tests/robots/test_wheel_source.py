@@ -16,8 +16,9 @@ from robots.assets.fetching import ensure
 from robots.assets.manifest import load_manifest
 from robots.assets.store import AssetStore, FileState
 from robots.assets.wheel_source import ManiSkillWheel
+from tests.process_trees import children_of
 from tests.robots.conftest import PANDA, contents
-from tests.robots.processes import children_of, is_alive, wait_until
+from tests.robots.processes import is_alive, wait_until
 from tests.robots.wheel_index import WheelIndex, build_wheel, members, without_pip_settings
 
 CHECKOUT = Path(__file__).parents[2]

@@ -27,6 +27,7 @@ from rollouts.playing.executor import (
     play_all,
 )
 from rollouts.playing.in_process import InProcessExecutor
+from tests.process_trees import workers_of
 from tests.rollouts.plays import (
     CannotBeLoaded,
     DiesOnce,
@@ -244,7 +245,7 @@ def test_the_time_in_which_this_process_is_stopped_makes_nobody_late():
     words = [sys.executable, "-c", textwrap.dedent(program)]
     process = subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, text=True)
     first = process.stdout.readline()
-    (worker,) = children(process.pid)
+    (worker,) = workers_of(process.pid)
     for pid in (process.pid, worker):
         os.kill(pid, signal.SIGSTOP)
     time.sleep(8)
@@ -252,12 +253,6 @@ def test_the_time_in_which_this_process_is_stopped_makes_nobody_late():
         os.kill(pid, signal.SIGCONT)
     rest, _ = process.communicate(timeout=60)
     assert (first + rest).split() == ["0", "1", "2"]
-
-
-def children(pid):
-    folder = Path(f"/proc/{pid}/task")
-    found = [int(c) for task in folder.iterdir() for c in (task / "children").read_text().split()]
-    return [c for c in found if "spawn_main" in Path(f"/proc/{c}/cmdline").read_text()]
 
 
 # -- what cannot be sent, loaded or understood ---------------------------------------------------

@@ -20,6 +20,7 @@ from rollouts.reading.trajectory import TrajectoryFile
 from rollouts.recording.record import record
 from rollouts.recording.recorder import Recorder
 from tasks.episode import play
+from tests.process_trees import workers_of
 from tests.rollouts.plays import NO_PLAN, TASK, at_random
 from tests.rollouts.test_recorder import same_files
 
@@ -65,12 +66,6 @@ def wait_until_nobody_is_left(process: subprocess.Popen[str]) -> None:
             return
         assert time.monotonic() < deadline, "a process is left"
         time.sleep(0.05)
-
-
-def workers_of(process: subprocess.Popen[str]) -> list[int]:
-    tasks_ = Path(f"/proc/{process.pid}/task").iterdir()
-    children = [int(pid) for task in tasks_ for pid in (task / "children").read_text().split()]
-    return [p for p in children if "spawn_main" in Path(f"/proc/{p}/cmdline").read_text()]
 
 
 def recorded_directly(path: Path, seeds: range) -> Path:
@@ -149,7 +144,7 @@ def test_an_executor_that_forgets_episodes(tmp_path):
 def test_a_worker_that_is_stopped(tmp_path):
     process = start(*arguments(tmp_path, 40, episode_timeout=10))
     wait_for_parts(tmp_path, 2)
-    (stopped,) = workers_of(process)
+    (stopped,) = workers_of(process.pid)
     os.kill(stopped, signal.SIGSTOP)
     printed, said = process.communicate(timeout=180)
     assert process.returncode == 0, said
@@ -217,7 +212,7 @@ def test_a_folder_that_cannot_be_written(tmp_path, capsys):
 def test_a_worker_that_is_killed(tmp_path):
     process = start(*arguments(tmp_path, 60, 2))
     wait_for_parts(tmp_path, 2)
-    workers = workers_of(process)
+    workers = workers_of(process.pid)
     os.kill(workers[0], signal.SIGKILL)
     printed, said = process.communicate(timeout=180)
     assert process.returncode == 0, said

@@ -66,6 +66,7 @@ def test_a_page_is_saved(recording, tmp_path, capsys):
     assert "<title>TwoRobotPickCube-v1, episode 0 of trajectory.h5</title>" in path.read_text()
 
 
+@pytest.mark.long
 def test_tasks_hand_a_demonstration_over(recording):
     words = ("view", TWO_ROBOTS, "--demo", str(recording), "--episode", "1", "--port", "0")
     with served("tasks", *words) as view:

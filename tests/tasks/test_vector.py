@@ -157,8 +157,8 @@ def test_an_ended_environment_stands_still_while_others_move(monkeypatch):
     simulation = env._crew._batch._task.simulation
     moved, step = [], simulation.step
 
-    def spy(action, joint_positions, env_ids):
-        moved.append([*env_ids])
+    def spy(action, joint_positions, env_ids=None):
+        moved.append([*(range(NUM_ENVS) if env_ids is None else env_ids)])
         step(action, joint_positions, env_ids)
 
     monkeypatch.setattr(simulation, "step", spy)

@@ -261,7 +261,11 @@ if __name__ == "__main__":
 
 @pytest.mark.parametrize(
     ("ending", "code"),
-    [("raises", 1), ("interrupted", -signal.SIGINT), ("killed", -signal.SIGKILL)],
+    [
+        pytest.param("raises", 1, marks=pytest.mark.long),
+        pytest.param("interrupted", -signal.SIGINT, marks=pytest.mark.long),
+        ("killed", -signal.SIGKILL),
+    ],
 )
 def test_no_ending_leaves_a_process_or_memory(tmp_path, ending, code):
     script, memory_before = tmp_path / "script.py", set(os.listdir("/dev/shm"))
