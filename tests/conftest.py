@@ -71,6 +71,15 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
             pytest.skip(problem)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Give all comparisons of a task to one process, which makes its native environment once."""
+    for item in items:
+        parameters = getattr(item, "callspec", None)
+        task_id = parameters.params.get("task_id") if parameters is not None else None
+        if task_id is not None and item.get_closest_marker("native"):
+            item.add_marker(pytest.mark.xdist_group(task_id))
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
     report = yield

@@ -2,7 +2,8 @@
 
 import functools
 import gc
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from typing import NamedTuple
 
 import pytest
@@ -32,6 +33,21 @@ class Pair(NamedTuple):
         everything = range(self.native.num_envs)
         for side in self:
             side.reset([0] * self.native.num_envs, everything, rebuild=True)
+
+    @contextmanager
+    def rewarding(self, mode: str) -> Generator[None]:
+        """Let both sides reward in another mode; making them anew takes a second."""
+        sides = [env.unwrapped for env in self.native.envs]
+        before, own = [side._reward_mode for side in sides], self.ours.env.reward_mode
+        try:
+            self.ours.env.reward_mode = mode
+            for side in sides:
+                side._reward_mode = mode
+            yield
+        finally:
+            self.ours.env.reward_mode = own
+            for side, earlier in zip(sides, before, strict=True):
+                side._reward_mode = earlier
 
     def play(self, episodes: Sequence[Episode], history: History = "fresh") -> list[EpisodeResult]:
         """Compare episodes, from a common past."""

@@ -175,6 +175,7 @@ def test_a_broken_entry_point_is_named(installed, name, message):
     assert message in printed
 
 
+@pytest.mark.long
 def test_a_preset_of_another_package_on_the_command_line(installed):
     assert "panda" in run(installed, "-m", "layouts", "show", "opposite", "a=panda", "b=panda")
     code = (

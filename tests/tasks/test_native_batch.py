@@ -13,7 +13,7 @@ from tests.native import NATIVE, TASKS, Pair, complaints, pair
 pytestmark = NATIVE
 
 NUM_ENVS = 8
-QUICK = ("PickCube-v1", "PushT-v1", "TwoRobotPickCube-v1")  # batching is the same in every task
+QUICK = ("PushT-v1", "TwoRobotPickCube-v1")  # batching is the same in every task
 BATCHED = [t if t in QUICK else pytest.param(t, marks=pytest.mark.long) for t in TASKS]
 
 

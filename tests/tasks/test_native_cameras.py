@@ -126,6 +126,7 @@ def test_another_scene_is_noticed(pick: Look, what: str, monkeypatch: pytest.Mon
     assert any(d.startswith(f"/{part} ") for d in differences(pick.observations, told))
 
 
+@pytest.mark.long
 def test_two_robots_see_with_their_own_cameras():
     look = native_look("TwoRobotPickCube-v1", "rgbd", steps=1)
     with closing(tasks.make("TwoRobotPickCube-v1", obs_mode="rgbd")) as env:
