@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -177,9 +178,32 @@ def _pairs(excluded: Iterable[ExcludedPair], model: UrdfModel, urdf: Path) -> li
 def _expect_meshes(model: UrdfModel, urdf: Path, *, visuals: bool) -> None:
     """Refuse meshes that the checks of a layout and its pictures would refuse."""
     for shape in _meshes(model.collisions.values()):
-        read_corners(_path(shape, urdf), shape.sizes, shape.where, urdf.as_posix())
+        _expect_corners(*_identity(shape, urdf), shape.sizes, shape.where, urdf.as_posix())
     for shape in _meshes(model.visuals.values()) if visuals else ():
-        load_scene(_path(shape, urdf), shape.where, urdf.as_posix())
+        _expect_scene(*_identity(shape, urdf), shape.where, urdf.as_posix())
+
+
+def _identity(mesh: UrdfShape, urdf: Path) -> tuple[str, tuple[int, ...]]:
+    """Return a mesh file's path and what changes with its contents; nothing if it is missing."""
+    path = _path(mesh, urdf)
+    try:
+        status = os.stat(path)
+    except OSError:
+        return path, ()
+    return path, (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
+
+
+# Reading takes trimesh milliseconds a file, and leaves garbage; a file is read once by a process.
+@lru_cache(maxsize=4096)
+def _expect_corners(
+    path: str, identity: tuple[int, ...], scale: tuple[float, ...], where: str, urdf: str
+) -> None:
+    read_corners(path, scale, where, urdf)
+
+
+@lru_cache(maxsize=4096)
+def _expect_scene(path: str, identity: tuple[int, ...], where: str, urdf: str) -> None:
+    load_scene(path, where, urdf)
 
 
 def _path(mesh: UrdfShape, urdf: Path) -> str:
