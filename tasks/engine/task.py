@@ -204,8 +204,9 @@ class MultiRobotTask(Declaration, Remade):
             TaskError: If the task's reward or observation is not finite.
         """
         obs, reward, terminated, truncated, info = self.advance(action, env_ids)
-        flags = _tensor(terminated), _tensor(truncated)
-        return _tensors(obs), _tensor(reward), *flags, _tensors(info)
+        observed = _tensor(obs) if isinstance(obs, np.ndarray) else _tensors(obs)
+        details = {key: _tensor(value) for key, value in info.items()}
+        return observed, _tensor(reward), _tensor(terminated), _tensor(truncated), details
 
     def advance(
         self, action: Any, env_ids: Sequence[int] | None = None
@@ -322,8 +323,10 @@ class MultiRobotTask(Declaration, Remade):
         return state
 
     def _info(self, state: State) -> Info:
-        evaluated = {key: np.asarray(value) for key, value in self.evaluate(state).items()}
-        return {"elapsed_steps": self._elapsed.copy(), **evaluated}
+        info: Info = {"elapsed_steps": self._elapsed.copy()}
+        for key, value in self.evaluate(state).items():
+            info[key] = np.asarray(value)
+        return info
 
     def _observation(self, state: State, info: Info) -> Any:
         if self.observer.mode.nothing:
