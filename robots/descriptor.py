@@ -86,7 +86,7 @@ class GripperMaterial:
 
 @dataclass(frozen=True)
 class Fingers:
-    """Two links that grasp, and how a grasp is told from their contact forces.
+    """Two links that grasp, and how their contact forces show a grasp.
 
     An object is grasped while each finger feels at least ``min_force`` from it, at an angle of at
     most ``max_angle`` to the direction in which that finger opens.

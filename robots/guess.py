@@ -31,7 +31,7 @@ from robots.urdf.tree import kinematic_tree
 
 STIFFNESS, DAMPING, FORCE = 1e3, 1e2, 100.0  # what ManiSkill gives its Panda
 STEP = 0.1  # of an arm joint, per control step (rad, m)
-SQUEEZE = 0.01  # by how much a parallel gripper is told to close beyond closed (m)
+SQUEEZE = 0.01  # how far beyond closed a parallel gripper's target is (m)
 REACH_STARTS = 8  # of the search for the largest distance
 
 

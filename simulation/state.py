@@ -26,7 +26,7 @@ _Value = TypeVar("_Value")
 def _remembered(
     compute: Callable[Concatenate[State, _Arguments], _Value],
 ) -> Callable[Concatenate[State, _Arguments], _Value]:
-    """Compute once per state and arguments: rewards ask for what success was told from.
+    """Compute once per state and arguments: rewards ask for what success was judged by.
 
     Views of what was read cost less than a look-up and are not remembered.
     """

@@ -112,21 +112,21 @@ def _load(urdf: Path, joints: tuple[str, ...], _modified: int) -> RobotModel:
         for link in model.links
         for shape in model.collisions.get(link, ())
     )
-    excused = {frozenset(pair.links) for pair in read_excluded_pairs(urdf)}
+    allowed = {frozenset(pair.links) for pair in read_excluded_pairs(urdf)}
     pairs = tuple(
         (a, b)
         for a, b in combinations(range(len(hulls)), 2)
-        if _may_touch(kinematics, hulls[a].link, hulls[b].link, excused)
+        if _may_touch(kinematics, hulls[a].link, hulls[b].link, allowed)
     )
     return RobotModel(kinematics, hulls, pairs)
 
 
-def _may_touch(kinematics: Tree, one: int, other: int, excused: set[frozenset[str]]) -> bool:
+def _may_touch(kinematics: Tree, one: int, other: int, allowed: set[frozenset[str]]) -> bool:
     """Tell whether two links can move into each other, and it would matter."""
     first, second = kinematics.bodies[one], kinematics.bodies[other]
     adjacent = kinematics.carrier(first) == second or kinematics.carrier(second) == first
     names = frozenset((kinematics.links[one], kinematics.links[other]))
-    return first != second and not adjacent and names not in excused
+    return first != second and not adjacent and names not in allowed
 
 
 def _shape_hull(link: int, shape: UrdfShape, urdf: Path) -> Hull:

@@ -288,10 +288,10 @@ class _Check:
 
     def _missed(self, reaches: Sequence[TargetReach]) -> Iterator[Finding]:
         for target, numbers in self._targets.items():
-            told = [reach for reach in reaches if reach.target == target]
-            if any(reach.reached for reach in told):
+            own = [reach for reach in reaches if reach.target == target]
+            if any(reach.reached for reach in own):
                 continue
-            best = min(told, key=lambda reach: (not reach.blocked, reach.missing))
+            best = min(own, key=lambda reach: (not reach.blocked, reach.missing))
             turned = len(numbers) == 7 and not best.blocked and self._gets_to(best.robot, numbers)
             what = f"no robot reaches {target}{' without a collision' * best.blocked}"
             yield Finding(

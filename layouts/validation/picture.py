@@ -141,12 +141,12 @@ def _draw_overlaps(plan: Axes, report: Results) -> None:
 
 
 def _draw_target(plan: Axes, report: Results, name: str, position: tuple[float, ...]) -> None:
-    told = [reach for reach in report.reaches if reach.target == name]
-    reached = any(reach.reached for reach in told)
+    own = [reach for reach in report.reaches if reach.target == name]
+    reached = any(reach.reached for reach in own)
     colour = GOOD if reached else BAD
     plan.plot(*position[:2], "*", color=colour, markeredgecolor="white", markersize=15, zorder=8)
     _write(plan, np.array(position[:2]), np.array([0.0, 1.0]), name, colour, size=9)
-    for reach in told:
+    for reach in own:
         if reach.reached:
             x, y, _ = report.layout[reach.robot].base_position
             plan.plot([x, position[0]], [y, position[1]], ":", color=GOOD, linewidth=1, zorder=1)

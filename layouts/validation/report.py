@@ -102,5 +102,5 @@ def _spaces(report: Report) -> Iterator[str]:
 
 def _targets(report: Report) -> Iterator[str]:
     for name, position in report.targets.items():
-        told = [reach_text(reach) for reach in report.reaches if reach.target == name]
-        yield f"{name} ({', '.join(decimal(x) for x in position)}): {', '.join(told)}"
+        texts = [reach_text(reach) for reach in report.reaches if reach.target == name]
+        yield f"{name} ({', '.join(decimal(x) for x in position)}): {', '.join(texts)}"

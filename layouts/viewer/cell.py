@@ -76,7 +76,7 @@ class Cell:
         start: By robot, the joint positions to begin with, in the descriptor's order (rad, m).
         models: By robot, its links and hulls.
         visuals: By robot and link, what it looks like; empty where its files lack that.
-        notes: What a person should be told of the robots' files.
+        notes: Remarks on the robots' files, for a person.
     """
 
     def __init__(

@@ -32,7 +32,7 @@ def interleave(
     What slows the machine down for a while meets all of them.
 
     Args:
-        variants: Takes the number of the round and returns a sample; it times what it likes.
+        variants: Takes the number of the round and returns a sample; it chooses what it times.
         rounds: Samples of each.
         tick: Called after each sample with the share of the whole that it was.
         warm_up: Whether a first round goes before whose samples do not count.
@@ -120,7 +120,7 @@ class Measurement:
 
     @staticmethod
     def from_json(found: Mapping[str, Any]) -> Measurement:
-        """Return what `as_json` told.
+        """Return the measurement that `as_json` wrote.
 
         Raises:
             KeyError, TypeError: If it is something else.

@@ -19,12 +19,12 @@ DOTS_PER_INCH = 120
 PANEL_WIDTH, PANEL_HEIGHT, BAR_HEIGHT, FOOT = 6.5, 3.6, 0.2, 0.7  # inches
 
 
-def draw(measurements: Sequence[Measurement], told: str) -> Figure:
+def draw(measurements: Sequence[Measurement], footer: str) -> Figure:
     """Return a figure of measurements.
 
     Args:
         measurements: At least one.
-        told: What stands below: on what they were measured.
+        footer: What stands below: on what they were measured.
 
     Raises:
         MissingPackageError: If matplotlib is not installed.
@@ -39,7 +39,7 @@ def draw(measurements: Sequence[Measurement], told: str) -> Figure:
     for i, row in enumerate(in_rows):
         for j, measurement in enumerate(row):
             _panel(figure.add_subplot(grid[i, j]), measurement)
-    figure.supxlabel(fill(told, 85 * columns), color=FAINT, fontsize=9, x=0.01, ha="left")
+    figure.supxlabel(fill(footer, 85 * columns), color=FAINT, fontsize=9, x=0.01, ha="left")
     return figure
 
 

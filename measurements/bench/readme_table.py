@@ -28,7 +28,7 @@ def read(path: Path = RECORD) -> Report:
 
 
 def markdown(recorded: Report) -> Iterator[str]:
-    """Yield the lines: one row per task, then the vectors, then what is told in one number."""
+    """Yield the lines: one row per task, then the vectors, then what is one number."""
     step, reset = recorded.find("step"), recorded.find("reset")
     if step.values != reset.values:
         raise ValueError("step and reset were not measured on the same tasks")
@@ -47,7 +47,7 @@ def markdown(recorded: Report) -> Iterator[str]:
     yield ""
     yield from markdown_table(["besides", "median"], _small(recorded))
     yield ""
-    yield recorded.told()
+    yield recorded.conditions()
 
 
 def _headings(measurement: Measurement, what: str) -> list[str]:
@@ -60,11 +60,11 @@ def _small(recorded: Report) -> Iterator[list[str]]:
     """Yield a row for each: the last series by value, and its ratios."""
     for name in SMALL:
         measurement = recorded.find(name)
-        told = "; ".join(_told(measurement, value) for value in measurement.values)
-        yield [f"{measurement.title} ({measurement.unit})", told]
+        values = "; ".join(_value_text(measurement, value) for value in measurement.values)
+        yield [f"{measurement.title} ({measurement.unit})", values]
 
 
-def _told(measurement: Measurement, value: Value) -> str:
+def _value_text(measurement: Measurement, value: Value) -> str:
     last = [*measurement.samples][-1]
     at = f"{value} {measurement.variable}" if isinstance(value, int) else f"`{value}`"
     ratios = [

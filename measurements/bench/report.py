@@ -52,7 +52,7 @@ class Report:
                 return measurement
         raise BenchmarkError(f"nothing was measured of {name!r}")
 
-    def told(self) -> str:
+    def conditions(self) -> str:
         """Say on what it was measured, and how."""
         about = self.machine
         packages = ", ".join(f"{name} {v}" for name, v in about["versions"].items() if v)
@@ -77,7 +77,7 @@ class Report:
         """Yield the lines of a page with all tables."""
         yield "# Benchmarks"
         yield ""
-        yield self.told()
+        yield self.conditions()
         for measurement in self.measurements:
             yield ""
             yield f"## {measurement.title} ({measurement.unit})"
@@ -88,7 +88,7 @@ class Report:
         """Print all tables."""
         for measurement in self.measurements:
             console.print(_table(measurement))
-        console.print(self.told(), style="dim")
+        console.print(self.conditions(), style="dim")
 
     def write(self, folder: Path) -> list[Path]:
         """Write json, tables and plot into a folder; returns which files were written.
@@ -103,7 +103,7 @@ class Report:
             (markdown_path, "\n".join(self.markdown()) + "\n"),
         ):
             write_whole(path, text)
-        figure = draw(self.measurements, self.told())
+        figure = draw(self.measurements, self.conditions())
         with written_whole(plot_path) as unfinished:
             figure.savefig(unfinished, format="png")
         return [json_path, markdown_path, plot_path]

@@ -93,5 +93,5 @@ def _counted(level: Level) -> str:
     from measurements.soak.process_resources import QUANTITIES
 
     grown = {name: getattr(level, name) for name in QUANTITIES if name != "memory"}
-    told = [f"{name} {value:+.1f}" for name, value in grown.items() if value]
-    return ", ".join(told) or "–"
+    growth = [f"{name} {value:+.1f}" for name, value in grown.items() if value]
+    return ", ".join(growth) or "–"

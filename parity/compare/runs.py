@@ -108,7 +108,7 @@ def _play_one(run: Run, on_step: Callable[[Run, int], None]) -> RunResult:
         control_mode=run.control_mode,
     )
     native = NativeSide(env.task_id, run.reward_mode, run.num_envs, run.control_mode)
-    gc.freeze()  # native collects garbage at every rebuild: 0.2 s, unless told what stays
+    gc.freeze()  # native collects garbage at each rebuild, in 0.2 s unless frozen
     try:
         found = compare(
             native,

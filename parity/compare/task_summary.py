@@ -10,7 +10,7 @@ from rich.table import Table
 
 from parity.compare.snapshot import QUANTITIES
 
-REWARD = "reward"  # told apart by mode, not with the other quantities
+REWARD = "reward"  # separated by mode, not with the other quantities
 WITHOUT_REWARD = tuple(quantity for quantity in QUANTITIES if quantity != REWARD)
 REWARD_MODES = ("normalized_dense", "dense", "sparse", "none")
 NO_SUCH_MODE = "–"

@@ -199,7 +199,7 @@ def reason(task_id: str, spec: Any) -> str:
         spec: Its specification in native's registry.
     """
     special = _SPECIAL_REASONS.get(task_id) or next(
-        (said for prefix, said in _SPECIAL_PREFIXES.items() if task_id.startswith(prefix)), None
+        (remark for prefix, remark in _SPECIAL_PREFIXES.items() if task_id.startswith(prefix)), None
     )
     if special:
         return special

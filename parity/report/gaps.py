@@ -25,7 +25,7 @@ class Item:
 
 @dataclass(frozen=True)
 class Group:
-    """What is missing of one kind; ``nothing`` is said if ``entries`` is empty."""
+    """What is missing of one kind; ``nothing`` stands there if ``entries`` is empty."""
 
     title: str
     entries: tuple[Item, ...]
@@ -71,16 +71,16 @@ def _why_not_verified(entry: Mapping[str, Any] | None) -> str:
     if entry is None or not entry["clip"]:
         return no_clip(entry)
     clip = entry["clip"]
-    said: list[str] = []
+    remarks: list[str] = []
     if not clip["native_success"]:
-        said.append("native does not succeed")
+        remarks.append("native does not succeed")
     if not clip["our_success"]:
-        said.append("the clone does not succeed")
+        remarks.append("the clone does not succeed")
     if clip["differing_frames"]:
-        said.append(f"{clip['differing_frames']} of {clip['frames']} frames differ")
+        remarks.append(f"{clip['differing_frames']} of {clip['frames']} frames differ")
     if clip["max_state_difference"]:
-        said.append(f"the states differ by up to {number_text(clip['max_state_difference'])}")
-    return "; ".join(said)
+        remarks.append(f"the states differ by up to {number_text(clip['max_state_difference'])}")
+    return "; ".join(remarks)
 
 
 def not_cloned() -> tuple[tuple[Item, ...] | None, str]:

@@ -25,12 +25,12 @@ def task_content(
         runs: Folder of the sweep.
     """
     cls = get_task_class(task_id)
-    robots, said = robots_text(cls.layout), read_docstring(cls)
-    success = f" Success: {said.success}" if said.success else ""
+    robots, text = robots_text(cls.layout), read_docstring(cls)
+    success = f" Success: {text.success}" if text.success else ""
     return {
         "id": task_id,
         "robots": robots,
-        "summary": f"{said.summary}{success}",
+        "summary": f"{text.summary}{success}",
         "numbers": f"{cls.layout.action_dim} action numbers, {cls.max_episode_steps} steps",
         "cells": cells(entry, result),
         "status": _status(entry),

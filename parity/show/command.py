@@ -91,7 +91,7 @@ def _render(args: argparse.Namespace) -> int:
         with closing(NativeSide(task_id, control_mode=mode, picture_size=args.size)) as native:
             folder = _made_folder(args.out / task_id)
             candidates = recorded or _planned(args, env)
-            gc.freeze()  # native collects garbage at every rebuild: 0.2 s, unless told what stays
+            gc.freeze()  # native collects garbage at each rebuild, in 0.2 s unless frozen
             try:
                 made = _show(args, native, OurSide(env), candidates, folder)
             finally:

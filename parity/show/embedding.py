@@ -121,9 +121,9 @@ def _ffmpeg(*arguments: str) -> bytes:
     command = [_executable(), "-hide_banner", "-loglevel", "error", *arguments]
     done = subprocess.run(command, capture_output=True, check=False)
     if done.returncode != 0:
-        said = done.stderr.decode(errors="replace").strip().splitlines() or ["no message"]
+        output = done.stderr.decode(errors="replace").strip().splitlines() or ["no message"]
         path = arguments[arguments.index("-i") + 1]
-        raise ClipError(f"{path} cannot be read as a video: {said[-1]}")
+        raise ClipError(f"{path} cannot be read as a video: {output[-1]}")
     return done.stdout
 
 

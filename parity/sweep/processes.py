@@ -67,12 +67,12 @@ def sweep(
             if event.seed is None:
                 continue
             plan = plans[event.seed]
-            if event.said is not None:
-                progressed(plan.task_id, *event.said)
+            if event.note is not None:
+                progressed(plan.task_id, *event.note)
             elif event.result is not None:
                 yield event.result
-            elif not isinstance(event.error, WorkersDied):  # its death was told before
-                what = f"{event.died or event.error}; {plan.folder / LOG} holds what it said"
+            elif not isinstance(event.error, WorkersDied):  # its death was reported before
+                what = f"{event.died or event.error}; {plan.folder / LOG} holds its output"
                 yield {**blank(plan.task_id, plan.options), "error": what}
 
 

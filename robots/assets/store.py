@@ -210,14 +210,14 @@ def _wait_for_lock(descriptor: int, root: Path, say: Callable[[str], None]) -> b
     import fcntl
 
     start = time.monotonic()
-    said = False
+    announced = False
     while True:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            if not said and time.monotonic() - start > _WAIT_BEFORE_SAYING:
+            if not announced and time.monotonic() - start > _WAIT_BEFORE_SAYING:
                 say(f"another process is fetching robot files into {root}; waiting for it")
-                said = True
+                announced = True
             time.sleep(0.05)
         else:
             return True

@@ -183,4 +183,4 @@ def _last_words(log: str) -> str:
     errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
     if errors and errors[-1] == "Exception:":  # and its traceback, in the log alone
         errors = [lines[-1]]
-    return "pip failed: " + (errors or lines or ["it said nothing"])[-1]
+    return "pip failed: " + (errors or lines or ["it printed nothing"])[-1]

@@ -1,4 +1,4 @@
-"""Which joints of a URDF are its arm, its gripper, its base: told from the tree and the names."""
+"""Which joints of a URDF are its arm, its gripper, its base: from the tree and the names."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Anatomy:
         palm: Link that carries the fingers, or the last link of the arm.
         tcp: Link of the tool centre point.
         tips: Two links whose mean origin is the tool centre point, if they are named as tips.
-        reasons: What was told from what, one sentence each.
+        reasons: What was concluded from what, one sentence each.
     """
 
     base: tuple[ModelJoint, ...]
@@ -54,7 +54,7 @@ def find_anatomy(model: UrdfModel, urdf: str) -> Anatomy:
     if not fingers and chain and _is_jaw(chain[-1]):
         jaw = chain.pop()
         fingers = (jaw,)
-        reasons.append(f"gripper: one jaw, {jaw.name}, the last joint, told by its name")
+        reasons.append(f"gripper: one jaw, {jaw.name}, the last joint, by its name")
     if not fingers:
         reasons.append("gripper: none, as no joints branch at the end and none is named like a jaw")
     base, arm = _split_base(chain, reasons)
@@ -116,7 +116,7 @@ def _split_base(
         return base, arm
     if base:
         reasons.append(
-            f"base, held still: {_listing(base)}, told by name or by going farther than"
+            f"base, held still: {_listing(base)}, by name or by going farther than"
             f" {FARTHEST_SLIDE:g} m"
         )
     if arm:

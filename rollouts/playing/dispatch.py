@@ -16,7 +16,7 @@ from rollouts.playing.events import Event, WorkerError, WorkersDied
 DEATHS_ALLOWED = 3  # of workers at one seed
 EPISODE_SECONDS = 600.0  # some hundred times what our slowest expert takes
 START_SECONDS = 600.0  # to load torch and SAPIEN from a busy disk, fetch robot files, build worlds
-QUIET_SECONDS = 30.0  # without a message until it is said who plays what; twice as long each time
+QUIET_SECONDS = 30.0  # without a message until a note lists who plays what; twice as long each time
 
 _LOOK_SECONDS = 1.0  # between looks at the clock
 _LEAP_SECONDS = 5.0  # that count at most from one look to the next
@@ -199,7 +199,7 @@ class Shift:
             yield message
             if message.died is not None:
                 yield from self._replay(worker, message)
-            elif message.said is None:
+            elif message.note is None:
                 self._assign(worker, again=not self._rules.fresh)
 
     def _assign(self, worker: Worker, *, again: bool = True) -> None:
@@ -226,7 +226,7 @@ class Shift:
         """
         del self._since[worker]
         seed, died = death.seed, self._deaths
-        died[seed] += not death.excused
+        died[seed] += not death.machine_lost
         if seed is None and died[seed] >= max(DEATHS_ALLOWED, self._count):
             raise WorkerError(
                 f"{died[seed]} worker processes died before they could play anything; the last:"
@@ -245,7 +245,7 @@ class Shift:
             self._last_message, self._patience = self._clock.time, QUIET_SECONDS
         elif (quiet := self._clock.time - self._last_message) >= self._patience:
             self._patience *= 2
-            yield Event(None, said=f"no message for {quiet:.0f} s: {self._doings()}")
+            yield Event(None, note=f"no message for {quiet:.0f} s: {self._doings()}")
 
     def _doings(self) -> str:
         remark = self._crew.remark()

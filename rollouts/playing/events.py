@@ -27,8 +27,8 @@ class Event:
         result: What was returned when it was played to the end, else None.
         error: Why it could not be played, else None; `WorkersDied` if workers died of it.
         died: How its worker died, in words, else None; the episode will be played again.
-        excused: Whether it is out of reach, with its machine perhaps: not the episode's fault.
-        said: What was told meanwhile: by `report` if there is a seed, else by the executor, in
+        machine_lost: Whether its machine is out of reach; such a death is not counted.
+        note: What came meanwhile: from `report` if there is a seed, else from the executor, in
             words.
         worker: Who played it, in words.
     """
@@ -37,6 +37,6 @@ class Event:
     result: Any = None
     error: Exception | None = None
     died: str | None = None
-    excused: bool = False
-    said: Any = None
+    machine_lost: bool = False
+    note: Any = None
     worker: str = ""

@@ -45,7 +45,7 @@ class Executor(Protocol):
 
         Yields:
             One event with a result or an error for every seed, as they end, one for every worker
-            that died, and what is said meanwhile.
+            that died, and notes meanwhile.
 
         Raises:
             WorkerError: If no worker can be had.

@@ -21,12 +21,12 @@ from tasks.processes.worker import Worker as WorkerProcess
 _PATIENCE = 10.0  # s that a worker may take to end by itself
 
 
-def report(said: Any) -> None:
+def report(note: Any) -> None:
     """Tell the executor how far the episode is, from within a play.
 
     It arrives as an `Event` if a process of the same machine plays, else nowhere.
     """
-    _tell(said)
+    _send_note(note)
 
 
 class LocalProcesses:
@@ -99,8 +99,8 @@ class _Process:
             case Sign() as sign:
                 self._begun = True
                 return sign
-            case _Report(said):
-                return Event(self.seed, said=said, worker=self.name)
+            case _Report(note):
+                return Event(self.seed, note=note, worker=self.name)
             case _Answer(result, error):
                 seed, self.seed = self.seed, None
                 return Event(seed, result=result, error=error, worker=self.name)
@@ -173,7 +173,7 @@ class _Process:
 class _Report:
     """What a play says of itself before it is over."""
 
-    said: Any
+    note: Any
 
 
 @dataclass(frozen=True)
@@ -189,9 +189,9 @@ _GONE = object()  # the last message
 
 def _work(connection: Connection) -> None:
     """Be a worker: get what plays, say that it is ready, then answer each seed."""
-    global _tell
+    global _send_note
     processes.end_with_parent()
-    _tell = lambda said: connection.send(_Report(said))  # noqa: E731
+    _send_note = lambda note: connection.send(_Report(note))  # noqa: E731
     with suppress(EOFError, OSError):  # the main process is gone
         connection.send(Sign.BEGUN)
         play = _prepared(connection)
@@ -220,8 +220,8 @@ def _answer(play: Play, seed: int) -> bytes:
         return pickle.dumps(_Answer(None, portable(error)))
 
 
-def _tell_nobody(said: Any) -> None:
+def _drop_note(note: Any) -> None:
     pass
 
 
-_tell: Callable[[Any], None] = _tell_nobody
+_send_note: Callable[[Any], None] = _drop_note

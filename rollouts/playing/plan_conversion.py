@@ -1,4 +1,4 @@
-"""Experts' plans in any control mode: what the arms were told, as joint positions."""
+"""Experts' plans in any control mode: the drive targets of each step, as joint positions."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def as_positions(
 ) -> NDArray[np.float32]:
     """Return the actions in ``pd_joint_pos`` that move everything as these do, to the last bit.
 
-    The episode is played once, and what the drives were told is written down.
+    The episode is played once, and the drive targets of each step are kept.
 
     Args:
         task: A task with one environment in ``pd_joint_delta_pos``.

@@ -187,7 +187,7 @@ class _Actor:
     def late(self, seconds: float) -> Event:
         """Return how it dies if it is ended because it took longer than so many seconds."""
         if self._home is None:
-            return self._death(f"was given no place within {seconds:g} s", excused=True)
+            return self._death(f"was given no place within {seconds:g} s", machine_lost=True)
         what = "did not finish the episode" if self._ready else "was not ready"
         return self._death(f"{what} within {seconds:g} s and was ended")
 
@@ -220,11 +220,11 @@ class _Actor:
         else:  # several of one node would be too many deaths
             lost = lost or self._cluster.lose(self._nodes)
         how = "out of reach" if lost else _reason(error)
-        return self._death(f"was lost: {how}", excused=lost)
+        return self._death(f"was lost: {how}", machine_lost=lost)
 
-    def _death(self, how: str, *, excused: bool = False) -> Event:
+    def _death(self, how: str, *, machine_lost: bool = False) -> Event:
         died = f"worker {self.name} {how}"
-        return Event(self.seed, died=died, excused=excused, worker=self.name)
+        return Event(self.seed, died=died, machine_lost=machine_lost, worker=self.name)
 
 
 class _Player:

@@ -89,8 +89,8 @@ class _Status:
         if event is None and summary.already:
             total = self._line.total
             self._line.say(f"{summary.already} of {total} episodes were recorded before")
-        if event is not None and event.said is not None:
-            self._line.say(event.said)
+        if event is not None and event.note is not None:
+            self._line.say(event.note)
         if event is not None and event.died is not None:
             self._line.say(f"{summary.deaths[-1]}; another takes its place")
         if event is not None and event.error is not None:

@@ -274,14 +274,14 @@ def space_of(values: Any, *, batched: bool = False) -> Space[Any]:
     if isinstance(values, Mapping):
         return Dict({key: space_of(part, batched=batched) for key, part in values.items()})
     shape = tuple(values.shape[1:] if batched else values.shape)
-    dtype = told_dtype(values)
+    dtype = observed_dtype(values)
     if np.issubdtype(dtype, np.integer):
         bounds = np.iinfo(dtype)
         return Box(int(bounds.min), int(bounds.max), shape, dtype)
     return Box(-np.inf, np.inf, shape, np.float32)
 
 
-def told_dtype(values: Any) -> Any:
+def observed_dtype(values: Any) -> Any:
     """Return an observation's dtype: that of images their own, else float32."""
     dtype = np.dtype(str(values.dtype).removeprefix("torch."))
     return dtype.type if dtype.name in _IMAGE_DTYPES else np.float32

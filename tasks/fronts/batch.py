@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from robots import TaskError
 from tasks.engine.arguments import RECONFIGURE, SEED
-from tasks.engine.observation import told_dtype
+from tasks.engine.observation import observed_dtype
 from tasks.engine.scenario import Scenario
 from tasks.engine.task import MultiRobotTask
 from tasks.fronts.board import Arrays, Shapes
@@ -88,12 +88,12 @@ class Batch:
             "terminated": ((), "bool"),
             "truncated": ((), "bool"),
         }
-        told = {name: (x.shape[1:], str(x.dtype)) for name, x in _told(*self._task.start)}
-        told[SEEDS] = ((), "int64")
-        shapes.update(told)
+        shown = {name: (x.shape[1:], str(x.dtype)) for name, x in _named(*self._task.start)}
+        shown[SEEDS] = ((), "int64")
+        shapes.update(shown)
         if self._part.autoreset is AutoresetMode.SAME_STEP:
             shapes["restarted"] = ((), "bool")
-            shapes.update({FINAL + name: entry for name, entry in told.items()})
+            shapes.update({FINAL + name: entry for name, entry in shown.items()})
         return shapes
 
     def attach(self, board: Arrays) -> None:
@@ -164,7 +164,7 @@ class Batch:
 
     def _write(self, obs: Any, info: Mapping[str, Any], ids: Sequence[int] | None = None) -> None:
         which = slice(None) if ids is None else ids
-        for name, value in _told(obs, info):
+        for name, value in _named(obs, info):
             if name not in self._rows:
                 raise TaskError(
                     f"{name!r} was not there at the first reset of {type(self._task).__name__};"
@@ -178,11 +178,11 @@ class Batch:
             self._rows[name][ids] = False
 
 
-def _told(obs: Any, info: Mapping[str, Any]) -> Iterator[tuple[str, NDArray[Any]]]:
+def _named(obs: Any, info: Mapping[str, Any]) -> Iterator[tuple[str, NDArray[Any]]]:
     """Go through observation and info by the names of their arrays."""
     yield from _leaves(OBSERVATION, obs)
     for key, value in info.items():
-        if key != RECONFIGURE:  # which is not told of single environments
+        if key != RECONFIGURE:  # which is no single environment's
             yield f"{INFO}/{key}", as_array(value)
 
 
@@ -192,4 +192,4 @@ def _leaves(name: str, tree: Any) -> Iterator[tuple[str, NDArray[Any]]]:
             yield from _leaves(f"{name}/{key}", part)
     else:
         array = as_array(tree)
-        yield name, array.astype(told_dtype(array), copy=False)
+        yield name, array.astype(observed_dtype(array), copy=False)

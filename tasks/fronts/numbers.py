@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.engine.arguments import RECONFIGURE, SEED
-from tasks.engine.observation import told_dtype
+from tasks.engine.observation import observed_dtype
 from tasks.engine.task import MultiRobotTask
 
 
@@ -33,7 +33,7 @@ def row(observation: Any, env: int = 0) -> Any:
         return np.empty(0, np.float32)
     if isinstance(observation, Mapping):
         return {key: row(part, env) for key, part in observation.items()}
-    return np.array(as_array(observation)[env], told_dtype(observation))
+    return np.array(as_array(observation)[env], observed_dtype(observation))
 
 
 def info_row(info: Mapping[str, Any], seed: int) -> dict[str, Any]:
@@ -45,10 +45,10 @@ def info_row(info: Mapping[str, Any], seed: int) -> dict[str, Any]:
         info: What the task returned.
         seed: What the environment's random streams began with.
     """
-    told: dict[str, Any] = {
+    row_info: dict[str, Any] = {
         key: value[0].item() if value.ndim == 1 else as_array(value)[0].copy()
         for key, value in info.items()
         if key != RECONFIGURE
     }
-    told[SEED] = seed
-    return told
+    row_info[SEED] = seed
+    return row_info

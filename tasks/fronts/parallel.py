@@ -143,17 +143,17 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
             raise TaskError("no episode is being played; call reset() first")
         obs, reward, terminated, truncated, info = self._step(actions)
         observations, shared = self._observations(obs), reward[0].item()
-        told = info_row(info, self._seed)
+        own_info = info_row(info, self._seed)
         over, late = bool(terminated[0]), bool(truncated[0])
         agents = self.agents
         if over or late:
             self.agents = []
         return (
             observations,
-            {name: self._reward(name, observations[name], shared, told) for name in agents},
+            {name: self._reward(name, observations[name], shared, own_info) for name in agents},
             dict.fromkeys(agents, over),
             dict.fromkeys(agents, late),
-            self._infos(told),
+            self._infos(own_info),
         )
 
     def render(self) -> NDArray[np.uint8]:
@@ -181,23 +181,23 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         }
 
     def _observations(self, obs: Any) -> dict[str, Observation]:
-        told = row(obs)
-        return {name: self._own(name, told) for name in self.possible_agents}
+        whole = row(obs)
+        return {name: self._own(name, whole) for name in self.possible_agents}
 
-    def _own(self, robot: str, told: Any) -> Any:
+    def _own(self, robot: str, whole: Any) -> Any:
         """Return what one robot observes of all that is observed."""
-        if not isinstance(told, Mapping):
-            return told[self.observed[robot]]
-        own = dict(told)
-        if "state" in told:
-            own["state"] = told["state"][self.observed[robot]]
-        if "agent" in told:
+        if not isinstance(whole, Mapping):
+            return whole[self.observed[robot]]
+        own = dict(whole)
+        if "state" in whole:
+            own["state"] = whole["state"][self.observed[robot]]
+        if "agent" in whole:
             key = observation_keys(self.task.layout)[robot]
-            own["agent"] = told["agent"] if key is None else told["agent"][key]
+            own["agent"] = whole["agent"] if key is None else whole["agent"][key]
         cameras = self.task.observer.seen_by(robot)
         for kind in ("sensor_param", "sensor_data"):
-            if kind in told:
-                own[kind] = {name: told[kind][name] for name in cameras}
+            if kind in whole:
+                own[kind] = {name: whole[kind][name] for name in cameras}
         return own
 
     def _infos(self, info: dict[str, Any]) -> dict[str, dict[str, Any]]:

@@ -29,12 +29,12 @@ _OPTIONS = tuple(option for option in RESET_OPTIONS if option != "reset_mask")
 class SB3Task(Remade, VecEnv):
     """What `tasks.sb3_vec_env` gives: a `VectorTask` that speaks Stable-Baselines3's language.
 
-    An environment whose episode ends begins the next one in the same step. What it said then is
-    in its info: ``terminal_observation``, ``TimeLimit.truncated`` (its time was up, and it had not
-    terminated), and ``is_success``, from which Stable-Baselines3 takes its success rates. Parts of
-    an observation are called by their way, ``extra/tcp_pose`` or ``sensor_data/base_camera/rgb``:
-    nested spaces are unknown to Stable-Baselines3. ``VecMonitor`` adds the returns and lengths of
-    episodes.
+    An environment whose episode ends begins the next one in the same step. What its last step
+    returned is in its info: ``terminal_observation``, ``TimeLimit.truncated`` (its time was up, and
+    it had not terminated), and ``is_success``, of which Stable-Baselines3 makes success rates.
+    Nested spaces are unknown to Stable-Baselines3, so parts of an observation are named by their
+    path, ``extra/tcp_pose`` or ``sensor_data/base_camera/rgb``. ``VecMonitor`` adds the returns and
+    lengths of episodes.
 
     Attributes:
         vector: The Gymnasium vector behind it; ``vector.restart`` replaces workers that are gone.
@@ -67,7 +67,7 @@ class SB3Task(Remade, VecEnv):
         self._actions: Any = None
 
     def reset(self) -> VecEnvObs:
-        """Begin new episodes, with what `seed` and `set_options` said for this once.
+        """Begin new episodes, with what `seed` and `set_options` gave for this once.
 
         ``set_options({"reconfigure": True})`` rebuilds the worlds.
 
@@ -113,16 +113,16 @@ class SB3Task(Remade, VecEnv):
         """
         obs, reward, terminated, truncated, info = self.vector.step(self._actions)
         done = terminated | truncated
-        told = _rows(info, self.num_envs)
+        infos = _rows(info, self.num_envs)
         if done.any():
             final = _rows(info["final_info"], self.num_envs)
             for i in np.flatnonzero(done).tolist():
-                self.reset_infos[i], told[i] = told[i], final[i]
-                told[i]["terminal_observation"] = _flat(info["final_obs"][i])
-        for own, late in zip(told, (truncated & ~terminated).tolist(), strict=True):
+                self.reset_infos[i], infos[i] = infos[i], final[i]
+                infos[i]["terminal_observation"] = _flat(info["final_obs"][i])
+        for own, late in zip(infos, (truncated & ~terminated).tolist(), strict=True):
             own["TimeLimit.truncated"] = late
             own["is_success"] = own["success"]
-        return _flat(obs), reward, done, told
+        return _flat(obs), reward, done, infos
 
     def close(self) -> None:
         """End the workers; closing twice is allowed."""

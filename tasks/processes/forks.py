@@ -96,11 +96,11 @@ class _Popen(_ForkServerPopen):
         surroundings = Surroundings.of_this_process()
         preparation = spawn.get_preparation_data(process.name)
         main = {key: preparation.pop(key) for key in [*preparation] if "init_main" in key}
-        told = io.BytesIO()
+        packed = io.BytesIO()
         set_spawning_popen(self)
         try:
             for part in (surroundings, preparation, main, process):
-                reduction.dump(part, told)
+                reduction.dump(part, packed)
         finally:
             set_spawning_popen(None)
         tracker: Any = resource_tracker.getfd()
@@ -111,7 +111,7 @@ class _Popen(_ForkServerPopen):
         # A worker that was killed meanwhile is seen where its answers are read.
         with suppress(BrokenPipeError):
             try:
-                _write(line, told.getbuffer())
+                _write(line, packed.getbuffer())
             except TimeoutError:
                 os.kill(self.pid, signal.SIGKILL)
                 raise

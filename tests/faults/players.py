@@ -73,7 +73,7 @@ class Nobody:
         elif self.what == "answers for others":
             yield Event(77, result=3)
         elif self.what == "plays nothing":
-            yield Event(None, said="I rest")
+            yield Event(None, note="I rest")
 
 
 class Elsewhere:

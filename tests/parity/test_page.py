@@ -147,11 +147,11 @@ class Visit:
         self.context = browser.new_context(viewport={"width": width, "height": height}, **options)
         self.page = self.context.new_page()
         self.page.set_default_timeout(1000 * PATIENCE)
-        self.said: list[str] = []
+        self.note: list[str] = []
         self.asked: list[str] = []
-        self.page.on("console", lambda message: self.said.append(message.text))
-        self.page.on("pageerror", lambda error: self.said.append(str(error)))
-        self.page.on("dialog", lambda dialog: self.said.append(dialog.message))
+        self.page.on("console", lambda message: self.note.append(message.text))
+        self.page.on("pageerror", lambda error: self.note.append(str(error)))
+        self.page.on("dialog", lambda dialog: self.note.append(dialog.message))
         self.page.on("request", lambda request: self.asked.append(request.url))
         self.page.goto(file.as_uri())
 
@@ -194,7 +194,7 @@ class TestInABrowser:
         visited = visit()
         scroll_all(visited.page)
         visited.page.wait_for_timeout(300)
-        assert visited.said == []
+        assert visited.note == []
         assert visited.asked[0] == page_file.as_uri()
         assert {url.split(":")[0] for url in visited.asked} <= {"file", "data"}
         assert [url for url in visited.asked if url.startswith("file")] == [page_file.as_uri()]
@@ -373,7 +373,7 @@ class TestInABrowser:
         assert visited.page.title() != "taken over"
         assert visited.page.locator(f"#{FAILED} .problem").inner_text().endswith(INJECTION)
         assert visited.page.locator("img").count() == 0
-        assert visited.said == []
+        assert visited.note == []
 
     def test_foreign_scripts_are_refused(self, browser, page_file, tmp_path):
         path = tmp_path / "page.html"
@@ -381,10 +381,10 @@ class TestInABrowser:
         path.write_text(page_file.read_text().replace("</main>", f"{added}</main>"))
         visited = Visit(browser, path)
         deadline = time.monotonic() + PATIENCE
-        while len(visited.said) < 2 and time.monotonic() < deadline:
+        while len(visited.note) < 2 and time.monotonic() < deadline:
             visited.page.wait_for_timeout(100)
         assert visited.page.title() != "taken over"
-        assert sum("Content Security Policy" in said for said in visited.said) == 2
+        assert sum("Content Security Policy" in said for said in visited.note) == 2
         visited.context.close()
 
     def test_what_is_missing_is_said(self, visit):

@@ -247,7 +247,7 @@ class TestSweeping:
         (entry,) = sweep([one], progressed=kill)
         assert stages
         assert re.fullmatch(
-            rf"worker process \d+ died by SIGKILL; {tmp_path}/runs/{LOG} holds what it said",
+            rf"worker process \d+ died by SIGKILL; {tmp_path}/runs/{LOG} holds its output",
             entry["error"],
         )
         assert entry["equal"] is False

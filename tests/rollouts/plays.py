@@ -126,7 +126,7 @@ class StopsHalfWay:
     def play(self, seed: int):
         if not (self.folder / "hung").exists():
             (self.folder / "hung").touch()
-            (connection,) = (cell.cell_contents for cell in local_workers._tell.__closure__)
+            (connection,) = (cell.cell_contents for cell in local_workers._send_note.__closure__)
             os.write(connection.fileno(), struct.pack("!i", 1000) + b"half of an answer")
             os.kill(os.getpid(), signal.SIGSTOP)
         return os.getpid(), seed**2

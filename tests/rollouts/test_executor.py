@@ -105,7 +105,7 @@ def test_a_fresh_process_for_every_episode():
 
 def test_what_an_episode_says_of_itself():
     events = list(ProcessExecutor(1).run(Play(says="halfway"), range(2)))
-    said = [(event.seed, event.said or event.result[1]) for event in events]
+    said = [(event.seed, event.note or event.result[1]) for event in events]
     assert said == [(0, "halfway"), (0, 0), (1, "halfway"), (1, 1)]
 
 
@@ -223,7 +223,7 @@ def test_a_word_shows_that_an_episode_goes_on():
 
 def test_long_silence_is_said(monkeypatch):
     monkeypatch.setattr(rollouts.playing.dispatch, "QUIET_SECONDS", 1.0)
-    said = [event.said for event in run(Play(lasts=2.5), [3]) if event.said]
+    said = [event.note for event in run(Play(lasts=2.5), [3]) if event.note]
     patterns = [
         r"no message for \d s: process \d+ has been getting ready for \d s",
         r"no message for \d s: process \d+ has been playing seed 3 for \d s",

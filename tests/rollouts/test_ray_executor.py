@@ -69,7 +69,7 @@ def test_a_cluster_without_room(cluster, monkeypatch):
         run(cluster, Play(), range(3))
     monkeypatch.setattr(rollouts.playing.dispatch, "QUIET_SECONDS", 3.0)
     events = RayExecutor(cluster.address, 1, modules=MODULES).run(Play(), range(3))
-    said = next(events).said
+    said = next(events).note
     assert re.fullmatch(
         r"no message for \d s: actor has been getting ready for \d s;"
         r" 0 CPUs of the Ray cluster, of 1 nodes, are free",
