@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 from kinematics.quaternions import yaw_degrees
 
 if TYPE_CHECKING:
-    from layouts.layout import Layout
+    from layouts.arrangement import Arrangement
     from layouts.placement import Placement
 
 COLUMNS = ("#", "name", "robot", "action", "base x, y, z (m)", "facing", "keyframe", "reach (m)")
 
 
-def describe(layout: Layout) -> str:
+def describe(layout: Arrangement) -> str:
     """Return a headline and one line per robot, in action order.
 
     "facing" is the turn about z from the world's +x to where the robot reaches out at home
@@ -41,7 +41,7 @@ def describe(layout: Layout) -> str:
     return "\n".join([headline(layout), *_aligned([columns, *rows])])
 
 
-def headline(layout: Layout) -> str:
+def headline(layout: Arrangement) -> str:
     """Return how many robots and action numbers a layout has, in words."""
     robots = "1 robot" if len(layout) == 1 else f"{len(layout)} robots"
     return f"{robots}, {layout.action_dim} action numbers"

@@ -1,213 +1,32 @@
-"""Which robots stand where, under what names, and in what order."""
+"""A layout: which robots stand where, and what one asks of it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
-from kinematics.quaternions import yaw_quaternion
+from layouts.arrangement import Arrangement
 from layouts.description import describe
-from layouts.frames import (
-    ORIGIN,
-    Frame,
-    HangingError,
-    Pose,
-    check_frame_names,
-    numbers,
-    resolve,
-)
-from layouts.placement import Placement, RobotLike, placed
-from robots import LayoutError, UnknownNameError
-from robots.common.bounds import FAR, checked_number, shown
 from robots.common.writing import write_whole
-from robots.descriptor import Vector3
 
 if TYPE_CHECKING:
     from layouts.validation import Report
 
 
-class Layout(Mapping[str, Placement]):
+class Layout(Arrangement):
     """Ordered, named placements: a read-only mapping from name to `Placement`.
 
     The order is the order of the robots' action numbers. Two layouts are equal if they place the
     same robots under the same names in the same order.
     """
 
-    __slots__ = ("_frames", "_placements")
-
-    def __init__(
-        self, placements: Mapping[str, Placement], frames: Mapping[str, Frame] | None = None
-    ) -> None:
-        """Take placements in the order given, and resolve where those that hang are.
-
-        Args:
-            placements: Placement by name, in action order.
-            frames: Frame by name, for placements and other frames to hang on.
-
-        Raises:
-            LayoutError: If there is no placement, a name is not an identifier or is given twice,
-                or something hangs on what is not there or on itself.
-        """
-        for what, given in (("placements", placements), ("frames", frames or {})):
-            if not isinstance(given, Mapping):
-                raise LayoutError(f"{what} is {shown(given)}; it takes a mapping by name")
-        frames = {} if frames is None else dict(frames)
-        if not placements:
-            raise LayoutError("a layout needs at least one robot")
-        for name, placement in placements.items():
-            check_name(name)
-            if not isinstance(placement, Placement):
-                raise LayoutError(
-                    f"{name!r} is a {type(placement).__name__}; a layout holds Placements"
-                )
-            if name in frames:
-                raise HangingError(f"{name!r} names both a robot and a frame; rename one", name)
-        check_frame_names(frames)
-        poses = {name: (thing.on, thing.local_pose) for name, thing in frames.items()}
-        poses.update({name: (thing.on, thing.local_pose) for name, thing in placements.items()})
-        world = resolve(poses)
-        object.__setattr__(self, "_frames", frames)
-        object.__setattr__(
-            self, "_placements", {n: placed(p, world[n]) for n, p in placements.items()}
-        )
-
-    @classmethod
-    def of(
-        cls, *placements: tuple[str, Placement], frames: Mapping[str, Frame] | None = None
-    ) -> Layout:
-        """Build from (name, placement) pairs; a name given twice is an error, not an overwrite.
-
-        Raises:
-            LayoutError: If a name appears twice, or one of them is no pair.
-        """
-        for pair in placements:
-            if not (isinstance(pair, tuple) and len(pair) == 2):
-                raise LayoutError(f"{shown(pair)} is no pair of a name and a Placement")
-        names = [name for name, _ in placements]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            raise LayoutError(f"names {twice} are given twice; each robot needs its own name")
-        return cls(dict(placements), frames)
-
-    def __setattr__(self, name: str, value: object) -> None:
-        """Refuse: a layout is frozen."""
-        raise AttributeError(f"Layout is frozen; {name!r} cannot be set")
-
-    def __getitem__(self, name: str) -> Placement:
-        """Return the placement called ``name``."""
-        if not isinstance(name, str) or name not in self._placements:
-            raise UnknownNameError("robot of this layout", name, self._placements)
-        return self._placements[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """Iterate over the names in action order."""
-        return iter(self._placements)
-
-    def __len__(self) -> int:
-        """Return the number of robots."""
-        return len(self._placements)
-
-    def __eq__(self, other: object) -> bool:
-        """Compare names, order, placements and frames as they were declared."""
-        if not isinstance(other, Layout):
-            return NotImplemented
-        return list(self.items()) == list(other.items()) and self._frames == other._frames
-
-    def __hash__(self) -> int:
-        """Hash names, order, placements and frames."""
-        return hash((tuple(self.items()), frozenset(self._frames.items())))
-
-    def __reduce__(self) -> tuple[object, ...]:
-        """Pickle by the placements and frames."""
-        return (Layout, (dict(self._placements), self._frames))
-
-    def __repr__(self) -> str:
-        """Show names and robots in order."""
-        return f"Layout({', '.join(f'{n}={p.robot.name}' for n, p in self.items())})"
+    __slots__ = ()
 
     def __str__(self) -> str:
         """Show a table: name, robot, action numbers, base pose, keyframe and reach of each."""
         return describe(self)
-
-    @property
-    def frames(self) -> Mapping[str, Frame]:
-        """The named frames, as they were declared."""
-        return MappingProxyType(self._frames)
-
-    @property
-    def frame_poses(self) -> dict[str, Pose]:
-        """World pose of each frame, by name."""
-        poses = {name: (frame.on, frame.local_pose) for name, frame in self._frames.items()}
-        poses.update({name: (None, placement.base_pose) for name, placement in self.items()})
-        world = resolve(poses)
-        return {name: world[name] for name in self._frames}
-
-    @property
-    def action_split(self) -> dict[str, slice]:
-        """The slice of the flat action that each robot takes, in declared order."""
-        split: dict[str, slice] = {}
-        start = 0
-        for name, placement in self.items():
-            split[name] = slice(start, start + placement.robot.action_dim)
-            start += placement.robot.action_dim
-        return split
-
-    @property
-    def action_dim(self) -> int:
-        """How many numbers the flat action of all robots has."""
-        return sum(placement.robot.action_dim for placement in self.values())
-
-    def replace_robots(self, **robots: RobotLike) -> Layout:
-        """Return the layout with other robots in some places, facing the same way.
-
-        Args:
-            robots: Robot (name or descriptor) by place name.
-
-        Raises:
-            UnknownNameError: If a place, a robot or the place's keyframe does not exist.
-        """
-        return self._with({name: self[name].with_robot(robot) for name, robot in robots.items()})
-
-    def moved(self, position: Vector3 = ORIGIN, yaw: float = 0.0) -> Layout:
-        """Return the whole layout, its frames included, turned about z and then shifted.
-
-        What hangs on a frame or robot follows it, and stays declared as it was.
-
-        Args:
-            position: Shift (m).
-            yaw: Turn about the world's z axis (rad).
-
-        Raises:
-            LayoutError: If they are not finite.
-        """
-        yaw = checked_number("yaw", yaw, -FAR, FAR, LayoutError, "rad")
-        x, y, z = numbers("position", position, 3)
-        move = Pose((x, y, z), yaw_quaternion(yaw))
-        return Layout(
-            {name: _moved(placement, move) for name, placement in self.items()},
-            {name: _moved(frame, move) for name, frame in self._frames.items()},
-        )
-
-    @property
-    def action_bounds(self) -> tuple[tuple[float, float], ...]:
-        """The least and the largest value of each number of the flat action."""
-        return tuple(b for placement in self.values() for b in placement.robot.action_bounds)
-
-    def in_control_mode(self, mode: str) -> Layout:
-        """Return the layout with robots that take the actions of a control mode.
-
-        Raises:
-            UnknownNameError: If there is no such control mode.
-            DescriptorError: If a robot lacks the joint limits that the mode needs.
-        """
-        return self.replace_robots(**{n: p.robot.in_control_mode(mode) for n, p in self.items()})
-
-    def _with(self, changed: Mapping[str, Placement]) -> Layout:
-        return Layout({**self._placements, **changed}, self._frames)
 
     def to_yaml(self) -> str:
         """Return the layout as YAML text, as it was declared; robots by their registered names.
@@ -230,7 +49,7 @@ class Layout(Mapping[str, Placement]):
         """
         from layouts.yaml_format import from_yaml
 
-        return from_yaml(text)
+        return cls._of(from_yaml(text))
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the layout to a YAML file, whole or not at all, and return its path.
@@ -253,7 +72,11 @@ class Layout(Mapping[str, Placement]):
         """
         from layouts.yaml_format import read_layout
 
-        return read_layout(path)
+        return cls._of(read_layout(path))
+
+    @classmethod
+    def _of(cls, arrangement: Arrangement) -> Layout:
+        return cls(arrangement, arrangement.frames)
 
     def to_urdf(
         self, path: str | PathLike[str], *, relative: bool = False, visuals: bool = True
@@ -369,23 +192,3 @@ class Layout(Mapping[str, Placement]):
         return validate(
             self, targets=targets, samples=samples, table=table, seed=seed, workspaces=workspaces
         )
-
-
-def check_name(name: object) -> None:
-    """Refuse a robot's name that is not an identifier.
-
-    Raises:
-        LayoutError: If it is not.
-    """
-    if not (isinstance(name, str) and name.isidentifier()):
-        raise LayoutError(f"robot name {name!r} must be a letter followed by letters, digits and _")
-
-
-_Declared = TypeVar("_Declared", Placement, Frame)
-
-
-def _moved(declared: _Declared, move: Pose) -> _Declared:
-    if declared.on is not None:
-        return declared
-    pose = move.then(declared.local_pose)
-    return replace(declared, position=pose.position, quaternion=pose.quaternion, rpy=None)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from layouts.layout import Layout
+    from layouts.arrangement import Arrangement
     from layouts.placement import Placement
 
 Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)
@@ -45,7 +45,9 @@ LONGEST_NAME, LONGEST_ROBOT = 16, 24  # letters
 TILE = 241  # grid points per side, from which the overlap is drawn
 
 
-def preview(layout: Layout, path: str | os.PathLike[str], table: Rectangle | None = None) -> Path:
+def preview(
+    layout: Arrangement, path: str | os.PathLike[str], table: Rectangle | None = None
+) -> Path:
     """Draw a layout from above and save the picture, whole or not at all.
 
     Neither robot files nor a graphics driver are needed.
@@ -100,7 +102,7 @@ def blank_figure(
     return Figure(figsize=size, dpi=dots_per_inch, facecolor="white")
 
 
-def draw(layout: Layout, table: Rectangle | None = None) -> Figure:
+def draw(layout: Arrangement, table: Rectangle | None = None) -> Figure:
     """Return the figure that `preview` saves.
 
     Args:
@@ -125,7 +127,7 @@ def draw(layout: Layout, table: Rectangle | None = None) -> Figure:
     return figure
 
 
-def _bounds(layout: Layout, table: Rectangle | None) -> Rectangle:
+def _bounds(layout: Arrangement, table: Rectangle | None) -> Rectangle:
     """Return the outline of everything drawn, with a margin (m)."""
     boxes: list[Rectangle] = [] if table is None else [table]
     for corners in table_outlines(layout.frame_poses).values():
@@ -149,7 +151,7 @@ def _stretched(bounds: Rectangle, aspect: float) -> Rectangle:
     return (x_min - more_width, y_min - more_height, x_max + more_width, y_max + more_height)
 
 
-def _draw_plan(plan: Axes, layout: Layout, bounds: Rectangle, table: Rectangle | None) -> None:
+def _draw_plan(plan: Axes, layout: Arrangement, bounds: Rectangle, table: Rectangle | None) -> None:
     from matplotlib.patches import Polygon
 
     outlines = [
@@ -178,7 +180,7 @@ def _draw_plan(plan: Axes, layout: Layout, bounds: Rectangle, table: Rectangle |
         spine.set_color("#BBBBBB")
 
 
-def _draw_overlap(plan: Axes, layout: Layout, bounds: Rectangle) -> bool:
+def _draw_overlap(plan: Axes, layout: Arrangement, bounds: Rectangle) -> bool:
     """Shade what at least two robots reach, darker where more do; return whether any is."""
     x, y = np.meshgrid(
         np.linspace(bounds[0], bounds[2], TILE), np.linspace(bounds[1], bounds[3], TILE)
@@ -279,7 +281,7 @@ def _write_name(
     )
 
 
-def _draw_list(listing: Axes, layout: Layout) -> None:
+def _draw_list(listing: Axes, layout: Arrangement) -> None:
     """List name, robot, action numbers and pose of every robot under the plan."""
     heads = ("name", "robot", "action", "base x, y, z (m)", "facing", "reach (m)")
     rows = [heads, *(_cells(layout, name) for name in layout)]
@@ -297,7 +299,7 @@ def _draw_list(listing: Axes, layout: Layout) -> None:
             listing.text(x, row, cell, color=colour, fontsize=size, va="center_baseline")
 
 
-def _cells(layout: Layout, name: str) -> tuple[str, ...]:
+def _cells(layout: Arrangement, name: str) -> tuple[str, ...]:
     placement = layout[name]
     return (
         _shortened(name, LONGEST_NAME),

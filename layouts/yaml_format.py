@@ -17,8 +17,8 @@ from typing import Any, NoReturn
 
 import yaml
 
+from layouts.arrangement import Arrangement, check_name
 from layouts.frames import Frame, HangingError, check_frame_names
-from layouts.layout import Layout, check_name
 from layouts.placement import Placement
 from robots import (
     LayoutError,
@@ -46,7 +46,7 @@ RESERVED = ("true", "false", "yes", "no", "on", "off", "y", "n", "null")  # YAML
 TAGS = tuple(f"tag:yaml.org,2002:{kind}" for kind in ("str", "seq", "map"))
 
 
-def to_yaml(layout: Layout) -> str:
+def to_yaml(layout: Arrangement) -> str:
     """Return a layout as YAML text that `from_yaml` turns into an equal layout.
 
     Raises:
@@ -64,7 +64,7 @@ def to_yaml(layout: Layout) -> str:
     return "\n".join(lines) + "\n"
 
 
-def from_yaml(text: str, source: str = "") -> Layout:
+def from_yaml(text: str, source: str = "") -> Arrangement:
     """Return the layout that a YAML text describes.
 
     Args:
@@ -83,7 +83,7 @@ def from_yaml(text: str, source: str = "") -> Layout:
     return _Reader(source).layout(text)
 
 
-def read_layout(path: str | PathLike[str]) -> Layout:
+def read_layout(path: str | PathLike[str]) -> Arrangement:
     """Return the layout in a file; see `layouts.Layout.load`."""
     try:
         text = read_text(path, MAX_LENGTH)
@@ -104,7 +104,7 @@ class _Reader:
     def __init__(self, source: str) -> None:
         self.source = source
 
-    def layout(self, text: str) -> Layout:
+    def layout(self, text: str) -> Arrangement:
         root = self._compose(text)
         top = self._mapping(root, "a layout", ("version", "frames", "robots"))
         self._check_version(root, top)
@@ -122,7 +122,9 @@ class _Reader:
                 check_frame_names({name: Frame()})
         placements = {name: self._placement(name, node) for name, (_, node) in robots.items()}
         try:
-            return Layout(placements, {n: self._frame(n, node) for n, (_, node) in frames.items()})
+            return Arrangement(
+                placements, {n: self._frame(n, node) for n, (_, node) in frames.items()}
+            )
         except HangingError as error:
             key, node = robots.get(error.name) or frames[error.name]
             self._fail(next((v for k, v in node.value if k.value == "on"), key), str(error))

@@ -21,14 +21,14 @@ from robots.urdf.paths import resolve
 from robots.urdf.summary import parse_urdf, read_urdf
 
 if TYPE_CHECKING:
-    from layouts.layout import Layout
+    from layouts.arrangement import Arrangement
     from layouts.placement import Placement
 
 ENDING = ".dmd.yaml"  # by which Drake's parser knows directives
 COPIED = ("material", "link", "joint")  # elements of a robot that are taken over
 
 
-def write_drake(layout: Layout, path: str | os.PathLike[str], *, visuals: bool = True) -> Path:
+def write_drake(layout: Arrangement, path: str | os.PathLike[str], *, visuals: bool = True) -> Path:
     """Write a layout as Drake's model directives; see `layouts.Layout.to_drake`."""
     target = Path(path)
     if not target.name.endswith(ENDING):

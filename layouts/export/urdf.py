@@ -18,7 +18,7 @@ from robots.urdf.srdf import srdf_beside
 from robots.urdf.summary import parse_urdf, read_urdf
 
 if TYPE_CHECKING:
-    from layouts.layout import Layout
+    from layouts.arrangement import Arrangement
     from layouts.placement import Placement
 
 WORLD = "world"
@@ -26,7 +26,7 @@ COPIED = ("material", "link", "joint")  # elements of a robot that are taken ove
 
 
 def write_urdf(
-    layout: Layout,
+    layout: Arrangement,
     path: str | os.PathLike[str],
     *,
     relative: bool = False,

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from kinematics.rotations import Floats
-from layouts.layout import Layout
+from layouts.arrangement import Arrangement
 from layouts.placement import Placement
 from layouts.validation.collisions import Approach, Postures, nearer_than
 from layouts.validation.findings import TargetReach, length_text
@@ -18,7 +18,7 @@ MOVE_STEP = 0.01  # m
 SIDEWAYS = np.array([0.0, 1.0, 0.0])  # where to move a robot that stands in another one
 
 
-def to_stand_apart(layout: Layout, one: Postures, other: Postures) -> str:
+def to_stand_apart(layout: Arrangement, one: Postures, other: Postures) -> str:
     """Say how far apart two robots are clear of each other, found by trying."""
     moves = [
         (move, now, direction)
@@ -78,7 +78,7 @@ def _obstacles(reach: TargetReach) -> str:
     return " and ".join(own_base if o == reach.robot else o for o in reach.obstacles)
 
 
-def _ways(layout: Layout, one: str, other: str) -> Iterator[tuple[str, Floats, float]]:
+def _ways(layout: Arrangement, one: str, other: str) -> Iterator[tuple[str, Floats, float]]:
     """Yield in words and as a unit vector where to move, and how far that way they are (m)."""
     between = np.array(layout[other].base_position) - layout[one].base_position
     level, height = float(np.hypot(*between[:2])), abs(float(between[2]))

@@ -10,8 +10,8 @@ from itertools import combinations
 import numpy as np
 
 from kinematics.rotations import Floats
+from layouts.arrangement import Arrangement
 from layouts.frames import table_outlines
-from layouts.layout import Layout
 from layouts.placement import Placement
 from layouts.validation.advice import (
     NARROW,
@@ -56,7 +56,7 @@ PATIENCE = 2.0  # s; longer checks tell how far they are
 
 
 def validate(
-    layout: Layout,
+    layout: Arrangement,
     *,
     targets: Targets = (),
     samples: int = 20,
@@ -79,7 +79,7 @@ class _Check:
 
     def __init__(
         self,
-        layout: Layout,
+        layout: Arrangement,
         targets: Mapping[str, tuple[float, ...]],
         samples: int,
         table: Rectangle | None,
@@ -324,7 +324,7 @@ class _Progress:
             notice(f"checking the layout: {what}")
 
 
-def _table_tops(layout: Layout, table: Rectangle | None) -> dict[str, tuple[Point, ...]]:
+def _table_tops(layout: Arrangement, table: Rectangle | None) -> dict[str, tuple[Point, ...]]:
     """Return the corners of each table's top (m): those of the layout's frames, and the one given.
 
     The one given takes the place of a frame called ``table``.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinematics.rotations import Floats, pose_matrix
-from layouts import Placement
+from layouts.placement import Placement
 from layouts.validation.bodies import Hull, RobotModel
 
 Pairs = NDArray[np.intp]  # (n, 2): indices of hulls

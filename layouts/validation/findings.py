@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from layouts.layout import Layout
+    from layouts.arrangement import Arrangement
 
 Point = tuple[float, ...]  # (3,) (m), world
 
@@ -147,7 +147,7 @@ class Results:
         outlines: For each robot the corners of its hulls at the keyframe, world (m).
     """
 
-    layout: Layout
+    layout: Arrangement
     draws: int
     tables: dict[str, tuple[Point, ...]]
     targets: dict[str, Point]

@@ -9,7 +9,7 @@ import numpy as np
 
 from kinematics.rotations import Floats, pose_matrix
 from kinematics.solve import Goal, scattered, solve
-from layouts import Placement
+from layouts.placement import Placement
 from layouts.validation.bodies import RobotModel
 from robots import RobotDescriptor
 from robots.descriptor import IDENTITY

@@ -10,13 +10,12 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from robots import MissingPackageError
+from tasks.fronts.names import NAMESPACE
 from tasks.registry import list_tasks
 
 if TYPE_CHECKING:
     from tasks.fronts.parallel import ParallelTask
     from tasks.fronts.sb3 import SB3Task
-
-NAMESPACE = "RobotLayouts"  # Gymnasium ids are RobotLayouts/PickCube-v1
 
 _GYMNASIUM_NAME = re.compile(r"[\w.-]+-v\d+")
 

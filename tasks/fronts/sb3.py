@@ -19,7 +19,7 @@ from stable_baselines3.common.vec_env.base_vec_env import (
 from robots import TaskError, UnknownNameError
 from tasks.engine.arguments import RECONFIGURE, checked_options
 from tasks.engine.remade import Remade
-from tasks.fronts import NAMESPACE
+from tasks.fronts.names import NAMESPACE
 from tasks.fronts.vector import RESET_OPTIONS, VectorTask
 from tasks.registry import get_task_class
 
