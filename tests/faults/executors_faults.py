@@ -25,7 +25,7 @@ def faults() -> Iterator[Fault]:
 
 
 def _deaths() -> Iterator[Fault]:
-    for name in ("SIGKILL", "SIGTERM", "SIGSEGV", "SIGABRT", "SIGSTOP", "SIGTSTP"):
+    for name in ("SIGKILL", "SIGTERM", "SIGSEGV", "SIGABRT", "SIGSTOP"):
         run = functools.partial(_plays_again, f"signal {name}")
         yield Fault(AREA, f"an episode gets {name}", run, GOES_ON)
     for what in ("exit 0", "exit 3", "busy", "lock", "sleep", "fifo", "half an answer"):

@@ -308,10 +308,11 @@ def _killed(number: signal.Signals) -> Callable[[Path], None]:
 
         def kill() -> None:
             reached.wait(30)
-            for child in children_of(os.getpid()):
+            for child in {*children_of(os.getpid())} - before:
                 os.kill(child, number)
                 killed.append(child)
 
+        before = {*children_of(os.getpid())}  # such as a server of workers
         killed: list[int] = []
         killer = threading.Thread(target=kill)
         killer.start()

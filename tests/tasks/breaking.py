@@ -5,6 +5,7 @@ import os
 import sys
 import time
 from contextlib import contextmanager
+from threading import Lock
 
 import gymnasium
 
@@ -152,16 +153,24 @@ TASKS.update(
 )
 
 
+_offers: list[object] = []  # who needs these tasks now; any thread of a test may
+_offering = Lock()
+
+
 @contextmanager
 def offered():
     """Register these tasks meanwhile, so that no other test meets them in the catalogue."""
-    registered = registry.TASKS.registered
-    new = {task_id: cls for task_id, cls in TASKS.items() if task_id not in registered}
-    for task_id, cls in new.items():
-        register_task(task_id)(cls)
+    with _offering:
+        if not _offers:
+            for task_id, cls in TASKS.items():
+                register_task(task_id)(cls)
+        _offers.append(None)
     try:
         yield
     finally:
-        for task_id in new:
-            del registered[task_id]
-            gymnasium.registry.pop(f"RobotLayouts/{task_id}", None)
+        with _offering:
+            _offers.pop()
+            if not _offers:
+                for task_id in TASKS:
+                    del registry.TASKS.registered[task_id]
+                    gymnasium.registry.pop(f"RobotLayouts/{task_id}", None)
