@@ -50,7 +50,14 @@ def _too_little() -> Iterator[Fault]:
 
 
 def _few_descriptors(more: int) -> None:
+    from tests.tasks.breaking import offered
+
     server_pid()  # is there already
+    with offered():  # so are the tasks, which are looked for in files
+        _with_few_descriptors(more)
+
+
+def _with_few_descriptors(more: int) -> None:
     before, open_before = children(), open_files()
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (open_before + more, hard))
