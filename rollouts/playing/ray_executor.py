@@ -257,6 +257,8 @@ class _Player:
 def _reason(error: Exception) -> str:
     """Return what Ray says of a death, out of the page that it makes of it."""
     text = " ".join(str(error).split())
+    if "error raised in its creation task" in text:  # it does nothing then but load
+        return "its code could not be loaded"
     because = re.search(r" because (.+?)\.(?: |$)", text)
     return because[1] if because else text.partition(". ")[0]
 

@@ -115,6 +115,7 @@ def test_nodes_and_actors_that_are_killed_change_nothing(nodes, tmp_path):
     late = {  # sent to a node not yet known to be dead, or libraries that could not be loaded
         "out of reach before it could play anything",
         "its worker process has died before it could play anything",
+        "its code could not be loaded before it could play anything",
     }
     assert {words for words in lost if " at seed " not in words} <= late
     assert same_files(tmp_path / FILE, recorded_directly(tmp_path / "direct" / FILE, range(24)))
