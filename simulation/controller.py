@@ -46,7 +46,7 @@ class JointPositionController:
         multipliers, offsets = np.array([drive[1:3] for drive in drives], np.float32).T
         self._centre: Floats = multipliers * (half * (high + low))[self._source] + offsets
         self._half_range: Floats = multipliers * (half * (high - low))[self._source]
-        self._relative = np.array([drive.relative for drive in drives])
+        self._relative: Floats = np.array([drive.relative for drive in drives], np.float32)
 
     def targets(self, action: Floats, qpos: Floats) -> Floats:
         """Return the drive targets of a batch of actions.
@@ -61,8 +61,8 @@ class JointPositionController:
         """
         clipped = np.minimum(np.maximum(action, self._lowest), self._highest)
         driving = clipped if self._one_to_one else clipped.take(self._source, 1)
-        target = self._centre + self._half_range * driving
-        np.add(qpos, target, out=target, where=self._relative)
+        target: Floats = self._centre + self._half_range * driving
+        target += qpos * self._relative
         return target
 
 

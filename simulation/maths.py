@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import lru_cache, wraps
 from math import isfinite
-from typing import Any, cast
+from typing import Any, TypeGuard, cast
 
 import numpy as np
 import torch
@@ -55,6 +55,10 @@ def where(condition: Array, one: Array | float, other: Array | float) -> Any:
     """Return ``one`` where a condition holds and ``other`` elsewhere."""
     if isinstance(condition, Tensor):
         return torch.where(condition, _any(one), _any(other))
+    if isinstance(one, float) and _is_row(other, condition.shape):
+        chosen = other.copy()  # half of what `numpy.where` costs for a few numbers
+        chosen[condition] = one
+        return chosen
     return np.where(condition, one, other)
 
 
@@ -180,6 +184,12 @@ def full(x: Array, count: int, value: float) -> Any:
 def rounded(value: float) -> float:
     """Return the float32 nearest to a number."""
     return float(np.float32(value))
+
+
+def _is_row(values: Array | float, shape: tuple[int, ...]) -> TypeGuard[Floats]:
+    if not isinstance(values, np.ndarray):
+        return False
+    return values.dtype == np.float32 and values.shape == shape
 
 
 @lru_cache(maxsize=4096)
