@@ -10,23 +10,14 @@ from pathlib import Path
 
 import pytest
 
+from robots.common.rooms import ROOMS
+
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
 ROOT = Path(__file__).parent.parent
-ROOMS = (
-    "kinematics",
-    "robots",
-    "layouts",
-    "simulation",
-    "tasks",
-    "experts",
-    "rollouts",
-    "parity",
-    "measurements",
-)
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 ROBOT_FILES = (".urdf", ".srdf", ".stl", ".obj", ".dae", ".glb", ".gltf", ".ply")

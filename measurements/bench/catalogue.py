@@ -52,7 +52,7 @@ def measure(
         line: Tells how far it is.
     """
     torch.set_num_threads(1)  # the tensors are small: threads would only wait for each other
-    load, found = [os.getloadavg()[0]], list[Measurement]()
+    load, found = [_load()], list[Measurement]()
     left_out: dict[str, str] = {}
     for number, name in enumerate(names):
         progress = _Progress(line, number, name)
@@ -61,8 +61,13 @@ def measure(
         except (BenchmarkError, MissingPackageError, SimulationError) as error:
             left_out[name] = str(error)
             line.say(f"{name} is left out: {error}")
-    load.append(os.getloadavg()[0])
+    load.append(_load())
     return Report(tuple(found), machine(), str(settings.clock), tuple(load), left_out)
+
+
+def _load() -> float:
+    """Return how many processes wanted a core, on average over a minute."""
+    return round(os.getloadavg()[0], 1)
 
 
 class _Progress:

@@ -11,7 +11,6 @@ from contextlib import closing, contextmanager
 from functools import partial
 from typing import Any
 
-import gymnasium
 from gymnasium.vector import AsyncVectorEnv
 
 import tasks
@@ -24,7 +23,7 @@ from measurements.bench.readme_table import RECORD
 from measurements.bench.report import Report
 from measurements.bench.settings import Benchmark, Settings
 from measurements.bench.steps import PHYSICS, Played
-from parity.compare.native_env import make_native, native_action, quiet
+from parity.compare.native_env import make_native, make_native_front, native_action
 from robots import RobotLayoutsError, TaskError
 from robots.common.commands import start
 from robots.common.writing import write_whole
@@ -153,22 +152,9 @@ def _native_vector(task_id: str) -> Generator[AsyncVectorEnv | None]:
     if len(get_task_class(task_id).layout) > 1:
         yield None
         return
-    make = [partial(_native_front, task_id)] * PROCESSES
+    make = [partial(make_native_front, task_id)] * PROCESSES
     with closing(AsyncVectorEnv(make, context="spawn")) as env:
         yield env
-
-
-def _native_front(task_id: str) -> gymnasium.Env[Any, Any]:
-    """Make native's environment with NumPy observations, in a process of its own."""
-    import torch
-
-    torch.set_num_threads(1)
-    logging.disable(logging.WARNING)
-    native = make_native(task_id)
-    with quiet():
-        from mani_skill.utils.wrappers.gymnasium import CPUGymWrapper
-
-        return CPUGymWrapper(native)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

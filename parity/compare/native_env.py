@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
+import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
@@ -65,6 +66,19 @@ def make_native(
                 f" ({error}). A software driver serves: Mesa's lavapipe 24.3 or newer (on Debian,"
                 " mesa-vulkan-drivers)"
             ) from error
+
+
+def make_native_front(task_id: str) -> gymnasium.Env[Any, Any]:
+    """Make the native environment of a task with NumPy observations, alone in its process."""
+    import torch
+
+    torch.set_num_threads(1)
+    logging.disable(logging.WARNING)
+    native = make_native(task_id)
+    with quiet():
+        from mani_skill.utils.wrappers.gymnasium import CPUGymWrapper
+
+        return CPUGymWrapper(native)
 
 
 def native_tasks() -> dict[str, Any]:

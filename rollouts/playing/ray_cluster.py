@@ -22,10 +22,9 @@ from typing import Any, TypeVar
 
 from robots import MissingPackageError, TaskError, UnknownNameError
 from robots.assets.manifest import load_manifest
+from robots.common.rooms import PLAYING
 from rollouts.playing.events import WorkerError
 from rollouts.playing.transport import is_installed
-
-ROOMS = ("kinematics", "robots", "layouts", "simulation", "tasks", "experts", "rollouts")
 
 _CONNECT_SECONDS = 10.0  # that a port may take to accept
 _JOIN_SECONDS = 60.0  # that all of joining may take, the import of Ray included
@@ -303,7 +302,7 @@ def gather_code(folder: Path, modules: Iterable[str] = ()) -> None:
     Raises:
         UnknownNameError: If there is no such module.
     """
-    for name in dict.fromkeys([*ROOMS, *(module.partition(".")[0] for module in modules)]):
+    for name in dict.fromkeys([*PLAYING, *(module.partition(".")[0] for module in modules)]):
         spec = find_spec(name)
         if spec is None:
             raise UnknownNameError("module", name, (), "It must be importable here.")

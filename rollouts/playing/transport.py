@@ -13,21 +13,11 @@ from types import FunctionType
 from typing import Any
 
 from robots import RobotLayoutsError
+from robots.common.rooms import ROOMS
 from rollouts.playing.events import Play, WorkerError
 from tasks.processes.process import Sendable
 
 _CHECKOUT = Path(__file__).parents[2]
-_ROOMS = (
-    "kinematics",
-    "robots",
-    "layouts",
-    "simulation",
-    "tasks",
-    "experts",
-    "rollouts",
-    "parity",
-    "measurements",
-)
 
 HINT = "put it into a module that they can import, or pass workers=0, which plays in this process"
 
@@ -122,7 +112,7 @@ def is_installed(path: Path) -> bool:
 
 def _is_users(file: str) -> bool:
     path = Path(file)
-    library = any(path.is_relative_to(_CHECKOUT / room) for room in _ROOMS)
+    library = any(path.is_relative_to(_CHECKOUT / room) for room in ROOMS)
     return not (library or is_installed(path) or file.startswith("<frozen "))
 
 

@@ -14,10 +14,11 @@ import rollouts.playing.dispatch
 import rollouts.playing.ray_executor
 from experts import registry
 from robots import MissingPackageError, TaskError, UnknownNameError
+from robots.common.rooms import PLAYING
 from rollouts import evaluate
 from rollouts.__main__ import main
 from rollouts.playing.executor import WorkerError, WorkersDied
-from rollouts.playing.ray_cluster import ROOMS, gather_code
+from rollouts.playing.ray_cluster import gather_code
 from rollouts.playing.ray_executor import RayExecutor
 from rollouts.reading.trajectory import TrajectoryFile
 from rollouts.recording.record import FILE, record
@@ -99,6 +100,16 @@ class Disturbance:
             os.kill(int(second.split()[1]), signal.SIGKILL)
 
 
+@pytest.mark.usefixtures("_cheap_expert")
+def test_a_cluster_records_what_this_machine_does(cluster, tmp_path):
+    cluster.grow(1)
+    summary = record(TASK, range(3), tmp_path, RayExecutor(cluster.address))
+    assert not summary.deaths
+    assert same_files(tmp_path / FILE, recorded_directly(tmp_path / "direct" / FILE, range(3)))
+    cluster.wait_for_no_player()
+
+
+@pytest.mark.long
 @pytest.mark.usefixtures("_cheap_expert")
 def test_nodes_and_actors_that_are_killed_change_nothing(nodes, tmp_path):
     nodes.grow(3)
@@ -214,7 +225,7 @@ def test_ray_is_not_installed(monkeypatch, tmp_path, capsys):
 
 def test_nodes_get_all_the_code(tmp_path):
     gather_code(tmp_path, ["tests.rollouts.plays"])
-    assert {path.name for path in tmp_path.iterdir()} == {*ROOMS, "tests"}
+    assert {path.name for path in tmp_path.iterdir()} == {*PLAYING, "tests"}
     program = "import robots; print(robots.__file__); from robots.assets.manifest import *; "
     program += "print(CHECKOUT_CACHE.exists(), len(load_manifest().packages))"
     words = [sys.executable, "-c", program]

@@ -1,0 +1,7 @@
+"""The rooms of the library: its top-level packages."""
+
+PLAYING = ("kinematics", "robots", "layouts", "simulation", "tasks", "experts", "rollouts")
+"""What plays episodes, each room importing only those before it."""
+
+ROOMS = (*PLAYING, "parity", "measurements")
+"""All of them."""
