@@ -29,6 +29,7 @@ def native():
 
 
 @pytest.mark.native
+@pytest.mark.xdist_group(TASK)
 @pytest.mark.filterwarnings("ignore:__array_wrap__:DeprecationWarning")  # mani_skill's own
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_same_actions_succeed_in_native(native, seed):

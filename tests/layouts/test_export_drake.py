@@ -14,6 +14,8 @@ from layouts import single
 from robots import LayoutError, RobotRegistry
 from tests.layouts.cells import hung, link_poses, mixed_cell, random_positions, skeleton
 
+pytestmark = pytest.mark.xdist_group("drake")  # they share one exported cell
+
 DRAWS = 5
 READABLE = (".obj", ".vtk", ".gltf")  # by Drake
 

@@ -131,6 +131,7 @@ class TestComparing:
         assert "mesa-vulkan-drivers" in last
         assert "Traceback" not in done.stderr
 
+    @pytest.mark.long
     def test_native_is_quiet(self):
         done = run_alone(COMPARE)
         assert done.returncode == 0, done.stderr
@@ -203,6 +204,7 @@ def test_without_mani_skill():
     assert "pip install 'robot-layouts[parity]'" in done.stderr
 
 
+@pytest.mark.long
 def test_without_a_package_that_mani_skill_needs():
     done = run_alone("import sys; sys.modules['dacite'] = None\n" + COMPARE)
     assert done.returncode == 2

@@ -91,6 +91,7 @@ def test_no_such_folder_or_record(tmp_path, capsys):
     assert capsys.readouterr().err.startswith("error: cannot read")
 
 
+@pytest.mark.long
 def test_without_mani_skill_the_rest_is_told():
     code = (
         "import sys; sys.modules['mani_skill'] = None\n"

@@ -144,6 +144,7 @@ class TestRendering:
         assert run("--task", "PickCube-v1", "--demo", demo, "--out", tmp_path) == 2
         assert f"error: cannot write to {tmp_path / 'PickCube-v1'}" in capsys.readouterr().err
 
+    @pytest.mark.long
     def test_without_a_vulkan_driver(self, tmp_path):
         nowhere = {"VK_DRIVER_FILES": "/nowhere.json", "VK_ICD_FILENAMES": "/nowhere.json"}
         done = run_alone(RENDER.replace("sys.argv[1]", repr(str(tmp_path))), **nowhere)
@@ -216,6 +217,7 @@ class TestFiles:
         assert "not (T, 7)" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_without_imageio(tmp_path):
     """As on a machine without it: it cannot be found nor imported."""
     code = (

@@ -46,6 +46,7 @@ def test_states_need_nothing_that_draws():
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.long
 def test_without_a_driver_one_is_told_why_there_are_no_images():
     done = run_without_driver("import tasks\ntasks.make('PickCube-v1', obs_mode='rgb')\n")
     assert "SimulationError: pictures need a Vulkan driver" in done.stderr
