@@ -20,7 +20,6 @@ from collections.abc import Collection, Mapping
 from multiprocessing.connection import Connection
 from os import PathLike
 from threading import Lock
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -62,12 +61,7 @@ class Hdf5File:
         """Return itself."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close the file."""
         self.close()
 
