@@ -129,7 +129,8 @@ class ColumnReader:
         return {place: np.stack(found) for place, found in poses.items()}
 
     def _joints(self, place: str, rows: Floats) -> Floats:
-        return declared_joints(self.task.simulation.index, place, rows)
+        # Column by column in memory, because statistics round by the order in which they add up.
+        return np.asfortranarray(declared_joints(self.task.simulation.index, place, rows))
 
     def _checked(self, trajectory: Trajectory) -> States:
         states = trajectory.states
