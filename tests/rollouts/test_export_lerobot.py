@@ -29,7 +29,7 @@ from tests.rollouts.recordings import (
     record,
 )
 
-LENGTHS = [5, 1, 7]
+LENGTHS = [5, 1, 40]
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 
 
@@ -129,7 +129,7 @@ def test_info_names_every_number(dataset):
         "codebase_version": "v3.0",
         "robot_type": "panda_wristcam+panda_stick",
         "total_episodes": 3,
-        "total_frames": 13,
+        "total_frames": sum(LENGTHS),
         "total_tasks": 1,
         "chunks_size": 1000,
         "data_files_size_in_mb": 100,
@@ -152,7 +152,7 @@ def test_episodes_say_where_their_frames_are(dataset):
     )
     assert (
         list(rows.values())
-        == [[0, 1, 2], [[text]] * 3, LENGTHS, [0, 5, 6], [5, 6, 13]] + [[0] * 3] * 4
+        == [[0, 1, 2], [[text]] * 3, LENGTHS, [0, 5, 6], [5, 6, sum(LENGTHS)]] + [[0] * 3] * 4
     )
     task = query(f"select * from '{dataset}/meta/tasks.parquet'")
     assert task == {"task_index": [0], "task": [text]}
