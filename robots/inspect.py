@@ -69,6 +69,7 @@ def report(robot: RobotDescriptor, store: AssetStore) -> str:
         "Drives": _drives(robot),
         "Keyframes (rad, m)": _keyframes(robot, urdf),
         "Gripper": _gripper(robot),
+        "Links that may overlap": _overlaps(robot),
         "Cameras": _cameras(robot),
         "Files": _files(robot, store),
     }
@@ -197,6 +198,15 @@ def _gripper(robot: RobotDescriptor) -> Iterator[str]:
             f"grasps while {' and '.join(fingers.links)} each feel {fingers.min_force:g} N or more,"
             f" within {fingers.max_angle:g}° of the direction they open in"
         )
+
+
+def _overlaps(robot: RobotDescriptor) -> Iterator[str]:
+    if robot.allowed_collisions is None:
+        yield "the SRDF's pairs of reason Default, and those that a joint joins"
+        return
+    yield "those that a joint joins or that are rigid with each other"
+    for one, other in robot.allowed_collisions:
+        yield f"{one} and {other}"
 
 
 def _cameras(robot: RobotDescriptor) -> Iterator[str]:
