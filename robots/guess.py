@@ -15,6 +15,7 @@ from kinematics.rotations import Floats, inverse_pose, transform
 from kinematics.solve import farthest
 from kinematics.tree import Tree
 from robots.assets.locator import LocalUrdf
+from robots.bodies.overlaps import guess_allowed
 from robots.common.errors import DescriptorError
 from robots.descriptor import (
     ActionSplit,
@@ -78,6 +79,7 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     split, drives = _action_split(anatomy)
     rest, stance = _rest(anatomy, split)
     distance, measured = _reach(model, anatomy, rest)
+    allowed, overlaps = guess_allowed(model, path)
     fields: dict[str, Any] = {
         "name": name or _as_name(model.name or path.stem),
         "urdf": locator,
@@ -89,12 +91,13 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
         "keyframes": {"rest": tuple(rest[joint] for joint in split.joints)},
         "reach": distance,
         "source": f"guessed from {path.name}",
+        "allowed_collisions": allowed,
     }
     unknown = sorted(set(overrides) - set(RobotDescriptor.__dataclass_fields__))
     if unknown:
         known = ", ".join(RobotDescriptor.__dataclass_fields__)
         raise DescriptorError(f"a descriptor has no fields {unknown}; it has {known}")
-    reasons = (*anatomy.reasons, *drives, *_about_grasps(anatomy), stance, measured)
+    reasons = (*anatomy.reasons, *drives, *_about_grasps(anatomy), stance, measured, *overlaps)
     given = tuple(f"{field}: given, not guessed" for field in overrides)
     return Guess(RobotDescriptor(**{**fields, **overrides}), (*reasons, *given))
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from itertools import combinations
+from pathlib import Path
 
 from robots.common.errors import UnknownNameError
 from robots.descriptor import RobotDescriptor
 from robots.urdf.model import UrdfModel
-from robots.urdf.srdf import ExcludedPair
+from robots.urdf.srdf import ExcludedPair, read_excluded_pairs
 
 LinkPair = frozenset[str]
 """The names of two links."""
@@ -43,6 +44,17 @@ def allowed_pairs(
                 what = f"link in allowed_collisions of {robot.name}"
                 raise UnknownNameError(what, link, model.links)
     return fixed | frozenset(map(frozenset, robot.allowed_collisions))
+
+
+def read_allowed_pairs(robot: RobotDescriptor, model: UrdfModel, urdf: Path) -> frozenset[LinkPair]:
+    """Return `allowed_pairs`, reading the SRDF beside the URDF if the robot relies on it.
+
+    Raises:
+        AssetError: If that SRDF cannot be read.
+        UnknownNameError: If ``allowed_collisions`` names a link that the URDF lacks.
+    """
+    excluded = read_excluded_pairs(urdf) if robot.allowed_collisions is None else ()
+    return allowed_pairs(robot, model, excluded)
 
 
 def joined_pairs(model: UrdfModel) -> frozenset[LinkPair]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from kinematics.rotations import Floats
 from kinematics.tree import Tree
-from robots.bodies.allowed import LinkPair, allowed_pairs
+from robots.bodies.allowed import LinkPair, read_allowed_pairs
 from robots.common.errors import AssetError, MissingPackageError
 from robots.descriptor import RobotDescriptor
 from robots.urdf.mesh_files import has_volume, read_corners
@@ -23,7 +23,7 @@ from robots.urdf.model import UrdfModel
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model
 from robots.urdf.shapes import UrdfShape
-from robots.urdf.srdf import read_excluded_pairs, srdf_beside
+from robots.urdf.srdf import srdf_beside
 from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree
 
@@ -95,24 +95,19 @@ def require_packages() -> None:
         ) from error
 
 
-def read_hulls(model: UrdfModel, kinematics: Tree, urdf: Path) -> tuple[Hull, ...]:
+def read_hulls(model: UrdfModel, urdf: Path) -> tuple[Hull, ...]:
     """Return the hulls of all collision shapes of a robot, in the order of the URDF's links.
 
     Args:
         model: What its URDF describes.
-        kinematics: Its links; hulls name theirs by its index.
-        urdf: Its URDF, for meshes that it refers to.
+        urdf: That URDF, for meshes that it refers to.
 
     Raises:
         AssetError: If a mesh cannot be read, or a shape has no volume.
         MissingPackageError: If trimesh or python-fcl is not installed.
     """
     require_packages()
-    return tuple(
-        _shape_hull(kinematics.link(link), shape, urdf)
-        for link in model.links
-        for shape in model.collisions.get(link, ())
-    )
+    return _hulls(model, urdf, os.stat(urdf).st_mtime_ns)
 
 
 def counted_pairs(
@@ -134,19 +129,26 @@ def counted_pairs(
 
 
 @lru_cache(maxsize=64)
-def _load(robot: RobotDescriptor, urdf: Path, modified: tuple[int, ...]) -> RobotModel:
-    model, kinematics, hulls = _read(urdf, robot.joints, modified[0])
-    allowed = allowed_pairs(robot, model, read_excluded_pairs(urdf))
+def _load(robot: RobotDescriptor, urdf: Path, _modified: tuple[int, ...]) -> RobotModel:
+    model = read_model(read_urdf(urdf), str(urdf))
+    kinematics, hulls = _tree(model, robot.joints), read_hulls(model, urdf)
+    allowed = read_allowed_pairs(robot, model, urdf)
     return RobotModel(kinematics, hulls, counted_pairs(kinematics, hulls, allowed))
 
 
 @lru_cache(maxsize=64)
-def _read(
-    urdf: Path, joints: tuple[str, ...], _modified: int
-) -> tuple[UrdfModel, Tree, tuple[Hull, ...]]:
-    model = read_model(read_urdf(urdf), str(urdf))
-    kinematics = kinematic_tree(model, joints)
-    return model, kinematics, read_hulls(model, kinematics, urdf)
+def _tree(model: UrdfModel, joints: tuple[str, ...]) -> Tree:
+    return kinematic_tree(model, joints)
+
+
+@lru_cache(maxsize=64)
+def _hulls(model: UrdfModel, urdf: Path, _modified: int) -> tuple[Hull, ...]:
+    tree = kinematic_tree(model)  # every tree of a model has its links in the same order
+    return tuple(
+        _shape_hull(tree.link(link), shape, urdf)
+        for link in model.links
+        for shape in model.collisions.get(link, ())
+    )
 
 
 def _shape_hull(link: int, shape: UrdfShape, urdf: Path) -> Hull:
