@@ -284,11 +284,11 @@ class RobotDescriptor:
 
     @property
     def arm_joints(self) -> tuple[str, ...]:
-        """Joints of every group that is neither called ``gripper`` nor held."""
+        """Joints of every group that is neither a ``gripper`` by its name nor held."""
         driven = [
             group
             for name, group in self.action_split.groups.items()
-            if name != "gripper" and not group.held
+            if "gripper" not in name.split("_") and not group.held
         ]
         return tuple(joint for group in driven for joint in group.joints)
 
