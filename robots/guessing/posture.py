@@ -17,12 +17,15 @@ from robots.urdf.anatomy import FARTHEST_SLIDE, Limb
 DRAWS = 1500  # random postures of a limb
 BEST = 40  # of them, refined and then looked at for overlaps
 ROUNDS = 4  # of refinement, each with half the spread
-MARGIN = 0.08  # of a joint's range, which it stays away from its ends
+MARGIN = 0.1  # of a joint's range, which it stays away from its ends
 OUT = 0.55  # of the reach; where the TCP is best, ahead of the limb's first joint
-NEAR, FAR = 0.25, 0.92  # of the reach; where it may be
+NEAR, FAR = 0.35, 0.85  # of the reach; where it may be
 HEIGHT = 0.35  # of the reach, above the ground; best for an arm that stands on it
 HANGING = -0.25  # of the reach, below the shoulder; best for an arm on a body
 LOW = 0.02  # m above the ground; the least of any moving link
+PLAIN = 0.5  # weight of joints that leave the posture that the search starts from
+DOWN = 0.15  # weight of a tool that does not point down
+ONE_SIDED = 0.15  # of the reach; how far aside the middle of a workspace tells a front
 BESIDE = 0.35  # of the reach; how far the TCP may be to the side of what is ahead
 
 
@@ -132,9 +135,12 @@ class PostureSearch:
             view.reach = float(np.quantile(np.linalg.norm(places, axis=1), 0.98))
             ahead += places.mean(axis=0)
         ahead[2] = 0.0
-        length = float(np.linalg.norm(ahead))
         total = sum(view.reach for view in self._views)
-        angle = np.arctan2(ahead[1], ahead[0]) if length > 0.03 * total else 0.0
+        if np.linalg.norm(ahead) < ONE_SIDED * total:  # all around: then as it stands
+            ahead = sum((view.places(posture[None])[0] for view in self._views), np.zeros(3))
+            ahead[2] = 0.0
+        clear = np.linalg.norm(ahead) >= ONE_SIDED * total
+        angle = np.arctan2(ahead[1], ahead[0]) if clear else 0.0
         nearest = np.round(angle / (np.pi / 4)) * np.pi / 4
         angle = nearest if abs(angle - nearest) < np.pi / 10 else angle
         self._front = np.array([np.cos(angle), np.sin(angle), 0.0])
@@ -154,9 +160,11 @@ class PostureSearch:
         wanted = HEIGHT if stands else HANGING
         low, high = view.limits
         at = (postures[:, view.free] - (low + high) / 2) / (high - low) * 2
-        cost = (out - OUT) ** 2 + aside**2 + (height - wanted) ** 2 + 0.1 * (at**2).mean(axis=1)
-        cost += 0.15 * (1 + view.pointing(poses)[:, 2]) / 2
-        bad = (far < NEAR) | (far > FAR) | (out < 0.5 * NEAR) | (aside > BESIDE)
+        away = (postures[:, view.free] - self._start[view.free]) / (high - low) * 2
+        cost = (out - OUT) ** 2 + aside**2 + (height - wanted) ** 2
+        cost += PLAIN * (away**2).mean(axis=1)
+        cost += DOWN * (1 + view.pointing(poses)[:, 2]) / 2
+        bad = (far < NEAR) | (far > FAR) | (out < 0.8 * NEAR) | (aside > BESIDE)
         bad |= poses[:, view.moving, 2, 3].min(axis=1) < self._ground + LOW
         if strict:
             bad |= (np.abs(at[:, view.bounded]) > 1 - MARGIN).any(axis=1)
@@ -164,7 +172,9 @@ class PostureSearch:
 
     def _best(self, view: _View, posture: Floats, drawn: Floats) -> Floats:
         """Return the best posture of one limb that overlaps nothing, else the best."""
-        drawn = drawn.copy()
+        drawn, near = drawn.copy(), DRAWS // 2
+        pulled = (drawn[:near, view.free] + self._start[view.free]) / 2
+        drawn[:near, view.free] = np.clip(pulled, *view.room)
         fixed = np.delete(np.arange(len(posture)), view.free)
         drawn[:, fixed] = posture[fixed]
         pool = self._refined(view, drawn)
