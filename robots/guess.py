@@ -26,7 +26,7 @@ from robots.descriptor import (
 from robots.urdf.anatomy import FARTHEST_SLIDE, Anatomy, find_anatomy
 from robots.urdf.model import ModelJoint, UrdfModel
 from robots.urdf.reading import read_model
-from robots.urdf.summary import read_urdf
+from robots.urdf.summary import read_cleaned
 from robots.urdf.tree import kinematic_tree
 
 STIFFNESS, DAMPING, FORCE = 1e3, 1e2, 100.0  # what ManiSkill gives its Panda
@@ -73,7 +73,8 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     """
     locator = LocalUrdf(str(urdf))
     path = locator.locate()
-    model = read_model(read_urdf(path), path.as_posix())
+    cleaned = read_cleaned(path)
+    model = read_model(cleaned.xml, path.as_posix())
     anatomy = find_anatomy(model, path.as_posix())
     split, drives = _action_split(anatomy)
     rest, stance = _rest(anatomy, split)
@@ -94,7 +95,8 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     if unknown:
         known = ", ".join(RobotDescriptor.__dataclass_fields__)
         raise DescriptorError(f"a descriptor has no fields {unknown}; it has {known}")
-    reasons = (*anatomy.reasons, *drives, *_about_grasps(anatomy), stance, measured)
+    repairs = (f"repaired: {repair}" for repair in cleaned.repairs)
+    reasons = (*repairs, *anatomy.reasons, *drives, *_about_grasps(anatomy), stance, measured)
     given = tuple(f"{field}: given, not guessed" for field in overrides)
     return Guess(RobotDescriptor(**{**fields, **overrides}), (*reasons, *given))
 

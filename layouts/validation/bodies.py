@@ -22,6 +22,7 @@ from robots.urdf.shapes import UrdfShape
 from robots.urdf.srdf import read_excluded_pairs
 from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree
+from robots.urdf.xacro_files import template_of
 
 SIDES = 32  # of the polygon that stands for a circle; 0.5 % of the radius is lost
 
@@ -71,7 +72,7 @@ def load_model(robot: RobotDescriptor) -> RobotModel:
     """
     require_packages()
     urdf = robot.urdf.locate()
-    return _load(urdf, robot.joints, os.stat(urdf).st_mtime_ns)
+    return _load(urdf, robot.joints, os.stat(template_of(urdf)[0]).st_mtime_ns)
 
 
 def require_packages() -> None:

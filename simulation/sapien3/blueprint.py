@@ -19,7 +19,7 @@ import sapien.physx as physx
 from sapien.wrapper.urdf_loader import URDFLoader
 
 from robots import AssetError, RobotDescriptor
-from robots.urdf.mesh_files import load_scene, read_corners
+from robots.urdf.mesh_files import has_body, load_scene
 from robots.urdf.model import UrdfModel
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model
@@ -178,7 +178,7 @@ def _pairs(excluded: Iterable[ExcludedPair], model: UrdfModel, urdf: Path) -> li
 def _expect_meshes(model: UrdfModel, urdf: Path, *, visuals: bool) -> None:
     """Refuse meshes that the checks of a layout and its pictures would refuse."""
     for shape in _meshes(model.collisions.values()):
-        _expect_corners(*_identity(shape, urdf), shape.sizes, shape.where, urdf.as_posix())
+        has_body(_path(shape, urdf), shape.sizes, shape.where, urdf.as_posix())
     for shape in _meshes(model.visuals.values()) if visuals else ():
         _expect_scene(*_identity(shape, urdf), shape.where, urdf.as_posix())
 
@@ -194,13 +194,6 @@ def _identity(mesh: UrdfShape, urdf: Path) -> tuple[str, tuple[int, ...]]:
 
 
 # Reading takes trimesh milliseconds a file, and leaves garbage; a file is read once by a process.
-@lru_cache(maxsize=4096)
-def _expect_corners(
-    path: str, identity: tuple[int, ...], scale: tuple[float, ...], where: str, urdf: str
-) -> None:
-    read_corners(path, scale, where, urdf)
-
-
 @lru_cache(maxsize=4096)
 def _expect_scene(path: str, identity: tuple[int, ...], where: str, urdf: str) -> None:
     load_scene(path, where, urdf)
