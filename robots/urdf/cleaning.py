@@ -63,7 +63,7 @@ def is_template(xml: bytes, urdf: str) -> bool:
 @lru_cache(maxsize=64)
 def _references(xml: bytes, urdf: str) -> tuple[str, ...]:
     root, _ = parse_damaged(xml, urdf)
-    return tuple(mesh.get("filename", "") for mesh in root.iterfind("link/*/geometry/mesh"))
+    return tuple(mesh.get("filename", "") for mesh in root.iterfind("link/collision/geometry/mesh"))
 
 
 @lru_cache(maxsize=64)
