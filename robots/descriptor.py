@@ -257,6 +257,7 @@ class RobotDescriptor:
         name: str | None = None,
         *,
         quiet: bool = False,
+        xacro: Mapping[str, object] | None = None,
         **overrides: Any,
     ) -> RobotDescriptor:
         """Guess a robot from its URDF, and say on stderr what was guessed and why.
@@ -268,11 +269,12 @@ class RobotDescriptor:
             path_or_name: A URDF on this machine, or a name of the package robot_descriptions.
             name: Registry name; None takes that of the URDF.
             quiet: Whether to say nothing.
+            xacro: Arguments of a xacro template, as in ``{"prefix": "left_"}``.
             **overrides: Fields that are known better than guessed.
         """
         from robots.from_urdf import guess_descriptor
 
-        found = guess_descriptor(path_or_name, name, **overrides)
+        found = guess_descriptor(path_or_name, name, xacro=xacro, **overrides)
         if not quiet:
             print(found, file=sys.stderr)
         return found.descriptor

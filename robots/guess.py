@@ -37,7 +37,7 @@ from robots.urdf.anatomy import FARTHEST_SLIDE, PARTS, Anatomy, Limb, find_anato
 from robots.urdf.masses import read_masses
 from robots.urdf.model import ModelJoint, UrdfModel
 from robots.urdf.reading import read_model
-from robots.urdf.summary import parse_urdf, read_urdf
+from robots.urdf.summary import parse_urdf, read_cleaned
 from robots.urdf.tree import kinematic_tree
 
 REACH_STARTS = 8  # of the search for the largest distance
@@ -95,7 +95,8 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     """
     locator = LocalUrdf(str(urdf))
     path = locator.locate()
-    parts = _look_at(path)
+    cleaned = read_cleaned(path)
+    parts = _look_at(path, cleaned.xml)
     main = parts.anatomy.limbs[0]
     split, drives = _action_split(parts)
     allowed, overlaps = guess_allowed(parts.model, path)
@@ -119,13 +120,13 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
         known = ", ".join(RobotDescriptor.__dataclass_fields__)
         raise DescriptorError(f"a descriptor has no fields {unknown}; it has {known}")
     tools = [tool.reason for tool in parts.tools.values()]
-    reasons = (*parts.anatomy.reasons, *tools, *drives, *_about_grasps(parts), *stance, measured)
+    repairs = [f"repaired: {repair}" for repair in cleaned.repairs]
+    about = (*parts.anatomy.reasons, *tools, *_about_grasps(parts), *drives, *stance, measured)
     given = tuple(f"{field}: given, not guessed" for field in overrides)
-    return Guess(RobotDescriptor(**{**fields, **overrides}), (*reasons, *overlaps, *given))
+    return Guess(RobotDescriptor(**{**fields, **overrides}), (*repairs, *about, *overlaps, *given))
 
 
-def _look_at(path: Path) -> _Parts:
-    xml = read_urdf(path)
+def _look_at(path: Path, xml: bytes) -> _Parts:
     model = read_model(xml, path.as_posix())
     anatomy = find_anatomy(model, path.as_posix())
     stance = Stance(model)

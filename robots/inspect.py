@@ -19,7 +19,7 @@ from robots.fetch_assets import describe_file
 from robots.registry import RobotRegistry
 from robots.urdf.model import ModelJoint
 from robots.urdf.reading import read_model
-from robots.urdf.summary import read_urdf
+from robots.urdf.summary import read_cleaned, read_urdf
 from robots.urdf.tree import kinematic_tree, link_index
 
 
@@ -55,7 +55,7 @@ def report(robot: RobotDescriptor, store: AssetStore) -> str:
         store: The local copy of robot files to look into.
     """
     urdf, remark = find_urdf(robot, store)
-    sections = {
+    sections: dict[str, Iterable[str]] = {
         f"{robot.name}: {robot.summary}": [
             f"numbers from  {robot.source}",
             f"reach         {robot.reach:g} m from the base axis",
@@ -64,6 +64,7 @@ def report(robot: RobotDescriptor, store: AssetStore) -> str:
             f" {_row(robot.home.quaternion)}, keyframe {robot.home.keyframe!r}",
             f"URDF          {remark}",
         ],
+        **_repairs(urdf),
         "Joints that move": _joints(robot, urdf),
         "Action, each number from -1 to 1": map(str, robot.describe_action()),
         "Drives": _drives(robot),
@@ -77,6 +78,12 @@ def report(robot: RobotDescriptor, store: AssetStore) -> str:
     for title, body in sections.items():
         lines += [title, *(f"  {line}" for line in body), ""]
     return "\n".join(lines)
+
+
+def _repairs(urdf: Path | None) -> dict[str, tuple[str, ...]]:
+    """Return a section on what is repaired in a URDF, or none if nothing is."""
+    repairs = read_cleaned(urdf).repairs if urdf is not None else ()
+    return {"Repaired in the URDF": repairs} if repairs else {}
 
 
 def find_urdf(robot: RobotDescriptor, store: AssetStore) -> tuple[Path | None, str]:

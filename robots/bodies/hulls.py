@@ -26,6 +26,7 @@ from robots.urdf.shapes import UrdfShape
 from robots.urdf.srdf import srdf_beside
 from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree
+from robots.urdf.xacro_files import template_of
 
 SIDES = 32  # of the polygon that stands for a circle; 0.5 % of the radius is lost
 
@@ -77,7 +78,8 @@ def load_model(robot: RobotDescriptor) -> RobotModel:
     require_packages()
     urdf = robot.urdf.locate()
     beside = srdf_beside(urdf)
-    return _load(robot, urdf, tuple(os.stat(file).st_mtime_ns for file in (urdf, beside) if file))
+    files = (template_of(urdf)[0], beside)
+    return _load(robot, urdf, tuple(os.stat(file).st_mtime_ns for file in files if file))
 
 
 def require_packages() -> None:
@@ -107,7 +109,7 @@ def read_hulls(model: UrdfModel, urdf: Path) -> tuple[Hull, ...]:
         MissingPackageError: If trimesh or python-fcl is not installed.
     """
     require_packages()
-    return _hulls(model, urdf, os.stat(urdf).st_mtime_ns)
+    return _hulls(model, urdf, os.stat(template_of(urdf)[0]).st_mtime_ns)
 
 
 def counted_pairs(

@@ -19,13 +19,14 @@ import sapien.physx as physx
 from sapien.wrapper.urdf_loader import URDFLoader
 
 from robots import AssetError, RobotDescriptor
-from robots.urdf.mesh_files import load_scene, read_corners
+from robots.urdf.mesh_files import has_body, load_scene
 from robots.urdf.model import UrdfModel
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model
 from robots.urdf.shapes import UrdfShape
 from robots.urdf.srdf import ExcludedPair, read_excluded_pairs
 from robots.urdf.summary import parse_urdf, read_urdf
+from simulation.sapien3.mirrored import unmirrored
 
 MOST_PAIRS = 31  # that SAPIEN's loader can keep apart: a bit each
 
@@ -105,6 +106,8 @@ def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
         raise AssetError(
             f"SAPIEN cannot read {urdf}: {str(error) or type(error).__name__}"
         ) from error
+    tendons = builder.mimic_joint_records
+    builder.mimic_joint_records = [t for t in tendons if _needs_tendon(t, descriptor, model)]
     return Blueprint(urdf, model, builder)
 
 
@@ -136,7 +139,27 @@ class _Loader(URDFLoader):
             mesh = part.geometry.mesh
             if mesh is not None:
                 mesh.filename = resolve(mesh.filename, self.urdf, os.path.isfile)
+        for part in link.collisions:
+            mesh = part.geometry.mesh
+            if mesh is not None and mesh.scale is not None and min(mesh.scale) < 0:
+                where = f"{self.urdf}, link {link.name!r}"
+                scale = tuple(mesh.scale.tolist())
+                mesh.filename = unmirrored(mesh.filename, scale, where, self.urdf)
+                mesh.scale = None
         super()._build_link(link, link_builder)
+
+
+def _needs_tendon(mimic: Any, descriptor: RobotDescriptor, model: UrdfModel) -> bool:
+    """Tell whether SAPIEN should tie a joint to the one that it mimics.
+
+    Its ties are far stiffer than most drives, pull along a chain, and then end in NaN or a crash.
+    So a joint that has a drive of its own gets none, but for one beside its leader that moves just
+    as it does: ManiSkill ties such fingers, and what clones it is equal to its last bit.
+    """
+    parents = {joint.name: joint.parent for joint in model.joints}
+    alike = mimic.multiplier == 1 and mimic.offset == 0
+    beside = parents[mimic.joint] == parents[mimic.mimic]
+    return mimic.joint not in descriptor.joints or (alike and beside)
 
 
 def _for_sapien(root: ElementTree.Element, *, visuals: bool) -> str:
@@ -178,7 +201,7 @@ def _pairs(excluded: Iterable[ExcludedPair], model: UrdfModel, urdf: Path) -> li
 def _expect_meshes(model: UrdfModel, urdf: Path, *, visuals: bool) -> None:
     """Refuse meshes that the checks of a layout and its pictures would refuse."""
     for shape in _meshes(model.collisions.values()):
-        _expect_corners(*_identity(shape, urdf), shape.sizes, shape.where, urdf.as_posix())
+        has_body(_path(shape, urdf), shape.sizes, shape.where, urdf.as_posix())
     for shape in _meshes(model.visuals.values()) if visuals else ():
         _expect_scene(*_identity(shape, urdf), shape.where, urdf.as_posix())
 
@@ -194,13 +217,6 @@ def _identity(mesh: UrdfShape, urdf: Path) -> tuple[str, tuple[int, ...]]:
 
 
 # Reading takes trimesh milliseconds a file, and leaves garbage; a file is read once by a process.
-@lru_cache(maxsize=4096)
-def _expect_corners(
-    path: str, identity: tuple[int, ...], scale: tuple[float, ...], where: str, urdf: str
-) -> None:
-    read_corners(path, scale, where, urdf)
-
-
 @lru_cache(maxsize=4096)
 def _expect_scene(path: str, identity: tuple[int, ...], where: str, urdf: str) -> None:
     load_scene(path, where, urdf)
