@@ -168,7 +168,7 @@ def _action_split(parts: _Parts) -> tuple[ActionSplit, list[str]]:
         " brings them",
     ]
     if drives.raised:
-        listing = ", ".join(dict.fromkeys(drives.raised))
+        listing = ", ".join(drives.raised)
         reasons.append(
             f"forces: more than the URDF's efforts for {listing}, which would not bring them 0.04"
             " rad or m in a control step"

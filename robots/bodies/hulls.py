@@ -147,15 +147,24 @@ def _tree(model: UrdfModel, joints: tuple[str, ...]) -> Tree:
 def _hulls(model: UrdfModel, urdf: Path, _modified: int) -> tuple[Hull, ...]:
     tree = kinematic_tree(model)  # every tree of a model has its links in the same order
     return tuple(
-        _shape_hull(tree.link(link), shape, urdf)
+        convex_hull(tree.link(link), shape_corners(shape, urdf), shape.where)
         for link in model.links
         for shape in model.collisions.get(link, ())
     )
 
 
-def _shape_hull(link: int, shape: UrdfShape, urdf: Path) -> Hull:
-    corners = _corners(shape, urdf) @ shape.origin[:3, :3].T + shape.origin[:3, 3]
-    return convex_hull(link, corners, shape.where)
+def shape_corners(shape: UrdfShape, urdf: Path) -> Floats:
+    """Return the corners of a collision shape in the frame of its link, (n, 3) (m).
+
+    Args:
+        shape: The shape.
+        urdf: Its URDF, for the mesh that it may refer to.
+
+    Raises:
+        AssetError: If that mesh cannot be read.
+        MissingPackageError: If trimesh is not installed.
+    """
+    return _corners(shape, urdf) @ shape.origin[:3, :3].T + shape.origin[:3, 3]
 
 
 def _corners(shape: UrdfShape, urdf: Path) -> Floats:

@@ -8,6 +8,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinematics.rotations import Floats
 from robots.bodies.allowed import LinkPair, joined_pairs, rigid_groups, rigid_pairs, srdf_pairs
@@ -93,8 +94,10 @@ def always_overlapping(
     return frozenset(frozenset((names[a], names[b])) for a, b in waiting.tolist())
 
 
-def overlapping(hulls: Sequence[Hull], poses: Floats, pairs: Iterable[Sequence[int]]) -> Floats:
-    """Return for each pair of hulls whether they overlap, (pairs,), boolean.
+def overlapping(
+    hulls: Sequence[Hull], poses: Floats, pairs: Iterable[Sequence[int]]
+) -> NDArray[np.bool_]:
+    """Return for each pair of hulls whether they overlap, (pairs,).
 
     Args:
         hulls: Hulls of one robot.

@@ -57,24 +57,31 @@ class Drives:
         self._inertia: Mapping[str, float] = {
             joint.name: float(value) for joint, value in zip(moving, inertia, strict=True)
         }
-        self.raised: list[str] = []
+        self.raised: list[str] = []  # names of joints
 
     def of(self, joint: ModelJoint) -> Drive:
         """Return the drive of a joint that an action moves."""
+        drive, raised = self._drive(joint)
+        if raised and joint.name not in self.raised:
+            self.raised.append(joint.name)
+        return drive
+
+    def _drive(self, joint: ModelJoint) -> tuple[Drive, bool]:
+        """Return a drive, and whether its force is more than the URDF's effort."""
         inertia = self._inertia[joint.name]
         stiffness = max(STIFFNESS, inertia * FREQUENCY**2)
         needed = JUST_ENOUGH * inertia / CONTROL_STEP**2  # per step
         force = joint.effort or max(FORCE, needed * SHORTEST_STEP)
         step = min(LONGEST_STEP, force / needed) if needed else LONGEST_STEP
-        if step < SHORTEST_STEP:
-            self.raised.append(joint.name)
+        raised = step < SHORTEST_STEP
+        if raised:
             force, step = needed * SHORTEST_STEP, SHORTEST_STEP
         damping = 2 * (stiffness * inertia) ** 0.5
-        return Drive(*map(_rounded, (stiffness, damping, force)), step=_down(step))
+        return Drive(*map(_rounded, (stiffness, damping, force)), step=_down(step)), raised
 
     def holding(self, joint: ModelJoint) -> Drive:
         """Return the drive of a joint that stays where it starts."""
-        drive = self.of(joint)
+        drive, _ = self._drive(joint)
         force = max(drive.force_limit, FORCE) * HOLDING
         return Drive(drive.stiffness, drive.damping, _rounded(force), drive.step)
 

@@ -72,9 +72,17 @@ class Fingertips:
 
     def is_thumb(self, link: str) -> bool:
         """Tell whether a link belongs to a finger that is called a thumb."""
+        return self.is_called(link, "thumb")
+
+    def is_called(self, link: str, word: str) -> bool:
+        """Tell whether a link belongs to a finger that is called by a word."""
         path = self.stance.model.path_to(link)
         names = [joint.name for joint in path if joint in self.limb.fingers]
-        return any(words.has(name, ("thumb",)) for name in (link, *names))
+        return any(words.has(name, (word,)) for name in (link, *names))
+
+    def tip(self, end: str) -> Floats:
+        """Return the tip of one of ``ends``, in the root's frame, (3,) (m)."""
+        return self._tips[end]
 
     def _tip(self, link: str) -> Floats:
         """Return the mean of the outermost points of a link and what is rigid with it."""

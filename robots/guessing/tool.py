@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
@@ -15,6 +13,7 @@ from robots.urdf.anatomy import Limb
 
 BETWEEN = 0.05  # m; a frame named like a tool counts if it is so near to the place between tips
 EXACT = 0.02  # m; farther away, the reason says so
+OPPOSITE = ("index", "middle")  # fingers that a thumb meets, the first one first
 BLIND = (*words.HEAD, "optical", "imu", "ft", "force", "torque", "inertia", "range", "led")
 
 
@@ -100,56 +99,49 @@ def _between(
         return round(float(np.linalg.norm(places.mean(axis=0) - middle)), 6)
 
     ends = [link for link in rigid if words.is_tool(link) or words.has(link, words.HAND)]
-    named = sorted((off((link,)), link) for link in ends)
-    if named and named[0][0] <= BETWEEN:
-        link = named[0][1]
-        return Tool(link, (), f"{which}: the link {link}, which lies between the finger tips")
-    for candidates in (_tip_frames(stance, limb), _finger_links(tips)):
-        ranked = sorted((off(pair), pair) for pair in _pairs(tips, candidates))
-        if ranked and ranked[0][0] <= BETWEEN:
-            pair = ranked[0][1]
-            reason = f"{which}: the middle of {' and '.join(pair)}, turned as {limb.palm}"
-            return Tool(limb.palm, pair, reason + _apart(ranked[0][0]))
-    everything = [(off((link,)), (link,)) for link in (limb.palm, *rigid)]
-    everything += [(off(pair), pair) for pair in _pairs(tips, _finger_links(tips))]
-    distance, best = min(everything)
-    if best == (limb.palm,):
-        reason = f"{which}: the link {limb.palm}, which is only the palm{_apart(distance)}"
-        return Tool(limb.palm, (), reason)
-    if len(best) == 1:
-        return Tool(best[0], (), f"{which}: the link {best[0]}{_apart(distance)}")
-    reason = f"{which}: the middle of {' and '.join(best)}, turned as {limb.palm}"
-    return Tool(limb.palm, best, reason + _apart(distance))
+    ends += [limb.palm] if words.has(limb.palm, words.HAND) else []
+    named = min(((off((link,)), link) for link in ends), default=(np.inf, ""))
+    if named[0] <= BETWEEN:
+        reason = f"{which}: the link {named[1]}, which lies between the finger tips"
+        return Tool(named[1], (), reason)
+    frames = _grasping(stance, tips)
+    if off(frames) <= BETWEEN:
+        return _mean(limb, frames, which, off(frames))
+    choices = [(limb.palm,), *((link,) for link in rigid), frames]
+    distance, best = min((off(links), links) for links in choices)
+    if len(best) > 1:
+        return _mean(limb, best, which, distance)
+    only = ", which is only the palm" if best == (limb.palm,) else ", the nearest to the tips"
+    return Tool(best[0], (), f"{which}: the link {best[0]}{only}{_apart(distance)}")
+
+
+def _mean(limb: Limb, links: tuple[str, ...], which: str, distance: float) -> Tool:
+    listing = ", ".join(links[:-1]) + f" and {links[-1]}"
+    reason = f"{which}: the middle of {listing}, turned as {limb.palm}"
+    return Tool(limb.palm, links, reason + _apart(distance))
+
+
+def _grasping(stance: Stance, tips: Fingertips) -> tuple[str, ...]:
+    """Return the frame at the tip of each finger that grasps: all, or a thumb and its opposite."""
+    frames = {end: _frame_at(stance, tips, end) for end in tips.ends}
+    thumbs = [end for end in tips.ends if tips.is_thumb(end)]
+    others = [end for end in tips.ends if end not in thumbs]
+    if not thumbs or not others:
+        return tuple(frames.values())
+    named = [[end for end in others if tips.is_called(end, word)] for word in OPPOSITE]
+    opposite = next((ends[0] for ends in named if ends), others[0])
+    return (frames[thumbs[0]], frames[opposite])
+
+
+def _frame_at(stance: Stance, tips: Fingertips, end: str) -> str:
+    """Return the frame nearest to the tip of a finger; one that is called a tip before others."""
+    rigid = stance.model.rigid_with(end)
+    links = [link for link in rigid if words.has(link, words.TIP)] or list(rigid)
+    away = np.linalg.norm(stance.places(links) - tips.tip(end), axis=1)
+    return links[int(np.argmin(np.round(away, 6)))]
 
 
 def _apart(distance: float) -> str:
     if distance <= EXACT:
         return ""
     return f"; the finger tips meet {distance * 100:.0f} cm away, where no frame lies"
-
-
-def _tip_frames(stance: Stance, limb: Limb) -> list[str]:
-    """Return the links of a hand that are called tips, also of a jaw's other side."""
-    behind = [link for j in limb.fingers for link in stance.model.rigid_with(j.child)]
-    found = (*stance.model.rigid_with(limb.palm), *behind)
-    return [link for link in dict.fromkeys(found) if words.has(link, words.TIP)]
-
-
-def _finger_links(tips: Fingertips) -> list[str]:
-    model = tips.stance.model
-    return [link for joint in tips.limb.fingers for link in model.rigid_with(joint.child)]
-
-
-def _pairs(tips: Fingertips, links: list[str]) -> Iterator[tuple[str, ...]]:
-    """Yield pairs of links of different fingers, of which one is a thumb if there is one."""
-    known = set(_finger_links(tips))
-    thumbs = any(tips.is_thumb(link) for link in known)
-    for one, other in combinations(links, 2):
-        if one in known and other in known:
-            if tips.finger_of(one) == tips.finger_of(other):
-                continue
-            if thumbs and tips.is_thumb(one) == tips.is_thumb(other):
-                continue
-        yield (one, other)
-    if len(links) > 2:
-        yield tuple(links)

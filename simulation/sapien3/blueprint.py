@@ -26,6 +26,7 @@ from robots.urdf.reading import read_model
 from robots.urdf.shapes import UrdfShape
 from robots.urdf.srdf import ExcludedPair, read_excluded_pairs
 from robots.urdf.summary import parse_urdf, read_urdf
+from simulation.sapien3.collision_groups import overlap_words
 from simulation.sapien3.mirrored import unmirrored
 
 MOST_PAIRS = 31  # that SAPIEN's loader can keep apart: a bit each
@@ -45,26 +46,33 @@ class Blueprint:
         urdf: Its URDF.
         model: What that describes.
         builder: SAPIEN's builder of an articulation.
+        overlaps: Word 2 of the collision groups of links that may overlap others; None where
+            SAPIEN's loader has set them.
         checked: Whether an articulation that it built was compared with the model.
     """
 
     urdf: Path
     model: UrdfModel
     builder: Any
+    overlaps: dict[str, int] | None = None
     checked: bool = False
 
-    def build(self, scene: sapien.Scene, pose: sapien.Pose) -> Any:
+    def build(self, scene: sapien.Scene, pose: sapien.Pose, number: int = 0) -> Any:
         """Build an articulation in a scene and return it.
 
         Args:
             scene: SAPIEN's scene.
             pose: Of its base.
+            number: Which of the scene's robots it is; links of different robots always collide.
 
         Raises:
             AssetError: If SAPIEN left out a collision shape.
         """
         self.builder.set_scene(scene)
         self.builder.set_initial_pose(pose)
+        if self.overlaps is not None:
+            for link in self.builder.link_builders:
+                link.collision_groups = [1, 1, self.overlaps.get(link.name, 0), number + 1]
         articulation = self.builder.build()
         self.builder.set_scene(None)  # else it would keep the scene alive
         articulation.set_root_pose(pose)
@@ -84,6 +92,7 @@ def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
     Raises:
         AssetError: If its files cannot be found, or make no sense.
         MissingPackageError: If a mesh cannot be read for want of a package.
+        UnknownNameError: If ``allowed_collisions`` names a link that the URDF lacks.
     """
     urdf = descriptor.urdf.locate(pictures=visuals)
     contents = read_urdf(urdf)
@@ -99,7 +108,9 @@ def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
             loader.set_link_patch_radius(link, material.patch_radius)
             loader.set_link_min_patch_radius(link, material.patch_radius)
     text = _for_sapien(parse_urdf(contents, urdf.as_posix()), visuals=visuals)
-    pairs = _pairs(read_excluded_pairs(urdf), model, urdf)
+    own = descriptor.allowed_collisions is not None
+    overlaps = overlap_words(descriptor, model, urdf) if own else None
+    pairs = [] if own else _pairs(read_excluded_pairs(urdf), model, urdf)
     try:
         builder = loader.load_text(text, urdf, pairs)
     except Exception as error:  # SAPIEN's parser raises whatever it meets
@@ -108,7 +119,7 @@ def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
         ) from error
     tendons = builder.mimic_joint_records
     builder.mimic_joint_records = [t for t in tendons if _needs_tendon(t, descriptor, model)]
-    return Blueprint(urdf, model, builder)
+    return Blueprint(urdf, model, builder, overlaps)
 
 
 class _Loader(URDFLoader):
@@ -193,7 +204,8 @@ def _pairs(excluded: Iterable[ExcludedPair], model: UrdfModel, urdf: Path) -> li
     if apart > MOST_PAIRS:
         raise AssetError(
             f"the SRDF beside {urdf} leaves {apart} pairs of links out of collisions; SAPIEN can do"
-            f" so with {MOST_PAIRS} at most"
+            f" so with {MOST_PAIRS} at most (a descriptor that names them itself, as"
+            " allowed_collisions, may have more)"
         )
     return pairs
 
