@@ -205,6 +205,9 @@ class RobotDescriptor:
         fingers: The links that grasp, if it has any.
         cameras: Cameras on its links.
         home: Default standing place and keyframe.
+        allowed_collisions: Pairs of links that may overlap, besides those that a joint joins and
+            those that are rigid with each other; checks and physics let them. None takes what
+            ManiSkill's loader takes: of the SRDF beside the URDF the pairs of reason ``Default``.
     """
 
     name: str
@@ -219,6 +222,7 @@ class RobotDescriptor:
     fingers: Fingers | None = None
     cameras: tuple[CameraMount, ...] = ()
     home: Home = field(default_factory=Home)
+    allowed_collisions: tuple[tuple[str, str], ...] | None = None
 
     def __post_init__(self) -> None:
         """Freeze the keyframes and refuse contradictions."""
@@ -231,6 +235,11 @@ class RobotDescriptor:
         _expect(self.reach > 0, f"{self.name}: reach is {self.reach} m; it must be positive")
         _expect_different(f"{self.name}: tcp_position_links", self.tcp_position_links)
         _expect_different(f"{self.name}: cameras", [camera.name for camera in self.cameras])
+        pairs = self.allowed_collisions or ()
+        for i, pair in enumerate(pairs):
+            _expect_different(f"{self.name}: allowed_collisions[{i}]", pair)
+        written = [" and ".join(sorted(pair)) for pair in pairs]
+        _expect_different(f"{self.name}: allowed_collisions", written)
         frozen = {key: tuple(float(x) for x in qpos) for key, qpos in self.keyframes.items()}
         for key, qpos in frozen.items():
             _expect(
@@ -248,6 +257,7 @@ class RobotDescriptor:
         name: str | None = None,
         *,
         quiet: bool = False,
+        xacro: Mapping[str, object] | None = None,
         **overrides: Any,
     ) -> RobotDescriptor:
         """Guess a robot from its URDF, and say on stderr what was guessed and why.
@@ -259,11 +269,12 @@ class RobotDescriptor:
             path_or_name: A URDF on this machine, or a name of the package robot_descriptions.
             name: Registry name; None takes that of the URDF.
             quiet: Whether to say nothing.
+            xacro: Arguments of a xacro template, as in ``{"prefix": "left_"}``.
             **overrides: Fields that are known better than guessed.
         """
         from robots.from_urdf import guess_descriptor
 
-        found = guess_descriptor(path_or_name, name, **overrides)
+        found = guess_descriptor(path_or_name, name, xacro=xacro, **overrides)
         if not quiet:
             print(found, file=sys.stderr)
         return found.descriptor
@@ -275,11 +286,11 @@ class RobotDescriptor:
 
     @property
     def arm_joints(self) -> tuple[str, ...]:
-        """Joints of every group that is neither called ``gripper`` nor held."""
+        """Joints of every group that is neither a ``gripper`` by its name nor held."""
         driven = [
             group
             for name, group in self.action_split.groups.items()
-            if name != "gripper" and not group.held
+            if "gripper" not in name.split("_") and not group.held
         ]
         return tuple(joint for group in driven for joint in group.joints)
 

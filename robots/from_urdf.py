@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import redirect_stdout
 from difflib import get_close_matches
 from importlib import import_module
@@ -21,19 +21,26 @@ from robots.common.commands import exit_code, start
 from robots.common.errors import AssetError, MissingPackageError, UnknownNameError
 from robots.common.paths import absolute
 from robots.guess import Guess, guess
+from robots.urdf.xacro_files import template_of, with_arguments
 
 __all__ = ["Guess", "guess_descriptor", "main"]
 
 
 def guess_descriptor(
-    path_or_name: str | os.PathLike[str], name: str | None = None, **overrides: Any
+    path_or_name: str | os.PathLike[str],
+    name: str | None = None,
+    *,
+    xacro: Mapping[str, object] | None = None,
+    **overrides: Any,
 ) -> Guess:
     """Guess a robot's descriptor from its URDF; nothing is fetched for a path.
 
     Args:
         path_or_name: A URDF on this machine, or a name of the package robot_descriptions, which
-            clones the robot's repository if it has not before.
+            clones the robot's repository if it has not before. A xacro template will do, if the
+            package xacro is installed.
         name: Registry name; None takes that of the URDF.
+        xacro: Arguments of the template, as in ``{"prefix": "left_"}``.
         **overrides: Fields of `robots.RobotDescriptor` that are known better than guessed.
 
     Returns:
@@ -42,10 +49,11 @@ def guess_descriptor(
     Raises:
         AssetError: If the URDF or a mesh of it is missing, or it describes no robot.
         DescriptorError: If nothing moves, or an override contradicts the rest.
-        MissingPackageError: If a name is given and robot_descriptions is not installed.
+        MissingPackageError: If a name is given and robot_descriptions is not installed, or a
+            template and xacro is not.
         UnknownNameError: If robot_descriptions has no URDF of that name.
     """
-    return guess(_find(path_or_name), name, overrides)
+    return guess(with_arguments(_find(path_or_name), xacro or {}), name, overrides)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -58,20 +66,35 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("urdf", metavar="PATH", help="URDF, or name in robot_descriptions")
     parser.add_argument("--name", help="registry name of the robot")
     parser.add_argument("--module", action="store_true", help="print the data module to paste")
+    parser.add_argument(
+        "--xacro",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        type=_argument,
+        help="argument of a xacro template; may be given again",
+    )
     options = parser.parse_args(arguments)
     return exit_code(lambda: _print(options))
 
 
 def _print(options: argparse.Namespace) -> None:
-    found = guess_descriptor(options.urdf, options.name)
+    found = guess_descriptor(options.urdf, options.name, xacro=dict(options.xacro))
     print(found.module().rstrip("\n") if options.module else found)
+
+
+def _argument(text: str) -> tuple[str, str]:
+    key, equals, value = text.partition("=")
+    if not key or not equals:
+        raise argparse.ArgumentTypeError(f"{text!r} is not KEY=VALUE, such as prefix=left_")
+    return key, value
 
 
 def _find(path_or_name: str | os.PathLike[str]) -> Path:
     """Return the path, or what robot_descriptions has of that name."""
     path = absolute(path_or_name, "the path of the URDF")
     is_name = isinstance(path_or_name, str) and path_or_name.isidentifier()
-    if os.path.exists(path) or not is_name:
+    if os.path.exists(template_of(path)[0]) or not is_name:
         return path
     return _described(str(path_or_name))
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import random
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,9 @@ from kinematics.rotations import Floats, inverse_pose, transform
 from kinematics.solve import farthest
 from kinematics.tree import Tree
 from robots.assets.locator import LocalUrdf
+from robots.bodies.allowed import joined_pairs, rigid_pairs
+from robots.bodies.hulls import Hull, counted_pairs, read_hulls
+from robots.bodies.overlaps import guess_allowed
 from robots.common.errors import DescriptorError
 from robots.descriptor import (
     ActionSplit,
@@ -23,15 +27,19 @@ from robots.descriptor import (
     JointGroup,
     RobotDescriptor,
 )
-from robots.urdf.anatomy import FARTHEST_SLIDE, Anatomy, find_anatomy
+from robots.guessing.drives import CONTROL_STEP, Drives, alike, drive_fields
+from robots.guessing.fingertips import Fingertips
+from robots.guessing.grippers import Gripper, find_gripper
+from robots.guessing.posture import PostureSearch
+from robots.guessing.stance import Stance
+from robots.guessing.tool import Tool, find_tool
+from robots.urdf.anatomy import FARTHEST_SLIDE, PARTS, Anatomy, Limb, find_anatomy
+from robots.urdf.masses import read_masses
 from robots.urdf.model import ModelJoint, UrdfModel
 from robots.urdf.reading import read_model
-from robots.urdf.summary import read_urdf
+from robots.urdf.summary import parse_urdf, read_cleaned
 from robots.urdf.tree import kinematic_tree
 
-STIFFNESS, DAMPING, FORCE = 1e3, 1e2, 100.0  # what ManiSkill gives its Panda
-STEP = 0.1  # of an arm joint, per control step (rad, m)
-SQUEEZE = 0.01  # how far beyond closed a parallel gripper's target is (m)
 REACH_STARTS = 8  # of the search for the largest distance
 
 
@@ -59,6 +67,20 @@ class Guess:
         return write_module(self.descriptor, self.reasons)
 
 
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """What the steps of a guess share."""
+
+    model: UrdfModel
+    stance: Stance
+    anatomy: Anatomy
+    hulls: tuple[Hull, ...]
+    drives: Drives
+    tips: Mapping[str, Fingertips]
+    tools: Mapping[str, Tool]
+    grippers: Mapping[str, Gripper]
+
+
 def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     """Guess a descriptor.
 
@@ -73,30 +95,49 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     """
     locator = LocalUrdf(str(urdf))
     path = locator.locate()
-    model = read_model(read_urdf(path), path.as_posix())
-    anatomy = find_anatomy(model, path.as_posix())
-    split, drives = _action_split(anatomy)
-    rest, stance = _rest(anatomy, split)
-    distance, measured = _reach(model, anatomy, rest)
+    cleaned = read_cleaned(path)
+    parts = _look_at(path, cleaned.xml)
+    main = parts.anatomy.limbs[0]
+    split, drives = _action_split(parts)
+    allowed, overlaps = guess_allowed(parts.model, path)
+    rest, stance = _rest(parts, allowed)
+    distance, measured = _reach(parts, main, rest)
     fields: dict[str, Any] = {
-        "name": name or _as_name(model.name or path.stem),
+        "name": name or _as_name(parts.model.name or path.stem),
         "urdf": locator,
         "action_split": split,
-        "tcp_link": anatomy.tcp,
-        "tcp_position_links": anatomy.tips,
-        "gripper_material": _material(anatomy),
-        "fingers": _fingers(anatomy),
+        "tcp_link": parts.tools[main.name].link,
+        "tcp_position_links": parts.tools[main.name].links,
+        "gripper_material": _material(parts.anatomy),
+        "fingers": _fingers(main),
         "keyframes": {"rest": tuple(rest[joint] for joint in split.joints)},
         "reach": distance,
         "source": f"guessed from {path.name}",
+        "allowed_collisions": allowed,
     }
     unknown = sorted(set(overrides) - set(RobotDescriptor.__dataclass_fields__))
     if unknown:
         known = ", ".join(RobotDescriptor.__dataclass_fields__)
         raise DescriptorError(f"a descriptor has no fields {unknown}; it has {known}")
-    reasons = (*anatomy.reasons, *drives, *_about_grasps(anatomy), stance, measured)
+    tools = [tool.reason for tool in parts.tools.values()]
+    repairs = [f"repaired: {repair}" for repair in cleaned.repairs]
+    about = (*parts.anatomy.reasons, *tools, *_about_grasps(parts), *drives, *stance, measured)
     given = tuple(f"{field}: given, not guessed" for field in overrides)
-    return Guess(RobotDescriptor(**{**fields, **overrides}), (*reasons, *given))
+    return Guess(RobotDescriptor(**{**fields, **overrides}), (*repairs, *about, *overlaps, *given))
+
+
+def _look_at(path: Path, xml: bytes) -> _Parts:
+    model = read_model(xml, path.as_posix())
+    anatomy = find_anatomy(model, path.as_posix())
+    stance = Stance(model)
+    hulls = read_hulls(model, path) if find_spec("fcl") and find_spec("trimesh") else ()
+    masses = read_masses(parse_urdf(xml, path.as_posix()), stance.tree)
+    drives = Drives(stance, masses)
+    hands = [limb for limb in anatomy.limbs if limb.fingers]
+    tips = {limb.name: Fingertips(stance, limb, hulls) for limb in hands}
+    tools = {limb.name: find_tool(stance, limb, tips.get(limb.name)) for limb in anatomy.limbs}
+    grippers = {limb.name: find_gripper(limb, tips[limb.name], drives) for limb in hands}
+    return _Parts(model, stance, anatomy, hulls, drives, tips, tools, grippers)
 
 
 def _as_name(text: str) -> str:
@@ -104,24 +145,42 @@ def _as_name(text: str) -> str:
     return name if re.match(r"[a-z]", name) else f"robot_{name}".rstrip("_")
 
 
-def _action_split(anatomy: Anatomy) -> tuple[ActionSplit, list[str]]:
+def _action_split(parts: _Parts) -> tuple[ActionSplit, list[str]]:
     groups: dict[str, JointGroup] = {}
-    for part, joints in (("arm", anatomy.arm), ("body", anatomy.body)):
-        for name, alike in _by_unit(part, joints):
-            groups[name] = _relative(alike)
-    if anatomy.fingers:
-        groups["gripper"] = _gripper(anatomy.fingers)
-    for name, alike in _by_unit("base", anatomy.base):
+    drives = parts.drives
+    for limb in parts.anatomy.limbs:
+        for name, joints in _by_unit("arm", limb.arm):
+            groups[_of(limb, name)] = _relative(joints, drives)
+        if limb.name in parts.grippers:
+            groups.update(parts.grippers[limb.name].groups)
+    for part in PARTS:
+        for name, joints in _by_unit(part, parts.anatomy.parts.get(part, ())):
+            groups[name] = _held(joints, drives)
+    for name, joints in _by_unit("base", parts.anatomy.base):
         groups[name] = JointGroup.hold(
-            _names(alike), stiffness=1e5, damping=1e4, force_limit=1e5, unit=alike[0].unit
+            _names(joints), stiffness=1e5, damping=1e4, force_limit=1e5, unit=joints[0].unit
         )
-    order = ["arm_slide", "arm", "gripper"]  # then what else there is, the base last
-    ranked = sorted(groups, key=lambda name: order.index(name) if name in order else len(order))
-    return ActionSplit(**{name: groups[name] for name in ranked}), [
-        f"drives: stiffness {STIFFNESS:g}, damping {DAMPING:g} as ManiSkill's Panda; forces from"
-        f" the URDF's efforts, {FORCE:g} where it has none",
-        f"action: arm joints move by up to {STEP:g} rad or m per control step",
+    reasons = [
+        "drives: stiffness from the inertia that hangs on each joint, critically damped, so that a"
+        f" control step of {CONTROL_STEP:g} s covers what the action asks for; forces from the"
+        " URDF's efforts",
+        "action: arm joints move per control step by up to 0.1 rad or m, or as far as their force"
+        " brings them",
     ]
+    if drives.raised:
+        listing = ", ".join(drives.raised)
+        reasons.append(
+            f"forces: more than the URDF's efforts for {listing}, which would not bring them 0.04"
+            " rad or m in a control step"
+        )
+    return ActionSplit(**groups), reasons
+
+
+def _of(limb: Limb, group: str) -> str:
+    """Return the name of a limb's group: ``arm``, ``left_arm``, or ``arm_2``."""
+    if not limb.name:
+        return group
+    return f"{group}_{limb.name}" if limb.name.isdigit() else f"{limb.name}_{group}"
 
 
 def _by_unit(part: str, joints: Sequence[ModelJoint]) -> Iterator[tuple[str, list[ModelJoint]]]:
@@ -131,93 +190,40 @@ def _by_unit(part: str, joints: Sequence[ModelJoint]) -> Iterator[tuple[str, lis
             yield part + suffix, alike
 
 
-def _relative(joints: Sequence[ModelJoint]) -> JointGroup:
+def _relative(joints: Sequence[ModelJoint], drives: Drives) -> JointGroup:
+    made = [drives.of(joint) for joint in joints]
+    step = alike([drive.step for drive in made])
     return JointGroup(
         _names(joints),
-        lower=-STEP,
-        upper=STEP,
+        lower=-step if isinstance(step, float) else tuple(-value for value in step),
+        upper=step,
         delta=True,
         unit=joints[0].unit,
         limits=tuple(joint.span for joint in joints),
-        **_drive(joints),
+        **drive_fields(made),
     )
 
 
-def _gripper(fingers: Sequence[ModelJoint]) -> JointGroup:
-    unit = fingers[0].unit
-    leaders = [joint for joint in fingers if joint.mimics is None]
-    common: dict[str, Any] = {
-        "reset_noise": False,
-        "unit": unit,
-        "limits": tuple(joint.span for joint in fingers),
-        **_drive(fingers),
-    }
-    if any(joint.unit != unit for joint in fingers):
-        raise DescriptorError(
-            f"the gripper {', '.join(_names(fingers))} both turns and slides; declare its joint"
-            " groups by hand: action_split=ActionSplit(...)"
-        )
-    if len(leaders) == 1 or _is_parallel(leaders):
-        low, high = leaders[0].span
-        ratios = [_ratio(joint, fingers) for joint in fingers]
-        return JointGroup(
-            _names(fingers),
-            lower=low - SQUEEZE if unit == "m" else low,
-            upper=high,
-            mimic=len(fingers) > 1,
-            multipliers=_unless(1.0, [multiplier for multiplier, _ in ratios]),
-            offsets=_unless(0.0, [offset for _, offset in ratios]),
-            **common,
-        )
-    return JointGroup(_names(fingers), lower=-STEP, upper=STEP, delta=True, **common)
+def _held(joints: Sequence[ModelJoint], drives: Drives) -> JointGroup:
+    fields = drive_fields([drives.holding(joint) for joint in joints])
+    return JointGroup.hold(_names(joints), unit=joints[0].unit, **fields)
 
 
-def _is_parallel(leaders: Sequence[ModelJoint]) -> bool:
-    spans = {joint.span for joint in leaders}
-    return len(leaders) == 2 and len(spans) == 1 and leaders[0].type == "prismatic"
-
-
-def _ratio(joint: ModelJoint, joints: Sequence[ModelJoint]) -> tuple[float, float]:
-    """Return multiplier and offset from the leading joint to one that mimics it."""
-    if joint.mimics is None:
-        return 1.0, 0.0
-    leader = next((other for other in joints if other.name == joint.mimics), None)
-    if leader is None:
-        raise DescriptorError(f"{joint.name} mimics {joint.mimics}, which is not of the gripper")
-    multiplier, offset = _ratio(leader, joints)
-    return joint.multiplier * multiplier, joint.multiplier * offset + joint.offset
-
-
-def _unless(default: float, numbers: list[float]) -> tuple[float, ...]:
-    return () if all(number == default for number in numbers) else tuple(numbers)
-
-
-def _drive(joints: Sequence[ModelJoint]) -> dict[str, Any]:
-    forces = tuple(joint.effort if joint.effort else FORCE for joint in joints)
-    same = len(set(forces)) == 1
-    return {
-        "stiffness": STIFFNESS,
-        "damping": DAMPING,
-        "force_limit": forces[0] if same else forces,
-    }
-
-
-def _finger_links(anatomy: Anatomy) -> tuple[str, ...]:
-    links = tuple(joint.child for joint in anatomy.fingers)
-    return (anatomy.palm, *links) if len(links) == 1 else links
+def _finger_links(limb: Limb) -> tuple[str, ...]:
+    links = tuple(joint.child for joint in limb.fingers)
+    return (limb.palm, *links) if len(links) == 1 else links
 
 
 def _material(anatomy: Anatomy) -> GripperMaterial | None:
-    if not anatomy.fingers:
-        return None
-    return GripperMaterial(_finger_links(anatomy), 2.0, 2.0, 0.0, patch_radius=0.1)
+    links = tuple(link for limb in anatomy.limbs if limb.fingers for link in _finger_links(limb))
+    return GripperMaterial(links, 2.0, 2.0, 0.0, patch_radius=0.1) if links else None
 
 
-def _fingers(anatomy: Anatomy) -> Fingers | None:
+def _fingers(limb: Limb) -> Fingers | None:
     """Return the grasping links if both slide along their own y axis."""
-    if len(anatomy.fingers) != 2:
+    if len(limb.fingers) != 2:
         return None
-    one, other = anatomy.fingers
+    one, other = limb.fingers
     slide = all(j.type == "prismatic" and abs(j.axis[1]) > 0.99 for j in (one, other))
     if not slide:
         return None
@@ -225,53 +231,47 @@ def _fingers(anatomy: Anatomy) -> Fingers | None:
     return Fingers((one.child, other.child), opening_signs=signs)
 
 
-def _about_grasps(anatomy: Anatomy) -> Iterator[str]:
-    if not anatomy.fingers:
+def _about_grasps(parts: _Parts) -> Iterator[str]:
+    for gripper in parts.grippers.values():
+        yield from gripper.reasons
+    material = _material(parts.anatomy)
+    if material is None:
         return
-    mimics = [f"{joint.name} follows {joint.mimics}" for joint in anatomy.fingers if joint.mimics]
-    if mimics:
-        yield f"mimic joints, from the URDF: {', '.join(mimics)}"
-    elif _is_parallel(anatomy.fingers):
-        yield "one number drives both fingers, as they slide alike"
-    links = ", ".join(_finger_links(anatomy))
+    links = ", ".join(material.links)
     yield f"gripper_material: friction 2 on {links}, as ManiSkill's grippers have"
-    if _fingers(anatomy):
+    if _fingers(parts.anatomy.limbs[0]):
         yield "fingers: both slide along their y axis, in which they open"
     else:
         yield "fingers: none, so grasps go unnoticed; a Fingers(...) with two links changes that"
 
 
-def _rest(anatomy: Anatomy, split: ActionSplit) -> tuple[dict[str, float], str]:
-    """Return the keyframe: arms at 0 or mid-range, grippers open (rad, m)."""
-    everything = (*anatomy.base, *anatomy.arm, *anatomy.body, *anatomy.fingers)
-    rest = {joint.name: _middle(joint) for joint in everything}
-    gripper = split.groups.get("gripper")
-    if gripper is not None and not gripper.delta:
-        value = gripper.ranges[0][1]
-        for joint, (multiplier, offset) in zip(gripper.joints, gripper.followers, strict=True):
-            rest[joint] = multiplier * value + offset
-    return rest, "keyframe 'rest': joints at 0, or mid-range where 0 is out; the gripper at its end"
+def _rest(
+    parts: _Parts, allowed: tuple[tuple[str, str], ...]
+) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Return the keyframe (rad, m) and the reasons for it."""
+    excused = joined_pairs(parts.model) | rigid_pairs(parts.model)
+    excused |= frozenset(map(frozenset, allowed))
+    pairs = counted_pairs(parts.stance.tree, parts.hulls, excused)
+    opened = {k: v for gripper in parts.grippers.values() for k, v in gripper.open.items()}
+    tools = [(limb, parts.tools[limb.name]) for limb in parts.anatomy.limbs]
+    found = PostureSearch(parts.stance, tools, parts.hulls, pairs, opened).run()
+    return {**parts.stance.all_joints(found.position), **opened}, found.reasons
 
 
-def _middle(joint: ModelJoint) -> float:
-    low, high = joint.span
-    return 0.0 if low <= 0.0 <= high else round((low + high) / 2, 6)
-
-
-def _reach(model: UrdfModel, anatomy: Anatomy, rest: dict[str, float]) -> tuple[float, str]:
-    tree = kinematic_tree(model)
+def _reach(parts: _Parts, limb: Limb, rest: dict[str, float]) -> tuple[float, str]:
+    tree, tool = kinematic_tree(parts.model), parts.tools[limb.name]
     start = np.array([rest.get(joint, 0.0) for joint in tree.coordinates])
     poses = tree.forward(start[None])[0]
-    palm = tree.link(anatomy.palm)
-    tips = [tree.link(link) for link in anatomy.tips or (anatomy.tcp,)]
-    tool = transform(inverse_pose(poses[palm]), poses[tips, :3, 3]).mean(axis=0)
-    moving = [joint for joint in anatomy.arm if not _flies(joint)]
+    palm = tree.link(limb.palm)
+    tips = [tree.link(link) for link in tool.origins]
+    point = transform(inverse_pose(poses[palm]), poses[tips, :3, 3]).mean(axis=0)
+    moving = [joint for joint in limb.arm if not _flies(joint)]
     starts = _postures(tree, start, moving)
     free = [tree.coordinates.index(joint.name) for joint in moving]
     limits = tree.limits.copy()
     limits[free] = np.array([joint.span for joint in moving]).reshape(-1, 2)
-    found = farthest(replace(tree, limits=limits), palm, tool, starts, free)
-    if found < 0.01 or len(moving) < len(anatomy.arm):
+    found = farthest(replace(tree, limits=limits), palm, point, starts, free)
+    if found < 0.01 or len(moving) < len(limb.arm):
         return 1.0, "reach: 1 m, without ground, as nothing stands fixed or nothing reaches out"
     return round(found, 3), (
         "reach: the TCP's largest distance from the base's z axis within the joint limits;"
@@ -295,5 +295,5 @@ def _flies(joint: ModelJoint) -> bool:
     return joint.unit == "m" and high - low > FARTHEST_SLIDE
 
 
-def _names(joints: Iterable[ModelJoint]) -> tuple[str, ...]:
+def _names(joints: Sequence[ModelJoint]) -> tuple[str, ...]:
     return tuple(joint.name for joint in joints)

@@ -19,7 +19,7 @@ from robots.fetch_assets import describe_file
 from robots.registry import RobotRegistry
 from robots.urdf.model import ModelJoint
 from robots.urdf.reading import read_model
-from robots.urdf.summary import read_urdf
+from robots.urdf.summary import read_cleaned, read_urdf
 from robots.urdf.tree import kinematic_tree, link_index
 
 
@@ -55,7 +55,7 @@ def report(robot: RobotDescriptor, store: AssetStore) -> str:
         store: The local copy of robot files to look into.
     """
     urdf, remark = find_urdf(robot, store)
-    sections = {
+    sections: dict[str, Iterable[str]] = {
         f"{robot.name}: {robot.summary}": [
             f"numbers from  {robot.source}",
             f"reach         {robot.reach:g} m from the base axis",
@@ -64,11 +64,13 @@ def report(robot: RobotDescriptor, store: AssetStore) -> str:
             f" {_row(robot.home.quaternion)}, keyframe {robot.home.keyframe!r}",
             f"URDF          {remark}",
         ],
+        **_repairs(urdf),
         "Joints that move": _joints(robot, urdf),
         "Action, each number from -1 to 1": map(str, robot.describe_action()),
         "Drives": _drives(robot),
         "Keyframes (rad, m)": _keyframes(robot, urdf),
         "Gripper": _gripper(robot),
+        "Links that may overlap": _overlaps(robot),
         "Cameras": _cameras(robot),
         "Files": _files(robot, store),
     }
@@ -76,6 +78,12 @@ def report(robot: RobotDescriptor, store: AssetStore) -> str:
     for title, body in sections.items():
         lines += [title, *(f"  {line}" for line in body), ""]
     return "\n".join(lines)
+
+
+def _repairs(urdf: Path | None) -> dict[str, tuple[str, ...]]:
+    """Return a section on what is repaired in a URDF, or none if nothing is."""
+    repairs = read_cleaned(urdf).repairs if urdf is not None else ()
+    return {"Repaired in the URDF": repairs} if repairs else {}
 
 
 def find_urdf(robot: RobotDescriptor, store: AssetStore) -> tuple[Path | None, str]:
@@ -197,6 +205,15 @@ def _gripper(robot: RobotDescriptor) -> Iterator[str]:
             f"grasps while {' and '.join(fingers.links)} each feel {fingers.min_force:g} N or more,"
             f" within {fingers.max_angle:g}° of the direction they open in"
         )
+
+
+def _overlaps(robot: RobotDescriptor) -> Iterator[str]:
+    if robot.allowed_collisions is None:
+        yield "the SRDF's pairs of reason Default, and those that a joint joins"
+        return
+    yield "those that a joint joins or that are rigid with each other"
+    for one, other in robot.allowed_collisions:
+        yield f"{one} and {other}"
 
 
 def _cameras(robot: RobotDescriptor) -> Iterator[str]:

@@ -21,7 +21,6 @@ from layouts.validation.advice import (
     to_start_elsewhere,
     to_touch_itself_no_more,
 )
-from layouts.validation.bodies import RobotModel, load_model, slab_hull
 from layouts.validation.collisions import (
     Approach,
     Postures,
@@ -43,7 +42,9 @@ from layouts.validation.findings import (
 )
 from layouts.validation.reach import Reach, Solution, Workspace
 from layouts.validation.report import Report
+from layouts.validation.slabs import slab_hull
 from robots import LayoutError
+from robots.bodies.hulls import RobotModel, load_model
 from robots.common.commands import notice
 
 Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)

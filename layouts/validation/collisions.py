@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kinematics.rotations import Floats, pose_matrix
 from layouts.placement import Placement
-from layouts.validation.bodies import Hull, RobotModel
+from robots.bodies.hulls import Hull, RobotModel
 
 Pairs = NDArray[np.intp]  # (n, 2): indices of hulls
 

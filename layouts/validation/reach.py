@@ -10,8 +10,8 @@ import numpy as np
 from kinematics.rotations import Floats, pose_matrix
 from kinematics.solve import Goal, scattered, solve
 from layouts.placement import Placement
-from layouts.validation.bodies import RobotModel
 from robots import RobotDescriptor
+from robots.bodies.hulls import RobotModel
 from robots.descriptor import IDENTITY
 from robots.urdf.tree import link_index
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from kinematics.rotations import Floats
 from layouts.layout import Layout
-from layouts.validation.bodies import RobotModel, load_model
 from layouts.validation.collisions import stand, touching
 from layouts.viewer.text import printable
 from layouts.visuals import Part, read_visuals
 from robots import AssetError, LayoutError
+from robots.bodies.hulls import RobotModel, load_model
 
 
 @dataclass(frozen=True, eq=False)

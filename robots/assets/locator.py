@@ -65,7 +65,8 @@ class LocalUrdf:
     """A URDF that the user keeps on disk; making one touches nothing.
 
     Attributes:
-        path: Path of the URDF; ``~`` is the home directory.
+        path: Path of the URDF; ``~`` is the home directory. A xacro template will do, with its
+            arguments behind it: ``arm.urdf.xacro?prefix=left_``.
     """
 
     path: str | os.PathLike[str]

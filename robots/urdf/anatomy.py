@@ -1,44 +1,83 @@
-"""Which joints of a URDF are its arm, its gripper, its base: from the tree and the names."""
+"""The parts of a robot: its limbs with their grippers, and what moves besides, from its URDF.
+
+Told by structure first: where the tree of joints branches, how many joints follow, how long they
+are, what mimics what. Names help where several answers fit: the generic words of `robots.urdf.words`.
+"""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from robots.common.errors import DescriptorError
+from robots.urdf import words
+from robots.urdf.lengths import Lengths
 from robots.urdf.model import ModelJoint, UrdfModel
 
-BASE_WORDS = ("root", "world", "dummy", "planar", "virtual", "odom", "mobile", "wheel")
-JAW_WORDS = ("gripper", "jaw", "finger", "claw", "pincer", "knuckle")
-END_WORDS = ("ee", "eef", "endeffector", "effector", "tool", "tool0", "grasp")
-LONGEST_FINGER = 4  # joints in a row
 FARTHEST_SLIDE = 4.0  # m; a slide that goes farther is a way for a whole robot
+LONGEST_HAND = 0.4  # of the length of the arm that carries it
+LARGEST_HAND = 0.35  # m, of a hand without arm whose names do not say so
+FEWEST_ARM_JOINTS = 4  # of an arm whose names do not say so, beside other limbs
+WIDEST_JAW = 3.3  # rad; a joint that goes farther turns a wrist
+PARTS = ("torso", "head", "legs", "wheels", "body")  # what is no limb, in this order
+
+Joints = tuple[ModelJoint, ...]
+
+
+@dataclass(frozen=True)
+class Limb:
+    """An arm, or a hand without one, each part in the order base to tip.
+
+    Attributes:
+        name: ``left``, ``right``, a number, or empty if it is the only one.
+        arm: Joints from where it leaves the body to the palm.
+        fingers: Joints behind the palm; or the one joint of a jaw.
+        palm: Link that carries the fingers, or the last link of the arm.
+    """
+
+    name: str
+    arm: Joints
+    fingers: Joints
+    palm: str
 
 
 @dataclass(frozen=True)
 class Anatomy:
-    """The moving joints of a robot, by what they are for, each in the order base to tip.
+    """The moving joints of a robot, by what they are for.
 
     Attributes:
         base: Joints that move the robot as a whole.
-        arm: Joints from there to the palm.
-        fingers: Joints behind the palm; or the one joint of a jaw.
-        body: The others: heads, second arms, wheels.
-        palm: Link that carries the fingers, or the last link of the arm.
-        tcp: Link of the tool centre point.
-        tips: Two links whose mean origin is the tool centre point, if they are named as tips.
+        limbs: Its limbs, left before right.
+        parts: The others by part, one of `PARTS`; parts without joints are left out.
         reasons: What was concluded from what, one sentence each.
     """
 
-    base: tuple[ModelJoint, ...]
-    arm: tuple[ModelJoint, ...]
-    fingers: tuple[ModelJoint, ...]
-    body: tuple[ModelJoint, ...]
-    palm: str
-    tcp: str
-    tips: tuple[str, ...]
+    base: Joints
+    limbs: tuple[Limb, ...]
+    parts: Mapping[str, Joints]
     reasons: tuple[str, ...]
+
+
+@dataclass
+class _Chain:
+    """Joints in a row that end in a hand or in nothing; ``body`` is what else moves beside."""
+
+    joints: Joints
+    fingers: Joints = ()
+    palm: str = ""
+    kind: str = ""
+
+
+@dataclass
+class _Search:
+    """What the walk over the tree has found so far."""
+
+    model: UrdfModel
+    lengths: Lengths
+    base: Joints = ()
+    chains: list[_Chain] = field(default_factory=list)
+    torso: list[ModelJoint] = field(default_factory=list)
+    reasons: list[str] = field(default_factory=list)
 
 
 def find_anatomy(model: UrdfModel, urdf: str) -> Anatomy:
@@ -49,126 +88,247 @@ def find_anatomy(model: UrdfModel, urdf: str) -> Anatomy:
     """
     if not model.moving:
         raise DescriptorError(f"{urdf} has no joint that moves; there is nothing to drive")
-    reasons: list[str] = []
-    chain, fingers, body = _walk(model, reasons)
-    if not fingers and chain and _is_jaw(chain[-1]):
-        jaw = chain.pop()
-        fingers = (jaw,)
-        reasons.append(f"gripper: one jaw, {jaw.name}, the last joint, by its name")
-    if not fingers:
-        reasons.append("gripper: none, as no joints branch at the end and none is named like a jaw")
-    base, arm = _split_base(chain, reasons)
-    palm = fingers[0].parent if fingers else (arm or base)[-1].child
-    tcp, tips = _tool(model, palm, fingers, reasons)
-    return Anatomy(base, arm, fingers, body, palm, tcp, tips, tuple(reasons))
+    search = _Search(model, Lengths(model))
+    _walk(search, model.root, ())
+    for chain in search.chains:
+        chain.kind = chain.kind or _kind(chain, search.chains)
+    arms = [chain for chain in search.chains if chain.kind == "arm"] or _instead(search)
+    arms = [_with_jaw(search, chain) for chain in arms]
+    limbs = tuple(sorted(_named(search, arms), key=lambda limb: limb.name))
+    parts = {part: _joints_of(search, part) for part in PARTS}
+    parts = {part: joints for part, joints in parts.items() if joints}
+    _explain(search, limbs, parts)
+    return Anatomy(search.base, limbs, parts, tuple(search.reasons))
 
 
-def _walk(
-    model: UrdfModel, reasons: list[str]
-) -> tuple[list[ModelJoint], tuple[ModelJoint, ...], tuple[ModelJoint, ...]]:
-    """Follow the longest chain from the root to where it branches into fingers, or ends."""
-    chain: list[ModelJoint] = []
-    body: list[ModelJoint] = []
-    link = model.root
-    while nexts := model.moving_on(link):
-        if _are_fingers(model, nexts):
-            fingers = tuple(f for joint in nexts for f in model.below(joint))
-            reasons.append(
-                f"gripper: {_listing(fingers)}, as {fingers[0].parent} carries {len(nexts)} short"
-                " chains side by side"
-            )
-            return chain, fingers, tuple(body)
-        longest = max(nexts, key=lambda joint: model.depths[joint.name])  # the first of equals
-        shorter = [joint for joint in nexts if joint != longest]
-        others = [other for joint in shorter for other in model.below(joint)]
-        if others:
-            reasons.append(
-                f"body: {_listing(others)}, as {longest.name} leads on to the longer chain"
-                if model.depths[longest.name] > max(model.depths[joint.name] for joint in shorter)
-                else f"body: {_listing(others)}, a chain as long as that behind {longest.name}:"
-                " a second arm? Then make a group for each"
-            )
-        body += others
-        chain.append(longest)
-        link = longest.child
-    return chain, (), tuple(body)
+def _walk(search: _Search, link: str, path: Joints) -> None:
+    """Follow the tree from a link; ``path`` are the joints since the base or the last branch."""
+    nexts = search.model.moving_on(link)
+    if not nexts:
+        search.chains.append(_Chain(path, palm=path[-1].child))
+    elif len(nexts) == 1 and not path and _moves_the_whole(nexts[0]):
+        search.base += nexts
+        if search.model.moving_on(nexts[0].child):
+            _walk(search, nexts[0].child, ())
+    elif len(nexts) == 1:
+        _walk(search, nexts[0].child, (*path, *nexts))
+    elif _is_hand(search, link, nexts, path):
+        search.chains.append(_hand(search, nexts, path))
+    else:
+        _branch(search, nexts, path)
 
 
-def _are_fingers(model: UrdfModel, joints: Sequence[ModelJoint]) -> bool:
-    depths = sorted((model.depths[joint.name] for joint in joints), reverse=True)
-    return len(depths) > 1 and depths[0] <= LONGEST_FINGER and depths[0] - depths[1] <= 1
+def _branch(search: _Search, nexts: Joints, path: Joints) -> None:
+    """Tell a body that carries limbs from an arm that carries something beside."""
+    ranked = sorted(nexts, key=lambda joint: -search.lengths.behind(joint))
+    main, beside = ranked[0], ranked[1:]
+    if path and all(_is_accessory(search, joint, path) for joint in beside):
+        for joint in beside:
+            behind = search.model.below(joint)
+            search.chains.append(_Chain(behind, palm=behind[-1].child, kind="body"))
+        _walk(search, main.child, (*path, main))
+        return
+    search.torso += path
+    for joint in nexts:
+        _walk(search, joint.child, (joint,))
 
 
-def _is_jaw(joint: ModelJoint) -> bool:
-    return any(word in name.lower() for word in JAW_WORDS for name in (joint.name, joint.child))
-
-
-def _split_base(
-    chain: Sequence[ModelJoint], reasons: list[str]
-) -> tuple[tuple[ModelJoint, ...], tuple[ModelJoint, ...]]:
-    count = 0
-    while count < len(chain) and _moves_the_whole(chain[count]):
-        count += 1
-    base, arm = tuple(chain[:count]), tuple(chain[count:])
-    if base and not arm:
-        base, arm = (), base
-        reasons.append(f"arm: {_listing(arm)}; they move the whole robot, which so flies freely")
-        return base, arm
-    if base:
-        reasons.append(
-            f"base, held still: {_listing(base)}, by name or by going farther than"
-            f" {FARTHEST_SLIDE:g} m"
-        )
-    if arm:
-        reasons.append(f"arm: {_listing(arm)}, the longest chain from the base")
-    return base, arm
+def _is_accessory(search: _Search, joint: ModelJoint, path: Joints) -> bool:
+    """Tell whether a side branch is part of an arm: a strut that follows it, or a small thing."""
+    behind = search.model.below(joint)
+    names = _names(behind)
+    if any(words.has(name, (*words.HEAD, *words.LEG, *words.WHEEL)) for name in names):
+        return False
+    follows = all(other.mimics for other in behind)
+    return follows or (len(path) > 1 and len(behind) < 3 and not _says(behind, words.ARM))
 
 
 def _moves_the_whole(joint: ModelJoint) -> bool:
     low, high = joint.span
     far = joint.type == "prismatic" and high - low > FARTHEST_SLIDE
-    return far or bool(set(_words(joint.name)) & set(BASE_WORDS))
+    return far or bool(set(words.words(joint.name)) & set(words.BASE))
 
 
-def _tool(
-    model: UrdfModel, palm: str, fingers: Sequence[ModelJoint], reasons: list[str]
-) -> tuple[str, tuple[str, ...]]:
-    """Return the TCP link, and the tips that its position is the mean of, if there are two."""
-    rigid = model.rigid_with(palm)
-    for what, fits in (("tcp", _is_tcp), ("the end of an arm", _is_end)):
-        named = [link for link in rigid if fits(link)]
-        if named:
-            also = f"; so are {', '.join(named[1:])}" if named[1:] else ""
-            reasons.append(
-                f"TCP: the link {named[0]}, named like {what} and rigid with {palm}{also}"
-            )
-            return named[0], ()
-    behind = [link for joint in fingers for link in model.rigid_with(joint.child)]
-    tips = [link for link in dict.fromkeys((*rigid, *behind)) if "tip" in _words(link)]
-    if len(tips) == 2:
-        reasons.append(f"TCP: the middle of {tips[0]} and {tips[1]}, turned as {palm}")
-        return palm, (tips[0], tips[1])
-    last = palm if fingers else rigid[-1]
-    reasons.append(
-        f"TCP: the link {last}, for want of one named like a tool;"
-        + (" it is the palm, not the place between the fingers" if fingers else " it is the last")
+def _is_hand(search: _Search, link: str, nexts: Joints, path: Joints) -> bool:
+    """Tell whether a link that branches is a palm: all behind it is small, or named like fingers."""
+    behind = [search.model.below(joint) for joint in nexts]
+    if any(_is_other(joints) for joints in behind):
+        return False
+    span = max(search.lengths.between(link, joint) for joint in nexts)
+    arm = search.lengths.along(path)
+    named = all(_share(joints, words.FINGER) > 0.5 for joints in behind)
+    if named or (path and _is_called_palm(search.model, nexts)):
+        return not path or span <= max(arm, LARGEST_HAND)
+    return span <= LONGEST_HAND * arm if len(path) > 2 else span <= LARGEST_HAND and not path
+
+
+def _is_other(joints: Joints) -> bool:
+    """Tell whether most of some joints are called parts of an arm, a head, a leg or a wheel."""
+    known = (*words.ARM, *words.HEAD, *words.LEG, *words.WHEEL)
+    return _share(joints, known) > 0.5 and not _share(joints, words.FINGER) > 0.5
+
+
+def _is_called_palm(model: UrdfModel, nexts: Joints) -> bool:
+    """Tell whether a link that carries fingers is called a hand, or what is rigid with it is."""
+    return any(words.has(joint.parent, (*words.HAND, "palm")) for joint in nexts)
+
+
+def _hand(search: _Search, nexts: Joints, path: Joints) -> _Chain:
+    """Return the chain that ends in a hand; a joint that the fingers mimic belongs to the hand."""
+    fingers = tuple(f for joint in nexts for f in search.model.below(joint))
+    followed = {joint.mimics for joint in fingers}
+    leads = [i for i, joint in enumerate(path) if joint.name in followed]
+    start = min(leads, default=len(path))
+    carriers = [joint.parent for joint in nexts]
+    palm = max(dict.fromkeys(carriers), key=carriers.count)  # the first of equals
+    if start < len(path):
+        palm = path[start].parent
+    return _Chain(path[:start], (*path[start:], *fingers), palm)
+
+
+def _kind(chain: _Chain, chains: Sequence[_Chain]) -> str:
+    """Return what a chain is: ``arm``, or one of `PARTS`."""
+    joints = (*chain.joints, *chain.fingers)
+    arms, legs = _share(joints, words.ARM), _share(joints, words.LEG)
+    if _share(joints, words.WHEEL) >= 0.5 or _turns_freely(chain):
+        return "wheels" if len(chains) > 1 else "arm"
+    if _share(joints, words.HEAD) >= 0.5 and arms < 0.5:
+        return "head"
+    if legs >= 0.3 and legs > arms and not chain.fingers:
+        return "legs"
+    if chain.fingers or arms >= 0.3 or len(chains) == 1:
+        return "arm"
+    if _share(joints, words.TORSO) >= 0.5:
+        return "torso"
+    return "arm" if len(joints) >= FEWEST_ARM_JOINTS and not _many(chain, chains) else "body"
+
+
+def _turns_freely(chain: _Chain) -> bool:
+    return len(chain.joints) <= 2 and all(joint.type == "continuous" for joint in chain.joints)
+
+
+def _many(chain: _Chain, chains: Sequence[_Chain]) -> bool:
+    """Tell whether a chain is one of four or more alike, which are legs, beside a longer one."""
+    count = len(chain.joints)
+    alike = sum(len(other.joints) == count and not other.fingers for other in chains)
+    return alike >= 4 and any(len(other.joints) > count or other.fingers for other in chains)
+
+
+def _instead(search: _Search) -> list[_Chain]:
+    """Return what stands for arms in a robot that has none: legs, or what else moves."""
+    for kind in ("legs", "body", "head", "torso", "wheels"):
+        found = [chain for chain in search.chains if chain.kind == kind]
+        if found:
+            for chain in found:
+                chain.kind = "arm"
+            search.reasons.append(f"arm: none is recognised, so the {kind} are driven as arms")
+            return found
+    torso = tuple(search.torso) or search.base
+    search.torso, search.base = [], ()
+    search.reasons.append(
+        f"arm: {_listing(torso)}; they move the whole robot, which so flies freely"
     )
-    return last, ()
+    return [_Chain(torso, palm=torso[-1].child, kind="arm")]
 
 
-def _is_tcp(link: str) -> bool:
-    return "tcp" in _words(link)
+def _with_jaw(search: _Search, chain: _Chain) -> _Chain:
+    """Make the last joint of an arm its gripper if it is one jaw, and the base an arm if need be."""
+    fingers_only = _share(chain.joints, words.JAW) > 0.5
+    if len(chain.joints) > 1 and not (chain.fingers or fingers_only) and _is_jaw(chain.joints[-1]):
+        jaw = chain.joints[-1]
+        start = len(chain.joints) - 1
+        if jaw.mimics == chain.joints[start - 1].name:
+            start -= 1
+        chain = replace(chain, joints=chain.joints[:start], fingers=chain.joints[start:])
+        chain.palm = chain.fingers[0].parent
+        search.reasons.append(f"gripper: one jaw, {jaw.name}, the last joint, by its name")
+    return chain
 
 
-def _is_end(link: str) -> bool:
-    words = _words(link)
-    return bool(set(words) & set(END_WORDS)) or "end_effector" in "_".join(words)
+def _is_jaw(joint: ModelJoint) -> bool:
+    low, high = joint.span
+    named = any(words.has(name, words.JAW) for name in (joint.name, joint.child))
+    return named and high - low <= WIDEST_JAW and not words.has(joint.name, words.WRIST)
 
 
-def _words(name: str) -> list[str]:
-    apart = re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", name)
-    return [re.sub(r"(?<=tcp)\d+$", "", word) for word in re.split(r"[^a-z0-9]+", apart.lower())]
+def _named(search: _Search, arms: Sequence[_Chain]) -> list[Limb]:
+    """Return the limbs, named by side: as their names say, else by where they begin, else numbers."""
+    if len(arms) == 1:
+        (chain,) = arms
+        if not chain.joints and not search.torso:  # a hand that flies
+            chain.joints, search.base = search.base, ()
+        return [Limb("", chain.joints, chain.fingers, chain.palm)]
+    sides = [words.side(_names(chain.joints or chain.fingers)) for chain in arms]
+    if sorted(sides) != ["left", "right"]:
+        across = [search.lengths.place((chain.joints or chain.fingers)[0])[1] for chain in arms]
+        if len(arms) == 2 and abs(across[0] - across[1]) > 0.01:
+            sides = ["left" if y == max(across) else "right" for y in across]
+        else:
+            sides = [str(i + 1) for i in range(len(arms))]
+    return [
+        Limb(side, chain.joints, chain.fingers, chain.palm)
+        for side, chain in zip(sides, arms, strict=True)
+    ]
 
 
-def _listing(joints: Sequence[ModelJoint]) -> str:
+def _joints_of(search: _Search, part: str) -> Joints:
+    chains = [chain for chain in search.chains if chain.kind == part]
+    joints = [joint for chain in chains for joint in (*chain.joints, *chain.fingers)]
+    return (*(search.torso if part == "torso" else ()), *joints)
+
+
+def _explain(search: _Search, limbs: Iterable[Limb], parts: Mapping[str, Joints]) -> None:
+    why = {
+        "torso": "as limbs branch off behind it",
+        "head": "by name",
+        "legs": "by name",
+        "wheels": "by name, or as they turn without end",
+        "body": "as it is neither arm nor gripper",
+    }
+    reasons = search.reasons
+    if search.base:
+        reasons.append(
+            f"base, held still: {_listing(search.base)}, by name or by going farther than"
+            f" {FARTHEST_SLIDE:g} m"
+        )
+    for part, joints in parts.items():
+        reasons.append(
+            f"{part}, held still: {_listing(joints)}, {why[part]}; a JointGroup in the place of"
+            " JointGroup.hold drives it"
+        )
+    for limb in limbs:
+        which = f"{limb.name} " if limb.name else ""
+        if limb.arm:
+            reasons.append(f"{which}arm: {_listing(limb.arm)}, the joints in a row to {limb.palm}")
+        count = len({joint.parent for joint in limb.fingers})
+        if len(limb.fingers) > 1:
+            reasons.append(
+                f"{which}gripper: {_listing(limb.fingers)}, as {limb.palm} carries"
+                f" {len(search.model.moving_on(limb.palm))} short chains side by side"
+                if count
+                else ""
+            )
+        elif not limb.fingers:
+            reasons.append(
+                f"{which}gripper: none, as no joints branch at the end and none is named like a jaw"
+            )
+
+
+def _says(joints: Iterable[ModelJoint], known: Sequence[str]) -> bool:
+    return any(words.has(name, known) for name in _names(joints))
+
+
+def _share(joints: Sequence[ModelJoint], known: Sequence[str]) -> float:
+    """Return the share of joints that hold one of some words in their name or their link's."""
+    named = [any(words.has(n, known) for n in (j.name, j.child)) for j in joints]
+    return sum(named) / max(len(named), 1)
+
+
+def _names(joints: Iterable[ModelJoint]) -> list[str]:
+    return [name for joint in joints for name in (joint.name, joint.child)]
+
+
+def _listing(joints: Iterable[ModelJoint]) -> str:
     return ", ".join(joint.name for joint in joints)
+
+

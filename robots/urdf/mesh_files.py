@@ -13,6 +13,7 @@ import posixpath
 import re
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 from urllib.parse import unquote
 
@@ -35,6 +36,10 @@ _WRONG_FACE = re.compile(
 
 Floats = Any
 """An array of float64."""
+
+
+class _NoVolumeError(AssetError):
+    """A mesh that can be read, and that nothing can touch."""
 
 
 def load_scene(path: str, where: str, urdf: str | None = None, **options: Any) -> Any:
@@ -103,7 +108,7 @@ def read_corners(path: str, scale: Sequence[float], where: str, urdf: str) -> Fl
     except Exception as error:  # what the reader left behind may be anything
         raise AssetError(f"{where}: cannot read the mesh {path}: {_line(error)}") from error
     if len(corners) == 0 or len(mesh.faces) == 0:
-        raise AssetError(f"{where}: the mesh {path} is empty")
+        raise _NoVolumeError(f"{where}: the mesh {path} is empty")
     farthest = float(np.abs(corners).max())
     if not farthest <= LARGEST:
         raise AssetError(
@@ -111,11 +116,46 @@ def read_corners(path: str, scale: Sequence[float], where: str, urdf: str) -> Fl
             f" {LARGEST:g} m (are its lengths in other units? then give it a scale)"
         )
     if not has_volume(corners):
-        raise AssetError(
+        raise _NoVolumeError(
             f"{where}: the mesh {path} is a collision shape without a volume: all its corners lie"
             " in one plane"
         )
     return corners
+
+
+def has_body(path: str, scale: Sequence[float], where: str, urdf: str) -> bool:
+    """Tell whether a mesh that collides can be touched: whether it is neither empty nor flat.
+
+    A file is read once by a process, and again if it changes: reading takes trimesh milliseconds,
+    and leaves garbage.
+
+    Args:
+        path: The file.
+        scale: Factors along x, y and z.
+        where: What refers to it, for messages.
+        urdf: The URDF that it belongs to.
+
+    Raises:
+        AssetError: If it cannot be read; see `read_corners`.
+        MissingPackageError: If trimesh or pycollada is not installed.
+    """
+    try:
+        status = os.stat(path)
+    except OSError:
+        return _has_body(path, (), tuple(scale), where, urdf)
+    identity = (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
+    return _has_body(path, identity, tuple(scale), where, urdf)
+
+
+@lru_cache(maxsize=4096)
+def _has_body(
+    path: str, identity: tuple[int, ...], scale: tuple[float, ...], where: str, urdf: str
+) -> bool:
+    try:
+        read_corners(path, scale, where, urdf)
+    except _NoVolumeError:
+        return False
+    return True
 
 
 def has_volume(corners: Floats) -> bool:

@@ -8,12 +8,12 @@ from xml.etree import ElementTree
 
 from robots.common.errors import AssetError, UnreadableFileError
 from robots.common.files import read_regular
+from robots.urdf.cleaning import Cleaned, clean, is_template
 from robots.urdf.paths import Exists, resolve
+from robots.urdf.xacro_files import XACRO, expand, template_of
 from robots.urdf.xml_text import parse_xml
 
 MAX_URDF_BYTES = 32 << 20
-
-_XACRO = "www.ros.org/wiki/xacro"  # of the namespace {http://www.ros.org/wiki/xacro}
 
 
 @dataclass(frozen=True)
@@ -30,11 +30,35 @@ class UrdfReferences:
 
 
 def read_urdf(path: Path) -> bytes:
-    """Return the contents of a URDF or SRDF.
+    """Return the contents of a URDF, repaired where it is clear how, or of an SRDF.
 
     Raises:
-        AssetError: If it cannot be read, is no regular file, or is larger than `MAX_URDF_BYTES`.
+        AssetError: If it cannot be read, is no regular file, is larger than `MAX_URDF_BYTES`, is
+            no XML, or is a template that cannot be expanded.
+        MissingPackageError: If it is a template and xacro is not installed.
     """
+    return _read(path) if path.suffix == ".srdf" else read_cleaned(path).xml
+
+
+def read_cleaned(path: Path) -> Cleaned:
+    """Return the contents of a URDF, repaired where it is clear how, and what was repaired.
+
+    Args:
+        path: A URDF or a xacro template, with its arguments if it has some; see
+            `robots.urdf.xacro_files.with_arguments`.
+
+    Raises:
+        AssetError: As `read_urdf`.
+        MissingPackageError: As `read_urdf`.
+    """
+    file, arguments = template_of(path)
+    contents = _read(file)
+    if arguments or is_template(contents, str(file)):
+        contents = expand(file, arguments)
+    return clean(contents, path.as_posix())
+
+
+def _read(path: Path) -> bytes:
     try:
         return read_regular(path, MAX_URDF_BYTES)
     except UnreadableFileError as error:
@@ -76,6 +100,6 @@ def parse_urdf(xml: bytes, urdf: str) -> ElementTree.Element:
     root = parse_xml(xml, urdf, "a URDF")
     if root.tag != "robot":
         raise AssetError(f"{urdf} is not a URDF: it holds <{root.tag}>, not <robot>")
-    if any(_XACRO in element.tag for element in root.iter()):
-        raise AssetError(f"{urdf} is a xacro template; `xacro {urdf} > robot.urdf` makes a URDF")
+    if any(XACRO in element.tag for element in root.iter()):
+        raise AssetError(f"{urdf} is a xacro template; only a file of its own is expanded")
     return root

@@ -19,13 +19,15 @@ import sapien.physx as physx
 from sapien.wrapper.urdf_loader import URDFLoader
 
 from robots import AssetError, RobotDescriptor
-from robots.urdf.mesh_files import load_scene, read_corners
+from robots.urdf.mesh_files import has_body, load_scene
 from robots.urdf.model import UrdfModel
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model
 from robots.urdf.shapes import UrdfShape
 from robots.urdf.srdf import ExcludedPair, read_excluded_pairs
 from robots.urdf.summary import parse_urdf, read_urdf
+from simulation.sapien3.collision_groups import overlap_words
+from simulation.sapien3.mirrored import unmirrored
 
 MOST_PAIRS = 31  # that SAPIEN's loader can keep apart: a bit each
 
@@ -44,26 +46,33 @@ class Blueprint:
         urdf: Its URDF.
         model: What that describes.
         builder: SAPIEN's builder of an articulation.
+        overlaps: Word 2 of the collision groups of links that may overlap others; None where
+            SAPIEN's loader has set them.
         checked: Whether an articulation that it built was compared with the model.
     """
 
     urdf: Path
     model: UrdfModel
     builder: Any
+    overlaps: dict[str, int] | None = None
     checked: bool = False
 
-    def build(self, scene: sapien.Scene, pose: sapien.Pose) -> Any:
+    def build(self, scene: sapien.Scene, pose: sapien.Pose, number: int = 0) -> Any:
         """Build an articulation in a scene and return it.
 
         Args:
             scene: SAPIEN's scene.
             pose: Of its base.
+            number: Which of the scene's robots it is; links of different robots always collide.
 
         Raises:
             AssetError: If SAPIEN left out a collision shape.
         """
         self.builder.set_scene(scene)
         self.builder.set_initial_pose(pose)
+        if self.overlaps is not None:
+            for link in self.builder.link_builders:
+                link.collision_groups = [1, 1, self.overlaps.get(link.name, 0), number + 1]
         articulation = self.builder.build()
         self.builder.set_scene(None)  # else it would keep the scene alive
         articulation.set_root_pose(pose)
@@ -83,6 +92,7 @@ def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
     Raises:
         AssetError: If its files cannot be found, or make no sense.
         MissingPackageError: If a mesh cannot be read for want of a package.
+        UnknownNameError: If ``allowed_collisions`` names a link that the URDF lacks.
     """
     urdf = descriptor.urdf.locate(pictures=visuals)
     contents = read_urdf(urdf)
@@ -98,14 +108,18 @@ def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
             loader.set_link_patch_radius(link, material.patch_radius)
             loader.set_link_min_patch_radius(link, material.patch_radius)
     text = _for_sapien(parse_urdf(contents, urdf.as_posix()), visuals=visuals)
-    pairs = _pairs(read_excluded_pairs(urdf), model, urdf)
+    own = descriptor.allowed_collisions is not None
+    overlaps = overlap_words(descriptor, model, urdf) if own else None
+    pairs = [] if own else _pairs(read_excluded_pairs(urdf), model, urdf)
     try:
         builder = loader.load_text(text, urdf, pairs)
     except Exception as error:  # SAPIEN's parser raises whatever it meets
         raise AssetError(
             f"SAPIEN cannot read {urdf}: {str(error) or type(error).__name__}"
         ) from error
-    return Blueprint(urdf, model, builder)
+    tendons = builder.mimic_joint_records
+    builder.mimic_joint_records = [t for t in tendons if _needs_tendon(t, descriptor, model)]
+    return Blueprint(urdf, model, builder, overlaps)
 
 
 class _Loader(URDFLoader):
@@ -136,7 +150,27 @@ class _Loader(URDFLoader):
             mesh = part.geometry.mesh
             if mesh is not None:
                 mesh.filename = resolve(mesh.filename, self.urdf, os.path.isfile)
+        for part in link.collisions:
+            mesh = part.geometry.mesh
+            if mesh is not None and mesh.scale is not None and min(mesh.scale) < 0:
+                where = f"{self.urdf}, link {link.name!r}"
+                scale = tuple(mesh.scale.tolist())
+                mesh.filename = unmirrored(mesh.filename, scale, where, self.urdf)
+                mesh.scale = None
         super()._build_link(link, link_builder)
+
+
+def _needs_tendon(mimic: Any, descriptor: RobotDescriptor, model: UrdfModel) -> bool:
+    """Tell whether SAPIEN should tie a joint to the one that it mimics.
+
+    Its ties are far stiffer than most drives, pull along a chain, and then end in NaN or a crash.
+    So a joint that has a drive of its own gets none, but for one beside its leader that moves just
+    as it does: ManiSkill ties such fingers, and what clones it is equal to its last bit.
+    """
+    parents = {joint.name: joint.parent for joint in model.joints}
+    alike = mimic.multiplier == 1 and mimic.offset == 0
+    beside = parents[mimic.joint] == parents[mimic.mimic]
+    return mimic.joint not in descriptor.joints or (alike and beside)
 
 
 def _for_sapien(root: ElementTree.Element, *, visuals: bool) -> str:
@@ -170,7 +204,8 @@ def _pairs(excluded: Iterable[ExcludedPair], model: UrdfModel, urdf: Path) -> li
     if apart > MOST_PAIRS:
         raise AssetError(
             f"the SRDF beside {urdf} leaves {apart} pairs of links out of collisions; SAPIEN can do"
-            f" so with {MOST_PAIRS} at most"
+            f" so with {MOST_PAIRS} at most (a descriptor that names them itself, as"
+            " allowed_collisions, may have more)"
         )
     return pairs
 
@@ -178,7 +213,7 @@ def _pairs(excluded: Iterable[ExcludedPair], model: UrdfModel, urdf: Path) -> li
 def _expect_meshes(model: UrdfModel, urdf: Path, *, visuals: bool) -> None:
     """Refuse meshes that the checks of a layout and its pictures would refuse."""
     for shape in _meshes(model.collisions.values()):
-        _expect_corners(*_identity(shape, urdf), shape.sizes, shape.where, urdf.as_posix())
+        has_body(_path(shape, urdf), shape.sizes, shape.where, urdf.as_posix())
     for shape in _meshes(model.visuals.values()) if visuals else ():
         _expect_scene(*_identity(shape, urdf), shape.where, urdf.as_posix())
 
@@ -194,13 +229,6 @@ def _identity(mesh: UrdfShape, urdf: Path) -> tuple[str, tuple[int, ...]]:
 
 
 # Reading takes trimesh milliseconds a file, and leaves garbage; a file is read once by a process.
-@lru_cache(maxsize=4096)
-def _expect_corners(
-    path: str, identity: tuple[int, ...], scale: tuple[float, ...], where: str, urdf: str
-) -> None:
-    read_corners(path, scale, where, urdf)
-
-
 @lru_cache(maxsize=4096)
 def _expect_scene(path: str, identity: tuple[int, ...], where: str, urdf: str) -> None:
     load_scene(path, where, urdf)

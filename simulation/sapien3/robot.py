@@ -29,7 +29,12 @@ class SimulatedRobot:
     """
 
     def __init__(
-        self, scene: sapien.Scene, name: str, placement: Placement, blueprint: Blueprint
+        self,
+        scene: sapien.Scene,
+        name: str,
+        placement: Placement,
+        blueprint: Blueprint,
+        number: int = 0,
     ) -> None:
         """Build it in ``scene``, stand it at its placement and set its drives.
 
@@ -38,6 +43,7 @@ class SimulatedRobot:
             name: Its name in the layout.
             placement: What it is and where it stands.
             blueprint: What `simulation.sapien3.blueprint.read_blueprint` made of it.
+            number: Which of the scene's robots it is.
 
         Raises:
             AssetError: If SAPIEN left out a collision shape.
@@ -46,7 +52,7 @@ class SimulatedRobot:
         descriptor = placement.robot
         self.name, self.descriptor = name, descriptor
         self.base_pose = sapien.Pose(list(placement.base_position), list(placement.base_quaternion))
-        self.articulation: Any = blueprint.build(scene, self.base_pose)
+        self.articulation: Any = blueprint.build(scene, self.base_pose, number)
         self.links = {link.name: link for link in self.articulation.links}
         self.joints: list[Any] = list(self.articulation.active_joints)
         self.active_index = _active_index(descriptor, [joint.name for joint in self.joints])

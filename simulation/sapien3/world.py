@@ -84,10 +84,11 @@ class BuiltWorld:
         self.system.timestep = self.physics.timestep
         blueprints = {} if blueprints is None else blueprints
         self.robots: dict[str, SimulatedRobot] = {}
-        for name, placement in layout.items():
+        for number, (name, placement) in enumerate(layout.items()):
             if name not in blueprints:
                 blueprints[name] = read_blueprint(placement.robot, visuals=visuals)
-            self.robots[name] = SimulatedRobot(self.scene, name, placement, blueprints[name])
+            blueprint = blueprints[name]
+            self.robots[name] = SimulatedRobot(self.scene, name, placement, blueprint, number)
         self.articulations = [robot.articulation for robot in self.robots.values()]
         self.bodies: dict[str, BuiltBody] = {}
         self.studio: Any = None  # as long as this world lives, also in a fork

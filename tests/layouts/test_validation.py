@@ -17,9 +17,16 @@ from layouts import (
     side_by_side,
     yaw_quaternion,
 )
-from layouts.validation.bodies import load_model
 from layouts.validation.collisions import nearest, stand, touching
-from robots import AssetError, DescriptorError, LayoutError, MissingPackageError, RobotRegistry
+from robots import (
+    AssetError,
+    DescriptorError,
+    LayoutError,
+    MissingPackageError,
+    RobotRegistry,
+    UnknownNameError,
+)
+from robots.bodies.hulls import load_model
 from tests.layouts.cells import overlapping
 from tests.layouts.small_robots import (
     FOLDING,
@@ -243,8 +250,8 @@ class TestDistances:
 
 
 class TestSelfCollisions:
-    def fold(self, tmp_path, elbow, noise=0.0, **more):
-        arm = folding(tmp_path, elbow)
+    def fold(self, tmp_path, elbow, noise=0.0, allowed=None, **more):
+        arm = replace(folding(tmp_path, elbow), allowed_collisions=allowed)
         return Layout({"arm": Placement(arm, qpos_noise=noise)}).validate(**more)
 
     def test_links_that_fold_into_each_other_are_named(self, tmp_path):
@@ -279,13 +286,21 @@ class TestSelfCollisions:
         arm = robot(tmp_path, text, ["shoulder", "elbow"], tcp="lower")
         assert Layout({"arm": Placement(arm, qpos_noise=0.0)}).validate().ok
 
-    @pytest.mark.parametrize("reason", ["Default", "Never", "Adjacent"])
-    def test_the_srdf_excuses_pairs(self, reason, tmp_path):
+    @pytest.mark.parametrize(
+        ("reason", "ok"), [("Default", True), ("default", True), ("Never", False), ("", False)]
+    )
+    def test_of_the_srdf_those_pairs_may_touch_that_physics_lets(self, reason, ok, tmp_path):
         (tmp_path / "small.srdf").write_text(
             f'<robot name="small"><disable_collisions link1="lower" link2="base"'
             f' reason="{reason}"/></robot>'
         )
-        assert self.fold(tmp_path, math.pi - 0.01).ok
+        assert self.fold(tmp_path, math.pi - 0.01).ok == ok
+
+    def test_the_descriptor_names_pairs_that_may_touch(self, tmp_path):
+        assert self.fold(tmp_path, math.pi - 0.01, allowed=(("lower", "base"),)).ok
+        assert not self.fold(tmp_path, math.pi - 0.01, allowed=()).ok
+        with pytest.raises(UnknownNameError, match=r"'lowr'\. Did you mean 'lower'\?"):
+            self.fold(tmp_path, math.pi - 0.01, allowed=(("lowr", "base"),))
 
     @pytest.mark.parametrize("name", RobotRegistry.names())
     def test_no_keyframe_of_ours_has_one(self, name):

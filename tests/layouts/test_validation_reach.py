@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from layouts import Layout, Placement
-from layouts.validation.bodies import load_model
 from layouts.validation.reach import Reach
 from robots import RobotRegistry, UnknownNameError
+from robots.bodies.hulls import load_model
 from simulation.sapien3.world import BuiltWorld
 from tests.layouts.small_robots import turntable
 

@@ -125,6 +125,18 @@ def test_a_descriptor_refuses_nonsense(changes, message):
         (lambda: replace(PANDA, home=None), "panda: home is None; it must be a Home"),
         (lambda: replace(PANDA, name=5), "RobotDescriptor: name is 5; it must be a text"),
         (
+            lambda: replace(PANDA, allowed_collisions=(("a", "b", "c"),)),
+            "panda: allowed_collisions[0] has 3 entries; it must be a tuple of 2, each a text",
+        ),
+        (
+            lambda: replace(PANDA, allowed_collisions=(("a", "b"), ("c", "c"))),
+            "panda: allowed_collisions[1] has c more than once",
+        ),
+        (
+            lambda: replace(PANDA, allowed_collisions=(("a", "b"), ("b", "a"))),
+            "panda: allowed_collisions has a and b more than once",
+        ),
+        (
             lambda: replace(PANDA, cameras=(CameraMount("eye", "a"), CameraMount("eye", "b"))),
             "panda: cameras has eye more than once",
         ),

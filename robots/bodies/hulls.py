@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
@@ -14,14 +15,18 @@ import numpy as np
 
 from kinematics.rotations import Floats
 from kinematics.tree import Tree
-from robots import AssetError, MissingPackageError, RobotDescriptor
+from robots.bodies.allowed import LinkPair, read_allowed_pairs
+from robots.common.errors import AssetError, MissingPackageError
+from robots.descriptor import RobotDescriptor
 from robots.urdf.mesh_files import has_volume, read_corners
+from robots.urdf.model import UrdfModel
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model
 from robots.urdf.shapes import UrdfShape
-from robots.urdf.srdf import read_excluded_pairs
+from robots.urdf.srdf import srdf_beside
 from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree
+from robots.urdf.xacro_files import template_of
 
 SIDES = 32  # of the polygon that stands for a circle; 0.5 % of the radius is lost
 
@@ -48,8 +53,8 @@ class RobotModel:
     Attributes:
         kinematics: Its links and joints; positions come in the descriptor's order.
         hulls: Its convex bodies.
-        self_pairs: Pairs of hulls of one robot that may not touch: their links do not hang on
-            each other, and the SRDF beside the URDF does not excuse them.
+        self_pairs: Pairs of hulls of one robot that may not touch; see
+            `robots.bodies.allowed.allowed_pairs`.
     """
 
     kinematics: Tree
@@ -68,10 +73,13 @@ def load_model(robot: RobotDescriptor) -> RobotModel:
         AssetError: If its files cannot be found or make no sense.
         DescriptorError: If the descriptor and the URDF contradict each other.
         MissingPackageError: If trimesh or python-fcl is not installed.
+        UnknownNameError: If ``allowed_collisions`` names a link that the URDF lacks.
     """
     require_packages()
     urdf = robot.urdf.locate()
-    return _load(urdf, robot.joints, os.stat(urdf).st_mtime_ns)
+    beside = srdf_beside(urdf)
+    files = (template_of(urdf)[0], beside)
+    return _load(robot, urdf, tuple(os.stat(file).st_mtime_ns for file in files if file))
 
 
 def require_packages() -> None:
@@ -89,49 +97,74 @@ def require_packages() -> None:
         ) from error
 
 
-def slab_hull(top: Floats, depth: float, name: str) -> Hull:
-    """Return what lies below a flat top, as a body of its own in the world frame.
+def read_hulls(model: UrdfModel, urdf: Path) -> tuple[Hull, ...]:
+    """Return the hulls of all collision shapes of a robot, in the order of the URDF's links.
 
     Args:
-        top: Its corners, (n, 3) (m).
-        depth: How far it goes down (m).
-        name: Its name, for errors.
+        model: What its URDF describes.
+        urdf: That URDF, for meshes that it refers to.
 
     Raises:
-        AssetError: If it has no volume.
+        AssetError: If a mesh cannot be read, or a shape has no volume.
+        MissingPackageError: If trimesh or python-fcl is not installed.
     """
-    return _hull(0, np.concatenate([top, top - [0.0, 0.0, depth]]), name)
+    require_packages()
+    return _hulls(model, urdf, os.stat(template_of(urdf)[0]).st_mtime_ns)
+
+
+def counted_pairs(
+    kinematics: Tree, hulls: Sequence[Hull], allowed: frozenset[LinkPair]
+) -> tuple[tuple[int, int], ...]:
+    """Return the pairs of hulls of one robot that may not touch, by their indices.
+
+    Args:
+        kinematics: Its links.
+        hulls: Its hulls.
+        allowed: Pairs of links that may overlap.
+    """
+    links = [kinematics.links[hull.link] for hull in hulls]
+    return tuple(
+        (a, b)
+        for a, b in combinations(range(len(hulls)), 2)
+        if links[a] != links[b] and frozenset((links[a], links[b])) not in allowed
+    )
 
 
 @lru_cache(maxsize=64)
-def _load(urdf: Path, joints: tuple[str, ...], _modified: int) -> RobotModel:
+def _load(robot: RobotDescriptor, urdf: Path, _modified: tuple[int, ...]) -> RobotModel:
     model = read_model(read_urdf(urdf), str(urdf))
-    kinematics = kinematic_tree(model, joints)
-    hulls = tuple(
-        _shape_hull(kinematics.link(link), shape, urdf)
+    kinematics, hulls = _tree(model, robot.joints), read_hulls(model, urdf)
+    allowed = read_allowed_pairs(robot, model, urdf)
+    return RobotModel(kinematics, hulls, counted_pairs(kinematics, hulls, allowed))
+
+
+@lru_cache(maxsize=64)
+def _tree(model: UrdfModel, joints: tuple[str, ...]) -> Tree:
+    return kinematic_tree(model, joints)
+
+
+@lru_cache(maxsize=64)
+def _hulls(model: UrdfModel, urdf: Path, _modified: int) -> tuple[Hull, ...]:
+    tree = kinematic_tree(model)  # every tree of a model has its links in the same order
+    return tuple(
+        convex_hull(tree.link(link), shape_corners(shape, urdf), shape.where)
         for link in model.links
         for shape in model.collisions.get(link, ())
     )
-    allowed = {frozenset(pair.links) for pair in read_excluded_pairs(urdf)}
-    pairs = tuple(
-        (a, b)
-        for a, b in combinations(range(len(hulls)), 2)
-        if _may_touch(kinematics, hulls[a].link, hulls[b].link, allowed)
-    )
-    return RobotModel(kinematics, hulls, pairs)
 
 
-def _may_touch(kinematics: Tree, one: int, other: int, allowed: set[frozenset[str]]) -> bool:
-    """Tell whether two links can move into each other, and it would matter."""
-    first, second = kinematics.bodies[one], kinematics.bodies[other]
-    adjacent = kinematics.carrier(first) == second or kinematics.carrier(second) == first
-    names = frozenset((kinematics.links[one], kinematics.links[other]))
-    return first != second and not adjacent and names not in allowed
+def shape_corners(shape: UrdfShape, urdf: Path) -> Floats:
+    """Return the corners of a collision shape in the frame of its link, (n, 3) (m).
 
+    Args:
+        shape: The shape.
+        urdf: Its URDF, for the mesh that it may refer to.
 
-def _shape_hull(link: int, shape: UrdfShape, urdf: Path) -> Hull:
-    corners = _corners(shape, urdf) @ shape.origin[:3, :3].T + shape.origin[:3, 3]
-    return _hull(link, corners, shape.where)
+    Raises:
+        AssetError: If that mesh cannot be read.
+        MissingPackageError: If trimesh is not installed.
+    """
+    return _corners(shape, urdf) @ shape.origin[:3, :3].T + shape.origin[:3, 3]
 
 
 def _corners(shape: UrdfShape, urdf: Path) -> Floats:
@@ -154,7 +187,17 @@ def _corners(shape: UrdfShape, urdf: Path) -> Floats:
     return np.asarray(made.vertices, float)
 
 
-def _hull(link: int, corners: Floats, where: str) -> Hull:
+def convex_hull(link: int, corners: Floats, where: str) -> Hull:
+    """Return the convex hull of some points.
+
+    Args:
+        link: Index of the link that it is fixed to.
+        corners: The points, in the link's frame, (n, 3) (m).
+        where: What they belong to, for messages.
+
+    Raises:
+        AssetError: If it has no volume.
+    """
     import fcl
     import trimesh
 

@@ -1,0 +1,127 @@
+"""Which pairs of a robot's links a guess lets overlap, as contacts between them mean nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from importlib.util import find_spec
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinematics.rotations import Floats
+from robots.bodies.allowed import LinkPair, joined_pairs, rigid_groups, rigid_pairs, srdf_pairs
+from robots.bodies.hulls import Hull, counted_pairs, read_hulls
+from robots.urdf.model import UrdfModel
+from robots.urdf.srdf import read_excluded_pairs
+from robots.urdf.tree import kinematic_tree
+
+POSTURES = 200  # random ones, in which overlaps are looked for
+ALWAYS = 0.95  # of them; what MoveIt's setup assistant takes for always
+
+
+def guess_allowed(
+    model: UrdfModel, urdf: Path
+) -> tuple[tuple[tuple[str, str], ...], tuple[str, ...]]:
+    """Return the pairs of links that may overlap, and the reasons.
+
+    Links that a joint joins and links that are rigid with each other are left out, as they always
+    may; see `robots.bodies.allowed.allowed_pairs`.
+
+    Args:
+        model: What a URDF describes.
+        urdf: That URDF, for the SRDF beside it and its meshes.
+
+    Raises:
+        AssetError: If the SRDF or a mesh cannot be read, or a shape has no volume.
+    """
+    pairs = srdf_pairs(read_excluded_pairs(urdf), model)
+    source = "the SRDF's disabled pairs"
+    if not pairs:
+        pairs, source = neighbours(model), "neighbours across fixed joints"
+    reasons = [f"allowed_collisions: {source}, and links that overlap wherever the joints stand"]
+    fixed = joined_pairs(model) | rigid_pairs(model)
+    if find_spec("fcl") is None:
+        reasons = [
+            f"allowed_collisions: {source}; without python-fcl no overlaps are looked for"
+            " (pip install 'robot-layouts[checks]')"
+        ]
+    else:
+        pairs |= always_overlapping(model, urdf, fixed | pairs)
+    return _in_order(pairs - fixed, model), tuple(reasons)
+
+
+def neighbours(model: UrdfModel) -> frozenset[LinkPair]:
+    """Return the pairs of links, each rigid with one end of the same moving joint."""
+    groups = rigid_groups(model)
+    group = {link: links for links in groups.values() for link in links}
+    return frozenset(
+        frozenset(pair)
+        for joint in model.moving
+        for pair in product(group[joint.parent], group[joint.child])
+    )
+
+
+def always_overlapping(
+    model: UrdfModel, urdf: Path, besides: frozenset[LinkPair]
+) -> frozenset[LinkPair]:
+    """Return the pairs of links that overlap in all, or nearly all, of `POSTURES` random postures.
+
+    The postures are the same every time. Joints that mimic another follow it.
+
+    Args:
+        model: What a URDF describes.
+        urdf: That URDF, for its meshes.
+        besides: Pairs that are not looked at.
+
+    Raises:
+        AssetError: If a mesh cannot be read, or a shape has no volume.
+        MissingPackageError: If trimesh or python-fcl is not installed.
+    """
+    driven = [joint for joint in model.moving if joint.mimics is None]
+    tree = kinematic_tree(model, [joint.name for joint in driven])
+    hulls = read_hulls(model, urdf)
+    waiting = np.array(counted_pairs(tree, hulls, besides), int).reshape(-1, 2)
+    misses = np.zeros(len(waiting), int)
+    low, high = np.array([joint.span for joint in driven]).reshape(-1, 2).T
+    draws = np.random.default_rng(0).uniform(low, high, (POSTURES, len(driven)))
+    for poses in tree.forward(draws):
+        misses += ~overlapping(hulls, poses, waiting)
+        kept = misses <= (1 - ALWAYS) * POSTURES
+        waiting, misses = waiting[kept], misses[kept]
+    names = [tree.links[hull.link] for hull in hulls]
+    return frozenset(frozenset((names[a], names[b])) for a, b in waiting.tolist())
+
+
+def overlapping(
+    hulls: Sequence[Hull], poses: Floats, pairs: Iterable[Sequence[int]]
+) -> NDArray[np.bool_]:
+    """Return for each pair of hulls whether they overlap, (pairs,).
+
+    Args:
+        hulls: Hulls of one robot.
+        poses: Of its links, (links, 4, 4) (m).
+        pairs: Indices of two hulls each.
+    """
+    import fcl
+
+    bodies = [
+        fcl.CollisionObject(hull.geometry, fcl.Transform(pose[:3, :3], pose[:3, 3]))
+        for hull in hulls
+        for pose in (poses[hull.link],)
+    ]
+    request = fcl.CollisionRequest()
+    return np.array(
+        [fcl.collide(bodies[a], bodies[b], request, fcl.CollisionResult()) > 0 for a, b in pairs],
+        bool,
+    )
+
+
+def _in_order(pairs: Iterable[LinkPair], model: UrdfModel) -> tuple[tuple[str, str], ...]:
+    """Return pairs of links that collide with something, ordered as the links of the URDF are."""
+    place = {link: i for i, link in enumerate(model.links)}
+    sorted_pairs = (sorted(pair, key=place.__getitem__) for pair in pairs)
+    solid = [pair for pair in sorted_pairs if all(link in model.collisions for link in pair)]
+    ordered = sorted(solid, key=lambda pair: [place[link] for link in pair])
+    return tuple((one, other) for one, other in ordered)

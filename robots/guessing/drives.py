@@ -1,0 +1,108 @@
+"""The drives of joints, by the inertia that hangs on them, and how far they go in one step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from robots.guessing.stance import Stance
+from robots.urdf.masses import Masses, hanging_inertia
+from robots.urdf.model import ModelJoint
+
+CONTROL_STEP = 0.05  # s; of a world that is not told otherwise
+STIFFNESS = 1e3  # N·m/rad, N/m; the least, as of ManiSkill's Panda
+FORCE = 100.0  # N·m, N; the least where a URDF gives no effort, as of ManiSkill's Panda
+LONGEST_STEP = 0.1  # rad, m; of an arm's joint in one control step, as of ManiSkill's Panda
+SHORTEST_STEP = 0.04  # rad, m; what ManiSkill's Panda truly goes in one control step
+# A critically damped joint with this frequency covers 96 % of a small step in CONTROL_STEP, when
+# physics advances by 0.01 s; with a force that is just so large, 93 %.
+FREQUENCY = 150.0  # rad/s
+JUST_ENOUGH = 4.0  # of inertia · step / CONTROL_STEP²
+HOLDING = 10.0  # times the force that an arm's joint would have
+POSTURES = 16  # in which the inertia is looked at
+
+
+@dataclass(frozen=True)
+class Drive:
+    """How one joint is driven.
+
+    Attributes:
+        stiffness: N·m/rad or N/m.
+        damping: N·m·s/rad or N·s/m.
+        force_limit: N·m or N.
+        step: How far it goes in one control step (rad or m).
+    """
+
+    stiffness: float
+    damping: float
+    force_limit: float
+    step: float
+
+
+class Drives:
+    """The drives of a robot's joints."""
+
+    def __init__(self, stance: Stance, masses: Masses) -> None:
+        """Look at what hangs on the joints in some postures, the same every time."""
+        generator = np.random.default_rng(0)
+        low, high = np.array([joint.span for joint in stance.leaders]).reshape(-1, 2).T
+        postures = generator.uniform(low, high, (POSTURES, len(stance.leaders)))
+        postures[0] = stance.middle
+        moving = stance.model.moving
+        links = [stance.tree.link(joint.child) for joint in moving]
+        inertia = hanging_inertia(stance.tree, masses, stance.poses(postures), links)
+        self._inertia: Mapping[str, float] = {
+            joint.name: float(value) for joint, value in zip(moving, inertia, strict=True)
+        }
+        self.raised: list[str] = []  # names of joints
+
+    def of(self, joint: ModelJoint) -> Drive:
+        """Return the drive of a joint that an action moves."""
+        drive, raised = self._drive(joint)
+        if raised and joint.name not in self.raised:
+            self.raised.append(joint.name)
+        return drive
+
+    def _drive(self, joint: ModelJoint) -> tuple[Drive, bool]:
+        """Return a drive, and whether its force is more than the URDF's effort."""
+        inertia = self._inertia[joint.name]
+        stiffness = max(STIFFNESS, inertia * FREQUENCY**2)
+        needed = JUST_ENOUGH * inertia / CONTROL_STEP**2  # per step
+        force = joint.effort or max(FORCE, needed * SHORTEST_STEP)
+        step = min(LONGEST_STEP, force / needed) if needed else LONGEST_STEP
+        raised = step < SHORTEST_STEP
+        if raised:
+            force, step = needed * SHORTEST_STEP, SHORTEST_STEP
+        damping = 2 * (stiffness * inertia) ** 0.5
+        return Drive(*map(_rounded, (stiffness, damping, force)), step=_down(step)), raised
+
+    def holding(self, joint: ModelJoint) -> Drive:
+        """Return the drive of a joint that stays where it starts."""
+        drive, _ = self._drive(joint)
+        force = max(drive.force_limit, FORCE) * HOLDING
+        return Drive(drive.stiffness, drive.damping, _rounded(force), drive.step)
+
+
+def drive_fields(drives: Sequence[Drive]) -> dict[str, Any]:
+    """Return the fields of a JointGroup that drive its joints."""
+    return {
+        name: alike([getattr(drive, name) for drive in drives])
+        for name in ("stiffness", "damping", "force_limit")
+    }
+
+
+def alike(numbers: Sequence[float]) -> float | tuple[float, ...]:
+    """Return one number if all are the same, else all of them."""
+    return numbers[0] if len(set(numbers)) == 1 else tuple(numbers)
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.3g}")
+
+
+def _down(step: float) -> float:
+    """Return a step rounded down to 5 mrad or 5 mm."""
+    return round(int(step / 0.005 + 1e-9) * 0.005, 6)

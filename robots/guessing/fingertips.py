@@ -1,0 +1,113 @@
+"""Where the tips of a hand's fingers are, and how far apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kinematics.rotations import Floats, inverse_pose, transform
+from robots.bodies.hulls import Hull
+from robots.guessing.stance import Stance
+from robots.urdf import words
+from robots.urdf.anatomy import Limb
+from robots.urdf.model import ModelJoint
+
+SHORT = 0.6  # of the longest finger; what ends before it is a knuckle, not a tip
+CAP = 0.15  # of a finger's length; its corners within it from the end make its tip
+
+
+class Fingertips:
+    """The tips of one hand: points of its last links, the farthest from the palm.
+
+    Attributes:
+        stance: The robot.
+        limb: The limb that ends in the hand.
+        ends: The last link of each finger.
+    """
+
+    def __init__(self, stance: Stance, limb: Limb, hulls: Sequence[Hull]) -> None:
+        """Find the tips; ``hulls`` are the robot's, or empty to go by frames alone."""
+        self.stance, self.limb = stance, limb
+        self._poses = stance.poses(stance.middle)[0]
+        self._palm = self._poses[stance.tree.link(limb.palm)]
+        self._hulls = hulls
+        leaves = [joint for joint in limb.fingers if not stance.model.moving_on(joint.child)]
+        tips = {joint.child: self._tip(joint.child) for joint in leaves}
+        far = {link: float(np.linalg.norm(tip - self._palm[:3, 3])) for link, tip in tips.items()}
+        longest = max(far.values(), default=0.0)
+        self.ends = tuple(link for link in tips if far[link] >= SHORT * longest)
+        if len(limb.fingers) > 0 and len(self.ends) == 1:
+            tips[limb.palm] = self._fixed_tip(self.ends[0], tips[self.ends[0]])
+            self.ends = (*self.ends, limb.palm)
+        self._tips = {link: tips[link] for link in self.ends}
+
+    def middle(self) -> Floats:
+        """Return the place between the tips, in the root's frame, (3,) (m).
+
+        Where one finger is called a thumb, that is half-way between it and the others.
+        """
+        thumbs = [link for link in self.ends if self.is_thumb(link)]
+        others = [link for link in self.ends if link not in thumbs]
+        groups = [group for group in (thumbs, others) if group]
+        means = [np.mean([self._tips[link] for link in group], axis=0) for group in groups]
+        return np.mean(means, axis=0)
+
+    def apart(self, positions: dict[str, float]) -> float:
+        """Return how far the tips are from their middle (m), with some joints elsewhere."""
+        poses = self.stance.poses(self.stance.with_joints(positions))[0]
+        local = {
+            link: transform(inverse_pose(self._poses[self.stance.tree.link(link)]), tip)
+            for link, tip in self._tips.items()
+        }
+        places = np.array(
+            [transform(poses[self.stance.tree.link(link)], tip) for link, tip in local.items()]
+        )
+        return float(np.linalg.norm(places - places.mean(axis=0), axis=1).mean())
+
+    def finger_of(self, link: str) -> ModelJoint:
+        """Return the joint with which the finger of a link begins at the hand."""
+        path = [joint for joint in self.stance.model.path_to(link) if joint in self.limb.fingers]
+        return path[0]
+
+    def is_thumb(self, link: str) -> bool:
+        """Tell whether a link belongs to a finger that is called a thumb."""
+        return self.is_called(link, "thumb")
+
+    def is_called(self, link: str, word: str) -> bool:
+        """Tell whether a link belongs to a finger that is called by a word."""
+        path = self.stance.model.path_to(link)
+        names = [joint.name for joint in path if joint in self.limb.fingers]
+        return any(words.has(name, (word,)) for name in (link, *names))
+
+    def tip(self, end: str) -> Floats:
+        """Return the tip of one of ``ends``, in the root's frame, (3,) (m)."""
+        return self._tips[end]
+
+    def _tip(self, link: str) -> Floats:
+        """Return the mean of the outermost points of a link and what is rigid with it."""
+        return self._outermost(self._points(link), self._palm[:3, 3])
+
+    def _fixed_tip(self, end: str, tip: Floats) -> Floats:
+        """Return the tip of what a single jaw closes on: of the palm, its own size away."""
+        joint = self.stance.model.parent_joint[end]
+        root = self._poses[self.stance.tree.link(joint.child), :3, 3]
+        points = self._points(self.limb.palm)
+        direction = tip - root
+        ahead = points[(points - root) @ direction > 0]
+        return self._outermost(ahead if len(ahead) else points, root)
+
+    def _outermost(self, points: Floats, origin: Floats) -> Floats:
+        far = np.linalg.norm(points - origin, axis=1)
+        return points[far >= far.max() * (1 - CAP)].mean(axis=0)
+
+    def _points(self, link: str) -> Floats:
+        """Return corners of the hulls of a link and what is rigid with it, else their origins."""
+        tree = self.stance.tree
+        rigid = [tree.link(name) for name in self.stance.model.rigid_with(link)]
+        corners = [
+            transform(self._poses[hull.link], hull.corners)
+            for hull in self._hulls
+            if hull.link in rigid
+        ]
+        return np.concatenate(corners) if corners else self._poses[rigid, :3, 3]

@@ -1,0 +1,258 @@
+"""The joint groups of a hand: how many numbers drive it, and which way it opens."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from robots.descriptor import JointGroup
+from robots.guessing.drives import LONGEST_STEP, Drives, alike, drive_fields
+from robots.guessing.fingertips import Fingertips
+from robots.guessing.stance import middle_of
+from robots.urdf.anatomy import Limb
+from robots.urdf.model import ModelJoint
+
+SQUEEZE = 0.01  # how far beyond closed a parallel gripper's target is (m)
+SAME = 0.02  # of a range; how much two fingers' ranges may differ
+NOTICEABLE = 1e-4  # m; how much opening changes the distance of the tips
+
+
+@dataclass(frozen=True)
+class Gripper:
+    """The groups of a hand.
+
+    Attributes:
+        groups: Joint groups by name.
+        open: Where its joints are when it is open (rad, m).
+        reasons: One sentence each.
+    """
+
+    groups: Mapping[str, JointGroup]
+    open: Mapping[str, float]
+    reasons: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Follower:
+    """A joint that goes to multiplier · lead + offset."""
+
+    joint: ModelJoint
+    multiplier: float
+    offset: float
+
+
+def find_gripper(limb: Limb, tips: Fingertips, drives: Drives) -> Gripper:
+    """Return the groups of a hand: one number for what moves together, else one for each leader.
+
+    Args:
+        limb: The limb that ends in the hand.
+        tips: Its finger tips.
+        drives: The drives of its joints.
+    """
+    name = f"{limb.name}_gripper" if limb.name in ("left", "right") else "gripper"
+    name = f"{name}_{limb.name}" if limb.name.isdigit() else name
+    followers = _followers(limb.fingers)
+    leaders = [joint for joint in limb.fingers if joint.name in followers]
+    merged = _merged(leaders, followers, tips)
+    if merged:
+        reasons = [f"{name}: one number drives {_listing(leaders)}, as they move alike"]
+        followers, leaders = {leaders[0].name: merged}, leaders[:1]
+    else:
+        reasons = []
+    if len(leaders) > 1:
+        return _many(name, leaders, followers, drives)
+    group, positions, reason = _one(name, leaders[0], followers[leaders[0].name], tips, drives)
+    mimics = [f"{j.name} follows {j.mimics}" for j in limb.fingers if j.mimics]
+    if mimics:
+        reasons.append(f"{name}, mimic joints, from the URDF: {', '.join(mimics)}")
+    return Gripper({name: group}, positions, (*reasons, reason))
+
+
+def _followers(fingers: Sequence[ModelJoint]) -> dict[str, list[_Follower]]:
+    """Return for each leading joint what follows it, itself first."""
+    named = {joint.name: joint for joint in fingers}
+    groups: dict[str, list[_Follower]] = {
+        joint.name: [_Follower(joint, 1.0, 0.0)]
+        for joint in fingers
+        if joint.mimics not in named
+    }
+    for joint in fingers:
+        if joint.name not in groups:
+            multiplier, offset, at = 1.0, 0.0, joint
+            while at.name not in groups:
+                offset += multiplier * at.offset
+                multiplier *= at.multiplier
+                at = named[at.mimics or ""]
+            groups[at.name].append(_Follower(joint, multiplier, offset))
+    return groups
+
+
+def _merged(
+    leaders: Sequence[ModelJoint], followers: Mapping[str, Sequence[_Follower]], tips: Fingertips
+) -> list[_Follower]:
+    """Return what one number can drive, if the leaders are fingers that move alike or mirrored."""
+    first = leaders[0]
+    if len(leaders) < 2 or any(not _alike(first, joint) for joint in leaders[1:]):
+        return []
+    if any(len(followers[joint.name]) != len(followers[first.name]) for joint in leaders):
+        return []
+    if len({tips.finger_of(joint.child).name for joint in leaders}) < len(leaders):
+        return []
+    merged = list(followers[first.name])
+    for joint in leaders[1:]:
+        sign = _sense(first, joint, tips) if len(leaders) == 2 else 1.0
+        low, high = joint.span
+        offset = low - first.span[0] if sign > 0 else low + first.span[1]
+        merged += [
+            _Follower(f.joint, f.multiplier * sign, f.multiplier * _tidy(offset) + f.offset)
+            for f in followers[joint.name]
+        ]
+    return merged
+
+
+def _alike(one: ModelJoint, other: ModelJoint) -> bool:
+    ranges = [joint.span[1] - joint.span[0] for joint in (one, other)]
+    return one.unit == other.unit and abs(ranges[0] - ranges[1]) <= SAME * max(ranges)
+
+
+def _sense(first: ModelJoint, other: ModelJoint, tips: Fingertips) -> float:
+    """Return whether a finger moves with (1) or against (-1) the first, so that both close."""
+    if first.span == other.span and first.span[0] == 0.0:
+        return 1.0
+    (a, b), (c, d) = first.span, other.span
+
+    def change(at: tuple[float, float]) -> float:
+        ends = (tips.apart({first.name: f, other.name: o}) for f, o in zip((a, b), at, strict=True))
+        low, high = ends
+        return abs(high - low)
+
+    return -1.0 if change((d, c)) > change((c, d)) + NOTICEABLE else 1.0
+
+
+def _one(
+    name: str,
+    leader: ModelJoint,
+    followers: Sequence[_Follower],
+    tips: Fingertips,
+    drives: Drives,
+) -> tuple[JointGroup, dict[str, float], str]:
+    """Return the group that one number drives, where it is open, and the reason.
+
+    The number grows as the hand opens: where it opens towards the leader's lower limit, it counts
+    from the upper one.
+    """
+    low, high = leader.span
+    opens_down = _apart(tips, followers, low) > _apart(tips, followers, high) + NOTICEABLE
+    if opens_down:
+        flipped = [
+            _Follower(f.joint, -f.multiplier, f.multiplier * high + f.offset) for f in followers
+        ]
+        followers, low, high = flipped, 0.0, high - low
+    joints = [f.joint for f in followers]
+    mimic = len(followers) > 1 or opens_down
+    group = JointGroup(
+        tuple(joint.name for joint in joints),
+        lower=_tidy(low - SQUEEZE if leader.unit == "m" else low),
+        upper=_tidy(high),
+        mimic=mimic,
+        multipliers=_unless(1.0, [f.multiplier for f in followers]) if mimic else (),
+        offsets=_unless(0.0, [f.offset for f in followers]) if mimic else (),
+        unit=leader.unit,
+        reset_noise=False,
+        limits=tuple(joint.span for joint in joints),
+        **drive_fields([drives.of(joint) for joint in joints]),
+    )
+    positions = {f.joint.name: _tidy(f.multiplier * high + f.offset) for f in followers}
+    where = f"{leader.name} at {positions[leader.name]:g} {leader.unit}"
+    return group, positions, f"{name}: +1 opens it, with {where}, as the finger tips part there"
+
+
+def _apart(tips: Fingertips, followers: Sequence[_Follower], lead: float) -> float:
+    return tips.apart({f.joint.name: f.multiplier * lead + f.offset for f in followers})
+
+
+def _many(
+    name: str,
+    leaders: Sequence[ModelJoint],
+    followers: Mapping[str, Sequence[_Follower]],
+    drives: Drives,
+) -> Gripper:
+    """Return the groups of a hand whose fingers move each on its own."""
+    groups: dict[str, JointGroup] = {}
+    alone = [joint for joint in leaders if len(followers[joint.name]) == 1]
+    for unit, suffix in (("rad", ""), ("m", "_slide")):
+        joints = [joint for joint in alone if joint.unit == unit]
+        if joints:
+            groups[name + suffix] = _each(joints, drives)
+    for leader in leaders:
+        if len(followers[leader.name]) > 1:
+            groups[_free(f"{name}_{_identifier(leader.name)}", groups)] = _led(
+                followers[leader.name], drives
+            )
+    counts = f"{len(leaders)} numbers drive it, one for each joint that mimics none"
+    positions = {
+        f.joint.name: _tidy(f.multiplier * middle_of(leader) + f.offset)
+        for leader in leaders
+        for f in followers[leader.name]
+    }
+    return Gripper(groups, positions, (f"{name}: {counts}",))
+
+
+def _each(joints: Sequence[ModelJoint], drives: Drives) -> JointGroup:
+    made = [drives.of(joint) for joint in joints]
+    steps = [min(drive.step, LONGEST_STEP) for drive in made]
+    step = alike(steps)
+    return JointGroup(
+        tuple(joint.name for joint in joints),
+        lower=-step if isinstance(step, float) else tuple(-value for value in step),
+        upper=step,
+        delta=True,
+        unit=joints[0].unit,
+        reset_noise=False,
+        limits=tuple(joint.span for joint in joints),
+        **drive_fields(made),
+    )
+
+
+def _led(followers: Sequence[_Follower], drives: Drives) -> JointGroup:
+    leader = followers[0].joint
+    low, high = leader.span
+    fields: dict[str, Any] = drive_fields([drives.of(f.joint) for f in followers])
+    return JointGroup(
+        tuple(f.joint.name for f in followers),
+        lower=low,
+        upper=high,
+        mimic=True,
+        multipliers=_unless(1.0, [f.multiplier for f in followers]),
+        offsets=_unless(0.0, [f.offset for f in followers]),
+        unit=leader.unit,
+        reset_noise=False,
+        limits=tuple(f.joint.span for f in followers),
+        **fields,
+    )
+
+
+def _identifier(name: str) -> str:
+    return re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_").lower()
+
+
+def _free(name: str, taken: Mapping[str, Any]) -> str:
+    while name in taken:
+        name += "_"
+    return name
+
+
+def _unless(default: float, numbers: Sequence[float]) -> tuple[float, ...]:
+    tidy = tuple(_tidy(number) for number in numbers)
+    return () if all(number == default for number in tidy) else tidy
+
+
+def _tidy(value: float) -> float:
+    """Return a number without the dust of sums, and without a negative zero."""
+    return round(value, 9) + 0.0
+
+
+def _listing(joints: Sequence[ModelJoint]) -> str:
+    return " and ".join(joint.name for joint in joints)

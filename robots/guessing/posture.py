@@ -1,0 +1,267 @@
+"""A posture to stand in: in front of the robot, off the ground, and free of self-collision."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinematics.rotations import Floats
+from robots.bodies.hulls import Hull
+from robots.bodies.overlaps import overlapping
+from robots.guessing.stance import Stance
+from robots.guessing.tool import Tool
+from robots.urdf.anatomy import FARTHEST_SLIDE, Limb
+
+DRAWS = 1500  # random postures of a limb
+BEST = 40  # of them, refined and then looked at for overlaps
+ROUNDS = 4  # of refinement, each with half the spread
+MARGIN = 0.1  # of a joint's range, which it stays away from its ends
+OUT = 0.55  # of the reach; where the TCP is best, ahead of the limb's first joint
+NEAR, FAR = 0.35, 0.85  # of the reach; where it may be
+HEIGHT = 0.35  # of the reach, above the ground; best for an arm that stands on it
+HANGING = -0.25  # of the reach, below the shoulder; best for an arm on a body
+LOW = 0.02  # m above the ground; the least of any moving link
+PLAIN = 0.5  # weight of joints that leave the posture that the search starts from
+DOWN = 0.15  # weight of a tool that does not point down
+ONE_SIDED = 0.15  # of the reach; how far aside the middle of a workspace tells a front
+BESIDE = 0.35  # of the reach; how far the TCP may be to the side of what is ahead
+
+
+@dataclass(frozen=True)
+class Posture:
+    """A posture to stand in.
+
+    Attributes:
+        position: Of the leading joints, in the order of the stance's (rad, m).
+        reasons: One sentence each.
+    """
+
+    position: Floats
+    reasons: tuple[str, ...]
+
+
+class PostureSearch:
+    """The search for the posture of one robot; the same robot gets the same one every time."""
+
+    def __init__(
+        self,
+        stance: Stance,
+        tools: Sequence[tuple[Limb, Tool]],
+        hulls: Sequence[Hull],
+        pairs: Sequence[tuple[int, int]],
+        opened: Mapping[str, float],
+    ) -> None:
+        """Take a robot.
+
+        Args:
+            stance: The robot.
+            tools: Its limbs and their tool centre points.
+            hulls: Its convex bodies; empty if they cannot be read.
+            pairs: Indices of hulls that may not overlap.
+            opened: Where the leading joints of its hands are (rad, m).
+        """
+        self._stance, self._hulls, self._pairs = stance, hulls, np.array(pairs, int).reshape(-1, 2)
+        self._start = stance.with_joints(opened)
+        self._generator = np.random.default_rng(0)
+        self._views = [_View(stance, limb, tool) for limb, tool in tools if _searchable(limb)]
+        self._ground = self._lowest()
+
+    def run(self) -> Posture:
+        """Return the posture with all joints at 0 or mid-range if it is fine, else a better one."""
+        posture = self._start
+        if not self._views:
+            return Posture(posture, ("keyframe 'rest': joints at 0, or mid-range where 0 is out",))
+        samples = [self._draw(view, posture) for view in self._views]
+        self._look(posture, samples)
+        front = _as_text(self._front)
+        if not self._overlaps(posture, self._pairs).any() and self._is_fine(posture):
+            return Posture(
+                posture,
+                (
+                    "keyframe 'rest': joints at 0, or mid-range where 0 is out, the gripper open;"
+                    f" free of self-collision, with the TCP ahead, towards {front}",
+                ),
+            )
+        for view, drawn in zip(self._views, samples, strict=True):
+            posture = self._best(view, posture, drawn)
+        return Posture(posture, (self._said(posture, front),))
+
+    def _said(self, posture: Floats, front: str) -> str:
+        left = self._overlaps(posture, self._pairs)
+        text = (
+            "keyframe 'rest': found by search, as the joints at 0 or mid-range collide or bring the"
+            f" TCP nowhere useful; the TCP is ahead, towards {front}, where the arm's joints have"
+            " the middle of their way; the gripper is open"
+        )
+        if not left.any():
+            return text
+        names = [self._stance.tree.links[hull.link] for hull in self._hulls]
+        one, other = self._pairs[int(np.argmax(left))]
+        return f"{text}; {names[one]} and {names[other]} still overlap"
+
+    def _lowest(self) -> float:
+        """Return the height of the ground: of the lowest point of the root's body (m)."""
+        body = [
+            float(hull.corners[:, 2].min()) + place
+            for hull in self._hulls
+            if self._stance.tree.bodies[hull.link] == 0
+            for place in (self._root_height(hull.link),)
+        ]
+        return min([0.0, *body])
+
+    def _root_height(self, link: int) -> float:
+        return float(self._stance.poses(self._stance.middle)[0, link, 2, 3])
+
+    def _draw(self, view: _View, posture: Floats) -> Floats:
+        drawn = np.tile(posture, (DRAWS, 1))
+        low, high = view.room
+        drawn[:, view.free] = self._generator.uniform(low, high, (DRAWS, len(view.free)))
+        return drawn
+
+    def _look(self, posture: Floats, samples: Sequence[Floats]) -> None:
+        """Tell which way is front: where the limbs' workspaces lie, seen from their shoulders.
+
+        A limb whose first joint turns about the vertical reaches all around; it looks where it
+        does with that joint in the middle of its range.
+        """
+        ahead = np.zeros(3)
+        for view, drawn in zip(self._views, samples, strict=True):
+            turned = drawn.copy()
+            turned[:, view.free[0]] = posture[view.free[0]]
+            seen = drawn if len(self._views) > 1 or not view.is_upright else turned
+            places = view.places(seen)
+            view.reach = float(np.quantile(np.linalg.norm(places, axis=1), 0.98))
+            ahead += places.mean(axis=0)
+        ahead[2] = 0.0
+        total = sum(view.reach for view in self._views)
+        if np.linalg.norm(ahead) < ONE_SIDED * total:  # all around: then as it stands
+            ahead = sum((view.places(posture[None])[0] for view in self._views), np.zeros(3))
+            ahead[2] = 0.0
+        clear = np.linalg.norm(ahead) >= ONE_SIDED * total
+        angle = np.arctan2(ahead[1], ahead[0]) if clear else 0.0
+        nearest = np.round(angle / (np.pi / 4)) * np.pi / 4
+        angle = nearest if abs(angle - nearest) < np.pi / 10 else angle
+        self._front = np.array([np.cos(angle), np.sin(angle), 0.0])
+
+    def _is_fine(self, posture: Floats) -> bool:
+        return all(np.isfinite(self._cost(view, posture[None], strict=True)[0]) for view in self._views)
+
+    def _cost(self, view: _View, postures: Floats, *, strict: bool = False) -> Floats:
+        """Return how bad postures are, (postures,); infinite where they are no good at all."""
+        poses, place = view.look(postures)
+        out = place @ self._front / view.reach
+        aside = np.abs(place @ np.array([-self._front[1], self._front[0], 0.0])) / view.reach
+        far = np.linalg.norm(place, axis=1) / view.reach
+        up = view.shoulder[2] - self._ground
+        stands = up < 0.6 * view.reach
+        height = (place[:, 2] + (up if stands else 0.0)) / view.reach
+        wanted = HEIGHT if stands else HANGING
+        low, high = view.limits
+        at = (postures[:, view.free] - (low + high) / 2) / (high - low) * 2
+        away = (postures[:, view.free] - self._start[view.free]) / (high - low) * 2
+        cost = (out - OUT) ** 2 + aside**2 + (height - wanted) ** 2
+        cost += PLAIN * (away**2).mean(axis=1)
+        cost += DOWN * (1 + view.pointing(poses)[:, 2]) / 2
+        bad = (far < NEAR) | (far > FAR) | (out < 0.8 * NEAR) | (aside > BESIDE)
+        bad |= poses[:, view.moving, 2, 3].min(axis=1) < self._ground + LOW
+        if strict:
+            bad |= (np.abs(at[:, view.bounded]) > 1 - MARGIN).any(axis=1)
+        return np.where(bad, np.inf if strict else cost + 10.0, cost)
+
+    def _best(self, view: _View, posture: Floats, drawn: Floats) -> Floats:
+        """Return the best posture of one limb that overlaps nothing, else the best."""
+        drawn, near = drawn.copy(), DRAWS // 2
+        pulled = (drawn[:near, view.free] + self._start[view.free]) / 2
+        drawn[:near, view.free] = np.clip(pulled, *view.room)
+        fixed = np.delete(np.arange(len(posture)), view.free)
+        drawn[:, fixed] = posture[fixed]
+        pool = self._refined(view, drawn)
+        for tried in pool:
+            if not self._overlaps(tried, self._pairs).any():
+                return tried
+        return min(pool, key=lambda tried: int(self._overlaps(tried, self._pairs).sum()))
+
+    def _refined(self, view: _View, drawn: Floats) -> Floats:
+        low, high = view.room
+        pool = drawn[np.argsort(self._cost(view, drawn), kind="stable")[:BEST]]
+        spread = 0.15 * (high - low)
+        for _ in range(ROUNDS):
+            shape = (len(pool), 8, len(view.free))
+            noise = self._generator.normal(0.0, 1.0, shape) * spread
+            tried = np.repeat(pool[:, None], 8, axis=1)
+            tried[..., view.free] = np.clip(tried[..., view.free] + noise, low, high)
+            family = np.concatenate([pool[:, None], tried], axis=1)
+            cost = self._cost(view, family.reshape(-1, drawn.shape[1])).reshape(family.shape[:2])
+            pool = family[np.arange(len(pool)), cost.argmin(axis=1)]
+            spread = spread / 2
+        return pool[np.argsort(self._cost(view, pool), kind="stable")]
+
+    def _overlaps(self, posture: Floats, pairs: Floats) -> Floats:
+        if not len(pairs):
+            return np.zeros(0, bool)
+        return overlapping(self._hulls, self._stance.poses(posture)[0], pairs)
+
+
+class _View:
+    """One limb as the search sees it: only the links on the way to its TCP.
+
+    Attributes:
+        free: Indices of its joints among the leading ones.
+        limits: Lower and upper limits of those, (2, free) (rad, m).
+        room: The same without the margin at the ends.
+        bounded: Whether each of them turns less than a whole turn, or slides.
+        reach: How far the TCP gets from the shoulder (m).
+        shoulder: Where the first of them is, (3,) (m).
+        moving: Indices of the links that move, in the smaller tree.
+    """
+
+    def __init__(self, stance: Stance, limb: Limb, tool: Tool) -> None:
+        joints = [joint for joint in limb.arm if joint.mimics is None]
+        self.free = [stance.index[joint.name] for joint in joints]
+        spans = np.array([joint.span for joint in joints]).T
+        self.bounded = spans[1] - spans[0] < 2 * np.pi - 0.1
+        half = np.where(self.bounded, (spans[1] - spans[0]) / 2, np.pi)
+        middle = np.where(self.bounded, spans.mean(axis=0), np.clip(0.0, *spans))
+        self.limits = np.array([middle - half, middle + half])
+        margin = 1.5 * MARGIN * half * 2
+        self.room = self.limits + np.array([margin, -margin])
+        links = [stance.tree.link(name) for name in (*tool.origins, limb.palm)]
+        self._tree = stance.tree.towards(links)
+        self._tcp = [self._tree.link(name) for name in tool.origins]
+        self._palm = self._tree.link(limb.palm)
+        first = self._tree.link(joints[0].child)
+        pose = stance.poses(stance.middle)[0, stance.tree.link(joints[0].child)]
+        self.shoulder: Floats = pose[:3, 3]
+        axis = pose[:3, :3] @ self._tree.axes[first]
+        self.is_upright = abs(axis[2]) > 0.9 and not self._tree.slides[first]
+        self.moving = [i for i in range(len(self._tree.links)) if i > first]
+        self.reach = 1.0
+
+    def look(self, postures: Floats) -> tuple[Floats, Floats]:
+        """Return the poses of the limb's links, and the TCP from the shoulder, (postures, 3) (m)."""
+        poses = self._tree.forward(postures)
+        return poses, poses[:, self._tcp][..., :3, 3].mean(axis=1) - self.shoulder
+
+    def places(self, postures: Floats) -> Floats:
+        """Return the TCP from the shoulder, (postures, 3) (m)."""
+        return self.look(postures)[1]
+
+    def pointing(self, poses: Floats) -> Floats:
+        """Return which way the tool points, seen from the palm, (postures, 3); 0 if nowhere."""
+        way = poses[:, self._tcp][..., :3, 3].mean(axis=1) - poses[:, self._palm, :3, 3]
+        length = np.linalg.norm(way, axis=1, keepdims=True)
+        return np.where(length > 0.01, way / np.maximum(length, 1e-9), 0.0)
+
+
+def _searchable(limb: Limb) -> bool:
+    """Tell whether a limb has an arm of its own, which stands somewhere."""
+    flies = any(j.unit == "m" and j.span[1] - j.span[0] > FARTHEST_SLIDE for j in limb.arm)
+    return len([joint for joint in limb.arm if joint.mimics is None]) > 1 and not flies
+
+
+def _as_text(direction: Floats) -> str:
+    angle = round(float(np.degrees(np.arctan2(direction[1], direction[0]))))
+    names = {0: "+x", 90: "+y", 180: "-x", -180: "-x", -90: "-y"}
+    return names.get(angle, f"{angle} degrees from +x")

@@ -1,0 +1,147 @@
+"""The tool centre point of a limb: a named frame, a place between finger tips, or the palm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from robots.guessing.fingertips import Fingertips
+from robots.guessing.stance import Stance
+from robots.urdf import words
+from robots.urdf.anatomy import Limb
+
+BETWEEN = 0.05  # m; a frame named like a tool counts if it is so near to the place between tips
+EXACT = 0.02  # m; farther away, the reason says so
+OPPOSITE = ("index", "middle")  # fingers that a thumb meets, the first one first
+BLIND = (*words.HEAD, "optical", "imu", "ft", "force", "torque", "inertia", "range", "led")
+
+
+@dataclass(frozen=True)
+class Tool:
+    """The tool centre point of a limb.
+
+    Attributes:
+        link: Link whose frame orients it.
+        links: Links whose mean origin is its position; empty for ``link``.
+        reason: Why, one sentence.
+    """
+
+    link: str
+    links: tuple[str, ...]
+    reason: str
+
+    @property
+    def origins(self) -> tuple[str, ...]:
+        """The links whose mean origin is its position."""
+        return self.links or (self.link,)
+
+
+def find_tool(stance: Stance, limb: Limb, tips: Fingertips | None) -> Tool:
+    """Return the tool centre point of a limb.
+
+    Args:
+        stance: The robot.
+        limb: The limb.
+        tips: The tips of its fingers, if it has any.
+    """
+    which = f"{limb.name} TCP" if limb.name else "TCP"
+    rigid = [link for link in stance.model.rigid_with(limb.palm) if link != limb.palm]
+    rigid = [link for link in rigid if not words.has(link, BLIND)]
+    for known, what in ((words.TCP, "tcp"), (words.GRASP, "a grasp")):
+        named = [link for link in (*rigid, limb.palm) if words.has(link, known)]
+        if named:
+            also = f"; so are {', '.join(named[1:])}" if named[1:] else ""
+            reason = f"{which}: the link {named[0]}, named like {what} and rigid with {limb.palm}"
+            return Tool(named[0], (), reason + also)
+    if tips is None:
+        return _end(stance, limb, rigid, which)
+    return _between(stance, limb, rigid, tips, which)
+
+
+def _end(stance: Stance, limb: Limb, rigid: list[str], which: str) -> Tool:
+    """Return the end of an arm without gripper."""
+    ranks = (
+        lambda link: "tool" in words.words(link),
+        words.is_tool,
+        lambda link: words.has(link, words.TOOL),
+        lambda link: words.has(link, (*words.HAND, "flange")),
+    )
+    for fits in ranks:
+        named = [link for link in rigid if fits(link)]
+        if named:
+            also = f"; so are {', '.join(named[1:])}" if named[1:] else ""
+            reason = f"{which}: the link {named[0]}, named like the end of an arm{also}"
+            return Tool(named[0], (), reason)
+    if not rigid:
+        return Tool(
+            limb.palm, (), f"{which}: the link {limb.palm}, the last one, as no tool is named"
+        )
+    solid = [link for link in rigid if _has_shape(stance, link)] or rigid
+    places = stance.places((limb.palm, *solid))
+    far = np.linalg.norm(places[1:] - places[0], axis=1)
+    last = solid[int(np.argmax(np.round(far, 6)))]
+    return Tool(last, (), f"{which}: the link {last}, the farthest one, as no tool is named")
+
+
+def _has_shape(stance: Stance, link: str) -> bool:
+    return link in stance.model.collisions or link in stance.model.visuals
+
+
+def _between(
+    stance: Stance, limb: Limb, rigid: list[str], tips: Fingertips, which: str
+) -> Tool:
+    """Return the frame, or the mean of two, that lies nearest between the finger tips."""
+    middle, everywhere = tips.middle(), stance.places(stance.tree.links)
+
+    def off(links: tuple[str, ...]) -> float:
+        places = everywhere[[stance.tree.link(link) for link in links]]
+        return round(float(np.linalg.norm(places.mean(axis=0) - middle)), 6)
+
+    ends = [link for link in rigid if words.is_tool(link) or words.has(link, words.HAND)]
+    ends += [limb.palm] if words.has(limb.palm, words.HAND) else []
+    named = min(((off((link,)), link) for link in ends), default=(np.inf, ""))
+    if named[0] <= BETWEEN:
+        reason = f"{which}: the link {named[1]}, which lies between the finger tips"
+        return Tool(named[1], (), reason)
+    frames = _grasping(stance, tips)
+    if off(frames) <= BETWEEN:
+        return _mean(limb, frames, which, off(frames))
+    choices = [(limb.palm,), *((link,) for link in rigid), frames]
+    distance, best = min((off(links), links) for links in choices)
+    if len(best) > 1:
+        return _mean(limb, best, which, distance)
+    only = ", which is only the palm" if best == (limb.palm,) else ", the nearest to the tips"
+    return Tool(best[0], (), f"{which}: the link {best[0]}{only}{_apart(distance)}")
+
+
+def _mean(limb: Limb, links: tuple[str, ...], which: str, distance: float) -> Tool:
+    listing = ", ".join(links[:-1]) + f" and {links[-1]}"
+    reason = f"{which}: the middle of {listing}, turned as {limb.palm}"
+    return Tool(limb.palm, links, reason + _apart(distance))
+
+
+def _grasping(stance: Stance, tips: Fingertips) -> tuple[str, ...]:
+    """Return the frame at the tip of each finger that grasps: all, or a thumb and its opposite."""
+    frames = {end: _frame_at(stance, tips, end) for end in tips.ends}
+    thumbs = [end for end in tips.ends if tips.is_thumb(end)]
+    others = [end for end in tips.ends if end not in thumbs]
+    if not thumbs or not others:
+        return tuple(frames.values())
+    named = [[end for end in others if tips.is_called(end, word)] for word in OPPOSITE]
+    opposite = next((ends[0] for ends in named if ends), others[0])
+    return (frames[thumbs[0]], frames[opposite])
+
+
+def _frame_at(stance: Stance, tips: Fingertips, end: str) -> str:
+    """Return the frame nearest to the tip of a finger; one that is called a tip before others."""
+    rigid = stance.model.rigid_with(end)
+    links = [link for link in rigid if words.has(link, words.TIP)] or list(rigid)
+    away = np.linalg.norm(stance.places(links) - tips.tip(end), axis=1)
+    return links[int(np.argmin(np.round(away, 6)))]
+
+
+def _apart(distance: float) -> str:
+    if distance <= EXACT:
+        return ""
+    return f"; the finger tips meet {distance * 100:.0f} cm away, where no frame lies"

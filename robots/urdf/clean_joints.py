@@ -1,0 +1,92 @@
+"""Repairs joints of a URDF that say that they do not move, or say too much."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from xml.etree.ElementTree import Element
+
+from robots.urdf.numbers import numbers_of
+from robots.urdf.text_checks import link_of
+
+FREE = ("floating", "planar")  # types of joints that place a robot rather than move it
+BOUNDED = ("revolute", "prismatic")
+
+
+def repair_joints(root: Element, urdf: str) -> Iterator[str]:
+    """Repair the joints and yield what was done.
+
+    Args:
+        root: The ``<robot>``.
+        urdf: Its path, for messages.
+    """
+    joints = root.findall("joint")
+    yield from _fix_base(joints)
+    for joint in joints:
+        where = f"{urdf}: joint {joint.get('name')!r}"
+        if joint.get("type") in BOUNDED and _is_shut(joint.find("limit"), where):
+            _fix(joint)
+            yield (
+                f"joint {joint.get('name')!r} has the limits 0 … 0, which are those of a <limit>"
+                " that has none, so it is fixed (if it should turn freely, make it continuous)"
+            )
+        elif joint.get("type") == "continuous":
+            yield from _without_limits(joint)
+    yield from _fix_followers(joints, urdf)
+
+
+def _fix_base(joints: list[Element]) -> Iterator[str]:
+    """Fix a joint by which the whole robot would fly or drive: a layout says where it stands."""
+    carried = {link_of(joint, "child") for joint in joints}
+    for joint in joints:
+        kind, parent = joint.get("type", ""), link_of(joint, "parent")
+        alone = sum(link_of(other, "parent") == parent for other in joints) == 1
+        if kind in FREE and alone and parent not in carried:
+            _fix(joint)
+            yield (
+                f"joint {joint.get('name')!r}, by which the whole robot is {kind}, is fixed: a"
+                " layout says where it stands"
+            )
+
+
+def _is_shut(limit: Element | None, where: str) -> bool:
+    """Tell whether both limits are 0, which they are by the standard if they are left out."""
+    if limit is None:
+        return False
+    return all(numbers_of(limit, key, (0.0,), where) == (0.0,) for key in ("lower", "upper"))
+
+
+def _without_limits(joint: Element) -> Iterator[str]:
+    limit = joint.find("limit")
+    if limit is None or not {"lower", "upper"} & {*limit.keys()}:
+        return
+    ends = [limit.attrib.pop(key, "none") for key in ("lower", "upper")]
+    yield (
+        f"joint {joint.get('name')!r} is continuous, so its limits {' … '.join(ends)} rad count"
+        " for nothing"
+    )
+
+
+def _fix_followers(joints: list[Element], urdf: str) -> Iterator[str]:
+    """Fix the joints that mimic a joint that is fixed, and would stay where they are."""
+    fixed = {joint.get("name") for joint in joints if joint.get("type") == "fixed"}
+    waiting = [joint for joint in joints if joint.get("type") != "fixed"]
+    while follower := next((j for j in waiting if _follows(j, fixed, urdf)), None):
+        waiting.remove(follower)
+        _fix(follower)
+        fixed.add(follower.get("name"))
+        yield f"joint {follower.get('name')!r} mimics a joint that is fixed, so it is fixed"
+
+
+def _follows(joint: Element, fixed: set[str | None], urdf: str) -> bool:
+    mimic = joint.find("mimic")
+    if mimic is None or mimic.get("joint") not in fixed:
+        return False
+    where = f"{urdf}: joint {joint.get('name')!r}"
+    return numbers_of(mimic, "offset", (0.0,), where) == (0.0,)
+
+
+def _fix(joint: Element) -> None:
+    joint.set("type", "fixed")
+    for part in ("axis", "limit", "dynamics", "mimic", "safety_controller", "calibration"):
+        for element in joint.findall(part):
+            joint.remove(element)

@@ -1,0 +1,183 @@
+"""Finds the files that a URDF refers to by names that nearly fit."""
+
+from __future__ import annotations
+
+import os
+import posixpath
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+from robots.common.errors import AssetError, UnreadableFileError
+from robots.common.files import read_regular
+from robots.urdf.paths import resolve
+from robots.urdf.xml_text import parse_xml
+
+MAX_PACKAGE_BYTES = 1 << 20  # of a package.xml
+MOST_NEIGHBOURS = 500  # folders beside a package that are looked into
+
+_FIND = re.compile(r"(?:file://)?\$\(find\s+([^)\s]+)\s*\)/*(.*)", re.DOTALL)
+_GAZEBO = "model://"
+
+State = tuple[str, int, int, int]
+"""A file: its path, inode, size and time of change."""
+
+
+def file_states(references: Iterable[str], urdf: str) -> tuple[State, ...]:
+    """Return what changes with the files that a URDF refers to; nothing of those that are missing.
+
+    Args:
+        references: As they stand in the URDF.
+        urdf: Its path.
+    """
+    states: list[State] = []
+    for reference in references if posixpath.isabs(urdf) else ():
+        with suppress(AssetError, OSError, ValueError):
+            path = resolve(reference, urdf, os.path.isfile)
+            status = os.stat(path)
+            states.append((path, status.st_ino, status.st_size, status.st_mtime_ns))
+    return tuple(states)
+
+
+def repair_references(root: Element, urdf: str) -> Iterator[str]:
+    """Have every reference that leads nowhere lead to the one file that it may mean.
+
+    Args:
+        root: The ``<robot>``.
+        urdf: Its path; one that is relative refers to nothing on this machine.
+    """
+    repaired: dict[str, str] = {}
+    for element in (*root.iter("mesh"), *root.iter("texture")):
+        reference = element.get("filename", "")
+        if reference.strip() and posixpath.isabs(urdf) and not _leads(reference, urdf):
+            found = repaired.get(reference) or next(_meant(reference, urdf), "")
+            if found:
+                repaired[reference] = found
+                element.set("filename", found)
+    if repaired:
+        reference, found = next(iter(repaired.items()))
+        more = f", and {len(repaired) - 1} like it" if len(repaired) > 1 else ""
+        yield f"the file {reference!r} was found as {found!r}{more}"
+
+
+def find_package(name: str, folder: str) -> str:
+    """Return the folder of a package around or beside a folder; nothing if there is none.
+
+    Args:
+        name: As its package.xml gives it, or else its folder.
+        folder: Absolute path.
+    """
+    named = (f"{parent}/{name}" for parent in _around(folder))
+    return next(_packages(name, folder), "") or next(filter(os.path.isdir, named), "")
+
+
+def _leads(reference: str, urdf: str) -> bool:
+    """Tell whether a reference leads to a file that the URDF may refer to."""
+    try:
+        return os.path.isfile(resolve(reference, urdf, os.path.isfile))
+    except (AssetError, ValueError):
+        return False
+
+
+def _meant(reference: str, urdf: str) -> Iterator[str]:
+    """Yield references to files that a reference may mean."""
+    folder = posixpath.dirname(urdf)
+    for text in dict.fromkeys(_spellings(reference)):
+        if _leads(text, urdf):
+            yield text
+        for path in _paths(text, folder):
+            if found := _on_disk(path):
+                yield from _references_to(found, urdf)
+
+
+def _spellings(reference: str) -> Iterator[str]:
+    """Yield what a reference may be short for, or a slip of."""
+    text = reference.strip().replace("\\", "/")
+    if match := _FIND.fullmatch(text):
+        text = f"package://{match[1]}/{match[2]}"
+    if text.startswith(_GAZEBO):
+        text = f"package://{text.removeprefix(_GAZEBO)}"
+    yield text
+    if "://" not in text and not text.startswith("/"):
+        yield f"package://{text}"
+    if text.startswith("file://") and not text.startswith("file:///"):
+        yield text.removeprefix("file://")
+
+
+def _paths(reference: str, folder: str) -> Iterator[str]:
+    """Yield the absolute paths that a reference may mean, whatever the case of their letters."""
+    scheme, separator, rest = reference.partition("://")
+    if not separator:
+        yield posixpath.normpath(posixpath.join(folder, reference))
+    elif scheme == "package":
+        name, _, inside = rest.partition("/")
+        for package in _packages(name, folder):
+            yield posixpath.normpath(posixpath.join(package, inside))
+        for parent in _around(folder):
+            yield posixpath.normpath(posixpath.join(parent, rest))
+
+
+def _packages(name: str, folder: str) -> Iterator[str]:
+    """Yield the folders around a folder, and beside its package, whose package.xml has a name."""
+    around = list(_around(folder))
+    packages = [parent for parent in around if os.path.isfile(f"{parent}/package.xml")]
+    yield from (package for package in packages if _package_name(package) == name)
+    for beside in _neighbours(posixpath.dirname(packages[0])) if packages else ():
+        if _package_name(beside) == name:
+            yield beside
+
+
+def _around(folder: str) -> Iterator[str]:
+    while posixpath.dirname(folder) != folder:
+        yield folder
+        folder = posixpath.dirname(folder)
+
+
+def _neighbours(folder: str) -> list[str]:
+    names = _listing(folder)[:MOST_NEIGHBOURS]
+    return [f"{folder}/{name}" for name in names if os.path.isfile(f"{folder}/{name}/package.xml")]
+
+
+def _package_name(folder: str) -> str:
+    path = f"{folder}/package.xml"
+    try:
+        root = parse_xml(read_regular(path, MAX_PACKAGE_BYTES), path, "a package.xml")
+    except (AssetError, UnreadableFileError):
+        return ""
+    return (root.findtext("name") or "").strip()
+
+
+def _on_disk(path: str) -> str:
+    """Return the one file whose path differs at most by the case of letters, or nothing."""
+    if os.path.isfile(path):
+        return path
+    parts = path.split("/")
+    known = next(n for n in range(len(parts), 0, -1) if os.path.isdir("/".join(parts[:n]) or "/"))
+    found = "/".join(parts[:known])
+    for part in parts[known:]:
+        alike = [name for name in _listing(found) if name.lower() == part.lower()]
+        if len(alike) != 1:
+            return ""
+        found = f"{found}/{alike[0]}"
+    return found if os.path.isfile(found) else ""
+
+
+def _listing(folder: str) -> list[str]:
+    try:
+        return sorted(os.listdir(folder))
+    except OSError:
+        return []
+
+
+def _references_to(path: str, urdf: str) -> Iterator[str]:
+    """Yield how a URDF may refer to a file: relative to its folder, or within a package."""
+    folder = posixpath.dirname(urdf)
+    packages = [package for package in _around(posixpath.dirname(path))]
+    for text in (
+        Path(os.path.relpath(path, folder)).as_posix(),
+        *(f"package://{posixpath.relpath(path, posixpath.dirname(near))}" for near in packages),
+    ):
+        if _leads(text, urdf) and resolve(text, urdf, os.path.isfile) == path:
+            yield text

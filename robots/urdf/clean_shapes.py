@@ -1,0 +1,93 @@
+"""Leaves out the shapes of a URDF that have no extent: nothing can touch or see them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from xml.etree.ElementTree import Element
+
+from robots.common.errors import AssetError, MissingPackageError
+from robots.urdf.mesh_files import has_body
+from robots.urdf.numbers import numbers_of, required_numbers
+from robots.urdf.paths import resolve
+from robots.urdf.shapes import SIZES, SMALLEST_SIZE
+
+KINDS = ("visual", "collision")
+
+
+def repair_shapes(root: Element, urdf: str) -> Iterator[str]:
+    """Leave out shapes without extent and yield what was left out.
+
+    Args:
+        root: The ``<robot>``.
+        urdf: Its path, by which it refers to meshes.
+    """
+    for link in root.iterfind("link"):
+        name = link.get("name")
+        for kind in KINDS:
+            for element in link.findall(kind):
+                yield from _repair_geometry(element, f"link {name!r}: a {kind}")
+                if reason := _why_nothing(element, kind, f"{urdf}, link {name!r}", urdf):
+                    link.remove(element)
+                    yield f"link {name!r}: a {kind} {reason}, left out"
+
+
+def _repair_geometry(element: Element, what: str) -> Iterator[str]:
+    """Leave out what is no shape, and have a mesh scaled by three factors."""
+    geometry = element.find("geometry")
+    parts = [] if geometry is None else list(geometry)
+    strange = [part for part in parts if part.tag not in SIZES]
+    if geometry is not None and len(strange) == len(parts) - 1:
+        for part in strange:
+            geometry.remove(part)
+            yield f"{what} has a <{part.tag}> beside its shape, left out"
+    for mesh in element.iterfind("geometry/mesh"):
+        factors = mesh.get("scale", "").split()
+        if len(factors) == 1 or len(factors) == 4 and factors[3] in ("1", "1.0"):
+            scale = " ".join((factors * 3)[:3])
+            yield f"{what} has a mesh with scale={mesh.get('scale')!r}, taken as {scale!r}"
+            mesh.set("scale", scale)
+
+
+def _why_nothing(element: Element, kind: str, where: str, urdf: str) -> str:
+    """Return why a ``<collision>`` or ``<visual>`` stands for nothing, or nothing if it may."""
+    shapes = element.findall("geometry/*")
+    if not shapes:
+        return "without a shape"
+    if len(shapes) > 1 or shapes[0].tag not in SIZES:
+        return ""
+    (shape,) = shapes
+    if shape.tag == "mesh":
+        return _why_no_mesh(shape, kind, where, urdf)
+    try:
+        sizes = [
+            size
+            for attribute, count in SIZES[shape.tag].items()
+            for size in required_numbers(shape, attribute, count, where)
+        ]
+    except AssetError:
+        return ""
+    least = SMALLEST_SIZE if kind == "collision" else 0.0
+    if min(sizes) >= 0 and (min(sizes) < least or max(sizes) == 0):
+        return f"of a {shape.tag} with {_listing(shape)}, which has no volume"
+    return ""
+
+
+def _why_no_mesh(mesh: Element, kind: str, where: str, urdf: str) -> str:
+    file = mesh.get("filename", "")
+    if not file.strip():
+        return "of a mesh without a file"
+    try:
+        scale = numbers_of(mesh, "scale", (1.0, 1.0, 1.0), where)
+        if 0.0 in scale:
+            return f"of a mesh with {_listing(mesh)}, which has no volume"
+        path = resolve(file, urdf, os.path.isfile)
+        if kind == "visual" or not os.path.isfile(path) or has_body(path, scale, where, urdf):
+            return ""
+    except (AssetError, MissingPackageError):
+        return ""
+    return f"of the mesh {file!r}, which has no volume"
+
+
+def _listing(shape: Element) -> str:
+    return " ".join(f"{key}={value!r}" for key, value in shape.items())
