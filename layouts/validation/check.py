@@ -191,11 +191,10 @@ class _Check:
         self, one: Postures, other: Postures, pairs: Sequence[tuple[int, int]] | None
     ) -> tuple[list[Finding], list[Clearance]]:
         self._progress.tell(f"{one.name} with {other.name}")
-        first = slice(0, 1)
-        still = nearest(one.only(first), other.only(first), pairs)
-        near = nearest(one, other, pairs)
-        if still is None or near is None:
+        still = nearest(one.first, other.first, pairs)
+        if still is None:
             return [], []
+        near = nearest(one, other, pairs, still) or still
         between, table = (one.name, other.name), other.name in self._surfaces
         clearance = Clearance(
             between, table, still.links, still.distance, near.links, near.distance, still.points
@@ -275,7 +274,7 @@ class _Check:
 
     def _obstacles(self, name: str, solution: Solution) -> Iterator[str]:
         """Yield what a robot touches there, itself included, with the others at their keyframes."""
-        model, first = self._models[name], slice(0, 1)
+        model = self._models[name]
         robot = stand(name, self._layout[name], model, np.array([solution.qpos]))
         around = {**self._robots, **self._surfaces}
         for obstacle, body in around.items():
@@ -283,7 +282,7 @@ class _Check:
                 touches = touching(robot, robot, model.self_pairs)
             else:
                 pairs = _moving_hulls(model) if obstacle in self._surfaces else None
-                touches = touching(robot, body.only(first), pairs)
+                touches = touching(robot, body.first, pairs)
             if touches:
                 yield obstacle
 
