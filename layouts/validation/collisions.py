@@ -17,6 +17,7 @@ from robots.bodies.hulls import Hull, RobotModel
 Pairs = NDArray[np.intp]  # (n, 2): indices of hulls
 
 FAR = 10.0  # m; what is farther apart is not measured
+FEW = 8  # pairs of hulls that are measured sooner than sorted out
 ROUNDING = 1e-5  # m; of distances and directions that FCL finds by iteration
 
 
@@ -130,9 +131,7 @@ def nearest(
         best: An approach that is known already; returned if no other is nearer.
     """
     within = FAR if best is None else max(best.distance, 0.0)
-    left = _candidates(one, other, pairs, within)
-    if best is not None:
-        left = _those_nearer(left, one, other, best)
+    left = _candidates(one, other, pairs, within, best)
     while len(left.places):
         approach = _measure(one, other, *left.places[0].tolist())
         left = left.only(slice(1, None))
@@ -173,20 +172,29 @@ def _postures(
 
 
 def _candidates(
-    one: Postures, other: Postures, pairs: Sequence[tuple[int, int]] | None, within: float
+    one: Postures,
+    other: Postures,
+    pairs: Sequence[tuple[int, int]] | None,
+    within: float,
+    best: Approach | None = None,
 ) -> _Candidates:
-    """Return what may be within a distance (m), the least bound first.
+    """Return what may be within a distance (m) and nearer than the best, the least bound first.
 
     Where boxes overlap the bound says nothing; of those, the nearest centres come first.
     """
     a, b = _near_pairs(one, other, pairs, within)
-    bounds = _box_gaps(one.low[:, a], one.high[:, a], other.low[:, b], other.high[:, b])
-    posture, pair = np.nonzero(bounds <= within)
-    bounds, a, b = bounds[posture, pair], a[pair], b[pair]
-    sums = one.low[posture, a] + one.high[posture, a] - other.low[posture, b]
-    centres = np.linalg.norm(sums - other.high[posture, b], axis=-1)
-    places = np.stack([posture, a, b], axis=-1)
-    return _Candidates(bounds, places).only(np.lexsort((centres, bounds)))
+    posture = np.arange(len(one.poses))[:, None]
+    posture, a, b = (every.ravel() for every in np.broadcast_arrays(posture, a, b))
+    if best is not None and len(a):
+        parted = _parted(one, other, posture, a, b, best)
+        posture, a, b = posture[~parted], a[~parted], b[~parted]
+    low, high = one.low[posture, a], one.high[posture, a]
+    other_low, other_high = other.low[posture, b], other.high[posture, b]
+    bounds = _box_gaps(low, high, other_low, other_high)
+    centres = np.linalg.norm(low + high - other_low - other_high, axis=-1)
+    order = np.lexsort((centres, bounds))
+    found = _Candidates(bounds, np.stack([posture, a, b], axis=-1)).only(order)
+    return found.only(found.bounds <= within)
 
 
 def _near_pairs(
@@ -209,31 +217,46 @@ def _box_gaps(low: Floats, high: Floats, other_low: Floats, other_high: Floats) 
     return np.linalg.norm(np.maximum(gaps, 0.0), axis=-1)
 
 
-def _those_nearer(
-    candidates: _Candidates, one: Postures, other: Postures, best: Approach
-) -> _Candidates:
-    """Return the candidates that may be nearer than the best so far.
+def _those_nearer(left: _Candidates, one: Postures, other: Postures, best: Approach) -> _Candidates:
+    """Return the candidates that may be nearer than the best so far."""
+    left = left.only(left.bounds <= max(best.distance, 0.0))
+    if len(left.places) < FEW:
+        return left
+    posture, a, b = left.places.T
+    return left.only(~_parted(one, other, posture, a, b, best))
 
-    Two convex bodies are at least as far apart as any plane between them shows. The plane that
-    parts the best pair parts most others as well, if the robots stand apart.
+
+def _parted(
+    one: Postures,
+    other: Postures,
+    posture: NDArray[np.intp],
+    a: NDArray[np.intp],
+    b: NDArray[np.intp],
+    best: Approach,
+) -> NDArray[np.bool_]:
+    """Tell of pairs of hulls whether they are seen not to be nearer than the best so far.
+
+    Two convex bodies are at least as far apart as between any two parallel planes that part them.
+    Those that touch the best pair do for most others too, where robots stand apart.
     """
-    candidates = candidates.only(candidates.bounds <= max(best.distance, 0.0))
-    if best.distance <= 0.0 or not len(candidates.places):
-        return candidates
     way = np.subtract(best.points[1], best.points[0])
-    way /= np.linalg.norm(way)
-    posture, a, b = candidates.places.T
+    length = float(np.linalg.norm(way))
+    if best.distance <= 0.0 or length < ROUNDING:
+        return np.zeros(len(a), bool)
+    way /= length
     gaps = -_farthest(other, b, -way)[posture, b] - _farthest(one, a, way)[posture, a]
-    return candidates.only(gaps <= best.distance + ROUNDING)
+    return gaps > best.distance + ROUNDING
 
 
 def _farthest(body: Postures, hulls: NDArray[np.intp], way: Floats) -> Floats:
-    """Return how far some hulls reach along a direction, (postures, hulls) (m); others: 0."""
-    reaches = np.zeros(body.poses.shape[:2])
-    for hull in np.unique(hulls):
-        poses = body.poses[:, hull]
-        own = poses[:, :3, :3].transpose(0, 2, 1) @ way
-        reaches[:, hull] = (body.hulls[hull].corners @ own.T).max(axis=0) + poses[:, :3, 3] @ way
+    """Return how far some hulls reach along a direction, (postures, hulls) (m).
+
+    What it returns for other hulls means nothing.
+    """
+    own = way @ body.poses[..., :3, :3]  # the direction in the frames of the links
+    reaches = body.poses[..., :3, 3] @ way
+    for hull in np.flatnonzero(np.bincount(hulls)):
+        reaches[:, hull] += (own[:, hull] @ body.hulls[hull].corners.T).max(axis=1)
     return reaches
 
 
