@@ -47,6 +47,9 @@ def _repair(link: Element, where: str, urdf: str) -> Iterator[str]:
     moments = [_given(tensor, key, where) for key in (*MOMENTS, *PRODUCTS)]
     if weight < 0 or 0 < weight < SMALLEST:
         return
+    if tensor is not None and (products := _complete(tensor)) and _is_possible(link, where):
+        yield f"link {link.get('name')!r} has an inertia without {', '.join(products)}, taken as 0"
+        return
     what = _problem(tensor, moments)
     size = _size(link, where, urdf)
     if weight == 0 and link.find("collision") is not None:
@@ -64,6 +67,22 @@ def _repair(link: Element, where: str, urdf: str) -> Iterator[str]:
         _set_box(inertial, weight, size or _ball(weight))
         body = _in_words(weight, size)
         yield f"link {link.get('name')!r} has {words}{what}: took that of {body}"
+
+
+def _complete(tensor: Element) -> list[str]:
+    """Set the products of inertia that are missing to 0, and return their names."""
+    missing = [key for key in PRODUCTS if key not in tensor.keys()]  # noqa: SIM118
+    for key in missing:
+        tensor.set(key, "0")
+    return missing
+
+
+def _is_possible(link: Element, where: str) -> bool:
+    try:
+        expect_inertia(link, where, moves=True)
+    except AssetError:
+        return False
+    return True
 
 
 def _given(element: Element | None, key: str, where: str) -> float:
@@ -112,7 +131,9 @@ def _size(link: Element, where: str, urdf: str) -> Size | None:
 
     for kind in ("collision", "visual"):
         corners = [
-            made for shape in link.iterfind(kind) if (made := _corners(shape, where, urdf)) is not None
+            made
+            for shape in link.iterfind(kind)
+            if (made := _corners(shape, where, urdf)) is not None
         ]
         if corners:
             x, y, z = np.maximum(np.ptp(np.concatenate(corners), axis=0), THINNEST).tolist()

@@ -19,7 +19,7 @@ from xml.etree.ElementTree import Element
 from robots.common.errors import AssetError, MissingPackageError
 from robots.urdf.clean_references import find_package
 
-XACRO = "www.ros.org/wiki/xacro"  # of the namespace {http://www.ros.org/wiki/xacro}
+XACRO = "/xacro"  # what its namespaces end in: http://www.ros.org/wiki/xacro, …
 DEFINITIONS = ("property", "arg", "macro")  # which do nothing where nothing uses them
 
 _turn = Lock()  # the package keeps what it is doing in its module
@@ -96,9 +96,11 @@ def _expand(template: Path, arguments: Mapping[str, str]) -> tuple[list[str], by
 def _package(template: Path) -> Any:
     try:
         import xacro  # pyright: ignore[reportMissingImports]
+        import xacro.substitution_args  # pyright: ignore[reportMissingImports]
     except ImportError as error:
         raise MissingPackageError(
-            f"{template} is a xacro template; expanding it needs xacro: pip install xacro"
+            f"{template} is a xacro template; expanding it needs xacro: pip install xacro (ROS"
+            " is not needed)"
         ) from error
     return xacro
 
@@ -126,7 +128,7 @@ def _times(files: Any) -> dict[str, int]:
 def _kind(element: Element) -> str:
     """Return what an element is to xacro; nothing if it is not one of its own."""
     space, _, name = element.tag.rpartition("}")
-    return name if XACRO in space else ""
+    return name if space.endswith(XACRO) else ""
 
 
 def _outside_definitions(root: Element) -> Iterator[Element]:
