@@ -22,7 +22,8 @@ PARTS = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro">
 <xacro:macro name="part" params="name">
   <link name="${name}"><inertial><mass value="1"/>
     <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
-    <collision><geometry><mesh filename="file://$(find toy_package)/box.stl"/></geometry></collision>
+    <collision><geometry><mesh filename="file://$(find toy_package)/box.stl"/></geometry>
+    </collision>
   </link>
 </xacro:macro></robot>"""
 
