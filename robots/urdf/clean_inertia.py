@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Iterator
 from contextlib import suppress
+from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element, SubElement
 
 from robots.common.errors import AssetError, MissingPackageError
@@ -15,6 +16,9 @@ from robots.urdf.numbers import numbers_of, required_numbers
 from robots.urdf.paths import resolve
 from robots.urdf.shapes import SIZES
 from robots.urdf.text_checks import link_of
+
+if TYPE_CHECKING:
+    from kinematics.rotations import Floats
 
 DENSITY = 1000.0  # kg/m³; what SAPIEN takes for collision shapes
 THINNEST = 1e-3  # m; of a body whose shapes are thinner
@@ -141,7 +145,7 @@ def _size(link: Element, where: str, urdf: str) -> Size | None:
     return None
 
 
-def _corners(element: Element, where: str, urdf: str):  # noqa: ANN202
+def _corners(element: Element, where: str, urdf: str) -> Floats | None:
     """Return the corners of what a shape fills in the link's frame, (n, 3) (m), or None."""
     import numpy as np
 
@@ -157,7 +161,7 @@ def _corners(element: Element, where: str, urdf: str):  # noqa: ANN202
     return np.asarray(own) @ pose[:3, :3].T + pose[:3, 3]
 
 
-def _own_corners(element: Element, where: str, urdf: str):  # noqa: ANN202
+def _own_corners(element: Element, where: str, urdf: str) -> Any:
     (shape,) = element.findall("geometry/*")
     if shape.tag == "mesh":
         scale = numbers_of(shape, "scale", (1.0, 1.0, 1.0), where)

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from importlib import import_module
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -96,7 +97,8 @@ def _expand(template: Path, arguments: Mapping[str, str]) -> tuple[list[str], by
 def _package(template: Path) -> Any:
     try:
         import xacro  # pyright: ignore[reportMissingImports]
-        import xacro.substitution_args  # pyright: ignore[reportMissingImports]
+
+        import_module("xacro.substitution_args")  # which xacro loads when it first needs it
     except ImportError as error:
         raise MissingPackageError(
             f"{template} is a xacro template; expanding it needs xacro: pip install xacro (ROS"
@@ -106,7 +108,7 @@ def _package(template: Path) -> Any:
 
 
 @contextmanager
-def _finding(xacro: Any, template: Path) -> Iterator[None]:
+def _finding(xacro: Any, template: Path) -> Generator[None]:
     """Have ``$(find PACKAGE)`` look around the template, before ROS if that is installed."""
     substitution = xacro.substitution_args
     installed = substitution._eval_find

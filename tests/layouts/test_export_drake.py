@@ -190,6 +190,7 @@ def test_a_slash_in_a_name_leads_to_no_other_folder(tmp_path):
         "left_.._tip_collision_0.obj",
         "left_.._tip_collision_0_2.obj",
         "left_.._tip_collision_1.obj",
+        "left_.._tip_collision_2.obj",
         "left_.._tip_visual_0.obj",
     ]
     loaded = yourdfpy.URDF.load(str(urdf), load_collision_meshes=True)
