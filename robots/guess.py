@@ -252,10 +252,18 @@ def _rest(
     excused = joined_pairs(parts.model) | rigid_pairs(parts.model)
     excused |= frozenset(map(frozenset, allowed))
     pairs = counted_pairs(parts.stance.tree, parts.hulls, excused)
-    opened = {k: v for gripper in parts.grippers.values() for k, v in gripper.open.items()}
+    hands = [gripper.postures for gripper in parts.grippers.values()]
     tools = [(limb, parts.tools[limb.name]) for limb in parts.anatomy.limbs]
-    found = PostureSearch(parts.stance, tools, parts.hulls, pairs, opened).run()
-    return {**parts.stance.all_joints(found.position), **opened}, found.reasons
+    found = PostureSearch(parts.stance, tools, parts.hulls, pairs, hands).run()
+    rest = parts.stance.all_joints(found.position)
+    for postures in hands:  # joints that one number drives need not mimic each other in the URDF
+        rest |= next(p for p in postures if _agree(p, rest, parts.stance))
+    return rest, found.reasons
+
+
+def _agree(posture: Mapping[str, float], rest: Mapping[str, float], stance: Stance) -> bool:
+    leaders = [joint for joint in posture if joint in stance.index]
+    return all(abs(posture[joint] - rest[joint]) < 1e-5 for joint in leaders)
 
 
 def _reach(parts: _Parts, limb: Limb, rest: dict[str, float]) -> tuple[float, str]:

@@ -16,6 +16,7 @@ from robots.urdf.model import ModelJoint
 
 SQUEEZE = 0.01  # how far beyond closed a parallel gripper's target is (m)
 SAME = 0.02  # of a range; how much two fingers' ranges may differ
+OPENINGS = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the way, in which a hand may stand
 NOTICEABLE = 1e-4  # m; how much opening changes the distance of the tips
 
 
@@ -25,12 +26,12 @@ class Gripper:
 
     Attributes:
         groups: Joint groups by name.
-        open: Where its joints are when it is open (rad, m).
+        postures: Where its joints are, wide open first, then less and less (rad, m).
         reasons: One sentence each.
     """
 
     groups: Mapping[str, JointGroup]
-    open: Mapping[str, float]
+    postures: tuple[Mapping[str, float], ...]
     reasons: tuple[str, ...]
 
 
@@ -63,11 +64,11 @@ def find_gripper(limb: Limb, tips: Fingertips, drives: Drives) -> Gripper:
         reasons = []
     if len(leaders) > 1:
         return _many(name, leaders, followers, drives)
-    group, positions, reason = _one(name, leaders[0], followers[leaders[0].name], tips, drives)
+    group, postures, reason = _one(name, leaders[0], followers[leaders[0].name], tips, drives)
     mimics = [f"{j.name} follows {j.mimics}" for j in limb.fingers if j.mimics]
     if mimics:
         reasons.append(f"{name}, mimic joints, from the URDF: {', '.join(mimics)}")
-    return Gripper({name: group}, positions, (*reasons, reason))
+    return Gripper({name: group}, postures, (*reasons, reason))
 
 
 def _followers(fingers: Sequence[ModelJoint]) -> dict[str, list[_Follower]]:
@@ -137,7 +138,7 @@ def _one(
     followers: Sequence[_Follower],
     tips: Fingertips,
     drives: Drives,
-) -> tuple[JointGroup, dict[str, float], str]:
+) -> tuple[JointGroup, tuple[dict[str, float], ...], str]:
     """Return the group that one number drives, where it is open, and the reason.
 
     The number grows as the hand opens: where it opens towards the leader's lower limit, it counts
@@ -164,9 +165,9 @@ def _one(
         limits=tuple(joint.span for joint in joints),
         **drive_fields([drives.of(joint) for joint in joints]),
     )
-    positions = {f.joint.name: _tidy(f.multiplier * high + f.offset) for f in followers}
-    where = f"{leader.name} at {positions[leader.name]:g} {leader.unit}"
-    return group, positions, f"{name}: +1 opens it, with {where}, as the finger tips part there"
+    postures = tuple(_led_to(followers, low + (high - low) * part) for part in OPENINGS)
+    where = f"{leader.name} at {postures[0][leader.name]:g} {leader.unit}"
+    return group, postures, f"{name}: +1 opens it, with {where}, as the finger tips part there"
 
 
 def _apart(tips: Fingertips, followers: Sequence[_Follower], lead: float) -> float:
@@ -192,12 +193,21 @@ def _many(
                 followers[leader.name], drives
             )
     counts = f"{len(leaders)} numbers drive it, one for each joint that mimics none"
-    positions = {
-        f.joint.name: _tidy(f.multiplier * middle_of(leader) + f.offset)
-        for leader in leaders
-        for f in followers[leader.name]
+    postures: list[dict[str, float]] = []
+    for part in OPENINGS:
+        postures.append({})
+        for joint in leaders:
+            value = part * middle_of(joint) + (1 - part) * sum(joint.span) / 2
+            postures[-1].update(_led_to(followers[joint.name], value))
+    return Gripper(groups, tuple(postures), (f"{name}: {counts}",))
+
+
+def _led_to(followers: Sequence[_Follower], lead: float) -> dict[str, float]:
+    """Return where joints go, each within its limits."""
+    return {
+        f.joint.name: min(max(_tidy(f.multiplier * lead + f.offset), f.joint.span[0]), f.joint.span[1])
+        for f in followers
     }
-    return Gripper(groups, positions, (f"{name}: {counts}",))
 
 
 def _each(joints: Sequence[ModelJoint], drives: Drives) -> JointGroup:
