@@ -254,7 +254,8 @@ def _rest(
     pairs = counted_pairs(parts.stance.tree, parts.hulls, excused)
     hands = [gripper.postures for gripper in parts.grippers.values()]
     tools = [(limb, parts.tools[limb.name]) for limb in parts.anatomy.limbs]
-    found = PostureSearch(parts.stance, tools, parts.hulls, pairs, hands).run()
+    torso = parts.anatomy.parts.get("torso", ())
+    found = PostureSearch(parts.stance, tools, parts.hulls, pairs, hands, torso).run()
     rest = parts.stance.all_joints(found.position)
     for postures in hands:  # joints that one number drives need not mimic each other in the URDF
         rest |= next(p for p in postures if _agree(p, rest, parts.stance))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinematics.rotations import Floats
 from robots.bodies.hulls import Hull
@@ -13,6 +14,7 @@ from robots.bodies.overlaps import overlapping
 from robots.guessing.stance import Stance
 from robots.guessing.tool import Tool
 from robots.urdf.anatomy import FARTHEST_SLIDE, Limb
+from robots.urdf.model import ModelJoint
 
 DRAWS = 1500  # random postures of a limb
 BEST = 16  # of them, refined and then looked at for overlaps
@@ -27,7 +29,8 @@ LOW = 0.02  # m above the ground; the least of any moving link
 PLAIN = 0.5  # weight of joints that leave the posture that the search starts from
 DOWN = 0.15  # weight of a tool that does not point down
 ONE_SIDED = 0.25  # of the reach; how far aside the middle of a workspace tells a front
-EIGHTH = np.pi / 4  # rad; to which the front is rounded
+QUARTER = np.pi / 2  # rad; to which the front is rounded, or to half of it
+NEARLY = 0.6  # rad; how near it must be to a quarter turn
 BESIDE = 0.35  # of the reach; how far the TCP may be to the side of what is ahead
 
 
@@ -54,6 +57,7 @@ class PostureSearch:
         hulls: Sequence[Hull],
         pairs: Sequence[tuple[int, int]],
         hands: Sequence[Sequence[Mapping[str, float]]],
+        torso: Sequence[ModelJoint],
     ) -> None:
         """Take a robot.
 
@@ -63,10 +67,12 @@ class PostureSearch:
             hulls: Its convex bodies; empty if they cannot be read.
             pairs: Indices of hulls that may not overlap.
             hands: Of each hand where its joints may stand, the best first (rad, m).
+            torso: Joints that carry limbs.
         """
         self._stance, self._hulls, self._pairs = stance, hulls, np.array(pairs, int).reshape(-1, 2)
         self._start = self._opened(hands)
         self._generator = np.random.default_rng(0)
+        self._torso = torso
         self._views = [_View(stance, limb, tool) for limb, tool in tools if _searchable(limb)]
         self._ground = self._lowest()
 
@@ -86,9 +92,35 @@ class PostureSearch:
                     f" no links overlap, and the TCP is ahead, towards {front}",
                 ),
             )
-        for view, drawn in zip(self._views, samples, strict=True):
-            posture = self._best(view, posture, drawn)
+        posture = min((self._searched(start, samples) for start in self._starts()), key=self._left)
         return Posture(posture, (self._said(posture, front),))
+
+    def _starts(self) -> Iterator[Floats]:
+        """Yield the postures to search from: as it stands, and with its torso half-way up."""
+        yield self._start
+        lifts = [joint for joint in self._torso if joint.unit == "m" and joint.mimics is None]
+        if lifts and self._left(self._posed) > 0:
+            yield self._stance.with_joints({j.name: sum(j.span) / 2 for j in lifts}, self._start)
+
+    def _left(self, posture: Floats) -> int:
+        return int(self._overlaps(posture, self._pairs).sum())
+
+    def _searched(self, posture: Floats, samples: Sequence[Floats]) -> Floats:
+        """Return a posture with one limb after the other at its best."""
+        waiting = [view.links for view in self._views]
+        for view, drawn in zip(self._views, samples, strict=True):
+            waiting.pop(0)
+            pairs = self._pairs[self._touching(view.links, frozenset().union(*waiting))]
+            posture = self._best(view, posture, drawn, pairs)
+        self._posed = posture
+        return posture
+
+    def _touching(self, links: frozenset[int], apart: frozenset[int]) -> NDArray[np.bool_]:
+        """Tell of which pairs one hull is on some links, and none on others, (pairs,)."""
+        sides = [[self._hulls[i].link for i in pair] for pair in self._pairs]
+        return np.array(
+            [bool(links & {*pair}) and not apart & {*pair} for pair in sides], bool
+        )  # fmt: skip
 
     def _opened(self, hands: Sequence[Sequence[Mapping[str, float]]]) -> Floats:
         """Return the middle posture with every hand as open as it can be without overlaps."""
@@ -160,7 +192,9 @@ class PostureSearch:
             ahead[2] = 0.0
         clear = np.linalg.norm(ahead) >= ONE_SIDED * total
         angle = np.arctan2(ahead[1], ahead[0]) if clear else 0.0
-        angle = np.round(angle / EIGHTH) * EIGHTH
+        quarter = np.round(angle / QUARTER) * QUARTER
+        eighth = np.round(angle / QUARTER * 2) * QUARTER / 2
+        angle = quarter if abs(angle - quarter) < NEARLY else eighth
         self._front = np.array([np.cos(angle), np.sin(angle), 0.0])
 
     def _is_fine(self, posture: Floats) -> bool:
@@ -188,7 +222,9 @@ class PostureSearch:
             bad |= (np.abs(at[:, view.bounded]) > 1 - MARGIN).any(axis=1)
         return np.where(bad, np.inf if strict else cost + 10.0, cost)
 
-    def _best(self, view: _View, posture: Floats, drawn: Floats) -> Floats:
+    def _best(
+        self, view: _View, posture: Floats, drawn: Floats, pairs: NDArray[np.intp]
+    ) -> Floats:
         """Return the best posture of one limb that overlaps nothing, else the one that does least.
 
         Each round leaves out the postures with overlaps that the last round met.
@@ -199,11 +235,11 @@ class PostureSearch:
         fixed = np.delete(np.arange(len(posture)), view.free)
         drawn[:, fixed] = posture[fixed]
         counts: list[tuple[int, int, Floats]] = []
-        met = np.zeros(len(self._pairs), bool)
+        met = np.zeros(len(pairs), bool)
         for _ in range(TRIES):
-            pool = self._refined(view, self._without(self._pairs[met], drawn, view))
+            pool = self._refined(view, self._without(pairs[met], drawn, view))
             for tried in pool:
-                overlaps = self._overlaps(tried, self._pairs)
+                overlaps = self._overlaps(tried, pairs)
                 if not overlaps.any():
                     return tried
                 met |= overlaps
@@ -250,6 +286,7 @@ class _View:
         reach: How far the TCP gets from the shoulder (m).
         shoulder: Where the first of them is, (3,) (m).
         moving: Indices of the links that move, in the smaller tree.
+        links: Indices of all links that it moves, in the robot's tree.
     """
 
     def __init__(self, stance: Stance, limb: Limb, tool: Tool) -> None:
@@ -272,6 +309,11 @@ class _View:
         axis = pose[:3, :3] @ self._tree.axes[first]
         self.is_upright = abs(axis[2]) > 0.9 and not self._tree.slides[first]
         self.moving = [i for i in range(len(self._tree.links)) if i > first]
+        self.links = frozenset(
+            stance.tree.link(link)
+            for joint in stance.model.below(joints[0])
+            for link in stance.model.rigid_with(joint.child)
+        )
         self.reach = 1.0
 
     def look(self, postures: Floats) -> tuple[Floats, Floats]:
