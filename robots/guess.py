@@ -29,7 +29,7 @@ from robots.descriptor import (
 )
 from robots.guessing.drives import CONTROL_STEP, Drives, alike, drive_fields
 from robots.guessing.fingertips import Fingertips
-from robots.guessing.grippers import Gripper, find_gripper
+from robots.guessing.grippers import Gripper, entangled, find_gripper
 from robots.guessing.posture import PostureSearch
 from robots.guessing.stance import Stance
 from robots.guessing.tool import Tool, find_tool
@@ -39,6 +39,8 @@ from robots.urdf.model import ModelJoint, UrdfModel
 from robots.urdf.reading import read_model
 from robots.urdf.summary import parse_urdf, read_cleaned
 from robots.urdf.tree import kinematic_tree
+
+LinkPairs = tuple[tuple[str, str], ...]
 
 REACH_STARTS = 8  # of the search for the largest distance
 
@@ -100,6 +102,8 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     main = parts.anatomy.limbs[0]
     split, drives = _action_split(parts)
     allowed, overlaps = guess_allowed(parts.model, path)
+    hands, about_hands = _within_hands(parts, allowed)
+    allowed += hands
     rest, stance = _rest(parts, allowed)
     distance, measured = _reach(parts, main, rest)
     fields: dict[str, Any] = {
@@ -123,7 +127,7 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     repairs = [f"repaired: {repair}" for repair in cleaned.repairs]
     about = (*parts.anatomy.reasons, *tools, *_about_grasps(parts), *drives, *stance, measured)
     given = tuple(f"{field}: given, not guessed" for field in overrides)
-    return Guess(RobotDescriptor(**{**fields, **overrides}), (*repairs, *about, *overlaps, *given))
+    return Guess(RobotDescriptor(**{**fields, **overrides}), (*repairs, *about, *overlaps, *about_hands, *given))
 
 
 def _look_at(path: Path, xml: bytes) -> _Parts:
@@ -245,13 +249,36 @@ def _about_grasps(parts: _Parts) -> Iterator[str]:
         yield "fingers: none, so grasps go unnoticed; a Fingers(...) with two links changes that"
 
 
-def _rest(
-    parts: _Parts, allowed: tuple[tuple[str, str], ...]
-) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return the keyframe (rad, m) and the reasons for it."""
+def _within_hands(
+    parts: _Parts, allowed: LinkPairs
+) -> tuple[LinkPairs, tuple[str, ...]]:
+    """Return the pairs of a hand's links that overlap however it stands, and a reason."""
+    found: dict[tuple[str, str], None] = {}
+    pairs = _counted(parts, allowed)
+    for limb in parts.anatomy.limbs:
+        if limb.name in parts.grippers:
+            gripper = parts.grippers[limb.name]
+            found |= dict.fromkeys(entangled(parts.stance, limb, parts.hulls, pairs, gripper))
+    if not found:
+        return (), ()
+    listing = ", ".join(f"{one} and {other}" for one, other in found)
+    return tuple(found), (
+        f"allowed_collisions, too: {listing}, of hands, which overlap while these are open",
+    )
+
+
+def _counted(parts: _Parts, allowed: LinkPairs) -> tuple[tuple[int, int], ...]:
+    """Return the pairs of hulls whose overlaps count, by their indices."""
     excused = joined_pairs(parts.model) | rigid_pairs(parts.model)
     excused |= frozenset(map(frozenset, allowed))
-    pairs = counted_pairs(parts.stance.tree, parts.hulls, excused)
+    return counted_pairs(parts.stance.tree, parts.hulls, excused)
+
+
+def _rest(
+    parts: _Parts, allowed: LinkPairs
+) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Return the keyframe (rad, m) and the reasons for it."""
+    pairs = _counted(parts, allowed)
     hands = [gripper.postures for gripper in parts.grippers.values()]
     tools = [(limb, parts.tools[limb.name]) for limb in parts.anatomy.limbs]
     torso = parts.anatomy.parts.get("torso", ())

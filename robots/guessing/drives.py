@@ -21,6 +21,7 @@ SHORTEST_STEP = 0.04  # rad, m; what ManiSkill's Panda truly goes in one control
 # physics advances by 0.01 s; with a force that is just so large, 93 %.
 FREQUENCY = 150.0  # rad/s
 JUST_ENOUGH = 4.0  # of inertia · step / CONTROL_STEP²
+SETTLING = 0.1  # s; of a finger that goes to a place
 HOLDING = 10.0  # times the force that an arm's joint would have
 POSTURES = 16  # in which the inertia is looked at
 
@@ -78,6 +79,15 @@ class Drives:
             force, step = needed * SHORTEST_STEP, SHORTEST_STEP
         damping = 2 * (stiffness * inertia) ** 0.5
         return Drive(*map(_rounded, (stiffness, damping, force)), step=_down(step)), raised
+
+    def gripping(self, joint: ModelJoint) -> Drive:
+        """Return the drive of a joint whose targets are places, far away at times: it takes time.
+
+        ManiSkill's Panda drives its fingers with a damping of a tenth of the stiffness.
+        """
+        drive = self.of(joint)
+        damping = max(drive.damping, drive.stiffness * SETTLING)
+        return Drive(drive.stiffness, _rounded(damping), drive.force_limit, drive.step)
 
     def holding(self, joint: ModelJoint) -> Drive:
         """Return the drive of a joint that stays where it starts."""

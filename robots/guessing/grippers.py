@@ -7,10 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from robots.bodies.hulls import Hull
+from robots.bodies.overlaps import overlapping
 from robots.descriptor import JointGroup
 from robots.guessing.drives import LONGEST_STEP, Drives, alike, drive_fields
 from robots.guessing.fingertips import Fingertips
-from robots.guessing.stance import middle_of
+from robots.guessing.stance import Stance, middle_of
 from robots.urdf.anatomy import Limb
 from robots.urdf.model import ModelJoint
 
@@ -69,6 +73,44 @@ def find_gripper(limb: Limb, tips: Fingertips, drives: Drives) -> Gripper:
     if mimics:
         reasons.append(f"{name}, mimic joints, from the URDF: {', '.join(mimics)}")
     return Gripper({name: group}, postures, (*reasons, reason))
+
+
+def entangled(
+    stance: Stance,
+    limb: Limb,
+    hulls: Sequence[Hull],
+    pairs: Sequence[tuple[int, int]],
+    gripper: Gripper,
+) -> list[tuple[str, str]]:
+    """Return the pairs of links of a hand that overlap as it stands, which means nothing then.
+
+    In a hand that one number drives, those that overlap while it is more open than closed: parts
+    of one mechanism. In others, those that overlap in each of the hand's postures.
+
+    Args:
+        stance: The robot.
+        limb: The limb that ends in the hand.
+        hulls: The robot's hulls.
+        pairs: Indices of hulls whose overlaps count.
+        gripper: What drives the hand.
+    """
+    rigid = [stance.model.rigid_with(link) for link in _links(limb)]
+    inside = {stance.tree.link(link) for links in rigid for link in links}
+    mine = np.array([p for p in pairs if {hulls[i].link for i in p} <= inside], int).reshape(-1, 2)
+    overlaps = np.array(
+        [
+            overlapping(hulls, stance.poses(stance.with_joints(posture))[0], mine)
+            for posture in gripper.postures
+        ]
+    )
+    one = sum(group.size for group in gripper.groups.values()) == 1
+    always = overlaps[: len(OPENINGS) // 2 + 1].any(axis=0) if one else overlaps.all(axis=0)
+    names = [[stance.tree.links[hulls[i].link] for i in pair] for pair in mine[always]]
+    return [(first, second) for first, second in names]
+
+
+def _links(limb: Limb) -> tuple[str, ...]:
+    return (limb.palm, *(joint.child for joint in limb.fingers))
 
 
 def _followers(fingers: Sequence[ModelJoint]) -> dict[str, list[_Follower]]:
@@ -163,7 +205,7 @@ def _one(
         unit=leader.unit,
         reset_noise=False,
         limits=tuple(joint.span for joint in joints),
-        **drive_fields([drives.of(joint) for joint in joints]),
+        **drive_fields([drives.gripping(joint) for joint in joints]),
     )
     postures = tuple(_led_to(followers, low + (high - low) * part) for part in OPENINGS)
     where = f"{leader.name} at {postures[0][leader.name]:g} {leader.unit}"
@@ -229,7 +271,7 @@ def _each(joints: Sequence[ModelJoint], drives: Drives) -> JointGroup:
 def _led(followers: Sequence[_Follower], drives: Drives) -> JointGroup:
     leader = followers[0].joint
     low, high = leader.span
-    fields: dict[str, Any] = drive_fields([drives.of(f.joint) for f in followers])
+    fields: dict[str, Any] = drive_fields([drives.gripping(f.joint) for f in followers])
     return JointGroup(
         tuple(f.joint.name for f in followers),
         lower=low,
