@@ -135,7 +135,10 @@ def _look_at(path: Path, xml: bytes) -> _Parts:
     anatomy = find_anatomy(model, path.as_posix())
     stance = Stance(model)
     hulls = read_hulls(model, path) if find_spec("fcl") and find_spec("trimesh") else ()
-    masses = read_masses(parse_urdf(xml, path.as_posix()), stance.tree)
+    bodies: dict[int, list[Floats]] = {}
+    for hull in hulls:
+        bodies.setdefault(hull.link, []).append(hull.corners)
+    masses = read_masses(parse_urdf(xml, path.as_posix()), stance.tree, bodies)
     drives = Drives(stance, masses)
     hands = [limb for limb in anatomy.limbs if limb.fingers]
     tips = {limb.name: Fingertips(stance, limb, hulls) for limb in hands}
@@ -257,8 +260,9 @@ def _within_hands(
     pairs = _counted(parts, allowed)
     for limb in parts.anatomy.limbs:
         if limb.name in parts.grippers:
-            gripper = parts.grippers[limb.name]
-            found |= dict.fromkeys(entangled(parts.stance, limb, parts.hulls, pairs, gripper))
+            gripper, ends = parts.grippers[limb.name], parts.tips[limb.name].ends
+            inside = entangled(parts.stance, limb, parts.hulls, pairs, gripper, ends)
+            found |= dict.fromkeys(inside)
     if not found:
         return (), ()
     listing = ", ".join(f"{one} and {other}" for one, other in found)

@@ -22,6 +22,10 @@ SHORTEST_STEP = 0.04  # rad, m; what ManiSkill's Panda truly goes in one control
 FREQUENCY = 150.0  # rad/s
 JUST_ENOUGH = 4.0  # of inertia · step / CONTROL_STEP²
 SETTLING = 0.1  # s; of a finger that goes to a place
+# Physics in single precision shakes light fingers that are driven more stiffly.
+STIFFEST = 1e3  # rad/s, of a joint's frequency
+MOST_DAMPED = 1e5  # 1/s, of its damping by its inertia; a Panda's finger has 7e3
+LIGHTEST = 1e-6  # kg·m², kg; of what hangs on a joint, if a URDF gives nothing that weighs
 HOLDING = 10.0  # times the force that an arm's joint would have
 POSTURES = 16  # in which the inertia is looked at
 
@@ -69,8 +73,9 @@ class Drives:
 
     def _drive(self, joint: ModelJoint) -> tuple[Drive, bool]:
         """Return a drive, and whether its force is more than the URDF's effort."""
-        inertia = self._inertia[joint.name]
+        inertia = max(self._inertia[joint.name], LIGHTEST)
         stiffness = max(STIFFNESS, inertia * FREQUENCY**2)
+        stiffness = min(stiffness, inertia * STIFFEST**2)
         needed = JUST_ENOUGH * inertia / CONTROL_STEP**2  # per step
         force = joint.effort or max(FORCE, needed * SHORTEST_STEP)
         step = min(LONGEST_STEP, force / needed) if needed else LONGEST_STEP
@@ -86,8 +91,11 @@ class Drives:
         ManiSkill's Panda drives its fingers with a damping of a tenth of the stiffness.
         """
         drive = self.of(joint)
-        damping = max(drive.damping, drive.stiffness * SETTLING)
-        return Drive(drive.stiffness, _rounded(damping), drive.force_limit, drive.step)
+        inertia = max(self._inertia[joint.name], LIGHTEST)
+        damping = min(max(drive.damping, drive.stiffness * SETTLING), inertia * MOST_DAMPED)
+        stiffness = min(drive.stiffness, damping / SETTLING)
+        force = min(drive.force_limit, FORCE)
+        return Drive(_rounded(stiffness), _rounded(damping), force, drive.step)
 
     def holding(self, joint: ModelJoint) -> Drive:
         """Return the drive of a joint that stays where it starts."""

@@ -81,11 +81,13 @@ def entangled(
     hulls: Sequence[Hull],
     pairs: Sequence[tuple[int, int]],
     gripper: Gripper,
+    grasping: Sequence[str],
 ) -> list[tuple[str, str]]:
     """Return the pairs of links of a hand that overlap as it stands, which means nothing then.
 
-    In a hand that one number drives, those that overlap while it is more open than closed: parts
-    of one mechanism. In others, those that overlap in each of the hand's postures.
+    In a hand that one number drives, those that overlap while it is more open than closed, and of
+    what does not grasp those that ever do: parts of one mechanism. In others, those that overlap
+    in each of the hand's postures.
 
     Args:
         stance: The robot.
@@ -93,6 +95,7 @@ def entangled(
         hulls: The robot's hulls.
         pairs: Indices of hulls whose overlaps count.
         gripper: What drives the hand.
+        grasping: The last link of each finger.
     """
     rigid = [stance.model.rigid_with(link) for link in _links(limb)]
     inside = {stance.tree.link(link) for links in rigid for link in links}
@@ -103,8 +106,12 @@ def entangled(
             for posture in gripper.postures
         ]
     )
-    one = sum(group.size for group in gripper.groups.values()) == 1
-    always = overlaps[: len(OPENINGS) // 2 + 1].any(axis=0) if one else overlaps.all(axis=0)
+    always = overlaps.all(axis=0)
+    if sum(group.size for group in gripper.groups.values()) == 1:
+        open_enough = overlaps[: len(OPENINGS) // 2 + 1].any(axis=0)
+        ends = {stance.tree.link(link) for end in grasping for link in stance.model.rigid_with(end)}
+        inner = np.array([not {hulls[i].link for i in pair} <= ends for pair in mine], bool)
+        always = open_enough | (overlaps.any(axis=0) & inner)
     names = [[stance.tree.links[hulls[i].link] for i in pair] for pair in mine[always]]
     return [(first, second) for first, second in names]
 
