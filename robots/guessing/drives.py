@@ -24,7 +24,7 @@ JUST_ENOUGH = 4.0  # of inertia · step / CONTROL_STEP²
 SETTLING = 0.1  # s; of a finger that goes to a place
 # Physics in single precision shakes light fingers that are driven more stiffly.
 STIFFEST = 1e3  # rad/s, of a joint's frequency
-MOST_DAMPED = 1e5  # 1/s, of its damping by its inertia; a Panda's finger has 7e3
+MOST_DAMPED = 7e3  # 1/s, of a finger's damping by its inertia, as a Panda's has
 LIGHTEST = 1e-6  # kg·m², kg; of what hangs on a joint, if a URDF gives nothing that weighs
 HOLDING = 10.0  # times the force that an arm's joint would have
 POSTURES = 16  # in which the inertia is looked at
