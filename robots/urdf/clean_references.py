@@ -94,7 +94,7 @@ def _meant(reference: str, urdf: str) -> Iterator[str]:
 
 def _spellings(reference: str) -> Iterator[str]:
     """Yield what a reference may be short for, or a slip of."""
-    text = reference.strip().replace("\\", "/")
+    text = reference.strip().replace("\\", "/").replace("package:///", "package://")
     if match := _FIND.fullmatch(text):
         text = f"package://{match[1]}/{match[2]}"
     if text.startswith(_GAZEBO):
