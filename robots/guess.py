@@ -127,7 +127,10 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     repairs = [f"repaired: {repair}" for repair in cleaned.repairs]
     about = (*parts.anatomy.reasons, *tools, *_about_grasps(parts), *drives, *stance, measured)
     given = tuple(f"{field}: given, not guessed" for field in overrides)
-    return Guess(RobotDescriptor(**{**fields, **overrides}), (*repairs, *about, *overlaps, *about_hands, *given))
+    return Guess(
+        RobotDescriptor(**{**fields, **overrides}),
+        (*repairs, *about, *overlaps, *about_hands, *given),
+    )
 
 
 def _look_at(path: Path, xml: bytes) -> _Parts:
@@ -252,9 +255,7 @@ def _about_grasps(parts: _Parts) -> Iterator[str]:
         yield "fingers: none, so grasps go unnoticed; a Fingers(...) with two links changes that"
 
 
-def _within_hands(
-    parts: _Parts, allowed: LinkPairs
-) -> tuple[LinkPairs, tuple[str, ...]]:
+def _within_hands(parts: _Parts, allowed: LinkPairs) -> tuple[LinkPairs, tuple[str, ...]]:
     """Return the pairs of a hand's links that overlap however it stands, and a reason."""
     found: dict[tuple[str, str], None] = {}
     pairs = _counted(parts, allowed)
@@ -278,9 +279,7 @@ def _counted(parts: _Parts, allowed: LinkPairs) -> tuple[tuple[int, int], ...]:
     return counted_pairs(parts.stance.tree, parts.hulls, excused)
 
 
-def _rest(
-    parts: _Parts, allowed: LinkPairs
-) -> tuple[dict[str, float], tuple[str, ...]]:
+def _rest(parts: _Parts, allowed: LinkPairs) -> tuple[dict[str, float], tuple[str, ...]]:
     """Return the keyframe (rad, m) and the reasons for it."""
     pairs = _counted(parts, allowed)
     hands = [gripper.postures for gripper in parts.grippers.values()]

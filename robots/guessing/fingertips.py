@@ -43,7 +43,7 @@ class Fingertips:
         self.ends = tuple([link for link in ends if words.has(link, words.TIP)] or ends)
         if len(limb.fingers) > 0 and len(self.ends) == 1:
             tips[limb.palm] = self._fixed_tip(self.ends[0], tips[self.ends[0]])
-            self.ends = (*self.ends, limb.palm)
+            self.ends = (limb.palm, *self.ends)
         self._tips = {link: tips[link] for link in self.ends}
 
     def middle(self) -> Floats:

@@ -124,9 +124,7 @@ def _followers(fingers: Sequence[ModelJoint]) -> dict[str, list[_Follower]]:
     """Return for each leading joint what follows it, itself first."""
     named = {joint.name: joint for joint in fingers}
     groups: dict[str, list[_Follower]] = {
-        joint.name: [_Follower(joint, 1.0, 0.0)]
-        for joint in fingers
-        if joint.mimics not in named
+        joint.name: [_Follower(joint, 1.0, 0.0)] for joint in fingers if joint.mimics not in named
     }
     for joint in fingers:
         if joint.name not in groups:
@@ -254,7 +252,9 @@ def _many(
 def _led_to(followers: Sequence[_Follower], lead: float) -> dict[str, float]:
     """Return where joints go, each within its limits."""
     return {
-        f.joint.name: min(max(_tidy(f.multiplier * lead + f.offset), f.joint.span[0]), f.joint.span[1])
+        f.joint.name: min(
+            max(_tidy(f.multiplier * lead + f.offset), f.joint.span[0]), f.joint.span[1]
+        )
         for f in followers
     }
 

@@ -198,7 +198,9 @@ class PostureSearch:
         self._front = np.array([np.cos(angle), np.sin(angle), 0.0])
 
     def _is_fine(self, posture: Floats) -> bool:
-        return all(np.isfinite(self._cost(view, posture[None], strict=True)[0]) for view in self._views)
+        return all(
+            np.isfinite(self._cost(view, posture[None], strict=True)[0]) for view in self._views
+        )
 
     def _cost(self, view: _View, postures: Floats, *, strict: bool = False) -> Floats:
         """Return how bad postures are, (postures,); infinite where they are no good at all."""
@@ -222,9 +224,7 @@ class PostureSearch:
             bad |= (np.abs(at[:, view.bounded]) > 1 - MARGIN).any(axis=1)
         return np.where(bad, np.inf if strict else cost + 10.0, cost)
 
-    def _best(
-        self, view: _View, posture: Floats, drawn: Floats, pairs: NDArray[np.intp]
-    ) -> Floats:
+    def _best(self, view: _View, posture: Floats, drawn: Floats, pairs: NDArray[np.intp]) -> Floats:
         """Return the best posture of one limb that overlaps nothing, else the one that does least.
 
         Each round leaves out the postures with overlaps that the last round met.
