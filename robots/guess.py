@@ -29,7 +29,7 @@ from robots.descriptor import (
 )
 from robots.guessing.drives import CONTROL_STEP, Drives, alike, drive_fields
 from robots.guessing.fingertips import Fingertips
-from robots.guessing.grippers import Gripper, find_gripper
+from robots.guessing.grippers import Gripper, entangled, find_gripper
 from robots.guessing.posture import PostureSearch
 from robots.guessing.stance import Stance
 from robots.guessing.tool import Tool, find_tool
@@ -39,6 +39,8 @@ from robots.urdf.model import ModelJoint, UrdfModel
 from robots.urdf.reading import read_model
 from robots.urdf.summary import parse_urdf, read_cleaned
 from robots.urdf.tree import kinematic_tree
+
+LinkPairs = tuple[tuple[str, str], ...]
 
 REACH_STARTS = 8  # of the search for the largest distance
 
@@ -100,6 +102,8 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     main = parts.anatomy.limbs[0]
     split, drives = _action_split(parts)
     allowed, overlaps = guess_allowed(parts.model, path)
+    hands, about_hands = _within_hands(parts, allowed)
+    allowed += hands
     rest, stance = _rest(parts, allowed)
     distance, measured = _reach(parts, main, rest)
     fields: dict[str, Any] = {
@@ -123,7 +127,10 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     repairs = [f"repaired: {repair}" for repair in cleaned.repairs]
     about = (*parts.anatomy.reasons, *tools, *_about_grasps(parts), *drives, *stance, measured)
     given = tuple(f"{field}: given, not guessed" for field in overrides)
-    return Guess(RobotDescriptor(**{**fields, **overrides}), (*repairs, *about, *overlaps, *given))
+    return Guess(
+        RobotDescriptor(**{**fields, **overrides}),
+        (*repairs, *about, *overlaps, *about_hands, *given),
+    )
 
 
 def _look_at(path: Path, xml: bytes) -> _Parts:
@@ -131,7 +138,10 @@ def _look_at(path: Path, xml: bytes) -> _Parts:
     anatomy = find_anatomy(model, path.as_posix())
     stance = Stance(model)
     hulls = read_hulls(model, path) if find_spec("fcl") and find_spec("trimesh") else ()
-    masses = read_masses(parse_urdf(xml, path.as_posix()), stance.tree)
+    bodies: dict[int, list[Floats]] = {}
+    for hull in hulls:
+        bodies.setdefault(hull.link, []).append(hull.corners)
+    masses = read_masses(parse_urdf(xml, path.as_posix()), stance.tree, bodies)
     drives = Drives(stance, masses)
     hands = [limb for limb in anatomy.limbs if limb.fingers]
     tips = {limb.name: Fingertips(stance, limb, hulls) for limb in hands}
@@ -245,17 +255,46 @@ def _about_grasps(parts: _Parts) -> Iterator[str]:
         yield "fingers: none, so grasps go unnoticed; a Fingers(...) with two links changes that"
 
 
-def _rest(
-    parts: _Parts, allowed: tuple[tuple[str, str], ...]
-) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return the keyframe (rad, m) and the reasons for it."""
+def _within_hands(parts: _Parts, allowed: LinkPairs) -> tuple[LinkPairs, tuple[str, ...]]:
+    """Return the pairs of a hand's links that overlap however it stands, and a reason."""
+    found: dict[tuple[str, str], None] = {}
+    pairs = _counted(parts, allowed)
+    for limb in parts.anatomy.limbs:
+        if limb.name in parts.grippers:
+            gripper, ends = parts.grippers[limb.name], parts.tips[limb.name].ends
+            inside = entangled(parts.stance, limb, parts.hulls, pairs, gripper, ends)
+            found |= dict.fromkeys(inside)
+    if not found:
+        return (), ()
+    listing = ", ".join(f"{one} and {other}" for one, other in found)
+    return tuple(found), (
+        f"allowed_collisions, too: {listing}, of hands, which overlap while these are open",
+    )
+
+
+def _counted(parts: _Parts, allowed: LinkPairs) -> tuple[tuple[int, int], ...]:
+    """Return the pairs of hulls whose overlaps count, by their indices."""
     excused = joined_pairs(parts.model) | rigid_pairs(parts.model)
     excused |= frozenset(map(frozenset, allowed))
-    pairs = counted_pairs(parts.stance.tree, parts.hulls, excused)
-    opened = {k: v for gripper in parts.grippers.values() for k, v in gripper.open.items()}
+    return counted_pairs(parts.stance.tree, parts.hulls, excused)
+
+
+def _rest(parts: _Parts, allowed: LinkPairs) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Return the keyframe (rad, m) and the reasons for it."""
+    pairs = _counted(parts, allowed)
+    hands = [gripper.postures for gripper in parts.grippers.values()]
     tools = [(limb, parts.tools[limb.name]) for limb in parts.anatomy.limbs]
-    found = PostureSearch(parts.stance, tools, parts.hulls, pairs, opened).run()
-    return {**parts.stance.all_joints(found.position), **opened}, found.reasons
+    torso = parts.anatomy.parts.get("torso", ())
+    found = PostureSearch(parts.stance, tools, parts.hulls, pairs, hands, torso).run()
+    rest = parts.stance.all_joints(found.position)
+    for postures in hands:  # joints that one number drives need not mimic each other in the URDF
+        rest |= next(p for p in postures if _agree(p, rest, parts.stance))
+    return rest, found.reasons
+
+
+def _agree(posture: Mapping[str, float], rest: Mapping[str, float], stance: Stance) -> bool:
+    leaders = [joint for joint in posture if joint in stance.index]
+    return all(abs(posture[joint] - rest[joint]) < 1e-5 for joint in leaders)
 
 
 def _reach(parts: _Parts, limb: Limb, rest: dict[str, float]) -> tuple[float, str]:

@@ -21,6 +21,11 @@ SHORTEST_STEP = 0.04  # rad, m; what ManiSkill's Panda truly goes in one control
 # physics advances by 0.01 s; with a force that is just so large, 93 %.
 FREQUENCY = 150.0  # rad/s
 JUST_ENOUGH = 4.0  # of inertia · step / CONTROL_STEP²
+SETTLING = 0.1  # s; of a finger that goes to a place
+# Physics in single precision shakes light fingers that are driven more stiffly.
+STIFFEST = 1e3  # rad/s, of a joint's frequency
+MOST_DAMPED = 7e3  # 1/s, of a finger's damping by its inertia, as a Panda's has
+LIGHTEST = 1e-6  # kg·m², kg; of what hangs on a joint, if a URDF gives nothing that weighs
 HOLDING = 10.0  # times the force that an arm's joint would have
 POSTURES = 16  # in which the inertia is looked at
 
@@ -68,8 +73,9 @@ class Drives:
 
     def _drive(self, joint: ModelJoint) -> tuple[Drive, bool]:
         """Return a drive, and whether its force is more than the URDF's effort."""
-        inertia = self._inertia[joint.name]
+        inertia = max(self._inertia[joint.name], LIGHTEST)
         stiffness = max(STIFFNESS, inertia * FREQUENCY**2)
+        stiffness = min(stiffness, inertia * STIFFEST**2)
         needed = JUST_ENOUGH * inertia / CONTROL_STEP**2  # per step
         force = joint.effort or max(FORCE, needed * SHORTEST_STEP)
         step = min(LONGEST_STEP, force / needed) if needed else LONGEST_STEP
@@ -78,6 +84,18 @@ class Drives:
             force, step = needed * SHORTEST_STEP, SHORTEST_STEP
         damping = 2 * (stiffness * inertia) ** 0.5
         return Drive(*map(_rounded, (stiffness, damping, force)), step=_down(step)), raised
+
+    def gripping(self, joint: ModelJoint) -> Drive:
+        """Return the drive of a joint whose targets are places, far away at times: it takes time.
+
+        ManiSkill's Panda drives its fingers with a damping of a tenth of the stiffness.
+        """
+        drive = self.of(joint)
+        inertia = max(self._inertia[joint.name], LIGHTEST)
+        damping = min(max(drive.damping, drive.stiffness * SETTLING), inertia * MOST_DAMPED)
+        stiffness = min(drive.stiffness, damping / SETTLING)
+        force = min(drive.force_limit, FORCE)
+        return Drive(_rounded(stiffness), _rounded(damping), force, drive.step)
 
     def holding(self, joint: ModelJoint) -> Drive:
         """Return the drive of a joint that stays where it starts."""

@@ -14,6 +14,7 @@ from robots.urdf.anatomy import Limb
 from robots.urdf.model import ModelJoint
 
 SHORT = 0.6  # of the longest finger; what ends before it is a knuckle, not a tip
+FOLLOWING = 0.85  # the same where all joints follow one, as in grippers with knuckles
 CAP = 0.15  # of a finger's length; its corners within it from the end make its tip
 
 
@@ -36,10 +37,13 @@ class Fingertips:
         tips = {joint.child: self._tip(joint.child) for joint in leaves}
         far = {link: float(np.linalg.norm(tip - self._palm[:3, 3])) for link, tip in tips.items()}
         longest = max(far.values(), default=0.0)
-        self.ends = tuple(link for link in tips if far[link] >= SHORT * longest)
+        led = sum(joint.mimics is None for joint in limb.fingers) == 1
+        least = (FOLLOWING if led else SHORT) * longest
+        ends = [link for link in tips if far[link] >= least]
+        self.ends = tuple([link for link in ends if words.has(link, words.TIP)] or ends)
         if len(limb.fingers) > 0 and len(self.ends) == 1:
             tips[limb.palm] = self._fixed_tip(self.ends[0], tips[self.ends[0]])
-            self.ends = (*self.ends, limb.palm)
+            self.ends = (limb.palm, *self.ends)
         self._tips = {link: tips[link] for link in self.ends}
 
     def middle(self) -> Floats:

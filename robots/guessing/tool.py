@@ -88,9 +88,7 @@ def _has_shape(stance: Stance, link: str) -> bool:
     return link in stance.model.collisions or link in stance.model.visuals
 
 
-def _between(
-    stance: Stance, limb: Limb, rigid: list[str], tips: Fingertips, which: str
-) -> Tool:
+def _between(stance: Stance, limb: Limb, rigid: list[str], tips: Fingertips, which: str) -> Tool:
     """Return the frame, or the mean of two, that lies nearest between the finger tips."""
     middle, everywhere = tips.middle(), stance.places(stance.tree.links)
 
