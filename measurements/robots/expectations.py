@@ -1,0 +1,3 @@
+from pathlib import Path
+EXPECTED=Path("x")
+def read_expectations(p): return {}

@@ -1,0 +1,145 @@
+"""Tries one URDF in this process: ``python -m measurements.robots.probe URDF``.
+
+Prints a line of JSON for each thing that it tried, so that what was seen before a crash is kept.
+A robot is refused where an error of this library says why; any other exception is ``raw``.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from layouts import Layout, face_to_face, side_by_side, single
+from robots import RobotDescriptor, RobotLayoutsError
+from robots.from_urdf import guess_descriptor
+from robots.urdf.reading import read_model
+from robots.urdf.summary import read_references, read_urdf
+from simulation.trial import NumberTrial, Trial, tcp_error, try_robot
+
+STEPS = 500
+NEIGHBOUR = "panda"
+LARGEST = 1e9  # of a number in the record, which has no infinity
+
+Seen = dict[str, Any]
+
+
+def main() -> int:
+    """Try the URDF of the command line, thing by thing."""
+    urdf = Path(sys.argv[1])
+    tell("files", lambda: missing_files(urdf))
+    robots: list[RobotDescriptor] = []
+    tell("loads", lambda: loads(urdf, robots))
+    for robot in robots:
+        tell("alone", lambda: valid(single({"robot": robot})))
+        tell("facing", lambda: valid(face_to_face({"a": robot, "b": robot}, spacing="auto")))
+        beside = {"robot": robot, "neighbour": NEIGHBOUR}
+        tell("beside", lambda: valid(side_by_side(beside, spacing="auto")))
+        tell("trial", lambda: trial(try_robot(robot, STEPS)))
+        tell("tcp_move", lambda: tcp_move(robot))
+        tell("to_urdf", lambda: exported_urdf(robot))
+        tell("to_drake", lambda: exported_drake(robot))
+    return 0
+
+
+def tell(what: str, run: Callable[[], Seen]) -> None:
+    """Print what came of something, or how it failed."""
+    try:
+        seen = run()
+    except RobotLayoutsError as error:
+        seen = {"refused": str(error)}
+    except Exception as error:  # what must not happen is what is looked for
+        seen = {"raw": f"{type(error).__name__}: {error}"}
+    print(json.dumps({what: seen}), flush=True)
+
+
+def missing_files(urdf: Path) -> Seen:
+    """Return which meshes for collisions are missing."""
+    path = urdf.as_posix()
+    references = read_references(read_urdf(urdf), path, lambda file: Path(file).is_file())
+    return {"missing": [file for file in references.collision if not Path(file).is_file()]}
+
+
+def loads(urdf: Path, robots: list[RobotDescriptor]) -> Seen:
+    """Return what is guessed of a robot, and add its descriptor to a list."""
+    robot = guess_descriptor(urdf).descriptor
+    robots.append(robot)
+    return {
+        "groups": {
+            name: {"joints": list(group.joints), "numbers": group.size}
+            for name, group in robot.action_split.groups.items()
+        },
+        "tcp": robot.tcp_link,
+        "tips": list(robot.tcp_position_links),
+        "reach": round(robot.reach, 4),
+    }
+
+
+def valid(layout: Layout) -> Seen:
+    """Return whether a layout passes its check, and what was found if not."""
+    report = layout.validate(workspaces=False)
+    serious = [finding.what for finding in report.findings if finding.serious]
+    return {"ok": report.ok, "why": serious[:1]}
+
+
+def tcp_move(robot: RobotDescriptor) -> Seen:
+    """Return how far the TCP stayed from where inverse kinematics was to bring it (m)."""
+    error = tcp_error(robot)
+    return {"error": None if error is None else _rounded(error)}
+
+
+def trial(seen: Trial) -> Seen:
+    """Return what was seen of a robot that was tried, in numbers."""
+    return {
+        "first_step": _rounded(seen.first_step.amount),
+        "after_hold": _rounded(seen.after_hold.amount),
+        "stands": seen.stands,
+        "fastest": _rounded(seen.fastest.times),
+        "exploded": None if seen.exploded is None else seen.exploded.step,
+        "numbers": len(seen.numbers),
+        "wrong_numbers": [number for one in seen.numbers for number in _wrong(one)],
+        "problems": list(seen.problems[:4]),
+    }
+
+
+def exported_urdf(robot: RobotDescriptor) -> Seen:
+    """Save a robot as a URDF, read that again, and guess a robot of it."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = single({"robot": robot}).to_urdf(Path(folder) / "robot.urdf", visuals=False)
+        again = guess_descriptor(path).descriptor
+        return {"ok": sorted(again.joints) == sorted(f"robot/{joint}" for joint in robot.joints)}
+
+
+def exported_drake(robot: RobotDescriptor) -> Seen:
+    """Save a robot for Drake, and read its URDF and its start again."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = single({"robot": robot}).to_drake(Path(folder) / "robot.dmd.yaml", visuals=False)
+        model = yaml.load(path.read_text(), Loader=_Directives)["directives"][0]["add_model"]
+        urdf = Path(model["file"].removeprefix("file://"))
+        moving = {joint.name for joint in read_model(read_urdf(urdf), urdf.as_posix()).moving}
+        return {"ok": set(model["default_joint_positions"]) <= moving == set(robot.joints)}
+
+
+class _Directives(yaml.SafeLoader):
+    """Reads directives of Drake, in which rotations have a tag."""
+
+
+_Directives.add_constructor("!Rpy", lambda loader, node: loader.construct_mapping(node, deep=True))
+
+
+def _wrong(number: NumberTrial) -> Iterator[str]:
+    if number.problem is not None:
+        yield number.number.name
+
+
+def _rounded(value: float) -> float:
+    return float(f"{min(value, LARGEST):.3g}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
