@@ -35,7 +35,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m measurements.robots", description=__doc__)
     add = parser.add_argument
     add("folders", nargs="*", metavar="[NAME=]FOLDER", help="folders with URDFs")
-    add("--sources", nargs="+", metavar="PACKAGE", help=f"installed packages: {', '.join(PACKAGES)}")
+    add(
+        "--sources", nargs="+", metavar="PACKAGE", help=f"installed packages: {', '.join(PACKAGES)}"
+    )
     add("--only", nargs="+", metavar="PATTERN", help="robots whose SOURCE/PATH matches, as a shell")
     add("--expected", type=Path, default=EXPECTED, metavar="FILE", help="what is expected of them")
     add("--out", type=Path, default=RECORD, metavar="FILE", help="the record (default %(default)s)")
