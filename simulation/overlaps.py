@@ -43,9 +43,9 @@ def stand(simulation: Simulation) -> None:
             world.stand(name, placement.start_qpos)
 
 
-def deepest(overlaps: Iterable[Overlap]) -> list[Overlap]:
-    """Return the overlaps deeper than `DEPTH`, the deepest first."""
-    deep = (overlap for overlap in overlaps if overlap.depth > DEPTH)
+def deepest(overlaps: Iterable[Overlap], than: float = DEPTH) -> list[Overlap]:
+    """Return the overlaps deeper than some length (m), the deepest first."""
+    deep = (overlap for overlap in overlaps if overlap.depth > than)
     return sorted(deep, key=lambda overlap: -overlap.depth)
 
 

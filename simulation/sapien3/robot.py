@@ -15,8 +15,9 @@ from robots.urdf.model import UrdfModel
 from simulation.sapien3.blueprint import Blueprint
 
 # Per unit of a joint: the least that is taken for its largest speed, what is taken where the URDF
-# has none, and the most (1/s). Wrists of arms turn at 2π rad/s; URDFs also have 0, and 1e6.
-SPEEDS = {"rad": (1.0, 2 * np.pi, 100.0), "m": (0.1, 1.0, 10.0)}
+# has none, and the most (1/s). Wrists of arms turn at 2π rad/s; URDFs also have 0, and 1e6. Fingers
+# that slide at 0.2 m/s are light: a hit that harms nothing makes them ten times as fast.
+SPEEDS = {"rad": (2.0, 2 * np.pi, 100.0), "m": (0.5, 1.0, 10.0)}
 
 
 class SimulatedRobot:
