@@ -11,8 +11,8 @@ import numpy as np
 
 from layouts import Layout, single
 from robots import ActionNumber, RobotDescriptor
-from simulation.backend import Overlap
-from simulation.maths import Floats
+from simulation.backend import Overlap, Part
+from simulation.maths import Array, Floats
 from simulation.overlaps import empty, stand, starting_overlaps
 from simulation.simulation import Simulation
 
@@ -117,6 +117,11 @@ class Trial:
     numbers: tuple[NumberTrial, ...]
     tcp_way: float
 
+    def unit(self, joint: str) -> str:
+        """Return the unit of a joint's position: rad or m."""
+        groups = self.robot.action_split.groups.values()
+        return next(group.unit for group in groups if joint in group.joints)
+
     @property
     def stands(self) -> bool:
         """Whether it holds still when it is to."""
@@ -130,15 +135,18 @@ class Trial:
     def _problems(self) -> Iterator[str]:
         joint, amount = self.first_step
         if not amount < KICK:
-            yield f"it kicks: {joint} moves by {amount:.3g} in the first step of holding still"
+            way = f"{amount:.3g} {self.unit(joint)}"
+            yield f"it kicks: {joint} moves by {way} in the first step of holding still"
         joint, amount = self.after_hold
         if not amount < STILL:
-            yield f"it does not hold still: {joint} moves at {amount:.3g} /s after {HELD} steps"
+            speed = f"{amount:.3g} {self.unit(joint)}/s"
+            yield f"it does not hold still: {joint} moves at {speed} after {HELD} steps"
         if self.exploded is not None:
             joint, speed, limit, step = self.exploded
-            yield f"it explodes: {joint} moves at {speed:.3g} /s in step {step}, made for {limit:g}"
+            made_for = f"made for {limit:.3g} {self.unit(joint)}/s"
+            yield f"it explodes: {joint} moves at {speed:.3g} in step {step}, {made_for}"
         if (self.exploded is not None or not self.stands) and self.overlaps:
-            yield f"the likely cause: at the start {self.overlaps[0]}"
+            yield f"the likely cause: at the start {in_itself(self.overlaps[0])}"
         yield from (trial.problem for trial in self.numbers if trial.problem is not None)
         if not self.tcp_way > 0.0:
             yield f"the TCP, {self.robot.tcp_link}, is moved by no action number"
@@ -203,6 +211,13 @@ def tcp_error(robot: RobotDescriptor) -> float | None:
     for share in np.linspace(0, 1, _ON_THE_WAY).tolist() + [1.0] * _AT_THE_END:
         alone.step(alone.numbers_for(here + share * (np.array(best.qpos) - here)))
     return float(np.linalg.norm(alone.tcp() - targets[best.target]))
+
+
+def in_itself(overlap: Overlap) -> str:
+    """Return an overlap of two links of one robot in words, without the robot's name."""
+    return str(
+        overlap._replace(one=Part(None, overlap.one.name), other=Part(None, overlap.other.name))
+    )
 
 
 def percent(share: float) -> str:
@@ -276,7 +291,7 @@ class _Alone:
                 action[number.index] = self._number_at(number, joints[number.joints[0]])
         return action
 
-    def step(self, action: Floats) -> None:
+    def step(self, action: Array) -> None:
         """Take a control step, unless nothing is left to be stepped."""
         positions = self._simulation.read().joint_positions
         if np.isfinite(positions).all():

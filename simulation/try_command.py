@@ -6,13 +6,15 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from robots import RobotDescriptor
-from simulation.trial import HELD, Fastest, NumberTrial, Trial, percent, try_robot
+from simulation.trial import HELD, Fastest, NumberTrial, Trial, in_itself, percent, try_robot
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
 STEPS = 50  # random ones
+MOST_OVERLAPS = 4  # that are shown
+WIDTH = 120  # characters of a table, at least
 
 
 def run(robots: Sequence[RobotDescriptor]) -> int:
@@ -27,6 +29,7 @@ def run(robots: Sequence[RobotDescriptor]) -> int:
     from rich.console import Console
 
     console = Console(markup=False, highlight=False, soft_wrap=True)
+    console.width = max(console.width, WIDTH)
     trials: list[Trial] = []
     for robot in robots:
         trials.append(try_robot(robot, STEPS))
@@ -47,16 +50,20 @@ def _print(trial: Trial, console: Console) -> None:
 
 
 def _lines(trial: Trial) -> Iterator[str]:
-    if trial.overlaps:
-        yield f"at the start    {'; '.join(map(str, trial.overlaps))}"
-    else:
-        yield "at the start    no links are inside each other"
+    yield f"at the start    {_overlaps(trial)}"
     joint, amount = trial.first_step
     yield f"first step      holding still, {joint} moves most: {_amount(trial, joint, amount)}"
     joint, amount = trial.after_hold
     yield f"after {HELD} steps  {joint} is fastest: {_amount(trial, joint, amount)}/s"
     yield f"random actions  {trial.steps} steps; fastest {_speed(trial, trial.fastest)}"
     yield f"TCP             {trial.robot.tcp_link}, moved by up to {trial.tcp_way * 1e3:.3g} mm"
+
+
+def _overlaps(trial: Trial) -> str:
+    shown = [in_itself(overlap) for overlap in trial.overlaps[:MOST_OVERLAPS]]
+    if more := len(trial.overlaps) - len(shown):
+        shown.append(f"and {more} pairs of links more")
+    return "; ".join(shown) or "no links are inside each other"
 
 
 def _speed(trial: Trial, fastest: Fastest) -> str:
@@ -68,8 +75,7 @@ def _speed(trial: Trial, fastest: Fastest) -> str:
 
 
 def _amount(trial: Trial, joint: str, amount: float) -> str:
-    groups = trial.robot.action_split.groups.values()
-    return f"{amount:.3g} {next(group.unit for group in groups if joint in group.joints)}"
+    return f"{amount:.3g} {trial.unit(joint)}"
 
 
 def _numbers(trial: Trial) -> Table:

@@ -93,5 +93,5 @@ def _expected(fields: Mapping[str, Any]) -> Expected:
         name: ExpectedArm(**{key: tuple(value) for key, value in arm.items()})
         for name, arm in fields.get("arms", {}).items()
     }
-    optional = tuple(fields.get("optional", ()))
-    return Expected(**{**fields, "arms": arms, "optional": optional})
+    rest: dict[str, Any] = {"arms": arms, "optional": tuple(fields.get("optional", ()))}
+    return Expected(**{**fields, **rest})

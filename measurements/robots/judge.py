@@ -13,8 +13,9 @@ Seen = Mapping[str, Any]
 # How far a reach may be from a data sheet's: that goes to the wrist or the flange, ours to the TCP.
 REACH_SHARES = 0.9, 1.35
 TCP_ERROR = 0.002  # m
+WITH_TCP = ("manipulator", "humanoid", "unknown")  # kinds of robots that bring it somewhere
 
-STAGES = ("files", "loads", "alone", "facing", "beside", "trial", "tcp_move", "to_urdf", "to_drake")
+STAGES = ("loads", "alone", "facing", "beside", "trial", "tcp_move", "to_urdf", "to_drake")
 
 QUESTIONS: Mapping[str, str] = {
     "loads": "loads",
@@ -75,13 +76,14 @@ def judge(seen: Seen, expected: Expected) -> dict[str, Answer]:
     wrong = trial.get("wrong_numbers")
     answers["numbers"] = _yes(wrong == [], _wrong_text(wrong, trial))
     error = seen.get("tcp_move", {}).get("error")
-    answers["tcp_move"] = _yes(error is not None and error < TCP_ERROR, _length(error))
+    came = _yes(error is not None and error < TCP_ERROR, _length(error))
+    answers["tcp_move"] = came if expected.kind in WITH_TCP else NOT_ASKED
     return {question: answers[question] for question in QUESTIONS}
 
 
 def usable(seen: Seen) -> bool:
     """Tell whether all meshes are there that physics needs."""
-    return not seen.get("files", {}).get("missing")
+    return not seen.get("missing")
 
 
 def reason(seen: Seen) -> str:

@@ -9,18 +9,20 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import yaml
+import yourdfpy
 
 from layouts import Layout, face_to_face, side_by_side, single
 from robots import RobotDescriptor, RobotLayoutsError
 from robots.from_urdf import guess_descriptor
 from robots.urdf.reading import read_model
-from robots.urdf.summary import read_references, read_urdf
-from simulation.trial import NumberTrial, Trial, tcp_error, try_robot
+from robots.urdf.summary import read_urdf
+from simulation.trial import NumberTrial, tcp_error, try_robot
 
 STEPS = 500
 NEIGHBOUR = "panda"
@@ -31,19 +33,11 @@ Seen = dict[str, Any]
 
 def main() -> int:
     """Try the URDF of the command line, thing by thing."""
-    urdf = Path(sys.argv[1])
-    tell("files", lambda: missing_files(urdf))
     robots: list[RobotDescriptor] = []
-    tell("loads", lambda: loads(urdf, robots))
+    tell("loads", lambda: loads(Path(sys.argv[1]), robots))
     for robot in robots:
-        tell("alone", lambda: valid(single({"robot": robot})))
-        tell("facing", lambda: valid(face_to_face({"a": robot, "b": robot}, spacing="auto")))
-        beside = {"robot": robot, "neighbour": NEIGHBOUR}
-        tell("beside", lambda: valid(side_by_side(beside, spacing="auto")))
-        tell("trial", lambda: trial(try_robot(robot, STEPS)))
-        tell("tcp_move", lambda: tcp_move(robot))
-        tell("to_urdf", lambda: exported_urdf(robot))
-        tell("to_drake", lambda: exported_drake(robot))
+        for what, look in LOOKS.items():
+            tell(what, partial(look, robot))
     return 0
 
 
@@ -56,13 +50,6 @@ def tell(what: str, run: Callable[[], Seen]) -> None:
     except Exception as error:  # what must not happen is what is looked for
         seen = {"raw": f"{type(error).__name__}: {error}"}
     print(json.dumps({what: seen}), flush=True)
-
-
-def missing_files(urdf: Path) -> Seen:
-    """Return which meshes for collisions are missing."""
-    path = urdf.as_posix()
-    references = read_references(read_urdf(urdf), path, lambda file: Path(file).is_file())
-    return {"missing": [file for file in references.collision if not Path(file).is_file()]}
 
 
 def loads(urdf: Path, robots: list[RobotDescriptor]) -> Seen:
@@ -93,8 +80,19 @@ def tcp_move(robot: RobotDescriptor) -> Seen:
     return {"error": None if error is None else _rounded(error)}
 
 
-def trial(seen: Trial) -> Seen:
-    """Return what was seen of a robot that was tried, in numbers."""
+def facing(robot: RobotDescriptor) -> Seen:
+    """Return whether two of a robot may look at each other."""
+    return valid(face_to_face({"a": robot, "b": robot}, spacing="auto"))
+
+
+def beside(robot: RobotDescriptor) -> Seen:
+    """Return whether a robot may stand beside a Panda."""
+    return valid(side_by_side({"robot": robot, "neighbour": NEIGHBOUR}, spacing="auto"))
+
+
+def trial(robot: RobotDescriptor) -> Seen:
+    """Try a robot, and return what was seen in numbers."""
+    seen = try_robot(robot, STEPS)
     return {
         "first_step": _rounded(seen.first_step.amount),
         "after_hold": _rounded(seen.after_hold.amount),
@@ -108,11 +106,21 @@ def trial(seen: Trial) -> Seen:
 
 
 def exported_urdf(robot: RobotDescriptor) -> Seen:
-    """Save a robot as a URDF, read that again, and guess a robot of it."""
+    """Save a robot as a URDF, and have another program read that with its meshes."""
     with tempfile.TemporaryDirectory() as folder:
         path = single({"robot": robot}).to_urdf(Path(folder) / "robot.urdf", visuals=False)
-        again = guess_descriptor(path).descriptor
-        return {"ok": sorted(again.joints) == sorted(f"robot/{joint}" for joint in robot.joints)}
+        try:
+            again = yourdfpy.URDF.load(
+                path,
+                build_scene_graph=False,
+                load_meshes=False,
+                build_collision_scene_graph=True,
+                load_collision_meshes=True,
+            ).robot
+        except Exception as error:  # a reader that raises whatever it meets
+            return {"ok": False, "why": f"yourdfpy: {type(error).__name__}: {error}"}
+        joints = {joint.name for joint in again.joints if joint.type != "fixed"}
+        return {"ok": joints == {f"robot/{joint}" for joint in robot.joints}}
 
 
 def exported_drake(robot: RobotDescriptor) -> Seen:
@@ -125,11 +133,26 @@ def exported_drake(robot: RobotDescriptor) -> Seen:
         return {"ok": set(model["default_joint_positions"]) <= moving == set(robot.joints)}
 
 
+LOOKS: Mapping[str, Callable[[RobotDescriptor], Seen]] = {
+    "alone": lambda robot: valid(single({"robot": robot})),
+    "facing": facing,
+    "beside": beside,
+    "trial": trial,
+    "tcp_move": tcp_move,
+    "to_urdf": exported_urdf,
+    "to_drake": exported_drake,
+}
+
+
 class _Directives(yaml.SafeLoader):
     """Reads directives of Drake, in which rotations have a tag."""
 
 
-_Directives.add_constructor("!Rpy", lambda loader, node: loader.construct_mapping(node, deep=True))
+def _mapping(loader: Any, node: Any) -> Any:
+    return loader.construct_mapping(node, deep=True)
+
+
+_Directives.add_constructor("!Rpy", _mapping)
 
 
 def _wrong(number: NumberTrial) -> Iterator[str]:

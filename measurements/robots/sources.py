@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
@@ -17,6 +18,8 @@ PACKAGES: Mapping[str, str] = {
     "pybullet": "pybullet_data",
 }
 
+_COLLISION = re.compile(rb"<collision.*?</collision>", re.DOTALL)
+_MESH = re.compile(rb"""<mesh\s[^>]*filename\s*=\s*["']([^"']+)["']""")
 _MOVING = re.compile(rb"""<joint\s[^>]*type\s*=\s*["'](?!fixed["'])""")
 
 
@@ -38,6 +41,19 @@ class Robot:
     def key(self) -> str:
         """What it is called in the record."""
         return f"{self.source}/{self.path}"
+
+    def missing_meshes(self) -> list[str]:
+        """Return the meshes that physics needs and that the source has nowhere.
+
+        Whatever a reference starts with, a file is looked for by its name and that of its folder.
+        """
+        there = _tails(self.folder)
+        meshes = [
+            mesh.decode(errors="replace")
+            for collision in _COLLISION.findall(self.urdf.read_bytes())
+            for mesh in _MESH.findall(collision)
+        ]
+        return [mesh for mesh in dict.fromkeys(meshes) if _tail(mesh) not in there]
 
     @property
     def urdf(self) -> Path:
@@ -84,3 +100,18 @@ def find_robots(folders: Iterable[tuple[str, Path]]) -> Iterator[Robot]:
         for urdf in sorted(folder.rglob("*.urdf")):
             if _MOVING.search(urdf.read_bytes()):
                 yield Robot(source, urdf.relative_to(folder).as_posix(), folder)
+
+
+@lru_cache(maxsize=16)
+def _tails(folder: Path) -> frozenset[str]:
+    """Return name and folder's name of every file, and the name alone."""
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    return frozenset(
+        tail for file in files for tail in (f"{file.parent.name}/{file.name}", file.name)
+    )
+
+
+def _tail(mesh: str) -> str:
+    path = mesh.split("://")[-1]
+    names = [name for name in path.split("/") if name not in ("", ".", "..")]
+    return "/".join(names[-2:])

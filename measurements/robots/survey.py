@@ -1,9 +1,10 @@
-"""Tries many URDFs, each in a process of its own: one that crashes or hangs is a result like any."""
+"""Tries many URDFs, each in a process of its own: a crash is a result like any other."""
 
 from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -17,6 +18,8 @@ from robots.common.child_process import running
 
 MEMORY = 8 << 30  # bytes of a process
 PROBE = "measurements.robots.probe"
+
+_PASSING = re.compile(re.escape(tempfile.gettempdir()) + r"/tmp\w+/")
 
 Seen = dict[str, Any]
 
@@ -69,7 +72,7 @@ def probe(robot: Robot, seconds: float) -> Seen:
         errors.seek(0)
         lines = output.read().decode(errors="replace").splitlines()
         words = errors.read().decode(errors="replace").strip().splitlines()
-    seen: Seen = {}
+    seen: Seen = {"missing": robot.missing_meshes()}
     for line in lines:
         if line.startswith("{"):  # libraries print, too
             seen.update(json.loads(line))
@@ -87,7 +90,7 @@ def _ending(code: int | None, seconds: float, words: Sequence[str]) -> str:
 
 
 def _without_folders(seen: Seen, robot: Robot) -> Seen:
-    """Return a result in which paths are relative to the robot's source."""
-    text = json.dumps(seen)
+    """Return a result in which paths are relative to the robot's source, or to a passing folder."""
+    text = _PASSING.sub("", json.dumps(seen))
     folder = json.dumps(robot.folder.as_posix())[1:-1]
     return json.loads(text.replace(f"{folder}/", "").replace(folder, "."))

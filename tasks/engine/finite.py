@@ -44,9 +44,9 @@ def refuse_state(
         cause = speeds.causes.of(lost.robot, joint)
         why = f" (before, {joint} was the fastest of its joints; the likely cause: {cause})"
     raise SimulationError(
-        f"physics diverged: {lost.what} has numbers that are not finite in environment {lost.env} at"
-        f" step {elapsed[lost.env]}{why}; reset(options={{'reconfigure': True}}) builds its world"
-        " anew"
+        f"physics diverged: {lost.what} has numbers that are not finite in environment {lost.env}"
+        f" at step {elapsed[lost.env]}{why}; reset(options={{'reconfigure': True}}) builds its"
+        " world anew"
     )
 
 

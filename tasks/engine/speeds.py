@@ -15,7 +15,7 @@ import numpy as np
 from robots import SimulationError
 from simulation import Simulation, State
 from simulation.causes import Causes
-from simulation.maths import Array, Floats
+from simulation.maths import Array
 
 WARNS, REFUSES = 10.0, 100.0  # times a joint's largest speed
 STACK = 5  # calls from a report up to that of `step`
@@ -34,8 +34,11 @@ class SpeedWatch:
         self._robots = simulation.index.robots
         limits = np.concatenate([robot.speeds for robot in self._robots.values()])
         self._limits, self._least = limits, float((WARNS * limits.min()) ** 2)
-        self._names = [
-            (name, joint) for name, place in simulation.layout.items() for joint in place.robot.joints
+        self._joints = [
+            (name, joint, group.unit)
+            for name, placement in simulation.layout.items()
+            for group in placement.robot.action_split.groups.values()
+            for joint in group.joints
         ]
         self._reported = np.zeros(simulation.num_envs, bool)
 
@@ -64,12 +67,10 @@ class SpeedWatch:
     def fastest(self, state: State, robot: str, env: int) -> str:
         """Return the joint of a robot that is the fastest for what it is made for."""
         speeds = np.abs(state.qvel(robot)[env]) / self._robots[robot].speeds
-        joints = [joint for name, joint in self._names if name == robot]
+        joints = [joint for name, joint, _ in self._joints if name == robot]
         return joints[int(np.nan_to_num(speeds, nan=np.inf).argmax())]
 
-    def _report(
-        self, times: Floats, state: State, moving: Sequence[int], elapsed: Array
-    ) -> None:
+    def _report(self, times: Array, state: State, moving: Sequence[int], elapsed: Array) -> None:
         for env in moving:
             worst = int(times[env].argmax())
             if times[env, worst] > REFUSES:
@@ -82,11 +83,11 @@ class SpeedWatch:
                 words = self._words(times, state, env, worst, elapsed)
                 warnings.warn(words, RuntimeWarning, stacklevel=STACK)
 
-    def _words(self, times: Floats, state: State, env: int, worst: int, elapsed: Array) -> str:
-        robot, joint = self._names[worst]
+    def _words(self, times: Array, state: State, env: int, worst: int, elapsed: Array) -> str:
+        robot, joint, unit = self._joints[worst]
         speed, limit = abs(state.joint_velocities[env, worst]), self._limits[worst]
         return (
-            f"robot {robot!r} is thrown about: {joint} moves at {speed:.3g} /s in environment {env}"
-            f" at step {elapsed[env]}, {times[env, worst]:.3g} times what it is made for"
-            f" ({limit:.3g}); the likely cause: {self.causes.of(robot, joint, env)}"
+            f"robot {robot!r} is thrown about: {joint} moves at {speed:.3g} {unit}/s in environment"
+            f" {env} at step {elapsed[env]}, {times[env, worst]:.3g} times what it is made for"
+            f" ({limit:.3g} {unit}/s); the likely cause: {self.causes.of(robot, joint, env)}"
         )
