@@ -129,8 +129,11 @@ class Trial:
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """What is wrong, a sentence each; nothing if it works."""
-        return tuple(self._problems())
+        """What is wrong, a sentence each, and the likely cause; nothing if it works."""
+        problems = tuple(self._problems())
+        if not problems or not self.overlaps:
+            return problems
+        return (*problems, f"the likely cause: at the start {in_itself(self.overlaps[0])}")
 
     def _problems(self) -> Iterator[str]:
         joint, amount = self.first_step
@@ -145,8 +148,6 @@ class Trial:
             joint, speed, limit, step = self.exploded
             made_for = f"made for {limit:.3g} {self.unit(joint)}/s"
             yield f"it explodes: {joint} moves at {speed:.3g} in step {step}, {made_for}"
-        if (self.exploded is not None or not self.stands) and self.overlaps:
-            yield f"the likely cause: at the start {in_itself(self.overlaps[0])}"
         yield from (trial.problem for trial in self.numbers if trial.problem is not None)
         if not self.tcp_way > 0.0:
             yield f"the TCP, {self.robot.tcp_link}, is moved by no action number"
