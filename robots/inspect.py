@@ -1,10 +1,16 @@
-"""`python -m robots.inspect panda`: joints, action numbers, gripper, cameras, files of a robot."""
+"""`python -m robots.inspect panda`: joints, action numbers, gripper, cameras, files of a robot.
+
+ROBOT is a name of the catalogue, or the path of a URDF, whose descriptor is guessed. With `--try`
+robots are stood, stepped and moved in physics instead, and the report is what was seen.
+"""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable, Iterator, Sequence
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -22,22 +28,43 @@ from robots.urdf.reading import read_model
 from robots.urdf.summary import read_cleaned, read_urdf
 from robots.urdf.tree import kinematic_tree, link_index
 
+TRY_COMMAND = "simulation.try_command"  # with run(robots)
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print reports, or the catalogue if no robot is named; fetches nothing.
 
     Returns:
-        0, or 1 if files are unreadable, or 2 if a robot does not exist.
+        0, or 1 if files are unreadable or a robot that is tried does not work, or 2 if a robot
+        does not exist.
     """
     parser = argparse.ArgumentParser(prog="python -m robots.inspect", description=__doc__)
     parser.add_argument("robots", nargs="*", metavar="ROBOT", help="robots to report on")
-    robots = parser.parse_args(arguments).robots
-    return exit_code(lambda: _print(robots))
+    parser.add_argument(
+        "--try", action="store_true", dest="tries", help="stand, step and move them in physics"
+    )
+    options = parser.parse_args(arguments)
+    if options.tries and not options.robots:
+        parser.error("--try takes robots to try")
+    return exit_code(lambda: (_try if options.tries else _print)(options.robots))
+
+
+def load(name_or_path: str) -> RobotDescriptor:
+    """Return a robot of the catalogue, or the guess of a URDF, by its path."""
+    path = Path(name_or_path)
+    if path.suffix == ".urdf" or path.is_file():
+        return RobotDescriptor.from_urdf(name_or_path, quiet=True)
+    return RobotRegistry.load(name_or_path)
+
+
+def _try(names: Sequence[str]) -> int:
+    command: Any = import_module(TRY_COMMAND)
+    return command.run([load(name) for name in names])
 
 
 def _print(names: Sequence[str]) -> int:
     for name in names:
-        print(report(RobotRegistry.load(name), AssetStore(default_root())))
+        print(report(load(name), AssetStore(default_root())))
     if names:
         return 0
     robots, failures = RobotRegistry.load_all()

@@ -77,6 +77,34 @@ class Pair(NamedTuple):
     body: str
 
 
+class Part(NamedTuple):
+    """A link of a robot, or a body of its own.
+
+    Attributes:
+        robot: The robot's name in the layout, or None.
+        name: Name of the link or the body.
+    """
+
+    robot: str | None
+    name: str
+
+    def __str__(self) -> str:
+        """Return ``robot.link``, or the body's name."""
+        return self.name if self.robot is None else f"{self.robot}.{self.name}"
+
+
+class Overlap(NamedTuple):
+    """Two parts that are inside each other, and how far at the deepest point (m)."""
+
+    one: Part
+    other: Part
+    depth: float
+
+    def __str__(self) -> str:
+        """Say so in a few words."""
+        return f"{self.one} and {self.other} overlap by {self.depth * 1e3:.3g} mm"
+
+
 @dataclass(frozen=True)
 class BuiltRobot:
     """What is known of a robot once it is built.
@@ -84,12 +112,15 @@ class BuiltRobot:
     Attributes:
         links: Frame of each link by name, the root first.
         limits: Lower and upper limit of each joint, (dof, 2) (rad, m).
+        speeds: Largest speed of each joint that its maker or, where the robot's file has none,
+            common sense allows, (dof,) (rad/s, m/s).
         loaded_order: For each joint in the order in which SAPIEN's loader numbers those of the
             robot's file, which is native's, its place among the descriptor's.
     """
 
     links: Mapping[str, int]
     limits: NDArray[np.float32]
+    speeds: NDArray[np.float32]
     loaded_order: tuple[int, ...]
 
     @property
@@ -239,6 +270,10 @@ class Backend(Protocol):
 
     def contact_counts(self) -> NDArray[np.int64]:
         """Return how many pairs of bodies touch or are about to, (N,)."""
+        ...
+
+    def overlaps(self, env: int) -> list[Overlap]:
+        """Return which parts of a world were inside each other in the last step of physics."""
         ...
 
     def touching(self) -> Flags:

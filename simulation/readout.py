@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from typing import Generic, Literal, TypeVar
+from typing import Generic, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,20 @@ from simulation.maths import Floats
 
 Place = TypeVar("Place")
 Key = TypeVar("Key", bound=Hashable)
+
+
+class Lost(NamedTuple):
+    """Something that is nowhere.
+
+    Attributes:
+        what: It, in words.
+        env: Its world's number.
+        robot: Its name in the layout, if it is a robot.
+    """
+
+    what: str
+    env: int
+    robot: str | None = None
 
 
 class Places(dict[str, Place]):

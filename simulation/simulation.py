@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from layouts import Layout
 from robots import RobotDescriptor
 from robots.descriptor import IDENTITY, Quaternion
-from simulation.backend import Backend, PointSolver, PoseSolver, Rows
+from simulation.backend import Backend, Overlap, PointSolver, PoseSolver, Rows
 from simulation.cameras import AnyCamera, View
 from simulation.controller import JointPositionController
 from simulation.maths import Array, Flags, Floats
@@ -192,6 +192,10 @@ class Simulation:
     def contact_counts(self) -> NDArray[np.int64]:
         """Return how many pairs of bodies touch or are about to, (N,)."""
         return self._backend.contact_counts()
+
+    def overlaps(self, env: int) -> list[Overlap]:
+        """Return which parts of a world were inside each other in the last step of physics."""
+        return self._backend.overlaps(env)
 
     def touching(self) -> Flags:
         """Tell where a robot pressed on a movable object in the last step of physics, (N,)."""

@@ -14,7 +14,7 @@ from robots import Fingers, SimulationError
 from simulation.backend import Readout, Velocity
 from simulation.grasps import grasped
 from simulation.maths import Array, Flags, Floats, concatenate, counted, full, like, norm
-from simulation.readout import Moment, ReadoutIndex
+from simulation.readout import Lost, Moment, ReadoutIndex
 from simulation.rotations import last_euler_angle, rotation_matrix
 
 _NOTHING = np.empty(0, np.float32)
@@ -104,20 +104,20 @@ class State:
         self.num_envs = len(self.joint_positions)
         self.all_poses = with_means(poses, index.mean_frames) if index.mean_frames else poses
 
-    def lost(self) -> tuple[str, int] | None:
-        """Return the first robot or body with numbers that are not finite, and its world's number.
+    def lost(self) -> Lost | None:
+        """Return the first robot or body with numbers that are not finite, or None.
 
-        None if there is none; looks at poses and joints.
+        Looks at poses and joints.
         """
         index = self._index
         for robot, links in index.links.items():
             parts = [self.all_poses[frame] for frame in links.values()]
             parts += [self.qpos(robot), self.qvel(robot)]
             if (env := _first_not_finite(np.concatenate(parts, 1))) is not None:
-                return f"robot {robot!r}", env
+                return Lost(f"robot {robot!r}", env, robot)
         for body, frame in index.bodies.items():
             if (env := _first_not_finite(self.all_poses[frame])) is not None:
-                return f"body {body!r}", env
+                return Lost(f"body {body!r}", env)
         return None
 
     # -- arrays of one's own -----------------------------------------------------------------

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulation.backend import Built, BuiltRobot, Pair, Readout, Rows, Velocity
+from simulation.backend import Built, BuiltRobot, Overlap, Pair, Readout, Rows, Velocity
 from simulation.cameras import AnyCamera, View
 from simulation.maths import Flags, Floats
 from simulation.sapien3.blueprint import Blueprint
 from simulation.sapien3.collision import described_shapes
-from simulation.sapien3.contacts import PairForces, presses_on_object
+from simulation.sapien3.contacts import PairForces, overlaps_in, presses_on_object
 from simulation.sapien3.inverse_kinematics import InverseKinematics
 from simulation.sapien3.point_reach import PointReach
 from simulation.sapien3.world import BuiltWorld, build_world
@@ -144,6 +144,10 @@ class SapienBackend:
         """Return how many pairs of bodies touch; see `Backend`."""
         return np.array([len(world.system.get_contacts()) for world in self.worlds])
 
+    def overlaps(self, env: int) -> list[Overlap]:
+        """Return which parts are inside each other; see `Backend`."""
+        return overlaps_in(self.worlds[env])
+
     def touching(self) -> Flags:
         """Tell where a link pressed on a dynamic body; see `Backend`."""
         return np.array([presses_on_object(world.system.get_contacts()) for world in self.worlds])
@@ -172,6 +176,7 @@ def _inventory(world: BuiltWorld) -> Built:
         name: BuiltRobot(
             links={link: place[part.entity] for link, part in robot.links.items()},
             limits=np.concatenate([joint.limits for joint in robot.driven]),
+            speeds=robot.speeds,
             loaded_order=tuple(robot.loaded_order),
         )
         for name, robot in world.robots.items()

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from simulation.backend import Pair
+from simulation.backend import Overlap, Pair, Part
 from simulation.maths import Floats
 from simulation.sapien3.world import BuiltWorld
 
@@ -61,6 +61,21 @@ def _impulses(contacts: Sequence[Any], table: _Table) -> dict[int, Any]:
             total = np.sum([point.impulse for point in contact.points], axis=0) * sign
             impulses[pair] = impulses.get(pair, np.zeros(3)) + total
     return impulses
+
+
+def overlaps_in(world: BuiltWorld) -> list[Overlap]:
+    """Return which parts of a world are inside each other, by the contacts of the last step."""
+    parts: dict[int, Part] = {}
+    for robot in world.robots.values():
+        parts.update((id(link), Part(robot.name, name)) for name, link in robot.links.items())
+    parts.update((id(body.component), Part(None, name)) for name, body in world.bodies.items())
+    found: list[Overlap] = []
+    for contact in world.system.get_contacts():
+        depth = max((-point.separation for point in contact.points), default=0.0)
+        if depth > 0:
+            one, other = (parts[id(body)] for body in contact.bodies)
+            found.append(Overlap(one, other, float(depth)))
+    return found
 
 
 def presses_on_object(contacts: Sequence[Any]) -> bool:

@@ -14,26 +14,39 @@ import numpy as np
 from robots import SimulationError, TaskError
 from simulation import State
 from simulation.maths import Array, all_finite
+from simulation.readout import Lost
+from tasks.engine.speeds import SpeedWatch
 
 
 class NotFinite(Exception):
     """An observation has numbers that are not finite; the task says which."""
 
 
-def refuse_state(state: State, elapsed: Array) -> NoReturn:
+def refuse_state(
+    state: State, before: State | None, speeds: SpeedWatch, elapsed: Array
+) -> NoReturn:
     """Refuse a state in which something is nowhere.
 
     Args:
         state: What the worlds look like.
+        before: What they looked like before, if that is known.
+        speeds: What watches their joints.
         elapsed: Steps of each environment's episode, (N,).
 
     Raises:
-        SimulationError: Always; names robot or body, environment and step.
+        SimulationError: Always; names robot or body, environment and step, and of a robot the joint
+            that was the fastest before, and the likely cause.
     """
-    what, env = state.lost() or ("a frame", 0)
+    lost = state.lost() or Lost("a frame", 0)
+    why = ""
+    if lost.robot is not None:
+        joint = speeds.fastest(state if before is None else before, lost.robot, lost.env)
+        cause = speeds.causes.of(lost.robot, joint)
+        why = f" (before, {joint} was the fastest of its joints; the likely cause: {cause})"
     raise SimulationError(
-        f"physics diverged: {what} has numbers that are not finite in environment {env} at step"
-        f" {elapsed[env]}; reset(options={{'reconfigure': True}}) builds its world anew"
+        f"physics diverged: {lost.what} has numbers that are not finite in environment {lost.env}"
+        f" at step {elapsed[lost.env]}{why}; reset(options={{'reconfigure': True}}) builds its"
+        " world anew"
     )
 
 
@@ -52,7 +65,7 @@ def refuse_reward(reward: Array, task: object, elapsed: Array) -> NoReturn:
 
 
 def refuse_observation(
-    state: State, parts: Mapping[str, Array], task: object, elapsed: Array
+    state: State, parts: Mapping[str, Array], task: object, speeds: SpeedWatch, elapsed: Array
 ) -> NoReturn:
     """Refuse observations that are not finite.
 
@@ -60,6 +73,7 @@ def refuse_observation(
         state: What the worlds look like.
         parts: What the task observes of them.
         task: The task.
+        speeds: What watches the robots' joints.
         elapsed: Steps of each environment's episode, (N,).
 
     Raises:
@@ -69,7 +83,7 @@ def refuse_observation(
     for name, part in parts.items():
         if not all_finite(part):
             _refuse(f"{type(task).__name__}.observe(): {name!r} is", part, elapsed)
-    refuse_state(state, elapsed)
+    refuse_state(state, None, speeds, elapsed)
 
 
 def _refuse(what: str, values: Array, elapsed: Array) -> NoReturn:

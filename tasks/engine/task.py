@@ -30,6 +30,7 @@ from tasks.engine.memory import Memory
 from tasks.engine.observation import Observer, read_mode, space_of
 from tasks.engine.remade import Remade
 from tasks.engine.scenario import Scenario
+from tasks.engine.speeds import SpeedWatch
 from tasks.language.randomness import EpisodeRandom
 from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict
 
@@ -116,6 +117,7 @@ class MultiRobotTask(Declaration, Remade):
             control_frequency=scenario.control_frequency,
             visuals=scenario.draws,
         )
+        self._speeds = SpeedWatch(self._simulation)
         self._camera: Any = None
         self._responds = type(self).respond is not Declaration.respond
         self.start = self._begin(list(range(self.num_envs)), reconfigured=True)
@@ -141,7 +143,8 @@ class MultiRobotTask(Declaration, Remade):
         """Let the worlds go; closing twice is allowed."""
         self._simulation = None
         self._camera = None
-        vars(self).pop("_state", None)  # it holds the worlds as well
+        for holder in ("_state", "_speeds"):  # of the worlds as well
+            vars(self).pop(holder, None)
         self.observer.close()
 
     # -- episodes ----------------------------------------------------------------------------
@@ -200,7 +203,8 @@ class MultiRobotTask(Declaration, Remade):
 
         Raises:
             ActionError: If the action has a wrong shape, type or number; nothing moves then.
-            SimulationError: If physics diverged: a pose is not finite.
+            SimulationError: If physics diverged: a pose is not finite, or a joint moves at a
+                hundred times its largest speed. At ten times a `RuntimeWarning` says so.
             TaskError: If the task's reward or observation is not finite.
         """
         obs, reward, terminated, truncated, info = self.advance(action, env_ids)
@@ -222,6 +226,7 @@ class MultiRobotTask(Declaration, Remade):
             self.simulation.step(flat, self._state.joint_positions, self.moving)
             self._elapsed[self.moving] += 1
         state = self._read()
+        self._speeds.look(state, self.moving, self._elapsed)
         if self._responds:
             self.respond(state)
             self.simulation.touched()
@@ -298,6 +303,7 @@ class MultiRobotTask(Declaration, Remade):
         if reconfigured:
             self._camera = None
         self._elapsed[ids] = 0
+        self._speeds.begin(ids)
         state = self._read()
         self.memory.renew(self.remember(state), ids)
         self.begin_episodes(state, ids)
@@ -317,9 +323,12 @@ class MultiRobotTask(Declaration, Remade):
             self.observation_space = batch_space(self.single_observation_space, self.num_envs)
 
     def _read(self) -> State:
-        state = self._state = self.simulation.read()
+        state = self.simulation.read()
         if not all_finite(state.all_poses):
-            refuse_state(state, self._elapsed)
+            before = vars(self).get("_state")
+            self._state = state
+            refuse_state(state, before, self._speeds, self._elapsed)
+        self._state = state
         return state
 
     def _info(self, state: State) -> Info:
@@ -335,7 +344,7 @@ class MultiRobotTask(Declaration, Remade):
         try:
             return self.observer.observe(self.simulation, state, parts)
         except NotFinite:
-            refuse_observation(state, parts, self, self._elapsed)
+            refuse_observation(state, parts, self, self._speeds, self._elapsed)
 
     def _reward(self, state: State, action: Floats, info: Info) -> Floats:
         match self.reward_mode:

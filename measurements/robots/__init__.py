@@ -1,0 +1,1 @@
+"""A survey of robots that this library has not seen: what becomes of other packages' URDFs."""

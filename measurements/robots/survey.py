@@ -1,0 +1,96 @@
+"""Tries many URDFs, each in a process of its own: a crash is a result like any other."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from typing import Any
+
+from measurements.robots.sources import Robot
+from robots.common.child_process import running
+
+MEMORY = 8 << 30  # bytes of a process
+PROBE = "measurements.robots.probe"
+
+_PASSING = re.compile(re.escape(tempfile.gettempdir()) + r"/tmp\w+/")
+
+Seen = dict[str, Any]
+
+
+def survey(
+    robots: Sequence[Robot],
+    keep: Callable[[Robot, Seen], None],
+    *,
+    workers: int = 1,
+    seconds: float = 180.0,
+) -> None:
+    """Try robots.
+
+    Args:
+        robots: Which ones.
+        keep: Called in this thread with what was seen of each, as soon as it is known.
+        workers: Processes at a time.
+        seconds: What each may take.
+
+    Raises:
+        OSError: If no process can be started.
+    """
+    with ThreadPoolExecutor(workers) as pool:
+        waiting = {pool.submit(probe, robot, seconds): robot for robot in robots}
+        try:
+            for done in as_completed(waiting):
+                keep(waiting[done], done.result())
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def probe(robot: Robot, seconds: float) -> Seen:
+    """Return what one process sees of a robot; ``ended`` says how, where it did not end well."""
+    command = [sys.executable, "-m", PROBE, str(robot.urdf)]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as errors:
+        with running(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=errors,
+            env=environment,
+            memory=MEMORY,
+        ) as process:
+            try:
+                code = process.wait(seconds)
+            except subprocess.TimeoutExpired:
+                code = None
+        output.seek(0)
+        errors.seek(0)
+        lines = output.read().decode(errors="replace").splitlines()
+        words = errors.read().decode(errors="replace").strip().splitlines()
+    seen: Seen = {"missing": robot.missing_meshes()}
+    for line in lines:
+        if line.startswith("{"):  # libraries print, too
+            seen.update(json.loads(line))
+    if code != 0:
+        seen["ended"] = _ending(code, seconds, words)
+    return _without_folders(seen, robot)
+
+
+def _ending(code: int | None, seconds: float, words: Sequence[str]) -> str:
+    if code is None:
+        return f"took longer than {seconds:g} s"
+    if code < 0:
+        return f"crashed: {signal.Signals(-code).name}"
+    return f"ended with {code}: {words[-1] if words else 'no word'}"
+
+
+def _without_folders(seen: Seen, robot: Robot) -> Seen:
+    """Return a result in which paths are relative to the robot's source, or to a passing folder."""
+    text = _PASSING.sub("", json.dumps(seen))
+    folder = json.dumps(robot.folder.as_posix())[1:-1]
+    return json.loads(text.replace(f"{folder}/", "").replace(folder, "."))

@@ -1,0 +1,53 @@
+"""Bodies that are inside each other: what physics drives apart, however hard that hits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from layouts import Layout
+from simulation.backend import Overlap
+from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
+from simulation.simulation import Simulation
+from simulation.world import World
+
+DEPTH = 1e-3  # m; what rests on something sinks in by less
+
+
+def starting_overlaps(layout: Layout, physics: PhysicsSettings | None = None) -> list[Overlap]:
+    """Return what overlaps by more than `DEPTH` where a layout's robots start, the deepest first.
+
+    Builds a world of its own, and takes one step of physics in it.
+
+    Args:
+        layout: The robots.
+        physics: Solver settings; None is SAPIEN's own defaults.
+
+    Raises:
+        RobotLayoutsError: If a robot cannot be built.
+    """
+    timestep = (physics or SAPIEN_DEFAULTS).timestep
+    alone = Simulation(layout, empty, 1, physics, control_frequency=1 / timestep)
+    stand(alone)
+    still = np.zeros((1, layout.action_dim), np.float32)
+    alone.step(still, alone.read().joint_positions)
+    return deepest(alone.overlaps(0))
+
+
+def stand(simulation: Simulation) -> None:
+    """Stand the robots of every world where its layout starts them, at rest."""
+    simulation.clear(range(simulation.num_envs))
+    for world in simulation.worlds:
+        for name, placement in simulation.layout.items():
+            world.stand(name, placement.start_qpos)
+
+
+def deepest(overlaps: Iterable[Overlap], than: float = DEPTH) -> list[Overlap]:
+    """Return the overlaps deeper than some length (m), the deepest first."""
+    deep = (overlap for overlap in overlaps if overlap.depth > than)
+    return sorted(deep, key=lambda overlap: -overlap.depth)
+
+
+def empty(world: World, number: int) -> None:
+    """Add nothing to a world."""
