@@ -279,6 +279,21 @@ class RobotDescriptor:
             print(found, file=sys.stderr)
         return found.descriptor
 
+    def with_gripper(
+        self, gripper: RobotDescriptor | str | os.PathLike[str], **details: Any
+    ) -> RobotDescriptor:
+        """Return the robot with another gripper in the place of its own, if it has one.
+
+        Args:
+            gripper: A descriptor, a registered name or a URDF: a gripper, or an arm whose gripper
+                is taken.
+            **details: ``link``, ``position``, ``quaternion`` and ``name``; see
+                `robots.grafting.with_gripper`, also for the errors.
+        """
+        from robots.grafting import with_gripper
+
+        return with_gripper(self, gripper, **details)
+
     @property
     def joints(self) -> tuple[str, ...]:
         """Driven joints, in the order of the action split."""

@@ -15,6 +15,7 @@ from robots.common.writing import written_whole
 from robots.descriptor import Vector3
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model
+from robots.urdf.renaming import rename
 from robots.urdf.srdf import srdf_beside
 from robots.urdf.summary import parse_urdf, read_urdf
 
@@ -75,14 +76,7 @@ def _renamed(file: Path, place: str, folder: Path | None, *, visuals: bool) -> I
             continue
         for visual in [] if visuals else element.findall("visual"):
             element.remove(visual)
-        names = [(element, "name"), *((part, "name") for part in element.iter("material"))]
-        names += [(part, "link") for part in element if part.tag in ("parent", "child")]
-        names += [(part, "joint") for part in element.iterfind("mimic")]
-        for part, key in {id(part): (part, key) for part, key in names}.values():
-            if part.get(key):
-                part.set(key, f"{place}/{part.get(key)}")
-        for part in (*element.iter("mesh"), *element.iter("texture")):
-            part.set("filename", _file(part.get("filename", ""), file, folder))
+        rename(element, lambda name: f"{place}/{name}", lambda name: _file(name, file, folder))
         yield element
 
 

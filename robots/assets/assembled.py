@@ -1,0 +1,205 @@
+"""URDFs that are put together from others."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+from kinematics.quaternions import Quaternion, Vector3, quaternion_rpy
+from robots.assets.store import default_root
+from robots.common.errors import DescriptorError, UnknownNameError
+from robots.urdf.model import UrdfModel
+from robots.urdf.paths import resolve
+from robots.urdf.reading import read_model
+from robots.urdf.renaming import rename
+from robots.urdf.summary import parse_urdf, read_urdf
+
+
+class Source(Protocol):
+    """Where a URDF comes from; see `robots.descriptor.UrdfSource`."""
+
+    def locate(self, *, pictures: bool = False) -> Path:
+        """Return the path of a complete, checked URDF on this machine."""
+        ...
+
+
+@dataclass(frozen=True)
+class Part:
+    """A URDF, and where its root link is fixed.
+
+    Attributes:
+        urdf: Where it comes from.
+        link: Link of what is there already that carries it.
+        position: Of its root in that link's frame (m).
+        quaternion: How its root is turned there, wxyz.
+        prefix: Put before the names of its links, joints and materials.
+        root: Link that is fixed, of which only what it carries is taken over; the whole if empty.
+    """
+
+    urdf: Source
+    link: str
+    position: Vector3 = (0.0, 0.0, 0.0)
+    quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    prefix: str = ""
+    root: str = ""
+
+
+@dataclass(frozen=True)
+class AssembledUrdf:
+    """A URDF made of others when it is located; making one touches nothing.
+
+    Attributes:
+        body: What carries the rest; keeps its names.
+        parts: What is fixed to it, in this order; a part may be fixed to an earlier one.
+        without: Links that are cut off the body, with all that they carry.
+    """
+
+    body: Source
+    parts: tuple[Part, ...] = ()
+    without: tuple[str, ...] = ()
+
+    def locate(self, *, pictures: bool = False) -> Path:
+        """Return the path of the URDF, put together from the parts as they are now.
+
+        It lies in a folder of the local copy of robot files that is named by its contents, beside
+        links to the folders of its meshes.
+
+        Args:
+            pictures: Whether the visual meshes are needed too.
+
+        Raises:
+            AssetError: If the files of a part cannot be found or make no sense.
+            UnknownNameError: If a link that carries a part, or is cut off, does not exist.
+            DescriptorError: If two parts have a link or joint of the same name, or nothing is left.
+        """
+        assembly = _Assembly(pictures=pictures)
+        assembly.take(self.body, without=self.without)
+        for part in self.parts:
+            assembly.fix(part)
+        return assembly.written()
+
+
+class _Assembly:
+    """A robot that grows part by part."""
+
+    def __init__(self, *, pictures: bool) -> None:
+        self._pictures = pictures
+        self._robot = Element("robot", name="assembled")
+        self._names: dict[str, set[str]] = {"link": set(), "joint": set()}
+        self._folders: dict[str, str] = {}  # of meshes: path → name of the link to it
+
+    def take(
+        self, source: Source, prefix: str = "", root: str = "", without: Sequence[str] = ()
+    ) -> str:
+        """Take a URDF over, or what one link of it carries, and return the new name of its root."""
+        path = source.locate(pictures=self._pictures)
+        contents = read_urdf(path)
+        model = read_model(contents, path.as_posix())
+        root = root or model.root
+        wanted = carried_by(model, [root]) - carried_by(model, without)
+        if root not in wanted:
+            raise DescriptorError(f"nothing is left without {root!r}, which carries the rest")
+        for element in parse_urdf(contents, path.as_posix()):
+            if not _belongs(element, wanted, root):
+                continue
+            for visual in [] if self._pictures else element.findall("visual"):
+                element.remove(visual)
+            rename(element, lambda name: prefix + name, lambda name: self._file(name, path))
+            self._expect_new(element, path)
+            self._robot.append(element)
+        return prefix + root
+
+    def fix(self, part: Part) -> None:
+        """Take a part over and fix its root to a link."""
+        if part.link not in self._names["link"]:
+            raise UnknownNameError("link to fix something to", part.link, self._names["link"])
+        root = self.take(part.urdf, part.prefix, part.root)
+        joint = SubElement(self._robot, "joint", name=f"{root}_mount", type="fixed")
+        self._expect_new(joint, Path(root))
+        SubElement(joint, "parent", link=part.link)
+        SubElement(joint, "child", link=root)
+        turn = quaternion_rpy(part.quaternion)
+        SubElement(joint, "origin", xyz=_text(part.position), rpy=_text(turn))
+
+    def written(self) -> Path:
+        """Write the URDF, unless it is there, and return its path."""
+        indent(self._robot)
+        xml = tostring(self._robot, encoding="utf-8", xml_declaration=True)
+        links = sorted((name, folder) for folder, name in self._folders.items())
+        digest = hashlib.sha256(repr((xml, links)).encode()).hexdigest()[:16]
+        folder = default_root() / "assembled" / digest
+        if not (folder / "assembled.urdf").is_file():
+            _make(folder, xml, dict(links))
+        return folder / "assembled.urdf"
+
+    def _file(self, reference: str, urdf: Path) -> str:
+        path = os.path.abspath(resolve(reference, urdf.as_posix(), os.path.isfile))
+        folder, file = os.path.split(path)
+        name = self._folders.setdefault(folder, f"meshes/{len(self._folders)}")
+        return f"{name}/{file}"
+
+    def _expect_new(self, element: Element, path: Path) -> None:
+        names, name = self._names.get(element.tag), element.get("name", "")
+        if names is None:
+            return
+        if name in names:
+            raise DescriptorError(
+                f"{path} has a {element.tag} {name!r}, and so has what it is joined with; a prefix"
+                " tells them apart"
+            )
+        names.add(name)
+
+
+def carried_by(model: UrdfModel, links: Sequence[str]) -> frozenset[str]:
+    """Return links and all that they carry.
+
+    Raises:
+        UnknownNameError: If there is no such link.
+    """
+    for link in links:
+        if link not in model.links:
+            raise UnknownNameError("link of the URDF", link, model.links)
+    found = set(links)
+    for joint in model.ordered:  # each after the one that carries its parent
+        if joint.parent in found:
+            found.add(joint.child)
+    return frozenset(found)
+
+
+def _belongs(element: Element, links: frozenset[str], root: str) -> bool:
+    """Tell whether an element is a material, one of some links, or a joint that carries one."""
+    child = element.find("child")
+    if element.tag == "joint" and child is not None:
+        return child.get("link") in links - {root}
+    return element.tag == "material" or (element.tag == "link" and element.get("name") in links)
+
+
+def _make(folder: Path, xml: bytes, links: Mapping[str, str]) -> None:
+    """Make the folder of a URDF, whole or not at all."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = Path(tempfile.mkdtemp(prefix=".partial-", dir=folder.parent))
+    try:
+        for name, target in links.items():
+            link = unfinished / name
+            link.parent.mkdir(exist_ok=True)
+            link.symlink_to(target, target_is_directory=True)
+        (unfinished / "assembled.urdf").write_bytes(xml)
+        unfinished.rename(folder)
+    except FileExistsError:  # another process was faster
+        pass
+    except OSError:
+        if not (folder / "assembled.urdf").is_file():
+            raise
+    finally:
+        shutil.rmtree(unfinished, ignore_errors=True)
+
+
+def _text(values: Vector3) -> str:
+    return " ".join(repr(float(value)) for value in values)

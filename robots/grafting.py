@@ -1,0 +1,432 @@
+"""Robots made of others: an arm with another gripper or a tool, arms on one body.
+
+Files are read when a robot is put together, since links are looked up in them. What is put together
+is described by the parts' own numbers: drives, limits, keyframes, fingers. Only which links may
+overlap is found anew, with the hulls of all parts.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinematics.rotations import Floats, inverse_pose, quaternion_of, transform
+from robots.action_split import ActionSplit, JointGroup
+from robots.assets.assembled import AssembledUrdf, Part, carried_by
+from robots.assets.locator import LocalUrdf
+from robots.bodies.allowed import LinkPair, read_allowed_pairs
+from robots.bodies.overlaps import guess_allowed
+from robots.common.errors import DescriptorError, UnknownNameError
+from robots.descriptor import (
+    IDENTITY,
+    CameraMount,
+    Fingers,
+    GripperMaterial,
+    Home,
+    Quaternion,
+    RobotDescriptor,
+    UrdfSource,
+    Vector3,
+)
+from robots.registry import RobotRegistry
+from robots.urdf.model import UrdfModel
+from robots.urdf.reading import read_model
+from robots.urdf.summary import read_urdf
+from robots.urdf.tree import kinematic_tree
+
+RobotLike = RobotDescriptor | str | os.PathLike[str]
+"""A descriptor, the name of a registered robot, or the path of a URDF."""
+
+
+@dataclass(frozen=True)
+class Mount:
+    """A robot that stands on a link of another body.
+
+    Attributes:
+        robot: The robot.
+        link: Link of the body that carries it; its root if empty.
+        position: Of the robot's root in that link's frame (m).
+        quaternion: How its root is turned there, wxyz.
+    """
+
+    robot: RobotLike
+    link: str = ""
+    position: Vector3 = (0.0, 0.0, 0.0)
+    quaternion: Quaternion = IDENTITY
+
+
+def with_gripper(
+    robot: RobotDescriptor,
+    gripper: RobotLike,
+    *,
+    link: str | None = None,
+    position: Vector3 | None = None,
+    quaternion: Quaternion | None = None,
+    name: str | None = None,
+) -> RobotDescriptor:
+    """Return an arm with another gripper in the place of its own, if it has one.
+
+    Args:
+        robot: The arm.
+        gripper: The gripper, or an arm whose gripper is taken.
+        link: Link that carries it. None takes the one that carries the present gripper, or
+            without one the link of the tool centre point.
+        position: Of the gripper's root in that link's frame (m); None takes that of the present
+            gripper, or without one that of the new one on the arm it is taken from.
+        quaternion: How its root is turned there, wxyz; likewise.
+        name: Registry name; None joins both names.
+
+    Raises:
+        DescriptorError: If the present gripper is no part of its own that could be taken off.
+        UnknownNameError: If there is no such link or robot.
+        AssetError: If files cannot be found or make no sense.
+    """
+    tool, origin, root = _gripper_of(_robot(gripper))
+    present = _gripper_joints(robot)
+    mount, without = robot.tcp_link, ()
+    if present:
+        cut, mount, origin = _flange(robot, _model(robot.urdf), present)
+        without = (cut,)
+    if link is not None:
+        mount, origin = link, np.eye(4)
+    part = Part(
+        tool.urdf,
+        mount,
+        _vector(origin) if position is None else position,
+        _quaternion(origin) if quaternion is None else quaternion,
+        root=root,
+    )
+    return _with_part(robot, tool, part, without, name or f"{robot.name}_with_{tool.name}")
+
+
+def with_tool(
+    robot: RobotDescriptor,
+    tool: UrdfSource | str | os.PathLike[str],
+    *,
+    tcp_link: str,
+    link: str | None = None,
+    position: Vector3 = (0.0, 0.0, 0.0),
+    quaternion: Quaternion = IDENTITY,
+    name: str | None = None,
+) -> RobotDescriptor:
+    """Return a robot with a body on one of its links: a pen, a camera's housing, a screwdriver.
+
+    Args:
+        robot: The robot.
+        tool: A URDF in which nothing moves.
+        tcp_link: Link of the tool that is the tool centre point from now on.
+        link: Link of the robot that carries it; None takes that of the tool centre point.
+        position: Of the tool's root in that link's frame (m).
+        quaternion: How its root is turned there, wxyz.
+        name: Registry name; None takes the robot's, with ``_with_tool`` behind it.
+
+    Raises:
+        DescriptorError: If something moves in the tool, or names are taken.
+        UnknownNameError: If there is no such link.
+        AssetError: If files cannot be found or make no sense.
+    """
+    source = LocalUrdf(tool) if isinstance(tool, str | os.PathLike) else tool
+    model = _model(source)
+    if model.moving:
+        raise DescriptorError(
+            f"the tool moves ({model.moving[0].name}); what moves is a gripper: with_gripper"
+        )
+    if tcp_link not in model.links:
+        raise UnknownNameError("link of the tool", tcp_link, model.links)
+    part = Part(source, link or robot.tcp_link, position, quaternion)
+    part = _apart(part, robot)
+    urdf = AssembledUrdf(robot.urdf, (part,))
+    made = replace(
+        robot,
+        name=name or f"{robot.name}_with_tool",
+        urdf=urdf,
+        tcp_link=part.prefix + tcp_link,
+        tcp_position_links=(),
+        allowed_collisions=_allowed(urdf, [(robot, "")]),
+    )
+    return replace(made, reach=_reach(robot, made))
+
+
+def with_camera(robot: RobotDescriptor, camera: CameraMount) -> RobotDescriptor:
+    """Return a robot with one more camera.
+
+    Raises:
+        DescriptorError: If it has a camera of that name.
+        UnknownNameError: If it has no such link.
+        AssetError: If its files cannot be found.
+    """
+    links = _model(robot.urdf).links
+    if camera.link not in links:
+        raise UnknownNameError(f"link of {robot.name}", camera.link, links)
+    return replace(robot, cameras=(*robot.cameras, camera))
+
+
+def on_body(
+    name: str, body: UrdfSource | str | os.PathLike[str], mounts: Mapping[str, Mount]
+) -> RobotDescriptor:
+    """Return one robot made of several that stand on one body: a pedestal, a torso, a gantry.
+
+    Its joint groups are called ``NAME_GROUP`` (``left_arm``, ``left_gripper``), its links and
+    joints ``NAME_LINK``. Tool centre point, fingers and reach are the first robot's.
+
+    Args:
+        name: Registry name.
+        body: A URDF in which nothing moves.
+        mounts: The robots by name, in the order of the action.
+
+    Raises:
+        DescriptorError: If there is no robot, or something moves in the body.
+        UnknownNameError: If there is no such link or robot.
+        AssetError: If files cannot be found or make no sense.
+    """
+    if not mounts:
+        raise DescriptorError("nothing stands on the body; name at least one robot")
+    source = LocalUrdf(body) if isinstance(body, str | os.PathLike) else body
+    model = _model(source)
+    if model.moving:
+        raise DescriptorError(f"the body moves ({model.moving[0].name}); only its robots may")
+    robots = {key: _robot(mount.robot) for key, mount in mounts.items()}
+    parts = [
+        Part(robots[key].urdf, m.link or model.root, m.position, m.quaternion, prefix=f"{key}_")
+        for key, m in mounts.items()
+    ]
+    urdf = AssembledUrdf(source, tuple(parts))
+    named = [_prefixed(robot, f"{key}_") for key, robot in robots.items()]
+    groups = {
+        f"{key}_{group}": joints
+        for key, robot in zip(robots, named, strict=True)
+        for group, joints in robot.action_split.groups.items()
+    }
+    first = named[0]
+    start = [x for robot in named for x in robot.keyframe(robot.home.keyframe)]
+    return RobotDescriptor(
+        name=name,
+        urdf=urdf,
+        action_split=ActionSplit(**groups),
+        tcp_link=first.tcp_link,
+        tcp_position_links=first.tcp_position_links,
+        gripper_material=_material(named),
+        fingers=first.fingers,
+        cameras=tuple(camera for robot in named for camera in robot.cameras),
+        keyframes={"rest": start},
+        home=Home(),
+        reach=first.reach + math.hypot(*parts[0].position[:2]),
+        source=" and ".join(dict.fromkeys(robot.source for robot in robots.values())),
+        allowed_collisions=_allowed(urdf, [(r, f"{key}_") for key, r in robots.items()]),
+    )
+
+
+def _robot(given: RobotLike) -> RobotDescriptor:
+    if isinstance(given, RobotDescriptor):
+        return given
+    if isinstance(given, str) and given in RobotRegistry.names():
+        return RobotRegistry.load(given)
+    if isinstance(given, str) and not given.lower().endswith((".urdf", ".xacro")):
+        return RobotRegistry.load(given)  # which says what there is
+    return RobotDescriptor.from_urdf(given, quiet=True)
+
+
+def _model(source: UrdfSource) -> UrdfModel:
+    path = source.locate()
+    return read_model(read_urdf(path), path.as_posix())
+
+
+def _gripper_joints(robot: RobotDescriptor) -> frozenset[str]:
+    groups = robot.action_split.groups.items()
+    return frozenset(
+        joint
+        for name, group in groups
+        if name == "gripper" or name.endswith("_gripper")
+        for joint in group.joints
+    )
+
+
+def _gripper_of(robot: RobotDescriptor) -> tuple[RobotDescriptor, Floats, str]:
+    """Return what a robot says of its gripper alone, where its arm carries it, and its root.
+
+    A robot that is nothing but a gripper is taken as it is.
+    """
+    joints = _gripper_joints(robot)
+    if not joints or not robot.arm_joints or joints >= set(robot.joints):
+        return robot, np.eye(4), ""
+    model = _model(robot.urdf)
+    root, _, origin = _flange(robot, model, joints)
+    groups = {k: g for k, g in robot.action_split.groups.items() if set(g.joints) <= joints}
+    places = [robot.joints.index(joint) for group in groups.values() for joint in group.joints]
+    own = {below.child for near in model.moving_on(root) for below in model.below(near)}
+    links = {link for carried in (root, *own) for link in model.rigid_with(carried)}
+    keyframes = {key: [qpos[i] for i in places] for key, qpos in robot.keyframes.items()}
+    return (
+        replace(
+            robot,
+            action_split=ActionSplit(**groups),
+            tcp_link=robot.tcp_link if robot.tcp_link in links else root,
+            cameras=tuple(camera for camera in robot.cameras if camera.link in links),
+            keyframes=keyframes,
+        ),
+        origin,
+        root,
+    )
+
+
+def _flange(
+    robot: RobotDescriptor, model: UrdfModel, gripper: frozenset[str]
+) -> tuple[str, str, Floats]:
+    """Return the link to cut off, the one that carries it, and where it does, (4, 4).
+
+    The gripper is cut off at the last fixed joint before it.
+    """
+    first = next(joint for joint in model.ordered if joint.name in gripper)
+    path = model.path_to(first.parent)
+    for joint in reversed(path):
+        if joint.moves:
+            break
+        carried = (below for near in model.moving_on(joint.child) for below in model.below(near))
+        if gripper <= {below.name for below in carried}:
+            return joint.child, joint.parent, joint.origin
+    raise DescriptorError(
+        f"the gripper of {robot.name} is built into {first.parent!r}, which an arm joint moves;"
+        " there is nothing to take off. with_gripper needs an arm whose gripper hangs on a fixed"
+        " joint, or that has none"
+    )
+
+
+def _with_part(
+    robot: RobotDescriptor, tool: RobotDescriptor, part: Part, without: tuple[str, ...], name: str
+) -> RobotDescriptor:
+    part = _apart(part, robot, without)
+    urdf = AssembledUrdf(robot.urdf, (part,), without)
+    model = _model(urdf)
+    body = _model(robot.urdf)
+    left = _names(body, {*body.links} - carried_by(body, without))
+    added = _prefixed(tool, part.prefix)
+    kept = {
+        key: group
+        for key, group in robot.action_split.groups.items()
+        if left.issuperset(group.joints)
+    }
+    new = {_group_name(key, kept): group for key, group in added.action_split.groups.items()}
+    places = [robot.joints.index(joint) for group in kept.values() for joint in group.joints]
+    opened = added.keyframe(added.home.keyframe)
+    keyframes = {
+        key: (*(qpos[i] for i in places), *opened) for key, qpos in robot.keyframes.items()
+    }
+    made = replace(
+        robot,
+        name=name,
+        urdf=urdf,
+        action_split=ActionSplit(**kept, **new),
+        tcp_link=added.tcp_link,
+        tcp_position_links=added.tcp_position_links,
+        gripper_material=added.gripper_material,
+        fingers=added.fingers,
+        cameras=(*(c for c in robot.cameras if c.link in model.links), *added.cameras),
+        keyframes=keyframes,
+        source=f"{robot.source}; {tool.source}",
+        allowed_collisions=_allowed(urdf, [(robot, ""), (tool, part.prefix)]),
+    )
+    return replace(made, reach=_reach(robot, made))
+
+
+def _apart(part: Part, robot: RobotDescriptor, without: Sequence[str] = ()) -> Part:
+    """Return a part with a prefix, if it has a name that is left of the robot."""
+    body, tool = _model(robot.urdf), _model(part.urdf)
+    kept = _names(body, {*body.links} - carried_by(body, without))
+    added = _names(tool, carried_by(tool, [part.root or tool.root]))
+    return part if kept.isdisjoint(added) else replace(part, prefix="tool_")
+
+
+def _names(model: UrdfModel, links: Collection[str]) -> set[str]:
+    """Return the names of links, and of the joints that carry them."""
+    return {*links, *(joint.name for joint in model.joints if joint.child in links)}
+
+
+def _group_name(name: str, taken: Mapping[str, JointGroup]) -> str:
+    return name if name == "gripper" or name not in taken else f"gripper_{name}"
+
+
+def _prefixed(robot: RobotDescriptor, prefix: str) -> RobotDescriptor:
+    """Return what a descriptor says of a robot whose links and joints have a prefix."""
+
+    def renamed(names: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(prefix + name for name in names)
+
+    groups = {
+        key: replace(group, joints=renamed(group.joints))
+        for key, group in robot.action_split.groups.items()
+    }
+    material, fingers = robot.gripper_material, robot.fingers
+    return replace(
+        robot,
+        action_split=ActionSplit(**groups),
+        tcp_link=prefix + robot.tcp_link,
+        tcp_position_links=renamed(robot.tcp_position_links),
+        gripper_material=material and replace(material, links=renamed(material.links)),
+        fingers=fingers and _renamed_fingers(fingers, prefix),
+        cameras=tuple(
+            replace(camera, name=prefix + camera.name, link=prefix + camera.link)
+            for camera in robot.cameras
+        ),
+    )
+
+
+def _renamed_fingers(fingers: Fingers, prefix: str) -> Fingers:
+    one, other = fingers.links
+    return replace(fingers, links=(prefix + one, prefix + other))
+
+
+def _material(robots: list[RobotDescriptor]) -> GripperMaterial | None:
+    """Return the material of all grippers; the numbers are the first one's."""
+    given = [robot.gripper_material for robot in robots if robot.gripper_material is not None]
+    if not given:
+        return None
+    return replace(given[0], links=tuple(link for one in given for link in one.links))
+
+
+def _allowed(
+    urdf: AssembledUrdf, robots: list[tuple[RobotDescriptor, str]]
+) -> tuple[tuple[str, str], ...]:
+    """Return the pairs that may overlap: each part's own, and those found in the whole."""
+    path = urdf.locate()
+    model = read_model(read_urdf(path), path.as_posix())
+    found, _ = guess_allowed(model, path)
+    pairs: set[LinkPair] = {frozenset(pair) for pair in found}
+    for robot, prefix in robots:
+        own = robot.urdf.locate()
+        parts = read_model(read_urdf(own), own.as_posix())
+        for pair in read_allowed_pairs(robot, parts, own):
+            pairs.add(frozenset(prefix + link for link in pair))
+    known = set(model.links)
+    kept = sorted(sorted(pair) for pair in pairs if pair <= known and len(pair) == 2)
+    return tuple((one, other) for one, other in kept)
+
+
+def _reach(robot: RobotDescriptor, made: RobotDescriptor) -> float:
+    """Return the reach with another tool: longer by what its centre point is farther out."""
+    last = robot.arm_joints[-1] if robot.arm_joints else robot.joints[-1]
+    return max(round(robot.reach + _length(made, last) - _length(robot, last), 3), 0.01)
+
+
+def _length(robot: RobotDescriptor, joint: str) -> float:
+    """Return the distance from a joint to the tool centre point at the first keyframe (m)."""
+    model = _model(robot.urdf)
+    tree = kinematic_tree(model, robot.joints)
+    poses = tree.forward(np.array([robot.keyframe(robot.home.keyframe)], float))[0]
+    carried = next(one.child for one in model.joints if one.name == joint)
+    tips = [tree.link(link) for link in robot.tcp_position_links or (robot.tcp_link,)]
+    centre = poses[tips, :3, 3].mean(axis=0)
+    return float(np.linalg.norm(transform(inverse_pose(poses[tree.link(carried)]), centre)))
+
+
+def _vector(pose: Floats) -> Vector3:
+    x, y, z = pose[:3, 3].tolist()
+    return (x, y, z)
+
+
+def _quaternion(pose: Floats) -> Quaternion:
+    w, x, y, z = quaternion_of(pose[:3, :3]).tolist()
+    return (w, x, y, z)

@@ -1,0 +1,221 @@
+"""Robots made of others: other grippers, tools, cameras, arms on one body."""
+
+import math
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from kinematics.rotations import pose_matrix
+from layouts import face_to_face, single
+from robots import CameraMount, DescriptorError, RobotRegistry, UnknownNameError
+from robots.assets.assembled import AssembledUrdf, Part
+from robots.assets.locator import LocalUrdf
+from robots.grafting import Mount, on_body, with_camera, with_gripper, with_tool
+from robots.urdf.reading import read_model
+from robots.urdf.summary import read_urdf
+from robots.urdf.tree import kinematic_tree
+from simulation import Simulation
+
+LINK = """<link name="{name}"><inertial><mass value="0.2"/><inertia ixx="1e-3" iyy="1e-3"
+ izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial><collision><origin xyz="0 0 {z}"/><geometry>
+ <box size="{size}"/></geometry></collision></link>"""
+PEN = (
+    '<robot name="pen">'
+    + LINK.format(name="shaft", z=0.05, size="0.01 0.01 0.1")
+    + '<link name="nib"/><joint name="nib_joint" type="fixed"><parent link="shaft"/>'
+    '<child link="nib"/><origin xyz="0 0 0.1"/></joint></robot>'
+)
+BENCH = f'<robot name="bench">{LINK.format(name="top", z=0.25, size="0.3 1.2 0.5")}</robot>'
+PANDA = RobotRegistry.load("panda")
+
+
+@pytest.fixture(autouse=True)
+def _own_folder(tmp_path, monkeypatch):
+    """Let nothing of what is put together stay behind."""
+    monkeypatch.setattr("robots.assets.assembled.default_root", lambda: tmp_path / "cache")
+
+
+@pytest.fixture
+def pen(tmp_path):
+    path = tmp_path / "pen.urdf"
+    path.write_text(PEN)
+    return path
+
+
+@pytest.fixture
+def bench(tmp_path):
+    path = tmp_path / "bench.urdf"
+    path.write_text(BENCH)
+    return path
+
+
+def model_of(robot):
+    path = robot.urdf.locate()
+    return read_model(read_urdf(path), path.as_posix())
+
+
+def pose_of(robot, link):
+    tree = kinematic_tree(model_of(robot), robot.joints)
+    start = np.array([robot.keyframe(robot.home.keyframe)], float)
+    return tree.forward(start)[0, tree.link(link)]
+
+
+def stepped(robot, action, steps=1):
+    """Return the joint positions before and after some steps of a robot that stands alone."""
+    layout = single({"arm": robot})
+
+    simulation = Simulation(layout, lambda world, index: None, 1)
+    simulation.clear([0])
+    simulation.worlds[0].stand("arm", layout["arm"].start_qpos)
+    before = simulation.read().qpos("arm")[0].copy()
+    for _ in range(steps):
+        state = simulation.read()
+        simulation.step(np.array([action], np.float32), state.joint_positions)
+    return before, simulation.read().qpos("arm")[0]
+
+
+class TestGrippers:
+    def test_an_arm_takes_the_gripper_of_another(self):
+        arm = RobotRegistry.load("panda_stick").with_gripper("panda")
+        assert (arm.dof, arm.action_dim) == (9, 8)
+        assert arm.joints[-2:] == ("tool_panda_finger_joint1", "tool_panda_finger_joint2")
+        assert arm.tcp_link.endswith("panda_hand_tcp")
+        assert arm.fingers.links == ("tool_panda_leftfinger", "tool_panda_rightfinger")
+        assert set(arm.gripper_material.links) <= set(model_of(arm).links)
+        assert arm.keyframe("rest")[-2:] == (0.04, 0.04)
+
+    def test_a_gripper_of_its_own_is_taken_off(self):
+        other = with_gripper(PANDA, "panda", position=(0, 0, 0.1), name="longer")
+        assert other.name == "longer"
+        assert sorted(model_of(other).links) == sorted(model_of(PANDA).links)
+        np.testing.assert_allclose(
+            pose_of(other, "panda_hand_tcp"),
+            pose_of(PANDA, "panda_link8")
+            @ pose_matrix((0, 0, 0.1), (math.cos(math.pi / 8), 0, 0, -math.sin(math.pi / 8)))
+            @ np.linalg.inv(pose_of(PANDA, "panda_hand"))
+            @ pose_of(PANDA, "panda_hand_tcp"),
+            atol=1e-6,
+        )
+        assert other.reach > PANDA.reach
+
+    def test_it_stands_and_obeys(self):
+        arm = with_gripper(RobotRegistry.load("panda_stick"), PANDA)
+        assert single({"arm": arm}).validate(workspaces=False).ok
+        assert face_to_face({"left": arm, "right": "panda"}, spacing=1.5).validate().ok
+        still = np.zeros(8)
+        still[-1] = 1.0  # an open gripper
+        before, after = stepped(arm, still, 20)
+        np.testing.assert_allclose(after, before, atol=1e-3)
+        closing = np.zeros(8)
+        closing[-1] = -1.0
+        _, after = stepped(arm, closing, 20)
+        assert (after[-2:] < 0.005).all()
+
+    def test_a_gripper_that_is_built_in_stays(self):
+        with pytest.raises(DescriptorError, match="gripper of so100 is built into 'Fixed_Jaw'"):
+            with_gripper(RobotRegistry.load("so100"), "panda")
+
+    def test_links_that_do_not_exist(self):
+        with pytest.raises(UnknownNameError, match="panda_link8"):
+            with_gripper(RobotRegistry.load("panda_stick"), "panda", link="panda_link88")
+        with pytest.raises(UnknownNameError, match="panda"):
+            with_gripper(PANDA, "pandda")
+
+
+class TestTools:
+    def test_the_tip_of_a_pen_is_the_tool_centre_point(self, pen):
+        arm = with_tool(PANDA, pen, tcp_link="nib")
+        hand = pose_of(PANDA, "panda_hand_tcp")
+        np.testing.assert_allclose(
+            pose_of(arm, "nib"), hand @ pose_matrix((0, 0, 0.1), (1, 0, 0, 0)), atol=1e-9
+        )
+        assert arm.reach == pytest.approx(PANDA.reach + 0.1, abs=1e-3)
+        assert arm.action_dim == PANDA.action_dim
+        before, after = stepped(arm, [*[0.0] * 7, 1.0], 10)
+        np.testing.assert_allclose(after, before, atol=1e-3)
+
+    def test_what_is_refused(self, pen):
+        with pytest.raises(UnknownNameError, match="nib"):
+            with_tool(PANDA, pen, tcp_link="nip")
+        with pytest.raises(DescriptorError, match=r"tool moves \(panda_joint1\)"):
+            with_tool(PANDA, PANDA.urdf, tcp_link="panda_hand")
+
+    def test_names_that_are_taken_get_a_prefix(self, tmp_path):
+        path = tmp_path / "tool.urdf"
+        path.write_text(PEN.replace('"shaft"', '"panda_hand"'))
+        arm = with_tool(PANDA, path, tcp_link="nib")
+        assert (arm.tcp_link, "tool_panda_hand" in model_of(arm).links) == ("tool_nib", True)
+
+    def test_a_camera(self):
+        camera = CameraMount("wrist", "panda_hand")
+        assert with_camera(PANDA, camera).cameras == (camera,)
+        with pytest.raises(UnknownNameError, match="panda_hand"):
+            with_camera(PANDA, CameraMount("wrist", "panda_hnad"))
+
+
+class TestArmsOnABody:
+    def test_two_arms_on_a_bench(self, bench):
+        both = on_body(
+            "bimanual",
+            bench,
+            {
+                "left": Mount("panda", position=(0.0, 0.4, 0.5)),
+                "right": Mount("panda_stick", position=(0.0, -0.4, 0.5)),
+            },
+        )
+        assert (both.dof, both.action_dim) == (16, 15)
+        assert list(both.action_split.groups) == ["left_arm", "left_gripper", "right_arm"]
+        assert single({"robot": both}).validate(workspaces=False).ok
+        left = pose_of(both, "left_panda_link0")
+        np.testing.assert_allclose(left[:3, 3], (0, 0.4, 0.5))
+        for number in (0, 8):
+            action = np.zeros(15)
+            action[7], action[number] = 1.0, 1.0
+            before, after = stepped(both, action, 10)
+            moved = np.flatnonzero(abs(after - before) > 0.3)
+            assert moved.tolist() == [both.joints.index(both.describe_action()[number].joints[0])]
+
+    def test_an_empty_or_moving_body(self, bench):
+        with pytest.raises(DescriptorError, match="nothing stands on the body"):
+            on_body("nothing", bench, {})
+        with pytest.raises(DescriptorError, match="body moves"):
+            on_body("moving", PANDA.urdf, {"left": Mount("panda")})
+
+
+class TestFiles:
+    def test_the_same_parts_make_the_same_file(self, pen, tmp_path):
+        urdf = AssembledUrdf(PANDA.urdf, (Part(LocalUrdf(pen), "panda_hand"),))
+        first = urdf.locate()
+        assert pickle.loads(pickle.dumps(urdf)).locate() == first
+        pen.write_text(PEN.replace("0.2", "0.3"))
+        second = urdf.locate()
+        assert second != first
+        assert sorted(p.name for p in first.parent.parent.iterdir()) == sorted(
+            [first.parent.name, second.parent.name]
+        )
+
+    def test_many_processes_at_once(self, pen, tmp_path):
+        code = (
+            "import sys; from robots import RobotRegistry, LocalUrdf;"
+            "from robots.assets import assembled; from pathlib import Path;"
+            "assembled.default_root = lambda: Path(sys.argv[2]);"
+            "panda = RobotRegistry.load('panda');"
+            "part = assembled.Part(LocalUrdf(sys.argv[1]), 'panda_hand');"
+            "print(assembled.AssembledUrdf(panda.urdf, (part,)).locate())"
+        )
+        words = [sys.executable, "-c", code, str(pen), str(tmp_path / "shared")]
+        running = [subprocess.Popen(words, stdout=subprocess.PIPE, text=True) for _ in range(4)]
+        places = {process.communicate()[0] for process in running}
+        assert {process.returncode for process in running} == {0}
+        assert len(places) == 1
+        assert len(list((tmp_path / "shared" / "assembled").iterdir())) == 1
+
+    def test_names_that_are_there_twice(self, pen):
+        part = Part(LocalUrdf(pen), "panda_hand")
+        with pytest.raises(DescriptorError, match="has a link 'shaft', and so has"):
+            AssembledUrdf(PANDA.urdf, (part, part)).locate()
+        with pytest.raises(DescriptorError, match="nothing is left without 'panda_link0'"):
+            AssembledUrdf(PANDA.urdf, without=("panda_link0",)).locate()
