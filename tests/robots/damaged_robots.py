@@ -319,7 +319,6 @@ REFUSED = {
         "link 'tip' moves, but has mass -1 kg",
     ),
     "a box below 0": (with_tip(shape('<box size="1 1 -1"/>')), "without a volume: a box"),
-    "an empty mesh": (with_tip(shape('<mesh filename="empty.stl"/>')), "empty.stl is empty"),
     "a mesh that is nowhere": (
         with_tip(shape('<mesh filename="package://toy_package/lost.stl"/>')),
         "refers to files that do not exist: ",
@@ -344,7 +343,6 @@ def write_damaged(folder: Path, text: str) -> Path:
     trimesh.creation.icosphere(radius=0.1).export(parts / "meshes/ball.stl")
     flat = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], process=False)
     flat.export(own / "flat.stl")
-    (own / "empty.stl").write_bytes(bytes(84))
     urdf = own / "toy.urdf"
     urdf.write_text(text)
     return urdf
