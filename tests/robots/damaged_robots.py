@@ -258,6 +258,10 @@ REPAIRS: dict[str, tuple[str, tuple[str, ...]]] = {
             "joint 'jaws' mimics a joint that is fixed, so it is fixed",
         ),
     ),
+    "a fixed joint that mimics": (
+        with_wrist('<mimic joint="shoulder"/>', "fixed"),
+        ("joint 'wrist' is fixed, so what it mimics counts for nothing",),
+    ),
     "limits of a continuous joint": (
         with_wrist('<limit lower="-3" upper="3" effort="1" velocity="1"/>', "continuous"),
         ("joint 'wrist' is continuous, so its limits -3 … 3 rad count for nothing",),
