@@ -31,6 +31,9 @@ def repair_joints(root: Element, urdf: str) -> Iterator[str]:
             )
         elif joint.get("type") == "continuous":
             yield from _without_limits(joint)
+        elif joint.get("type") == "fixed" and (mimic := joint.find("mimic")) is not None:
+            joint.remove(mimic)
+            yield f"joint {joint.get('name')!r} is fixed, so what it mimics counts for nothing"
     yield from _fix_followers(joints, urdf)
 
 

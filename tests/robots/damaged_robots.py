@@ -161,10 +161,6 @@ REPAIRS: dict[str, tuple[str, tuple[str, ...]]] = {
         with_tip(shape('<mesh filename="flat.stl"/>')),
         ("link 'tip': a collision of the mesh 'flat.stl', which has no volume, left out",),
     ),
-    "an empty mesh": (
-        with_tip(shape('<mesh filename="empty.stl"/>')),
-        ("link 'tip': a collision of the mesh 'empty.stl', which has no volume, left out",),
-    ),
     "a scale of one number": (
         with_tip(shape('<mesh filename="box.stl" scale="0.5"/>')),
         ("link 'tip': a collision has a mesh with scale='0.5', taken as '0.5 0.5 0.5'",),
@@ -233,6 +229,10 @@ REPAIRS: dict[str, tuple[str, tuple[str, ...]]] = {
         with_wrist(LIMIT).replace('name="toy"', 'name="toy" xmlns="http://drake.mit.edu"'),
         ("the namespace 'http://drake.mit.edu' of <robot>, left out",),
     ),
+    "commas": (
+        with_wrist(LIMIT).replace('xyz="0 0 0.4"', 'xyz="0, 0, 0.4"'),
+        ("commas between the numbers of vectors, left out: 2 times",),
+    ),
     "blank lines at the top": (
         '\n\n<?xml version="1.0"?>' + with_wrist(LIMIT),
         ("blank lines before <?xml …?>, left out",),
@@ -257,6 +257,10 @@ REPAIRS: dict[str, tuple[str, tuple[str, ...]]] = {
             " is fixed (if it should turn freely, make it continuous)",
             "joint 'jaws' mimics a joint that is fixed, so it is fixed",
         ),
+    ),
+    "a fixed joint that mimics": (
+        with_wrist('<mimic joint="shoulder"/>', "fixed"),
+        ("joint 'wrist' is fixed, so what it mimics counts for nothing",),
     ),
     "limits of a continuous joint": (
         with_wrist('<limit lower="-3" upper="3" effort="1" velocity="1"/>', "continuous"),
@@ -343,7 +347,6 @@ def write_damaged(folder: Path, text: str) -> Path:
     trimesh.creation.icosphere(radius=0.1).export(parts / "meshes/ball.stl")
     flat = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], process=False)
     flat.export(own / "flat.stl")
-    (own / "empty.stl").write_bytes(bytes(84))
     urdf = own / "toy.urdf"
     urdf.write_text(text)
     return urdf
