@@ -62,13 +62,29 @@ class Drives:
         self._inertia: Mapping[str, float] = {
             joint.name: float(value) for joint, value in zip(moving, inertia, strict=True)
         }
-        self.raised: list[str] = []  # names of joints
+        self._raised: list[str] = []  # names of joints
+
+    def reasons(self) -> list[str]:
+        """Return what was done about the drives that were asked for, one sentence each."""
+        reasons = [
+            "drives: stiffness from the inertia that hangs on each joint, critically damped, so"
+            f" that a control step of {CONTROL_STEP:g} s covers what the action asks for; forces"
+            " from the URDF's efforts",
+            f"action: arm joints move per control step by up to {LONGEST_STEP:g} rad or m, or as"
+            " far as their force brings them",
+        ]
+        if self._raised:
+            reasons.append(
+                f"forces: more than the URDF's efforts for {', '.join(self._raised)}, which would"
+                f" not bring them {SHORTEST_STEP:g} rad or m in a control step"
+            )
+        return reasons
 
     def of(self, joint: ModelJoint) -> Drive:
         """Return the drive of a joint that an action moves."""
         drive, raised = self._drive(joint)
-        if raised and joint.name not in self.raised:
-            self.raised.append(joint.name)
+        if raised and joint.name not in self._raised:
+            self._raised.append(joint.name)
         return drive
 
     def _drive(self, joint: ModelJoint) -> tuple[Drive, bool]:

@@ -12,8 +12,9 @@ import numpy as np
 from robots.bodies.hulls import Hull
 from robots.bodies.overlaps import overlapping
 from robots.descriptor import JointGroup
-from robots.guessing.drives import LONGEST_STEP, Drives, alike, drive_fields
+from robots.guessing.drives import Drives, drive_fields
 from robots.guessing.fingertips import Fingertips
+from robots.guessing.groups import by_steps, name_of
 from robots.guessing.stance import Stance, middle_of
 from robots.urdf.anatomy import Limb
 from robots.urdf.model import ModelJoint
@@ -56,8 +57,7 @@ def find_gripper(limb: Limb, tips: Fingertips, drives: Drives) -> Gripper:
         tips: Its finger tips.
         drives: The drives of its joints.
     """
-    name = f"{limb.name}_gripper" if limb.name in ("left", "right") else "gripper"
-    name = f"{name}_{limb.name}" if limb.name.isdigit() else name
+    name = name_of(limb, "gripper")
     followers = _followers(limb.fingers)
     leaders = [joint for joint in limb.fingers if joint.name in followers]
     merged = _merged(leaders, followers, tips)
@@ -151,7 +151,7 @@ def _merged(
     merged = list(followers[first.name])
     for joint in leaders[1:]:
         sign = _sense(first, joint, tips) if len(leaders) == 2 else 1.0
-        low, high = joint.span
+        low, _ = joint.span
         offset = low - first.span[0] if sign > 0 else low + first.span[1]
         merged += [
             _Follower(f.joint, f.multiplier * sign, f.multiplier * _tidy(offset) + f.offset)
@@ -233,7 +233,7 @@ def _many(
     for unit, suffix in (("rad", ""), ("m", "_slide")):
         joints = [joint for joint in alone if joint.unit == unit]
         if joints:
-            groups[name + suffix] = _each(joints, drives)
+            groups[name + suffix] = by_steps(joints, drives, reset_noise=False)
     for leader in leaders:
         if len(followers[leader.name]) > 1:
             groups[_free(f"{name}_{_identifier(leader.name)}", groups)] = _led(
@@ -257,22 +257,6 @@ def _led_to(followers: Sequence[_Follower], lead: float) -> dict[str, float]:
         )
         for f in followers
     }
-
-
-def _each(joints: Sequence[ModelJoint], drives: Drives) -> JointGroup:
-    made = [drives.of(joint) for joint in joints]
-    steps = [min(drive.step, LONGEST_STEP) for drive in made]
-    step = alike(steps)
-    return JointGroup(
-        tuple(joint.name for joint in joints),
-        lower=-step if isinstance(step, float) else tuple(-value for value in step),
-        upper=step,
-        delta=True,
-        unit=joints[0].unit,
-        reset_noise=False,
-        limits=tuple(joint.span for joint in joints),
-        **drive_fields(made),
-    )
 
 
 def _led(followers: Sequence[_Follower], drives: Drives) -> JointGroup:
