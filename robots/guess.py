@@ -13,7 +13,7 @@ from kinematics.rotations import Floats
 from robots.assets.locator import LocalUrdf
 from robots.bodies.allowed import joined_pairs, rigid_pairs
 from robots.bodies.hulls import Hull, counted_pairs, read_hulls
-from robots.bodies.overlaps import guess_allowed
+from robots.bodies.overlaps import guess_allowed, overlapping
 from robots.common.errors import DescriptorError
 from robots.descriptor import ActionSplit, Fingers, JointGroup, RobotDescriptor
 from robots.guessing.drives import Drives
@@ -32,6 +32,8 @@ from robots.urdf.reading import read_model
 from robots.urdf.summary import parse_urdf, read_cleaned
 
 LinkPairs = tuple[tuple[str, str], ...]
+
+LISTED = 6  # pairs of links that a reason names
 
 
 @dataclass(frozen=True)
@@ -90,9 +92,7 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     parts = _look_at(path, cleaned.xml)
     main = parts.anatomy.limbs[0]
     split = _action_split(parts)
-    allowed, overlaps = guess_allowed(parts.model, path)
-    hands, about_hands = _within_hands(parts, allowed)
-    allowed += hands
+    allowed, overlaps = _may_overlap(parts, path)
     rest, stance = _rest(parts, allowed)
     distance, measured = find_reach(parts.model, main, parts.tools[main.name], rest)
     fingers, grasping = _fingers(parts, main)
@@ -121,7 +121,7 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     given = tuple(f"{field}: given, not guessed" for field in overrides)
     return Guess(
         RobotDescriptor(**{**fields, **overrides}),
-        (*repairs, *about, *overlaps, *about_hands, *given),
+        (*repairs, *about, *overlaps, *given),
     )
 
 
@@ -170,8 +170,26 @@ def _about_hands(parts: _Parts) -> Iterator[str]:
         yield f"gripper_material: friction 2 on {links}, as ManiSkill's grippers have"
 
 
-def _within_hands(parts: _Parts, allowed: LinkPairs) -> tuple[LinkPairs, tuple[str, ...]]:
-    """Return the pairs of a hand's links that overlap however it stands, and a reason."""
+def _may_overlap(parts: _Parts, path: Path) -> tuple[LinkPairs, tuple[str, ...]]:
+    """Return the pairs of links that may overlap, and the reasons."""
+    allowed, reasons = guess_allowed(parts.model, path)
+    hands = _within_hands(parts, allowed)
+    if hands:
+        reasons = (*reasons, _too(hands, "of hands, which overlap while these are open"))
+    still = _still(parts, (*allowed, *hands))
+    if still:
+        reasons = (*reasons, _too(still, "of what is held still, which overlap there"))
+    return (*allowed, *hands, *still), reasons
+
+
+def _too(pairs: LinkPairs, why: str) -> str:
+    listing = ", ".join(f"{one} and {other}" for one, other in pairs[:LISTED])
+    more = f" and {len(pairs) - LISTED} pairs more" if len(pairs) > LISTED else ""
+    return f"allowed_collisions, too: {listing}{more}, {why}"
+
+
+def _within_hands(parts: _Parts, allowed: LinkPairs) -> LinkPairs:
+    """Return the pairs of a hand's links that overlap however it stands."""
     found: dict[tuple[str, str], None] = {}
     pairs = _counted(parts, allowed)
     for limb in parts.anatomy.limbs:
@@ -179,12 +197,27 @@ def _within_hands(parts: _Parts, allowed: LinkPairs) -> tuple[LinkPairs, tuple[s
             gripper, ends = parts.grippers[limb.name], parts.tips[limb.name].ends
             inside = entangled(parts.stance, limb, parts.hulls, pairs, gripper, ends)
             found |= dict.fromkeys(inside)
-    if not found:
-        return (), ()
-    listing = ", ".join(f"{one} and {other}" for one, other in found)
-    return tuple(found), (
-        f"allowed_collisions, too: {listing}, of hands, which overlap while these are open",
-    )
+    return tuple(found)
+
+
+def _still(parts: _Parts, allowed: LinkPairs) -> LinkPairs:
+    """Return the pairs of links that no action moves and that overlap where they are held."""
+    limbs = parts.anatomy.limbs
+    driven = [joint for limb in limbs for joint in (*limb.arm, *limb.fingers)]
+    tree, model = parts.stance.tree, parts.model
+    moved = {
+        tree.link(link)
+        for joint in driven
+        for behind in model.below(joint)
+        for link in model.rigid_with(behind.child)
+    }
+    links = [hull.link for hull in parts.hulls]
+    pairs = [p for p in _counted(parts, allowed) if not moved & {links[i] for i in p}]
+    poses = parts.stance.poses(parts.stance.middle)[0]
+    overlaps = overlapping(parts.hulls, poses, pairs)
+    names = [(tree.links[links[a]], tree.links[links[b]]) for a, b in pairs]
+    found = [name for name, overlap in zip(names, overlaps, strict=True) if overlap]
+    return tuple(dict.fromkeys(found))
 
 
 def _counted(parts: _Parts, allowed: LinkPairs) -> tuple[tuple[int, int], ...]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robots.bodies.hulls import Hull
 from robots.bodies.overlaps import overlapping
@@ -22,6 +23,7 @@ from robots.urdf.model import ModelJoint
 SQUEEZE = 0.01  # how far beyond closed a parallel gripper's target is (m)
 SAME = 0.02  # of a range; how much two fingers' ranges may differ
 OPENINGS = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the way, in which a hand may stand
+MOST_JOINTS = 20  # of a hand whose fingers collide with each other
 NOTICEABLE = 1e-4  # m; how much opening changes the distance of the tips
 
 
@@ -87,7 +89,8 @@ def entangled(
 
     In a hand that one number drives, those that overlap while it is more open than closed, and of
     what does not grasp those that ever do: parts of one mechanism. In others, those that overlap
-    in each of the hand's postures.
+    in each of the hand's postures; in hands of very many joints all,
+    as physics tells only so many sets of links apart.
 
     Args:
         stance: The robot.
@@ -100,6 +103,8 @@ def entangled(
     rigid = [stance.model.rigid_with(link) for link in _links(limb)]
     inside = {stance.tree.link(link) for links in rigid for link in links}
     mine = np.array([p for p in pairs if {hulls[i].link for i in p} <= inside], int).reshape(-1, 2)
+    if len(limb.fingers) > MOST_JOINTS:
+        return _names(stance, hulls, mine)
     overlaps = np.array(
         [
             overlapping(hulls, stance.poses(stance.with_joints(posture))[0], mine)
@@ -112,8 +117,12 @@ def entangled(
         ends = {stance.tree.link(link) for end in grasping for link in stance.model.rigid_with(end)}
         inner = np.array([not {hulls[i].link for i in pair} <= ends for pair in mine], bool)
         always = open_enough | (overlaps.any(axis=0) & inner)
-    names = [[stance.tree.links[hulls[i].link] for i in pair] for pair in mine[always]]
-    return [(first, second) for first, second in names]
+    return _names(stance, hulls, mine[always])
+
+
+def _names(stance: Stance, hulls: Sequence[Hull], pairs: NDArray[np.intp]) -> list[tuple[str, str]]:
+    links = [stance.tree.links[hull.link] for hull in hulls]
+    return list(dict.fromkeys((links[a], links[b]) for a, b in pairs))
 
 
 def _links(limb: Limb) -> tuple[str, ...]:
