@@ -21,7 +21,7 @@ from robots.guessing.fingertips import Fingertips
 from robots.guessing.grasps import find_fingers, find_material
 from robots.guessing.grippers import Gripper, entangled, find_gripper
 from robots.guessing.groups import arm_groups, held_groups
-from robots.guessing.posture import PostureSearch
+from robots.guessing.posture import Posture, PostureSearch
 from robots.guessing.reach import find_reach
 from robots.guessing.stance import Stance
 from robots.guessing.tool import Tool, find_tool
@@ -93,7 +93,7 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     main = parts.anatomy.limbs[0]
     split = _action_split(parts)
     allowed, overlaps = _may_overlap(parts, path)
-    rest, stance = _rest(parts, allowed)
+    rest, posture = _rest(parts, allowed)
     distance, measured = find_reach(parts.model, main, parts.tools[main.name], rest)
     fingers, grasping = _fingers(parts, main)
     fields: dict[str, Any] = {
@@ -107,7 +107,7 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
         "keyframes": {"rest": tuple(rest[joint] for joint in split.joints)},
         "reach": distance,
         "source": f"guessed from {path.name}",
-        "allowed_collisions": allowed,
+        "allowed_collisions": (*allowed, *posture.overlapping),
     }
     unknown = sorted(set(overrides) - set(RobotDescriptor.__dataclass_fields__))
     if unknown:
@@ -117,7 +117,7 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     repairs = [f"repaired: {repair}" for repair in cleaned.repairs]
     hands_too = (*_about_hands(parts), grasping) if parts.grippers else ()
     drives = parts.drives.reasons()
-    about = (*parts.anatomy.reasons, *tools, *hands_too, *drives, *stance, measured)
+    about = (*parts.anatomy.reasons, *tools, *hands_too, *drives, *posture.reasons, measured)
     given = tuple(f"{field}: given, not guessed" for field in overrides)
     return Guess(
         RobotDescriptor(**{**fields, **overrides}),
@@ -227,8 +227,8 @@ def _counted(parts: _Parts, allowed: LinkPairs) -> tuple[tuple[int, int], ...]:
     return counted_pairs(parts.stance.tree, parts.hulls, excused)
 
 
-def _rest(parts: _Parts, allowed: LinkPairs) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return the keyframe (rad, m) and the reasons for it."""
+def _rest(parts: _Parts, allowed: LinkPairs) -> tuple[dict[str, float], Posture]:
+    """Return the keyframe (rad, m), and the posture that it is."""
     pairs = _counted(parts, allowed)
     hands = [gripper.postures for gripper in parts.grippers.values()]
     tools = [(limb, parts.tools[limb.name]) for limb in parts.anatomy.limbs]
@@ -237,7 +237,7 @@ def _rest(parts: _Parts, allowed: LinkPairs) -> tuple[dict[str, float], tuple[st
     rest = parts.stance.all_joints(found.position)
     for postures in hands:  # joints that one number drives need not mimic each other in the URDF
         rest |= next(p for p in postures if _agree(p, rest, parts.stance))
-    return rest, found.reasons
+    return rest, found
 
 
 def _agree(posture: Mapping[str, float], rest: Mapping[str, float], stance: Stance) -> bool:

@@ -21,6 +21,8 @@ DRAWS = 1500  # random postures of a limb
 BEST = 16  # of them, refined and then looked at for overlaps
 TRIES = 3  # rounds of that, each without the overlaps met before
 ROUNDS = 4  # of refinement, each with half the spread
+ROOM = 0.15  # rad, of each joint, in which nothing may overlap either
+ROOM_TRIES = 6  # random motions by so much
 OUT = 0.55  # of the reach; where the TCP is best, ahead of the limb's first joint
 NEAR, FAR = 0.35, 0.85  # of the reach; where it may be
 HEIGHT = 0.35  # of the reach, above the ground; best for an arm that stands on it
@@ -40,10 +42,12 @@ class Posture:
 
     Attributes:
         position: Of the leading joints, in the order of the stance's (rad, m).
+        overlapping: Pairs of links that overlap in it all the same.
         reasons: One sentence each.
     """
 
     position: Floats
+    overlapping: tuple[tuple[str, str], ...]
     reasons: tuple[str, ...]
 
 
@@ -81,20 +85,36 @@ class PostureSearch:
         """Return the posture with all joints at 0 or mid-range if it is fine, else a better one."""
         posture = self._start
         if not self._views:
-            return Posture(posture, ("keyframe 'rest': joints at 0, or mid-range where 0 is out",))
+            return self._made(posture, "joints at 0, or mid-range where 0 is out")
         samples = [self._draw(view, posture) for view in self._views]
         self._look(posture, samples)
         front = _as_text(self._front)
-        if not self._overlaps(posture, self._pairs).any() and self._is_fine(posture):
-            return Posture(
+        if not self._left(posture) and self._is_fine(posture):
+            return self._made(
                 posture,
-                (
-                    "keyframe 'rest': joints at 0, or mid-range where 0 is out, the gripper open;"
-                    f" no links overlap, and the TCP is ahead, towards {front}",
-                ),
+                "joints at 0, or mid-range where 0 is out, the gripper open; no links overlap, and"
+                f" the TCP is ahead, towards {front}",
             )
         posture = min((self._searched(start, samples) for start in self._starts()), key=self._left)
-        return Posture(posture, (self._said(posture, front),))
+        return self._made(
+            posture,
+            "from a search, as with the joints at 0 or mid-range links overlap, or the TCP is not"
+            f" well ahead of the robot; it is now, towards {front}, where the workspace lies; the"
+            " gripper is open",
+        )
+
+    def _made(self, position: Floats, about: str) -> Posture:
+        """Return a posture, with what overlaps in it and the reason."""
+        links = [self._stance.tree.links[hull.link] for hull in self._hulls]
+        left = self._pairs[self._overlaps(position, self._pairs)]
+        pairs = tuple(dict.fromkeys((links[a], links[b]) for a, b in left.tolist()))
+        reasons = [f"keyframe 'rest': {about}"]
+        if pairs:
+            listing = ", ".join(f"{one} and {other}" for one, other in pairs)
+            reasons.append(
+                f"allowed_collisions, too: {listing}, which overlap in the best posture there is"
+            )
+        return Posture(position, pairs, tuple(reasons))
 
     def _starts(self) -> Iterator[Floats]:
         """Yield the postures to search from: as it stands, and with its torso half-way up."""
@@ -139,19 +159,6 @@ class PostureSearch:
 
     def _moved(self, joints: Mapping[str, float]) -> list[str]:
         return [joint.child for joint in self._stance.model.moving if joint.name in joints]
-
-    def _said(self, posture: Floats, front: str) -> str:
-        left = self._overlaps(posture, self._pairs)
-        text = (
-            "keyframe 'rest': from a search, as with the joints at 0 or mid-range links overlap, or"
-            " the TCP is not well ahead of the robot; it is now, towards"
-            f" {front}, where the workspace lies; the gripper is open"
-        )
-        if not left.any():
-            return text
-        names = [self._stance.tree.links[hull.link] for hull in self._hulls]
-        one, other = self._pairs[int(np.argmax(left))]
-        return f"{text}; {names[one]} and {names[other]} still overlap"
 
     def _lowest(self) -> float:
         """Return the height of the ground: of the lowest point of the root's body (m)."""
@@ -241,11 +248,23 @@ class PostureSearch:
             pool = self._refined(view, self._without(pairs[met], drawn, view))
             for tried in pool:
                 overlaps = self._overlaps(tried, pairs)
-                if not overlaps.any():
+                near = overlaps.any() or self._near(view, tried, pairs)
+                if not near:
                     return tried
                 met |= overlaps
                 counts.append((int(overlaps.sum()), len(counts), tried))
         return min(counts)[2]
+
+    def _near(self, view: View, posture: Floats, pairs: NDArray[np.intp]) -> bool:
+        """Tell whether a small motion of a limb from a posture makes something overlap."""
+        shape = (ROOM_TRIES, len(view.free))
+        moves = np.random.default_rng(0).choice([-ROOM, ROOM], shape)
+        for move in moves:
+            moved = posture.copy()
+            moved[view.free] += np.where(view.slides, move * ROOM, move)
+            if self._overlaps(moved, pairs).any():
+                return True
+        return False
 
     def _without(self, pairs: NDArray[np.intp], drawn: Floats, view: View) -> Floats:
         """Return the best of some postures in which some pairs do not overlap, or all if none."""

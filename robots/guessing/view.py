@@ -20,6 +20,7 @@ class View:
         limits: Lower and upper limits of those, (2, free) (rad, m).
         room: The same without the margin at the ends.
         bounded: Whether each of them turns less than a whole turn, or slides.
+        slides: Whether each of them slides.
         reach: How far the TCP gets from the shoulder (m).
         shoulder: Where the first of them is, (3,) (m).
         moving: Indices of the links that move, in the smaller tree.
@@ -35,6 +36,7 @@ class View:
         half = np.where(self.bounded, (spans[1] - spans[0]) / 2, np.pi)
         middle = np.where(self.bounded, spans.mean(axis=0), np.clip(0.0, *spans))
         self.limits = np.array([middle - half, middle + half])
+        self.slides = np.array([joint.unit == "m" for joint in joints])
         margin = 1.5 * MARGIN * half * 2
         self.room = self.limits + np.array([margin, -margin])
         links = [stance.tree.link(name) for name in (*tool.origins, limb.palm)]
