@@ -377,3 +377,12 @@ class TestReasons:
         reasons = guess(parts, tmp_path).reasons
         for start in ("left arm: a_joint1", "right arm: b_joint1", "left TCP", "right TCP"):
             assert any(reason.startswith(start) for reason in reasons)
+
+
+def test_rotors_are_no_fingers(tmp_path):
+    parts = Parts()
+    parts.link("body", 1.0, "0.2 0.2 0.05")
+    for i, (x, y) in enumerate(((1, 1), (1, -1), (-1, 1), (-1, -1))):
+        parts.link(f"x{i}", 0.01)
+        parts.joint(f"y{i}", "body", f"x{i}", f"{0.12 * x} {0.12 * y} 0.05", kind="continuous")
+    assert not any("gripper" in name for name in joints_of(guess(parts, tmp_path)))
