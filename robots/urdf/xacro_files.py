@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from importlib import import_module
@@ -22,6 +23,8 @@ from robots.urdf.clean_references import find_package
 
 XACRO = "/xacro"  # what its namespaces end in: http://www.ros.org/wiki/xacro, …
 DEFINITIONS = ("property", "arg", "macro")  # which do nothing where nothing uses them
+
+_EXPRESSION = re.compile(r"\$\{|\$\((?!find\b)")  # finding packages is left to the readers
 
 _turn = Lock()  # the package keeps what it is doing in its module
 _expanded: dict[tuple[str, str], tuple[dict[str, int], bytes]] = {}
@@ -143,4 +146,4 @@ def _outside_definitions(root: Element) -> Iterator[Element]:
 def _is_instruction(element: Element) -> bool:
     """Tell whether an element is an instruction to xacro, or has an expression for it."""
     texts = [*element.attrib.values(), element.text or ""]
-    return bool(_kind(element)) or any("${" in text or "$(arg" in text for text in texts)
+    return bool(_kind(element)) or any(map(_EXPRESSION.search, texts))

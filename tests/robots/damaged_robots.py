@@ -161,10 +161,6 @@ REPAIRS: dict[str, tuple[str, tuple[str, ...]]] = {
         with_tip(shape('<mesh filename="flat.stl"/>')),
         ("link 'tip': a collision of the mesh 'flat.stl', which has no volume, left out",),
     ),
-    "an empty mesh": (
-        with_tip(shape('<mesh filename="empty.stl"/>')),
-        ("link 'tip': a collision of the mesh 'empty.stl', which has no volume, left out",),
-    ),
     "a scale of one number": (
         with_tip(shape('<mesh filename="box.stl" scale="0.5"/>')),
         ("link 'tip': a collision has a mesh with scale='0.5', taken as '0.5 0.5 0.5'",),
@@ -232,6 +228,10 @@ REPAIRS: dict[str, tuple[str, tuple[str, ...]]] = {
     "a namespace of its own": (
         with_wrist(LIMIT).replace('name="toy"', 'name="toy" xmlns="http://drake.mit.edu"'),
         ("the namespace 'http://drake.mit.edu' of <robot>, left out",),
+    ),
+    "commas": (
+        with_wrist(LIMIT).replace('xyz="0 0 0.4"', 'xyz="0, 0, 0.4"'),
+        ("commas between the numbers of vectors, left out: 2 times",),
     ),
     "blank lines at the top": (
         '\n\n<?xml version="1.0"?>' + with_wrist(LIMIT),
@@ -319,6 +319,7 @@ REFUSED = {
         "link 'tip' moves, but has mass -1 kg",
     ),
     "a box below 0": (with_tip(shape('<box size="1 1 -1"/>')), "without a volume: a box"),
+    "an empty mesh": (with_tip(shape('<mesh filename="empty.stl"/>')), "empty.stl is empty"),
     "a mesh that is nowhere": (
         with_tip(shape('<mesh filename="package://toy_package/lost.stl"/>')),
         "refers to files that do not exist: ",
