@@ -78,7 +78,9 @@ def load_model(robot: RobotDescriptor) -> RobotModel:
     require_packages()
     urdf = robot.urdf.locate()
     beside = srdf_beside(urdf)
-    return _load(robot, urdf, tuple(_modified(file) for file in (template_of(urdf)[0], beside) if file))
+    return _load(
+        robot, urdf, tuple(_modified(file) for file in (template_of(urdf)[0], beside) if file)
+    )
 
 
 def require_packages() -> None:
