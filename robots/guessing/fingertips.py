@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -57,17 +57,25 @@ class Fingertips:
         means = [np.mean([self._tips[link] for link in group], axis=0) for group in groups]
         return np.mean(means, axis=0)
 
-    def apart(self, positions: dict[str, float]) -> float:
+    def apart(self, positions: Mapping[str, float]) -> float:
         """Return how far the tips are from their middle (m), with some joints elsewhere."""
-        poses = self.stance.poses(self.stance.with_joints(positions))[0]
-        local = {
-            link: transform(inverse_pose(self._poses[self.stance.tree.link(link)]), tip)
-            for link, tip in self._tips.items()
-        }
-        places = np.array(
-            [transform(poses[self.stance.tree.link(link)], tip) for link, tip in local.items()]
-        )
+        places = self._places(self.stance.poses(self.stance.with_joints(positions))[0])
         return float(np.linalg.norm(places - places.mean(axis=0), axis=1).mean())
+
+    def _places(self, poses: Floats) -> Floats:
+        """Return the tips where the links have some poses, (ends, 3) (m)."""
+        links = [self.stance.tree.link(end) for end in self.ends]
+        points = np.array([self._tips[end] for end in self.ends])
+        return transform(poses[links], transform(inverse_pose(self._poses[links]), points))
+
+    def opening(self, positions: Mapping[str, float]) -> list[float]:
+        """Return for each of ``ends`` how well its y axis points away from the others, -1 … 1."""
+        poses = self.stance.poses(self.stance.with_joints(positions))[0]
+        places = self._places(poses)
+        ways = places - places.mean(axis=0)
+        ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-9)
+        axes = [poses[self.stance.tree.link(link), :3, 1] for link in self.ends]
+        return [float(axis @ way) for axis, way in zip(axes, ways, strict=True)]
 
     def finger_of(self, link: str) -> ModelJoint:
         """Return the joint with which the finger of a link begins at the hand."""

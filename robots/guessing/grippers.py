@@ -8,12 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robots.bodies.hulls import Hull
 from robots.bodies.overlaps import overlapping
 from robots.descriptor import JointGroup
-from robots.guessing.drives import LONGEST_STEP, Drives, alike, drive_fields
+from robots.guessing.drives import Drives, drive_fields
 from robots.guessing.fingertips import Fingertips
+from robots.guessing.groups import by_steps, name_of
 from robots.guessing.stance import Stance, middle_of
 from robots.urdf.anatomy import Limb
 from robots.urdf.model import ModelJoint
@@ -21,6 +23,7 @@ from robots.urdf.model import ModelJoint
 SQUEEZE = 0.01  # how far beyond closed a parallel gripper's target is (m)
 SAME = 0.02  # of a range; how much two fingers' ranges may differ
 OPENINGS = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the way, in which a hand may stand
+MOST_JOINTS = 20  # of a hand whose fingers collide with each other
 NOTICEABLE = 1e-4  # m; how much opening changes the distance of the tips
 
 
@@ -56,8 +59,7 @@ def find_gripper(limb: Limb, tips: Fingertips, drives: Drives) -> Gripper:
         tips: Its finger tips.
         drives: The drives of its joints.
     """
-    name = f"{limb.name}_gripper" if limb.name in ("left", "right") else "gripper"
-    name = f"{name}_{limb.name}" if limb.name.isdigit() else name
+    name = name_of(limb, "gripper")
     followers = _followers(limb.fingers)
     leaders = [joint for joint in limb.fingers if joint.name in followers]
     merged = _merged(leaders, followers, tips)
@@ -87,7 +89,8 @@ def entangled(
 
     In a hand that one number drives, those that overlap while it is more open than closed, and of
     what does not grasp those that ever do: parts of one mechanism. In others, those that overlap
-    in each of the hand's postures.
+    in each of the hand's postures; in hands of very many joints all,
+    as physics tells only so many sets of links apart.
 
     Args:
         stance: The robot.
@@ -100,6 +103,8 @@ def entangled(
     rigid = [stance.model.rigid_with(link) for link in _links(limb)]
     inside = {stance.tree.link(link) for links in rigid for link in links}
     mine = np.array([p for p in pairs if {hulls[i].link for i in p} <= inside], int).reshape(-1, 2)
+    if len(limb.fingers) > MOST_JOINTS:
+        return _names(stance, hulls, mine)
     overlaps = np.array(
         [
             overlapping(hulls, stance.poses(stance.with_joints(posture))[0], mine)
@@ -112,8 +117,12 @@ def entangled(
         ends = {stance.tree.link(link) for end in grasping for link in stance.model.rigid_with(end)}
         inner = np.array([not {hulls[i].link for i in pair} <= ends for pair in mine], bool)
         always = open_enough | (overlaps.any(axis=0) & inner)
-    names = [[stance.tree.links[hulls[i].link] for i in pair] for pair in mine[always]]
-    return [(first, second) for first, second in names]
+    return _names(stance, hulls, mine[always])
+
+
+def _names(stance: Stance, hulls: Sequence[Hull], pairs: NDArray[np.intp]) -> list[tuple[str, str]]:
+    links = [stance.tree.links[hull.link] for hull in hulls]
+    return list(dict.fromkeys((links[a], links[b]) for a, b in pairs))
 
 
 def _links(limb: Limb) -> tuple[str, ...]:
@@ -151,7 +160,7 @@ def _merged(
     merged = list(followers[first.name])
     for joint in leaders[1:]:
         sign = _sense(first, joint, tips) if len(leaders) == 2 else 1.0
-        low, high = joint.span
+        low, _ = joint.span
         offset = low - first.span[0] if sign > 0 else low + first.span[1]
         merged += [
             _Follower(f.joint, f.multiplier * sign, f.multiplier * _tidy(offset) + f.offset)
@@ -233,7 +242,7 @@ def _many(
     for unit, suffix in (("rad", ""), ("m", "_slide")):
         joints = [joint for joint in alone if joint.unit == unit]
         if joints:
-            groups[name + suffix] = _each(joints, drives)
+            groups[name + suffix] = by_steps(joints, drives, reset_noise=False)
     for leader in leaders:
         if len(followers[leader.name]) > 1:
             groups[_free(f"{name}_{_identifier(leader.name)}", groups)] = _led(
@@ -257,22 +266,6 @@ def _led_to(followers: Sequence[_Follower], lead: float) -> dict[str, float]:
         )
         for f in followers
     }
-
-
-def _each(joints: Sequence[ModelJoint], drives: Drives) -> JointGroup:
-    made = [drives.of(joint) for joint in joints]
-    steps = [min(drive.step, LONGEST_STEP) for drive in made]
-    step = alike(steps)
-    return JointGroup(
-        tuple(joint.name for joint in joints),
-        lower=-step if isinstance(step, float) else tuple(-value for value in step),
-        upper=step,
-        delta=True,
-        unit=joints[0].unit,
-        reset_noise=False,
-        limits=tuple(joint.span for joint in joints),
-        **drive_fields(made),
-    )
 
 
 def _led(followers: Sequence[_Follower], drives: Drives) -> JointGroup:

@@ -13,6 +13,7 @@ from robots.bodies.hulls import Hull
 from robots.bodies.overlaps import overlapping
 from robots.guessing.stance import Stance
 from robots.guessing.tool import Tool
+from robots.guessing.view import MARGIN, View
 from robots.urdf.anatomy import FARTHEST_SLIDE, Limb
 from robots.urdf.model import ModelJoint
 
@@ -20,7 +21,8 @@ DRAWS = 1500  # random postures of a limb
 BEST = 16  # of them, refined and then looked at for overlaps
 TRIES = 3  # rounds of that, each without the overlaps met before
 ROUNDS = 4  # of refinement, each with half the spread
-MARGIN = 0.1  # of a joint's range, which it stays away from its ends
+ROOM = 0.15  # rad, of each joint, in which nothing may overlap either
+ROOM_TRIES = 6  # random motions by so much
 OUT = 0.55  # of the reach; where the TCP is best, ahead of the limb's first joint
 NEAR, FAR = 0.35, 0.85  # of the reach; where it may be
 HEIGHT = 0.35  # of the reach, above the ground; best for an arm that stands on it
@@ -40,10 +42,12 @@ class Posture:
 
     Attributes:
         position: Of the leading joints, in the order of the stance's (rad, m).
+        overlapping: Pairs of links that overlap in it all the same.
         reasons: One sentence each.
     """
 
     position: Floats
+    overlapping: tuple[tuple[str, str], ...]
     reasons: tuple[str, ...]
 
 
@@ -70,30 +74,47 @@ class PostureSearch:
             torso: Joints that carry limbs.
         """
         self._stance, self._hulls, self._pairs = stance, hulls, np.array(pairs, int).reshape(-1, 2)
-        self._start = self._opened(hands)
+        self._start = self._posed = self._opened(hands)
+        self._front = np.array([1.0, 0.0, 0.0])
         self._generator = np.random.default_rng(0)
         self._torso = torso
-        self._views = [_View(stance, limb, tool) for limb, tool in tools if _searchable(limb)]
+        self._views = [View(stance, limb, tool) for limb, tool in tools if _searchable(limb)]
         self._ground = self._lowest()
 
     def run(self) -> Posture:
         """Return the posture with all joints at 0 or mid-range if it is fine, else a better one."""
         posture = self._start
         if not self._views:
-            return Posture(posture, ("keyframe 'rest': joints at 0, or mid-range where 0 is out",))
+            return self._made(posture, "joints at 0, or mid-range where 0 is out")
         samples = [self._draw(view, posture) for view in self._views]
         self._look(posture, samples)
         front = _as_text(self._front)
-        if not self._overlaps(posture, self._pairs).any() and self._is_fine(posture):
-            return Posture(
+        if not self._left(posture) and self._is_fine(posture):
+            return self._made(
                 posture,
-                (
-                    "keyframe 'rest': joints at 0, or mid-range where 0 is out, the gripper open;"
-                    f" no links overlap, and the TCP is ahead, towards {front}",
-                ),
+                "joints at 0, or mid-range where 0 is out, the gripper open; no links overlap, and"
+                f" the TCP is ahead, towards {front}",
             )
         posture = min((self._searched(start, samples) for start in self._starts()), key=self._left)
-        return Posture(posture, (self._said(posture, front),))
+        return self._made(
+            posture,
+            "from a search, as with the joints at 0 or mid-range links overlap, or the TCP is not"
+            f" well ahead of the robot; it is now, towards {front}, where the workspace lies; the"
+            " gripper is open",
+        )
+
+    def _made(self, position: Floats, about: str) -> Posture:
+        """Return a posture, with what overlaps in it and the reason."""
+        links = [self._stance.tree.links[hull.link] for hull in self._hulls]
+        left = self._pairs[self._overlaps(position, self._pairs)]
+        pairs = tuple(dict.fromkeys((links[a], links[b]) for a, b in left.tolist()))
+        reasons = [f"keyframe 'rest': {about}"]
+        if pairs:
+            listing = ", ".join(f"{one} and {other}" for one, other in pairs)
+            reasons.append(
+                f"allowed_collisions, too: {listing}, which overlap in the best posture there is"
+            )
+        return Posture(position, pairs, tuple(reasons))
 
     def _starts(self) -> Iterator[Floats]:
         """Yield the postures to search from: as it stands, and with its torso half-way up."""
@@ -139,19 +160,6 @@ class PostureSearch:
     def _moved(self, joints: Mapping[str, float]) -> list[str]:
         return [joint.child for joint in self._stance.model.moving if joint.name in joints]
 
-    def _said(self, posture: Floats, front: str) -> str:
-        left = self._overlaps(posture, self._pairs)
-        text = (
-            "keyframe 'rest': from a search, as with the joints at 0 or mid-range links overlap, or"
-            " the TCP is not well ahead of the robot; it is now, towards"
-            f" {front}, where the workspace lies; the gripper is open"
-        )
-        if not left.any():
-            return text
-        names = [self._stance.tree.links[hull.link] for hull in self._hulls]
-        one, other = self._pairs[int(np.argmax(left))]
-        return f"{text}; {names[one]} and {names[other]} still overlap"
-
     def _lowest(self) -> float:
         """Return the height of the ground: of the lowest point of the root's body (m)."""
         body = [
@@ -165,7 +173,7 @@ class PostureSearch:
     def _root_height(self, link: int) -> float:
         return float(self._stance.poses(self._stance.middle)[0, link, 2, 3])
 
-    def _draw(self, view: _View, posture: Floats) -> Floats:
+    def _draw(self, view: View, posture: Floats) -> Floats:
         drawn = np.tile(posture, (DRAWS, 1))
         low, high = view.room
         drawn[:, view.free] = self._generator.uniform(low, high, (DRAWS, len(view.free)))
@@ -202,7 +210,7 @@ class PostureSearch:
             np.isfinite(self._cost(view, posture[None], strict=True)[0]) for view in self._views
         )
 
-    def _cost(self, view: _View, postures: Floats, *, strict: bool = False) -> Floats:
+    def _cost(self, view: View, postures: Floats, *, strict: bool = False) -> Floats:
         """Return how bad postures are, (postures,); infinite where they are no good at all."""
         poses, place = view.look(postures)
         out = place @ self._front / view.reach
@@ -224,7 +232,7 @@ class PostureSearch:
             bad |= (np.abs(at[:, view.bounded]) > 1 - MARGIN).any(axis=1)
         return np.where(bad, np.inf if strict else cost + 10.0, cost)
 
-    def _best(self, view: _View, posture: Floats, drawn: Floats, pairs: NDArray[np.intp]) -> Floats:
+    def _best(self, view: View, posture: Floats, drawn: Floats, pairs: NDArray[np.intp]) -> Floats:
         """Return the best posture of one limb that overlaps nothing, else the one that does least.
 
         Each round leaves out the postures with overlaps that the last round met.
@@ -240,13 +248,25 @@ class PostureSearch:
             pool = self._refined(view, self._without(pairs[met], drawn, view))
             for tried in pool:
                 overlaps = self._overlaps(tried, pairs)
-                if not overlaps.any():
+                near = overlaps.any() or self._near(view, tried, pairs)
+                if not near:
                     return tried
                 met |= overlaps
                 counts.append((int(overlaps.sum()), len(counts), tried))
         return min(counts)[2]
 
-    def _without(self, pairs: Floats, drawn: Floats, view: _View) -> Floats:
+    def _near(self, view: View, posture: Floats, pairs: NDArray[np.intp]) -> bool:
+        """Tell whether a small motion of a limb from a posture makes something overlap."""
+        shape = (ROOM_TRIES, len(view.free))
+        moves = np.random.default_rng(0).choice([-ROOM, ROOM], shape)
+        for move in moves:
+            moved = posture.copy()
+            moved[view.free] += np.where(view.slides, move * ROOM, move)
+            if self._overlaps(moved, pairs).any():
+                return True
+        return False
+
+    def _without(self, pairs: NDArray[np.intp], drawn: Floats, view: View) -> Floats:
         """Return the best of some postures in which some pairs do not overlap, or all if none."""
         order = np.argsort(self._cost(view, drawn), kind="stable")[: DRAWS // 4]
         if not len(pairs):
@@ -254,7 +274,7 @@ class PostureSearch:
         free = [i for i in order if not self._overlaps(drawn[i], pairs).any()]
         return drawn[free] if free else drawn
 
-    def _refined(self, view: _View, drawn: Floats) -> Floats:
+    def _refined(self, view: View, drawn: Floats) -> Floats:
         low, high = view.room
         pool = drawn[np.argsort(self._cost(view, drawn), kind="stable")[:BEST]]
         spread = 0.15 * (high - low)
@@ -269,67 +289,10 @@ class PostureSearch:
             spread = spread / 2
         return pool[np.argsort(self._cost(view, pool), kind="stable")]
 
-    def _overlaps(self, posture: Floats, pairs: Floats) -> Floats:
+    def _overlaps(self, posture: Floats, pairs: NDArray[np.intp]) -> NDArray[np.bool_]:
         if not len(pairs):
             return np.zeros(0, bool)
-        return overlapping(self._hulls, self._stance.poses(posture)[0], pairs)
-
-
-class _View:
-    """One limb as the search sees it: only the links on the way to its TCP.
-
-    Attributes:
-        free: Indices of its joints among the leading ones.
-        limits: Lower and upper limits of those, (2, free) (rad, m).
-        room: The same without the margin at the ends.
-        bounded: Whether each of them turns less than a whole turn, or slides.
-        reach: How far the TCP gets from the shoulder (m).
-        shoulder: Where the first of them is, (3,) (m).
-        moving: Indices of the links that move, in the smaller tree.
-        links: Indices of all links that it moves, in the robot's tree.
-    """
-
-    def __init__(self, stance: Stance, limb: Limb, tool: Tool) -> None:
-        joints = [joint for joint in limb.arm if joint.mimics is None]
-        self.free = [stance.index[joint.name] for joint in joints]
-        spans = np.array([joint.span for joint in joints]).T
-        self.bounded = spans[1] - spans[0] < 2 * np.pi - 0.1
-        half = np.where(self.bounded, (spans[1] - spans[0]) / 2, np.pi)
-        middle = np.where(self.bounded, spans.mean(axis=0), np.clip(0.0, *spans))
-        self.limits = np.array([middle - half, middle + half])
-        margin = 1.5 * MARGIN * half * 2
-        self.room = self.limits + np.array([margin, -margin])
-        links = [stance.tree.link(name) for name in (*tool.origins, limb.palm)]
-        self._tree = stance.tree.towards(links)
-        self._tcp = [self._tree.link(name) for name in tool.origins]
-        self._palm = self._tree.link(limb.palm)
-        first = self._tree.link(joints[0].child)
-        pose = stance.poses(stance.middle)[0, stance.tree.link(joints[0].child)]
-        self.shoulder: Floats = pose[:3, 3]
-        axis = pose[:3, :3] @ self._tree.axes[first]
-        self.is_upright = abs(axis[2]) > 0.9 and not self._tree.slides[first]
-        self.moving = [i for i in range(len(self._tree.links)) if i > first]
-        self.links = frozenset(
-            stance.tree.link(link)
-            for joint in stance.model.below(joints[0])
-            for link in stance.model.rigid_with(joint.child)
-        )
-        self.reach = 1.0
-
-    def look(self, postures: Floats) -> tuple[Floats, Floats]:
-        """Return the poses of the limb's links, and the TCP from the shoulder, (postures, 3) (m)."""
-        poses = self._tree.forward(postures)
-        return poses, poses[:, self._tcp][..., :3, 3].mean(axis=1) - self.shoulder
-
-    def places(self, postures: Floats) -> Floats:
-        """Return the TCP from the shoulder, (postures, 3) (m)."""
-        return self.look(postures)[1]
-
-    def pointing(self, poses: Floats) -> Floats:
-        """Return which way the tool points, seen from the palm, (postures, 3); 0 if nowhere."""
-        way = poses[:, self._tcp][..., :3, 3].mean(axis=1) - poses[:, self._palm, :3, 3]
-        length = np.linalg.norm(way, axis=1, keepdims=True)
-        return np.where(length > 0.01, way / np.maximum(length, 1e-9), 0.0)
+        return np.asarray(overlapping(self._hulls, self._stance.poses(posture)[0], pairs), bool)
 
 
 def _searchable(limb: Limb) -> bool:

@@ -34,11 +34,11 @@ class Stance:
 
     def with_joints(self, positions: Mapping[str, float], posture: Floats | None = None) -> Floats:
         """Return a posture, or the middle one, with some leading joints elsewhere, (leaders,)."""
-        posture = (self.middle if posture is None else posture).copy()
+        changed = (self.middle if posture is None else posture).copy()
         for joint, position in positions.items():
             if joint in self.index:
-                posture[self.index[joint]] = position
-        return posture
+                changed[self.index[joint]] = position
+        return changed
 
     def poses(self, postures: Floats) -> Floats:
         """Return the poses of all links, (postures, links, 4, 4), in the root's frame (m)."""

@@ -18,6 +18,7 @@ FARTHEST_SLIDE = 4.0  # m; a slide that goes farther is a way for a whole robot
 LONGEST_HAND = 0.4  # of the length of the arm that carries it
 LARGEST_HAND = 0.35  # m, of a hand without arm whose names do not say so
 FEWEST_ARM_JOINTS = 4  # of an arm whose names do not say so, beside other limbs
+WIDEST_FINGER = 12.6  # rad; what turns farther is no finger whose name does not say so
 WIDEST_JAW = 3.3  # rad; a joint that goes farther turns a wrist
 PARTS = ("torso", "head", "legs", "wheels", "body")  # what is no limb, in this order
 
@@ -157,9 +158,16 @@ def _is_hand(search: _Search, link: str, nexts: Joints, path: Joints) -> bool:
     span = max(search.lengths.between(link, joint) for joint in nexts)
     arm = search.lengths.along(path)
     named = all(_share(joints, words.FINGER) > 0.5 for joints in behind)
+    if not named and any(_spins(joint) for joints in behind for joint in joints):
+        return False
     if named or (path and _is_called_palm(search.model, nexts)):
         return not path or span <= max(arm, LARGEST_HAND)
     return span <= LONGEST_HAND * arm if len(path) > 2 else span <= LARGEST_HAND and not path
+
+
+def _spins(joint: ModelJoint) -> bool:
+    low, high = joint.span
+    return joint.unit == "rad" and (joint.type == "continuous" or high - low > WIDEST_FINGER)
 
 
 def _is_other(joints: Joints) -> bool:
