@@ -31,7 +31,7 @@ def markdown(record: Record, expectations: Expectations) -> Iterator[str]:
     """Yield the lines of the page."""
     judged = [
         (key, seen, expectations.of(key), judge(seen, expectations.of(key)))
-        for key, seen in record.robots.items()
+        for key, seen in sorted(record.robots.items())
     ]
     yield "# Robots that this library had not seen"
     yield ""
