@@ -42,12 +42,12 @@ class Moved(NamedTuple):
 
 
 class Fastest(NamedTuple):
-    """The joint that was the fastest for what it is made for.
+    """The joint that was the fastest for its limit.
 
     Attributes:
         joint: Joint name.
         speed: Its speed (rad/s, m/s); infinite if it was not finite.
-        limit: The largest that it is made for (rad/s, m/s).
+        limit: What is taken as its limit (rad/s, m/s).
         step: In which step.
     """
 
@@ -146,8 +146,8 @@ class Trial:
             yield f"it does not hold still: {joint} moves at {speed} after {HELD} steps"
         if self.exploded is not None:
             joint, speed, limit, step = self.exploded
-            made_for = f"made for {limit:.3g} {self.unit(joint)}/s"
-            yield f"it explodes: {joint} moves at {speed:.3g} in step {step}, {made_for}"
+            times = f"{speed / limit:.3g} times the {limit:.3g} {self.unit(joint)}/s"
+            yield f"it explodes: in step {step} {joint} moves at {times} taken as its limit"
         yield from (trial.problem for trial in self.numbers if trial.problem is not None)
         if not self.tcp_way > 0.0:
             yield f"the TCP, {self.robot.tcp_link}, is moved by no action number"
