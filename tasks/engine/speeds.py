@@ -1,4 +1,4 @@
-"""Watches how fast the robots' joints move, after every step; that takes less than a microsecond.
+"""Watches how fast the joints move, after every step: half a microsecond for one environment.
 
 A joint ten times as fast as its limit was not driven there: links that are inside each other were
 driven apart, or something hit it. It is reported once in an episode by a `RuntimeWarning`, as
