@@ -7,6 +7,7 @@ robots are stood, stepped and moved in physics instead, and the report is what w
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -51,8 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def load(name_or_path: str) -> RobotDescriptor:
     """Return a robot of the catalogue, or the guess of a URDF, by its path."""
-    path = Path(name_or_path)
-    if path.suffix == ".urdf" or path.is_file():
+    if name_or_path.endswith(".urdf") or os.path.isfile(name_or_path):
         return RobotDescriptor.from_urdf(name_or_path, quiet=True)
     return RobotRegistry.load(name_or_path)
 

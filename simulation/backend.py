@@ -112,8 +112,8 @@ class BuiltRobot:
     Attributes:
         links: Frame of each link by name, the root first.
         limits: Lower and upper limit of each joint, (dof, 2) (rad, m).
-        speeds: Largest speed of each joint that its maker or, where the robot's file has none,
-            common sense allows, (dof,) (rad/s, m/s).
+        speeds: What is taken as the limit of each joint's speed: that of the robot's file, if it
+            has one and that makes sense, (dof,) (rad/s, m/s).
         loaded_order: For each joint in the order in which SAPIEN's loader numbers those of the
             robot's file, which is native's, its place among the descriptor's.
     """

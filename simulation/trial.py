@@ -22,9 +22,9 @@ KICK = 0.1  # rad or m in the first step; a robot that holds still moves by less
 STILL = 0.1  # rad/s or m/s after `HELD` steps of holding still
 HELD = 20  # steps
 EXPLODES = 10.0  # times a joint's largest speed
-# A relative number is given for two steps, in which its own joints are to move by half of what
-# one step asks for, and others by less than a tenth of what both ask for: an arm's links push each
-# other. One that asks for a position has half a second.
+# A relative number is given until its own joints have moved by half of what one step asks for, two
+# steps at most. Others are to move by less than a tenth of what was asked for until then: an arm's
+# links push each other. A number that asks for a position has half a second.
 OWN_SHARE, OTHER_SHARE = 0.5, 0.1
 RELATIVE_STEPS, ABSOLUTE_STEPS = 2, 10
 MOST_SHARE = 10.0
@@ -42,12 +42,12 @@ class Moved(NamedTuple):
 
 
 class Fastest(NamedTuple):
-    """The joint that was the fastest for what it is made for.
+    """The joint that was the fastest for its limit.
 
     Attributes:
         joint: Joint name.
         speed: Its speed (rad/s, m/s); infinite if it was not finite.
-        limit: The largest that it is made for (rad/s, m/s).
+        limit: What is taken as its limit (rad/s, m/s).
         step: In which step.
     """
 
@@ -70,8 +70,8 @@ class NumberTrial:
         number: The number.
         asked: How far its leading joint was to move, in a step if it is relative (rad, m).
         least: The one of its own joints that followed least, and its share of that.
-        other: The joint of the others that moved most, and its share of what all steps asked for;
-            None if there is no other.
+        other: The joint of the others that moved most, and its share of what was asked for until
+            then; None if there is no other.
     """
 
     number: ActionNumber
@@ -146,8 +146,8 @@ class Trial:
             yield f"it does not hold still: {joint} moves at {speed} after {HELD} steps"
         if self.exploded is not None:
             joint, speed, limit, step = self.exploded
-            made_for = f"made for {limit:.3g} {self.unit(joint)}/s"
-            yield f"it explodes: {joint} moves at {speed:.3g} in step {step}, {made_for}"
+            times = f"{speed / limit:.3g} times the {limit:.3g} {self.unit(joint)}/s"
+            yield f"it explodes: in step {step} {joint} moves at {times} taken as its limit"
         yield from (trial.problem for trial in self.numbers if trial.problem is not None)
         if not self.tcp_way > 0.0:
             yield f"the TCP, {self.robot.tcp_link}, is moved by no action number"
@@ -263,25 +263,43 @@ class _Alone:
         before, tcp = self._qpos(), self.tcp()
         action = self.numbers_for(self.start)
         asked, action[number.index] = self._ask(number, action[number.index])
-        for _ in range(RELATIVE_STEPS if number.relative else ABSOLUTE_STEPS):
+        steps = 0
+        while True:
             self.step(action)
-        in_all = asked * RELATIVE_STEPS if number.relative else asked
-        moved = np.nan_to_num(np.abs(self._qpos() - before), nan=np.inf)
-        multipliers = self._multipliers(number)
-        own = {
-            joint: float(moved[self.robot.joints.index(joint)] / abs(factor * asked))
-            for joint, factor in multipliers.items()
-        }
-        shares = {
-            joint: float(way / (in_all if unit == self._unit(number) else LEAST_ASKED[unit]))
-            for joint, unit, way in zip(self.robot.joints, self._units(), moved, strict=True)
-            if joint not in own
-        }
-        least = min(own, key=lambda joint: own[joint])
-        most = max(shares, key=lambda joint: shares[joint], default=None)
-        other = None if most is None else Moved(most, shares[most])
+            steps += 1
+            moved = np.nan_to_num(np.abs(self._qpos() - before), nan=np.inf)
+            least = self._least(number, moved / asked)
+            if (
+                steps == ABSOLUTE_STEPS
+                or number.relative
+                and (steps == RELATIVE_STEPS or least.amount > OWN_SHARE)
+            ):
+                break
+        other = self._other(number, moved, asked * steps if number.relative else asked)
         way = float(np.nan_to_num(np.linalg.norm(self.tcp() - tcp), nan=np.inf))
-        return NumberTrial(number, asked, Moved(least, own[least]), other), way
+        return NumberTrial(number, asked, least, other), way
+
+    def _least(self, number: ActionNumber, shares: Array) -> Moved:
+        """Return the joint of a number that followed least, and its share of what was asked."""
+        group = self.robot.action_split.groups[number.group]
+        factors = dict(zip(group.joints, group.followers, strict=True))
+        followed = {
+            joint: float(shares[self.robot.joints.index(joint)] / abs(factors[joint][0]))
+            for joint in number.joints
+        }
+        joint = min(followed, key=lambda joint: followed[joint])
+        return Moved(joint, followed[joint])
+
+    def _other(self, number: ActionNumber, moved: Array, asked: float) -> Moved | None:
+        """Return the joint that a number does not drive and that moved most, and its share."""
+        own = self.robot.action_split.groups[number.group].unit
+        shares = {
+            joint: float(way / (asked if unit == own else LEAST_ASKED[unit]))
+            for joint, unit, way in zip(self.robot.joints, self._units(), moved, strict=True)
+            if joint not in number.joints
+        }
+        most = max(shares, key=lambda joint: shares[joint], default=None)
+        return None if most is None else Moved(most, shares[most])
 
     def numbers_for(self, qpos: Sequence[float] | Floats) -> Floats:
         """Return the action that asks for joint positions, (A,); 0 where it is relative."""
@@ -325,14 +343,6 @@ class _Alone:
         end = most if most - present >= present - least else least
         scale = (number.upper - number.lower) / 2 if number.normalised else 1.0
         return abs(end - present) * scale, end
-
-    def _multipliers(self, number: ActionNumber) -> dict[str, float]:
-        group = self.robot.action_split.groups[number.group]
-        factors = dict(zip(group.joints, group.followers, strict=True))
-        return {joint: factors[joint][0] for joint in number.joints}
-
-    def _unit(self, number: ActionNumber) -> str:
-        return self.robot.action_split.groups[number.group].unit
 
     def _units(self) -> list[str]:
         groups = self.robot.action_split.groups.values()

@@ -70,7 +70,7 @@ def _speed(trial: Trial, fastest: Fastest) -> str:
     joint, speed, limit, step = fastest
     return (
         f"{joint}: {_amount(trial, joint, speed)}/s in step {step}, {fastest.times:.2g} times"
-        f" what it is made for ({_amount(trial, joint, limit)}/s)"
+        f" the {_amount(trial, joint, limit)}/s taken as its limit"
     )
 
 

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-import yourdfpy
 
 from layouts import Layout, face_to_face, side_by_side, single
 from robots import RobotDescriptor, RobotLayoutsError
@@ -106,21 +105,17 @@ def trial(robot: RobotDescriptor) -> Seen:
 
 
 def exported_urdf(robot: RobotDescriptor) -> Seen:
-    """Save a robot as a URDF, and have another program read that with its meshes."""
+    """Save a robot as a URDF, read that again, and look for its meshes."""
     with tempfile.TemporaryDirectory() as folder:
         path = single({"robot": robot}).to_urdf(Path(folder) / "robot.urdf", visuals=False)
-        try:
-            again = yourdfpy.URDF.load(
-                path,
-                build_scene_graph=False,
-                load_meshes=False,
-                build_collision_scene_graph=True,
-                load_collision_meshes=True,
-            ).robot
-        except Exception as error:  # a reader that raises whatever it meets
-            return {"ok": False, "why": f"yourdfpy: {type(error).__name__}: {error}"}
-        joints = {joint.name for joint in again.joints if joint.type != "fixed"}
-        return {"ok": joints == {f"robot/{joint}" for joint in robot.joints}}
+        model = read_model(read_urdf(path), path.as_posix())
+        joints = {joint.name for joint in model.moving}
+        meshes = [s.file for shapes in model.collisions.values() for s in shapes if s.file]
+        missing = [mesh for mesh in meshes if not Path(mesh).is_file()]
+        return {
+            "ok": joints == {f"robot/{joint}" for joint in robot.joints} and not missing,
+            "missing": missing,
+        }
 
 
 def exported_drake(robot: RobotDescriptor) -> Seen:

@@ -18,6 +18,7 @@ PACKAGES: Mapping[str, str] = {
     "pybullet": "pybullet_data",
 }
 
+_COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 _COLLISION = re.compile(rb"<collision.*?</collision>", re.DOTALL)
 _MESH = re.compile(rb"""<mesh\s[^>]*filename\s*=\s*["']([^"']+)["']""")
 _MOVING = re.compile(rb"""<joint\s[^>]*type\s*=\s*["'](?!fixed["'])""")
@@ -50,7 +51,7 @@ class Robot:
         there = _tails(self.folder)
         meshes = [
             mesh.decode(errors="replace")
-            for collision in _COLLISION.findall(self.urdf.read_bytes())
+            for collision in _COLLISION.findall(_COMMENT.sub(b"", self.urdf.read_bytes()))
             for mesh in _MESH.findall(collision)
         ]
         return [mesh for mesh in dict.fromkeys(meshes) if _tail(mesh) not in there]
@@ -98,7 +99,7 @@ def find_robots(folders: Iterable[tuple[str, Path]]) -> Iterator[Robot]:
     """Yield every URDF in folders that has a joint that moves, sorted by path."""
     for source, folder in folders:
         for urdf in sorted(folder.rglob("*.urdf")):
-            if _MOVING.search(urdf.read_bytes()):
+            if _MOVING.search(_COMMENT.sub(b"", urdf.read_bytes())):
                 yield Robot(source, urdf.relative_to(folder).as_posix(), folder)
 
 

@@ -20,6 +20,7 @@ MEMORY = 8 << 30  # bytes of a process
 PROBE = "measurements.robots.probe"
 
 _PASSING = re.compile(re.escape(tempfile.gettempdir()) + r"/tmp\w+/")
+_CUT_SHORT = re.compile(r"(/[^\s'\"…]*)…")
 
 Seen = dict[str, Any]
 
@@ -78,7 +79,7 @@ def probe(robot: Robot, seconds: float) -> Seen:
             seen.update(json.loads(line))
     if code != 0:
         seen["ended"] = _ending(code, seconds, words)
-    return _without_folders(seen, robot)
+    return without_folders(seen, robot.folder.as_posix())
 
 
 def _ending(code: int | None, seconds: float, words: Sequence[str]) -> str:
@@ -89,8 +90,17 @@ def _ending(code: int | None, seconds: float, words: Sequence[str]) -> str:
     return f"ended with {code}: {words[-1] if words else 'no word'}"
 
 
-def _without_folders(seen: Seen, robot: Robot) -> Seen:
-    """Return a result in which paths are relative to the robot's source, or to a passing folder."""
-    text = _PASSING.sub("", json.dumps(seen))
-    folder = json.dumps(robot.folder.as_posix())[1:-1]
-    return json.loads(text.replace(f"{folder}/", "").replace(folder, "."))
+def without_folders(seen: Seen, folder: str) -> Seen:
+    """Return a result in which no path names a folder of this machine.
+
+    Args:
+        seen: The result; messages may cut paths short.
+        folder: The source's folder, to which paths become relative.
+    """
+
+    def cut(found: re.Match[str]) -> str:
+        return "…" if folder.startswith(found[1]) else found[0]
+
+    text = _PASSING.sub("", json.dumps(seen, ensure_ascii=False))
+    text = text.replace(f"{folder}/", "").replace(folder, ".")
+    return json.loads(_CUT_SHORT.sub(cut, text))

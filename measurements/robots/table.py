@@ -31,7 +31,7 @@ def markdown(record: Record, expectations: Expectations) -> Iterator[str]:
     """Yield the lines of the page."""
     judged = [
         (key, seen, expectations.of(key), judge(seen, expectations.of(key)))
-        for key, seen in record.robots.items()
+        for key, seen in sorted(record.robots.items())
     ]
     yield "# Robots that this library had not seen"
     yield ""
@@ -66,8 +66,8 @@ def _about(record: Record, judged: Sequence[Judged]) -> Iterator[str]:
     yield "- valid alone, face to face, beside a Panda: `validate()`, at the presets' distances"
     yield "- 50 steps, 500 steps: holds still when it is to (less than 0.1 rad in the first step,"
     yield "  at rest after 20), then random actions; no joint at ten times its largest speed"
-    yield "- its own joints: each number moves them by more than half a step within two, and"
-    yield "  others by less than a tenth of what was asked for"
+    yield "- its own joints: each number moves them by more than half a step within one or two, and"
+    yield "  others by less than a tenth of what was asked for until then"
     yield "- TCP move: 5 cm by inverse kinematics, less than 2 mm off; URDF, Drake: saved, and read"
     yield "  again"
     yield ""

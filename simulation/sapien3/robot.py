@@ -32,7 +32,7 @@ class SimulatedRobot:
         driven: Active joints in the order of the descriptor's joints.
         active_index: For each joint of the descriptor, its place in SAPIEN's order.
         loaded_order: For each active joint in SAPIEN's order, its place in the descriptor.
-        speeds: Largest speeds of the descriptor's joints, (dof,) (rad/s, m/s).
+        speeds: What is taken as the limits of the descriptor's joints' speeds, (dof,) (rad/s, m/s).
         root: The root link.
     """
 

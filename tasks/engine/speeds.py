@@ -1,8 +1,8 @@
-"""Watches how fast the robots' joints move, after every step; that takes less than a microsecond.
+"""Watches how fast the joints move, after every step: half a microsecond for one environment.
 
-A joint that moves ten times as fast as it is made for was not driven there: links that are inside
-each other were driven apart. It is reported once in an episode by a `RuntimeWarning`, as something
-may still come of it; beyond a hundred times, physics has diverged.
+A joint ten times as fast as its limit was not driven there: links that are inside each other were
+driven apart, or something hit it. It is reported once in an episode by a `RuntimeWarning`, as
+something may still come of the episode; beyond a hundred times, physics has diverged.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class SpeedWatch:
             elapsed: Steps of each environment's episode, (N,).
 
         Raises:
-            SimulationError: If a joint is `REFUSES` times as fast as it is made for.
+            SimulationError: If a joint is `REFUSES` times as fast as its limit.
         """
         speeds = state.joint_velocities
         if np.vdot(speeds, speeds) < self._least:  # then none is too fast; often enough that is all
@@ -65,7 +65,7 @@ class SpeedWatch:
             self._report(times, state, moving, elapsed)
 
     def fastest(self, state: State, robot: str, env: int) -> str:
-        """Return the joint of a robot that is the fastest for what it is made for."""
+        """Return the joint of a robot that is the fastest for its limit."""
         speeds = np.abs(state.qvel(robot)[env]) / self._robots[robot].speeds
         joints = [joint for name, joint, _ in self._joints if name == robot]
         return joints[int(np.nan_to_num(speeds, nan=np.inf).argmax())]
@@ -73,7 +73,7 @@ class SpeedWatch:
     def _report(self, times: Array, state: State, moving: Sequence[int], elapsed: Array) -> None:
         for env in moving:
             worst = int(times[env].argmax())
-            if times[env, worst] > REFUSES:
+            if not times[env, worst] <= REFUSES:  # be it NaN
                 raise SimulationError(
                     f"physics diverged: {self._words(times, state, env, worst, elapsed)};"
                     " reset(options={'reconfigure': True}) builds its world anew"
@@ -88,6 +88,6 @@ class SpeedWatch:
         speed, limit = abs(state.joint_velocities[env, worst]), self._limits[worst]
         return (
             f"robot {robot!r} is thrown about: {joint} moves at {speed:.3g} {unit}/s in environment"
-            f" {env} at step {elapsed[env]}, {times[env, worst]:.3g} times what it is made for"
-            f" ({limit:.3g} {unit}/s); the likely cause: {self.causes.of(robot, joint, env)}"
+            f" {env} at step {elapsed[env]}, {times[env, worst]:.3g} times the {limit:.3g} {unit}/s"
+            f" taken as its limit; the likely cause: {self.causes.of(robot, joint, env)}"
         )

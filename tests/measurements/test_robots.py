@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from measurements.robots.judge import QUESTIONS, judge, reason, usable
 from measurements.robots.probe import loads, tell
 from measurements.robots.record import Record, SurveyError
 from measurements.robots.sources import Robot, find_robots, named_folder, package_folder
-from measurements.robots.survey import probe
+from measurements.robots.survey import probe, without_folders
 from measurements.robots.table import markdown
 from robots import AssetError, MissingPackageError, UnknownNameError
 from tests.three_links import arm, save
@@ -63,7 +64,7 @@ class TestSources:
     def test_missing_meshes_are_looked_for_in_the_whole_source(self, tmp_path):
         mesh = '<collision><geometry><mesh filename="{}"/></geometry></collision>'
         names = ("package://any/meshes/here.stl", "../gone/here.stl", "here.stl", "gone.stl")
-        links = "".join(mesh.format(name) for name in names)
+        links = "".join(mesh.format(name) for name in names) + f"<!-- {mesh.format('no.stl')} -->"
         save(tmp_path, f'<robot name="r"><link name="a">{links}</link></robot>')
         (tmp_path / "meshes").mkdir()
         (tmp_path / "meshes" / "here.stl").touch()
@@ -129,6 +130,17 @@ class TestProbe:
         monkeypatch.setattr(survey_module, "PROBE", "crashing")
         seen = probe(Robot("mine", "small.urdf", tmp_path), 60.0)
         assert seen == {"missing": [], "loads": {}, "ended": ended}
+
+    def test_no_path_of_this_machine_is_kept(self):
+        folder, passing = "/opt/robots", f"{tempfile.gettempdir()}/tmpabc_1/robot.urdf"
+        seen = {
+            "a": [f"{folder}/x/y.urdf, in {folder}"],
+            "b": f"{passing} refers to '/opt/rob…', and to '/usr/rob…'",
+        }
+        assert without_folders(seen, folder) == {
+            "a": ["x/y.urdf, in ."],
+            "b": "robot.urdf refers to '…', and to '/usr/rob…'",
+        }
 
 
 class TestJudge:
