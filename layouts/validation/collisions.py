@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinematics.rotations import Floats, pose_matrix
+from kinematics.rotations import Floats, pose_matrix, transform
 from layouts.placement import Placement
+from robots.bodies.depth import overlap
 from robots.bodies.hulls import Hull, RobotModel
 
 Pairs = NDArray[np.intp]  # (n, 2): indices of hulls
@@ -263,14 +264,19 @@ def _farthest(body: Postures, hulls: NDArray[np.intp], way: Floats) -> Floats:
 def _measure(one: Postures, other: Postures, posture: int, a: int, b: int) -> Approach:
     import fcl
 
-    request = fcl.DistanceRequest(enable_nearest_points=True, enable_signed_distance=True)
-    result = fcl.DistanceResult()
+    request, result = fcl.DistanceRequest(enable_nearest_points=True), fcl.DistanceResult()
     bodies: list[Any] = []
     for body, hull in ((one, a), (other, b)):
         pose = body.poses[posture, hull]
         place = fcl.Transform(pose[:3, :3], pose[:3, 3])
         bodies.append(fcl.CollisionObject(body.hulls[hull].geometry, place))
-    distance = float(fcl.distance(*bodies, request, result))
-    points: Any = result.nearest_points
+    distance, points = float(fcl.distance(*bodies, request, result)), result.nearest_points
+    if distance <= 0.0:
+        depth, points = overlap(_corners(one, posture, a), _corners(other, posture, b))
+        distance = -depth
     near, far = (tuple(float(x) for x in point) for point in points)
     return Approach((one.links[a], other.links[b]), posture, distance, (near, far))
+
+
+def _corners(body: Postures, posture: int, hull: int) -> Floats:
+    return transform(body.poses[posture, hull], body.hulls[hull].corners)
