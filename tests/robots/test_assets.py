@@ -13,7 +13,8 @@ from robots import AssetError, RobotRegistry, UnknownNameError, UrdfLocator
 from robots.assets import store as asset_store
 from robots.assets.fetching import ensure
 from robots.assets.manifest import load_manifest
-from robots.assets.sources import InstalledManiSkill, LocalCopy, SourceError
+from robots.assets.packages import MANI_SKILL, SourceError
+from robots.assets.sources import InstalledPackage, LocalCopy
 from robots.assets.store import AssetStore, FileState, default_root
 from robots.fetch_assets import main
 from robots.urdf.summary import read_references
@@ -30,6 +31,9 @@ class FakeSource:
     def __init__(self, given: dict[str, bytes], error: str = "") -> None:
         self.given, self.error, self.asked = given, error, []
 
+    def holds(self, file) -> bool:
+        return True
+
     def fetch(self, files, scratch, *, again, trust):
         self.asked.append(([file.path for file in files], again))
         yield from ((file, self.given[file.path]) for file in files if file.path in self.given)
@@ -44,7 +48,9 @@ def right(files) -> dict[str, bytes]:
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize("pictures", [False, True])
 def test_locate_returns_a_urdf_whose_files_are_all_there(robot, pictures, monkeypatch):
-    monkeypatch.setattr("robots.assets.fetching.default_sources", lambda: [InstalledManiSkill()])
+    monkeypatch.setattr(
+        "robots.assets.fetching.default_sources", lambda: [InstalledPackage(MANI_SKILL)]
+    )
     locator = RobotRegistry.load(robot).urdf
     package = load_manifest().package(locator.package)
     drawn = pictures and locator.file not in package.undrawable
@@ -201,7 +207,7 @@ def test_what_a_killed_fetch_left_is_removed(store, physics):
 
 def test_a_read_only_destination_is_named(read_only_folder, physics):
     with pytest.raises(AssetError, match=rf"cannot write robot files to {read_only_folder}/x:"):
-        ensure(physics, AssetStore(read_only_folder / "x"), [InstalledManiSkill()])
+        ensure(physics, AssetStore(read_only_folder / "x"), [InstalledPackage(MANI_SKILL)])
 
 
 def test_a_file_in_place_of_the_destination_is_named(tmp_path, physics):
@@ -209,7 +215,7 @@ def test_a_file_in_place_of_the_destination_is_named(tmp_path, physics):
     store = AssetStore(tmp_path / "file")
     assert store.unusable(physics) == list(physics)
     with pytest.raises(AssetError, match="cannot write robot files to .*choose another folder"):
-        ensure(physics, store, [InstalledManiSkill()])
+        ensure(physics, store, [InstalledPackage(MANI_SKILL)])
 
 
 def test_a_complete_read_only_copy_is_enough(store, physics, fill, monkeypatch):

@@ -13,7 +13,7 @@ import pytest
 from robots import AssetError, UnknownNameError, write_manifest
 from robots.assets import manifest
 from robots.assets.manifest import CHECKOUT_CACHE, Manifest, load_manifest
-from robots.assets.sources import find_mani_skill
+from robots.assets.packages import find_package
 from robots.write_manifest import build_package
 
 
@@ -65,7 +65,7 @@ def test_every_package_says_its_origin_and_licence():
 
 
 def test_a_licence_that_is_not_known_is_refused(tmp_path):
-    folder = tmp_path / "assets" / "robots" / "toy"
+    folder = tmp_path / "mani_skill" / "assets" / "robots" / "toy"
     folder.mkdir(parents=True)
     (folder / "LICENSE").write_text("Ask me first.")
     with pytest.raises(AssetError, match="a licence this command does not know"):
@@ -96,7 +96,7 @@ def test_the_images_that_a_collada_mesh_names_are_pictures_too():
 
 
 def test_another_robot_needs_no_more_than_writing_the_manifest_again():
-    package = build_package("maniskill_so100", find_mani_skill(), {"so100.urdf"})
+    package = build_package("maniskill_so100", find_package("mani_skill"), {"so100.urdf"})
     paths = {file.path for file in package.needed("so100.urdf", pictures=False)}
     assert {"so100.urdf", "so100.srdf", "LICENSE"} < paths
     assert any(path.startswith("meshes/") for path in paths)
@@ -104,11 +104,11 @@ def test_another_robot_needs_no_more_than_writing_the_manifest_again():
 
 def test_a_package_that_is_no_folder_of_mani_skill_is_refused():
     with pytest.raises(AssetError, match="call it maniskill_<folder>"):
-        build_package("robotiq", find_mani_skill(), {"x.urdf"})
+        build_package("robotiq", find_package("mani_skill"), {"x.urdf"})
 
 
 def test_a_urdf_that_reaches_outside_its_folder_is_refused(tmp_path):
-    folder = tmp_path / "assets" / "robots" / "toy"
+    folder = tmp_path / "mani_skill" / "assets" / "robots" / "toy"
     folder.mkdir(parents=True)
     mesh = "<collision><geometry><mesh filename='../other/x.stl'/></geometry></collision>"
     (folder / "toy.urdf").write_text(f"<robot name='toy'><link name='a'>{mesh}</link></robot>")

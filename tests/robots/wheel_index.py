@@ -36,7 +36,7 @@ def build_wheel(contents: Mapping[str, bytes]) -> bytes:
 
 def members(files: Iterable[AssetFile], contents: Callable[[AssetFile], bytes]) -> dict[str, bytes]:
     """Return what a wheel holds of some robot files."""
-    return {f"mani_skill/{f.origin.mani_skill}/{f.path}": contents(f) for f in files}
+    return {f"{f.origin.folder}/{f.path}": contents(f) for f in files}
 
 
 class WheelIndex:

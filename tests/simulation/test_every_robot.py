@@ -10,7 +10,7 @@ import sapien
 
 from layouts import single
 from robots import ActionNumber, RobotRegistry
-from robots.assets.sources import find_mani_skill
+from robots.assets.packages import find_package
 from robots.from_urdf import guess_descriptor
 from robots.registry import CATALOGUE
 from robots.urdf.summary import parse_urdf
@@ -126,7 +126,7 @@ HANDS = ("dclaw/dclaw_gripper_glb.urdf", "allegro/allegro_hand_right.urdf")
 @pytest.mark.parametrize("robot", [*ROBOTS, *HANDS])
 def test_a_robot_that_was_only_guessed_stands_and_moves(robot):
     if robot in HANDS:
-        path = find_mani_skill() / "assets" / "robots" / robot
+        path = find_package("mani_skill") / "mani_skill" / "assets" / "robots" / robot
     else:
         path = RobotRegistry.load(robot).urdf.locate()
     guessed = guess_descriptor(path, "guessed").descriptor
