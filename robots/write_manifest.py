@@ -36,6 +36,7 @@ from robots.common.writing import write_whole
 from robots.registry import CATALOGUE, RobotRegistry
 from robots.urdf.summary import UrdfReferences, read_references
 
+ALL_ROBOTS = "robots"  # maniskill_robots: for a URDF that uses files of several robots' folders
 LICENCE_FILES = ("LICENSE", "LICENSE.txt")
 README = "README.md"
 TERMS = {
@@ -134,13 +135,16 @@ def build_package(name: str, installed: Path, urdfs: set[str]) -> AssetPackage:
     """
     package = _index_package(name)
     robot = name.removeprefix(package.prefix)
-    folder = installed / package.robots / robot
+    relative = package.robots if robot == ALL_ROBOTS else f"{package.robots}/{robot}"
+    folder = installed / relative
     if not folder.is_dir():
         raise AssetError(
             f"package {name!r} has no folder {folder}; call it {package.prefix}<folder>"
         )
     licence = _licence(folder)
-    origin = _origin(package, name, f"{package.robots}/{robot}", "robot", licence)
+    origin = _origin(package, name, relative, "robot", licence)
+    if robot == ALL_ROBOTS:
+        origin = replace(origin, hub_dataset=None, hub_folder=None)
     if package.mount:
         origin = replace(origin, mount=f"{package.mount}/{robot}")
     physics: dict[str, set[str]] = {}
