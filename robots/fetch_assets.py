@@ -92,7 +92,8 @@ def describe_file(file: AssetFile, store: AssetStore) -> str:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m robots.fetch_assets", description=__doc__)
     add = parser.add_argument
-    add("robots", nargs="*", metavar="ROBOT", help="robots to fetch; if none is named, all, or all that --source has")
+    which = "robots to fetch; if none is named, all, or all that --source has"
+    add("robots", nargs="*", metavar="ROBOT", help=which)
     add("--check", action="store_true", help="fetch nothing, only list what is missing or wrong")
     add("--offline", action="store_true", help="never use the network")
     add("--source", choices=SOURCES, help="use this source alone")

@@ -13,12 +13,11 @@ def flying(side: str) -> RobotDescriptor:
     fixed = hand(side)
     urdf = f"RH56DFX-2LR/urdf/inspire_hand_{side}_floating.urdf"
     groups = fixed.action_split.groups
-    rotation = replace(ROTATION, stiffness=2e3, damping=2e2)  # twice ManiSkill's: it swings less
     return replace(
         fixed,
         name=f"floating_inspire_hand_{side}",
         urdf=UrdfLocator("maniskill_inspire_hand", urdf),
-        action_split=ActionSplit(position=POSITION, rotation=rotation, **groups),
+        action_split=ActionSplit(position=POSITION, rotation=ROTATION, **groups),
         keyframes={"rest": (*(0,) * 6, *fixed.keyframe("rest"))},
         reach=1.0,  # a working size: its joints end at 20 m
         source="mani_skill 3.0.1, agents/robots/inspire_hand/floating_inspire_hand.py",

@@ -1,6 +1,7 @@
 """Willow Garage PR2, two arms with grippers, on a base that stands still: 2 × (7 + 1) numbers."""
 
 from dataclasses import replace
+from math import pi
 
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, GripperMaterial, JointGroup, RobotDescriptor
@@ -8,7 +9,7 @@ from robots.link_pairs import among
 
 # fmt: off
 STIFF = {"stiffness": 1e5, "damping": 1e5, "force_limit": 1e5}
-TURNS = (-6.283185, 6.283185)  # of joints that turn without end
+TURNS = (-2 * pi, 2 * pi)  # of joints that turn without end
 HEAD = ("head_pan_joint", "head_tilt_joint", "laser_tilt_mount_joint")
 FINGERS = ("l_finger", "r_finger", "l_finger_tip", "r_finger_tip")
 HAND = (*FINGERS, "l_parallel", "r_parallel")
@@ -16,15 +17,14 @@ LIMITS = ((-2.3213, 0.0), TURNS, (-2.094, 0.0), TURNS)
 LEFT_ARM = JointGroup(
     tuple(f"l_{joint}_joint" for joint in ("shoulder_pan", "shoulder_lift", "upper_arm_roll",
           "elbow_flex", "forearm_roll", "wrist_flex", "wrist_roll")),
-    lower=(-0.04, -0.04, -0.04, -0.04, -0.1, -0.1, -0.1),
-    upper=(0.04, 0.04, 0.04, 0.04, 0.1, 0.1, 0.1),
+    lower=(*(-0.04,) * 4, *(-0.1,) * 3), upper=(*(0.04,) * 4, *(0.1,) * 3),
     stiffness=(9.99e4, 6.59e4, 9510.0, 9940.0, 1000.0, 1000.0, 1000.0),
     damping=(1330.0, 879.0, 127.0, 133.0, 12.7, 10.3, 7.39),
     force_limit=(284.0, 188.0, 30.0, 30.0, 30.0, 10.0, 10.0), delta=True,
-    limits=((-0.714602, 2.285398), (-0.5236, 1.3963), (-0.8, 3.9), *LIMITS))
+    limits=((-0.7146018, 2.2853982), (-0.5236, 1.3963), (-0.8, 3.9), *LIMITS))
 RIGHT_ARM = replace(
     LEFT_ARM, joints=tuple(f"r{joint[1:]}" for joint in LEFT_ARM.joints),
-    limits=((-2.285398, 0.714602), (-0.5236, 1.3963), (-3.9, 0.8), *LIMITS))
+    limits=((-2.2853982, 0.7146018), (-0.5236, 1.3963), (-3.9, 0.8), *LIMITS))
 # The URDF turns one of these against its limits; here all turn alike, as on the robot.
 LEFT_GRIPPER = JointGroup(
     tuple(f"l_gripper_{joint}_joint" for joint in (*FINGERS, "l_parallel_root", "r_parallel_root")),

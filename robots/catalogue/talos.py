@@ -9,8 +9,8 @@ from robots.link_pairs import among
 # fmt: off
 SIDES = ("left", "right")
 STIFF = {"stiffness": 1e5, "damping": 1e5, "force_limit": 1e5}
-LIMITS = ((-2.443461, 2.443461), (-2.356194, 0.0), (-2.530727, 2.530727), (-1.396263, 1.396263),
-          (-0.698132, 0.698132))
+LIMITS = ((-2.443461, 2.443461), (-2.3561945, 0.0), (-2.5307274, 2.5307274),
+          (-1.3962634, 1.3962634), (-0.6981317, 0.6981317))
 GRIPPER = ("base", "motor_double", "inner_double", "fingertip_1", "fingertip_2", "motor_single",
            "inner_single", "fingertip_3")
 LEFT_ARM = JointGroup(
@@ -19,13 +19,13 @@ LEFT_ARM = JointGroup(
     stiffness=(4.17e4, 3.06e4, 8410.0, 7410.0, 1000.0, 1000.0, 1000.0),
     damping=(556.0, 409.0, 112.0, 98.7, 10.4, 10.3, 10.2),
     force_limit=(119.0, 87.2, 23.9, 21.1, 3.0, 6.6, 6.6), delta=True,
-    limits=((-1.570796, 0.523599), (0.0, 2.879793), *LIMITS))
+    limits=((-1.5707964, 0.5235988), (0.0, 2.8797932), *LIMITS))
 RIGHT_ARM = replace(
     LEFT_ARM, joints=tuple(f"arm_right_{i}_joint" for i in range(1, 8)),
-    limits=((-0.523599, 1.570796), (-2.879793, 0.0), *LIMITS))
+    limits=((-0.5235988, 1.5707964), (-2.8797932, 0.0), *LIMITS))
 LEFT_GRIPPER = JointGroup(
-    ("gripper_left_joint",), lower=-1.047198, upper=0.0, stiffness=1e3, damping=2e2,
-    force_limit=1.0, reset_noise=False, limits=((-1.047198, 0.0),))
+    ("gripper_left_joint",), lower=-1.0471976, upper=0.0, stiffness=1e3, damping=2e2,
+    force_limit=1.0, reset_noise=False, limits=((-1.0471976, 0.0),))
 
 
 def wrist(side: str) -> tuple[str, ...]:

@@ -9,8 +9,8 @@ from robots.link_pairs import among
 # fmt: off
 SIDES, ENDS = ("left", "right"), ("front", "rear")
 STIFF = {"stiffness": 1e5, "damping": 1e5, "force_limit": 1e5}
-BEND, WRIST, TURN = (-2.443461, 1.134464), (-1.884956, 3.001966), (-2.617994, 2.617994)
-OPEN = 0.802851  # rad
+BEND, WRIST, TURN = (-2.443461, 1.134464), (-1.8849556, 3.0019662), (-2.6179938, 2.6179938)
+OPEN = 0.80285144  # rad
 WHEELS = tuple(f"wheel_{end}_{side}" for end in ENDS for side in SIDES)
 BASE = ("base_link", "base_antenna_left_link", "base_antenna_right_link", "base_dock_link",
         "base_front_laser_link", "base_rear_laser_link", "torso_base_link",
@@ -24,10 +24,10 @@ LEFT_ARM = JointGroup(
     stiffness=(2.57e4, 3.23e4, 8480.0, 7940.0, 1000.0, 1000.0, 1000.0),
     damping=(343.0, 431.0, 113.0, 106.0, 7.94, 8.06, 1.61),
     force_limit=(73.1, 92.0, 26.0, 26.0, 26.0, 26.0, 26.0), delta=True,
-    limits=((-0.523599, 4.712389), BEND, TURN, BEND, (-3.665191, 1.570796), WRIST, TURN))
+    limits=((-0.5235988, 4.712389), BEND, TURN, BEND, (-3.6651914, 1.5707964), WRIST, TURN))
 RIGHT_ARM = replace(
     LEFT_ARM, joints=tuple(f"arm_right_{i}_joint" for i in range(1, 8)),
-    limits=((-4.712389, 0.523599), BEND, TURN, BEND, (-1.570796, 3.665191), WRIST, TURN))
+    limits=((-4.712389, 0.5235988), BEND, TURN, BEND, (-1.5707964, 3.6651914), WRIST, TURN))
 GRIPPER = JointGroup(  # one motor moves both linkages
     JOINTS["left"], lower=0.0, upper=OPEN, mimic=True, multipliers=(-1, -1, -1, -1, 1, 1),
     offsets=(OPEN, OPEN, OPEN, OPEN, -OPEN, -OPEN), stiffness=2.0, damping=0.1, force_limit=10.0,
@@ -47,7 +47,7 @@ TIAGO_PRO = RobotDescriptor(
     keyframes={"rest": (0.343331, 0.067992, 0.503395, -0.938694, -1.153419, 2.114344, 0.018755,
                         *(0,) * 6, -0.498625, 0.597775, 1.222533, 0.340459, -0.694559, 1.880084,
                         0.630249, *(0,) * 13)},
-    reach=1.161,  # of the left TCP, from the URDF
+    reach=1.2,  # of the left TCP, from the URDF
     source="example-robot-data 6.0.0, tiago_pro_description; drives from each joint's inertia",
     allowed_collisions=among(  # neighbours, and what overlaps however the joints stand
         (*BASE, "torso_lift_link", "torso_head_link", "arm_left_1_link", "arm_right_1_link"),

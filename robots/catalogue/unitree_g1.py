@@ -13,7 +13,7 @@ ARM = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_roll",
        "wrist_yaw")
 LEG = ("hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll")
 PITCH, YAW, ELBOW = (-3.0892, 2.6704), (-2.618, 2.618), (-1.0472, 2.0944)
-WRIST = ((-1.972222, 1.972222), (-1.61443, 1.61443), (-1.61443, 1.61443))
+WRIST = ((-1.9722221, 1.9722221), (-1.6144296, 1.6144296), (-1.6144296, 1.6144296))
 LEFT_ARM = JointGroup(
     tuple(f"left_{joint}_joint" for joint in ARM),
     lower=(-0.09, -0.095, -0.1, -0.1, -0.1, -0.1, -0.1),

@@ -15,8 +15,8 @@ LEFT_GRIPPER = JointGroup(
     tuple(f"left_hand_{joint}_joint" for joint in HAND), lower=-0.1, upper=0.1, delta=True,
     stiffness=1e3, damping=2e1, force_limit=(2.45, 1.4, 1.4, 1.4, 1.4, 1.4, 1.4),
     reset_noise=False,
-    limits=((-1.047198, 1.047198), (-0.610865, 1.047198), (0.0, 1.745329), (-1.570796, 0.0),
-            (-1.745329, 0.0), (-1.570796, 0.0), (-1.745329, 0.0)),
+    limits=((-1.0471976, 1.0471976), (-0.61086524, 1.0471976), (0.0, 1.7453293), (-1.5707964, 0.0),
+            (-1.7453293, 0.0), (-1.5707964, 0.0), (-1.7453293, 0.0)),
 )
 RIGHT_GRIPPER = replace(
     LEFT_GRIPPER,

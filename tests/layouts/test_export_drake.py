@@ -11,7 +11,8 @@ import yourdfpy
 from scipy.spatial.transform import Rotation
 
 from layouts import single
-from robots import LayoutError, RobotRegistry
+from robots import LayoutError
+from tests.catalogue import every_robot
 from tests.layouts.cells import hung, link_poses, mixed_cell, random_positions, skeleton
 
 pytestmark = pytest.mark.xdist_group("drake")  # they share one exported cell
@@ -80,7 +81,7 @@ def test_links_are_where_the_robots_own_urdfs_put_them(cell, exported):
     assert compared == DRAWS * 50
 
 
-@pytest.mark.parametrize("robot", RobotRegistry.names())
+@pytest.mark.parametrize("robot", every_robot())
 def test_links_of_any_robot_that_hangs_are_there(robot, tmp_path):
     layout = hung(robot)
     models, welds = read(layout.to_drake(tmp_path / "cell.dmd.yaml", visuals=False))

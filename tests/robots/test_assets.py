@@ -13,14 +13,13 @@ from robots import AssetError, RobotRegistry, UnknownNameError, UrdfLocator
 from robots.assets import store as asset_store
 from robots.assets.fetching import ensure
 from robots.assets.manifest import load_manifest
-from robots.assets.packages import MANI_SKILL, SourceError
+from robots.assets.packages import INDEX_PACKAGES, MANI_SKILL, SourceError
 from robots.assets.sources import InstalledPackage, LocalCopy
 from robots.assets.store import AssetStore, FileState, default_root
 from robots.fetch_assets import main
 from robots.urdf.summary import read_references
-from tests.robots.conftest import PANDA, contents
-
-ROBOTS = RobotRegistry.names()
+from tests.catalogue import every_robot
+from tests.robots.conftest import PANDA, REAL_ROOT, contents
 
 
 class FakeSource:
@@ -45,12 +44,11 @@ def right(files) -> dict[str, bytes]:
     return {file.path: contents(file) for file in files}
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", every_robot())
 @pytest.mark.parametrize("pictures", [False, True])
 def test_locate_returns_a_urdf_whose_files_are_all_there(robot, pictures, monkeypatch):
-    monkeypatch.setattr(
-        "robots.assets.fetching.default_sources", lambda: [InstalledPackage(MANI_SKILL)]
-    )
+    copies = [LocalCopy(REAL_ROOT), *(InstalledPackage(package) for package in INDEX_PACKAGES)]
+    monkeypatch.setattr("robots.assets.fetching.default_sources", lambda: copies)
     locator = RobotRegistry.load(robot).urdf
     package = load_manifest().package(locator.package)
     drawn = pictures and locator.file not in package.undrawable

@@ -10,11 +10,12 @@ import pytest
 
 from robots import RobotRegistry
 from robots.inspect import find_urdf, main, report
+from tests.catalogue import every_robot
 
 ROBOTS = RobotRegistry.names()
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", every_robot())
 def test_a_report_names_every_joint_number_keyframe_and_camera(name, store):
     robot = RobotRegistry.load(name)
     text = report(robot, store)
