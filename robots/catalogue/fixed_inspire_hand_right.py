@@ -19,7 +19,7 @@ def hand(side: str) -> RobotDescriptor:
     wrist = tuple(f"{hand}_wrist_{way}_joint" for way in ("pitch", "yaw"))
     swing = ((-0.39549160850191506, 0.3860668305411457), (-0.445058959258554, 0.445058959258554))
     thumb = tuple(f"{hand}_thumb_{joint}_joint" for joint in ("CMC_pitch", "MCP", "IP"))
-    turn = JointGroup((f"{hand}_thumb_CMC_yaw_joint",), limits=((-1.309, 0.0),), **small)
+    turn = JointGroup((f"{hand}_thumb_CMC_yaw_joint",), limits=((-1.3089969, 0.0),), **small)
     # The joints that follow are driven like those they follow, as the URDF couples them.
     ratios = {"multipliers": (1, THIRD, THIRD / 2), "offsets": (0, -0.0814487, -0.0407243)}
     bend = JointGroup(thumb, -0.47, 0.0, mimic=True, reset_noise=False, **ratios, **drive)

@@ -127,7 +127,7 @@ def test_hulls_are_the_engines_collision_shapes(robot):
             compared += 1
             np.testing.assert_allclose(hull.corners.min(0), corners.min(0), atol=2e-3)
             np.testing.assert_allclose(hull.corners.max(0), corners.max(0), atol=2e-3)
-    assert compared >= 8
+    assert compared >= 2
 
 
 def shape_corners(shape):

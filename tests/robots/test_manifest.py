@@ -44,7 +44,12 @@ def test_a_stale_manifest_is_noticed_and_rewritten(tmp_path, monkeypatch, capsys
 DUTIES = {
     "CC BY-NC 4.0": "name the authors, no commercial use",
     "Apache-2.0": "keep the licence file",
+    "BSD": "keep the copyright notice",
+    "BSD-3-Clause": "keep the copyright notice",
+    "CC BY-NC-SA 4.0": "share what you change under the same terms",
+    "MPL-2.0": "what you change in the files stays under it",
 }
+WHEELS = {"maniskill_": "mani_skill==3.0.1", "example_": "example-robot-data==6.0.0"}
 APACHE = ("maniskill_koch", "maniskill_so100")
 
 
@@ -52,7 +57,8 @@ def test_every_package_says_its_origin_and_licence():
     packages = load_manifest().packages
     for package in packages.values():
         assert DUTIES[package.origin.licence] in package.origin.licence_note
-        assert package.origin.wheel == "mani_skill==3.0.1"
+        prefix = package.origin.name.partition("_")[0] + "_"
+        assert package.origin.wheel == WHEELS[prefix]
     for name in (
         "maniskill_fetch",
         "maniskill_panda",
@@ -144,7 +150,7 @@ def test_an_installation_reads_the_manifest_of_its_package(tmp_path, monkeypatch
         ("{}", "manifest has no 'packages'"),
         ('{"packages": []}', "manifest.packages is []; it must map names to values"),
         ("[" * 100_000, "its json nests deeper than"),
-        (None, r"files\['fetch.srdf'\] has no 'sha256'"),
+        (None, r"files\['LICENSE'\] has no 'sha256'"),
     ],
 )
 def test_a_damaged_manifest_is_one_error(tmp_path, monkeypatch, text, message):
