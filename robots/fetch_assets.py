@@ -10,17 +10,18 @@ from robots.assets.fetching import default_sources, ensure
 from robots.assets.hub_source import REVISION_VARIABLE, HubSource
 from robots.assets.locator import UrdfLocator
 from robots.assets.manifest import AssetFile, load_manifest
+from robots.assets.packages import INDEX_PACKAGES
 from robots.assets.progress import size
-from robots.assets.sources import AssetSource, InstalledManiSkill, LocalCopy
+from robots.assets.sources import AssetSource, InstalledPackage, LocalCopy
 from robots.assets.store import AssetStore, FileState, default_root
-from robots.assets.wheel_source import ManiSkillWheel
+from robots.assets.wheel_source import PackageWheel
 from robots.common.commands import exit_code, print_error, printable, start
 from robots.common.errors import RobotLayoutsError
 from robots.common.paths import absolute
 from robots.descriptor import RobotDescriptor
 from robots.registry import RobotRegistry
 
-SOURCES = ("local", "hf", "mani_skill", "wheel")
+SOURCES = ("local", "hf", *(package.name for package in INDEX_PACKAGES), "wheel")
 ONLINE_SOURCES = ("hf", "wheel")
 
 
@@ -49,12 +50,19 @@ def _fetch(options: argparse.Namespace) -> int:
         needs["scenery"] = load_manifest().package(scenery.PACKAGE).files
     chosen = options.dest
     store = AssetStore(default_root() if chosen is None else absolute(chosen, "--dest"))
+    sources = _sources(options, store)
+    if options.source and not options.robots:
+        needs = {name: files for name, files in needs.items() if _holds_all(sources, files)}
     if not options.check:
-        ensure(_union(needs), store, _sources(options, store), trust=options.trust_source)
+        ensure(_union(needs), store, sources, trust=options.trust_source)
     code = _report(needs, store)
     for failure in failures:
         print_error(failure)
     return 1 if failures else code
+
+
+def _holds_all(sources: Sequence[AssetSource], files: Sequence[AssetFile]) -> bool:
+    return all(any(source.holds(file) for source in sources) for file in files)
 
 
 def robot_files(robot: RobotDescriptor, *, pictures: bool) -> tuple[AssetFile, ...]:
@@ -84,7 +92,8 @@ def describe_file(file: AssetFile, store: AssetStore) -> str:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m robots.fetch_assets", description=__doc__)
     add = parser.add_argument
-    add("robots", nargs="*", metavar="ROBOT", help="robots to fetch; all if none is named")
+    which = "robots to fetch; if none is named, all, or all that --source has"
+    add("robots", nargs="*", metavar="ROBOT", help=which)
     add("--check", action="store_true", help="fetch nothing, only list what is missing or wrong")
     add("--offline", action="store_true", help="never use the network")
     add("--source", choices=SOURCES, help="use this source alone")
@@ -109,13 +118,13 @@ def _sources(options: argparse.Namespace, store: AssetStore) -> list[AssetSource
         return elsewhere + default_sources(offline=options.offline, revision=options.revision)
     states = FileState if options.trust_source else (FileState.VERIFIED,)
     present = [state for state in states if state is not FileState.MISSING]
-    chosen: dict[str, AssetSource] = {
-        "local": LocalCopy(default_root(), states=present),
-        "hf": HubSource(revision=options.revision),
-        "mani_skill": InstalledManiSkill(),
-        "wheel": ManiSkillWheel(),
+    chosen: dict[str, list[AssetSource]] = {
+        "local": [LocalCopy(default_root(), states=present)],
+        "hf": [HubSource(revision=options.revision)],
+        "wheel": [PackageWheel(package) for package in INDEX_PACKAGES],
+        **{package.name: [InstalledPackage(package)] for package in INDEX_PACKAGES},
     }
-    return [chosen[options.source]]
+    return chosen[options.source]
 
 
 def _union(needs: dict[str, tuple[AssetFile, ...]]) -> list[AssetFile]:

@@ -17,8 +17,8 @@ import numpy as np
 
 from robots.assets.locator import LocalUrdf, UrdfLocator
 from robots.assets.manifest import AssetFile, AssetPackage, load_manifest
+from robots.assets.packages import SourceError, find_package
 from robots.assets.progress import size
-from robots.assets.sources import SourceError, find_mani_skill
 from robots.assets.store import AssetStore, FileState, default_root
 from robots.common.commands import exit_code, print_error, start
 from robots.descriptor import JointGroup, RobotDescriptor
@@ -128,10 +128,11 @@ def find_urdf(robot: RobotDescriptor, store: AssetStore) -> tuple[Path | None, s
     if store.state(file).usable:
         return store.path(file), f"{store.path(file)} ({store.state(file).value})"
     try:
-        path = find_mani_skill() / package.origin.mani_skill / urdf.file
+        path = find_package(package.origin.distribution) / package.origin.folder / urdf.file
     except SourceError:
         return None, f"{store.path(file)} is {store.state(file).value}; {_fetch_hint(robot)}"
-    return path, f"{path} (installed mani_skill; not in {store.root} yet: {_fetch_hint(robot)})"
+    where = f"installed {package.origin.distribution}; not in {store.root} yet"
+    return path, f"{path} ({where}: {_fetch_hint(robot)})"
 
 
 def _fetch_hint(robot: RobotDescriptor) -> str:

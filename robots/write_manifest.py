@@ -1,11 +1,13 @@
-"""Rewrites `assets_cache/manifest.json` from an installed mani_skill, when a robot is added."""
+"""Rewrites `assets_cache/manifest.json` from installed packages, when a robot is added."""
 
 from __future__ import annotations
 
 import argparse
 import hashlib
+import os
 import posixpath
 import re
+from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
 
@@ -18,18 +20,35 @@ from robots.assets.manifest import (
     AssetPackage,
     Manifest,
     PackageOrigin,
+    load_manifest,
 )
-from robots.assets.sources import find_mani_skill
+from robots.assets.packages import (
+    INDEX_PACKAGES,
+    MANI_SKILL,
+    IndexPackage,
+    SourceError,
+    find_package,
+)
 from robots.common.commands import exit_code, start
 from robots.common.errors import AssetError
 from robots.common.files import read_regular, read_text
 from robots.common.writing import write_whole
 from robots.registry import CATALOGUE, RobotRegistry
-from robots.urdf.summary import read_references
+from robots.urdf.summary import UrdfReferences, read_references
 
-HUB_DATASET = "RoboVerseOrg/roboverse_data"
-PREFIX = "maniskill_"  # package maniskill_panda is mani_skill's folder assets/robots/panda
-LICENCE_FILE = "LICENSE"
+ALL_ROBOTS = "robots"  # maniskill_robots: for a URDF that uses files of several robots' folders
+LICENCE_FILES = ("LICENSE", "LICENSE.txt")
+README = "README.md"
+TERMS = {
+    "Apache-2.0": "Apache License 2.0: keep the licence file with the files",
+    "BSD": "BSD licence: keep the copyright notice with the files",
+    "BSD-3-Clause": "BSD 3-clause licence: keep the copyright notice with the files",
+    "CC BY-NC 4.0": "Creative Commons Attribution-NonCommercial 4.0: name the authors, no"
+    " commercial use",
+    "CC BY-NC-SA 4.0": "Creative Commons Attribution-NonCommercial-ShareAlike 4.0: name the"
+    " authors, no commercial use, and share what you change under the same terms",
+    "MPL-2.0": "Mozilla Public License 2.0: what you change in the files stays under it",
+}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -42,7 +61,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _write(*, check: bool) -> int:
     path = CHECKOUT_CACHE / "manifest.json"
-    text = build_manifest(find_mani_skill()).to_json()
+    text = build_manifest().to_json()
     if check:
         fresh = path.is_file() and read_text(path, LARGEST_FILE) == text
         print(
@@ -54,14 +73,14 @@ def _write(*, check: bool) -> int:
     return 0
 
 
-def build_manifest(mani_skill: Path) -> Manifest:
+def build_manifest() -> Manifest:
     """Return the manifest of everything that the catalogue's URDFs need, and of the scenery.
 
-    Args:
-        mani_skill: Folder of an installed mani_skill package.
+    What is of an index package that is not installed is taken from the manifest that there is.
 
     Raises:
-        AssetError: If a URDF refers to a file that mani_skill lacks.
+        AssetError: If a URDF refers to a file that its package lacks, or a package is neither
+            installed nor in the manifest.
         UnreadableFileError: If a file cannot be read.
     """
     urdfs: dict[str, set[str]] = {}
@@ -69,44 +88,68 @@ def build_manifest(mani_skill: Path) -> Manifest:
         locator = RobotRegistry.load(name).urdf
         if isinstance(locator, UrdfLocator):
             urdfs.setdefault(locator.package, set()).add(locator.file)
-    packages = {name: build_package(name, mani_skill, urdfs[name]) for name in urdfs}
-    return Manifest({**packages, scenery.PACKAGE: build_scenery(mani_skill)})
+    packages = {name: _build_or_keep(name, urdfs[name]) for name in urdfs}
+    scenes = build_scenery(find_package(MANI_SKILL.name))
+    return Manifest({**packages, scenery.PACKAGE: scenes})
 
 
-def build_scenery(mani_skill: Path) -> AssetPackage:
+def _build_or_keep(name: str, urdfs: set[str]) -> AssetPackage:
+    package = _index_package(name)
+    try:
+        installed = find_package(package.name)
+    except SourceError as error:
+        if package is MANI_SKILL or name not in load_manifest().packages:
+            raise
+        kept = load_manifest().package(name)
+        if set(kept.urdfs) != urdfs:
+            raise AssetError(f"{name} has other URDFs than the manifest, and {error}") from error
+        return kept
+    return build_package(name, installed, urdfs)
+
+
+def build_scenery(installed: Path) -> AssetPackage:
     """Return the package of what stands around robots in pictures.
 
     Args:
-        mani_skill: Folder of an installed mani_skill package.
+        installed: Folder that mani_skill is installed in.
 
     Raises:
         AssetError: If mani_skill lacks one of its files.
     """
-    folder = mani_skill / scenery.MANI_SKILL_FOLDER
-    origin = _origin(scenery.PACKAGE, folder, scenery.MANI_SKILL_FOLDER, "scenes")
+    folder = installed / scenery.FOLDER
+    origin = _origin(MANI_SKILL, scenery.PACKAGE, scenery.FOLDER, "scene", _licence(folder))
     paths = sorted(locator.file for locator in scenery.FILES)
     return AssetPackage(origin, tuple(_asset_file(origin, folder, p, set(), set()) for p in paths))
 
 
-def build_package(name: str, mani_skill: Path, urdfs: set[str]) -> AssetPackage:
+def build_package(name: str, installed: Path, urdfs: set[str]) -> AssetPackage:
     """Return one package with everything that some of its URDFs need.
 
     Args:
-        name: ``maniskill_`` and the name of a folder in mani_skill's ``assets/robots``.
-        mani_skill: Folder of an installed mani_skill package.
+        name: Prefix of an index package, as ``maniskill_``, and the name of a folder of its robots.
+        installed: Folder that the index package is installed in.
         urdfs: URDFs to include, relative to that folder.
 
     Raises:
         AssetError: If a URDF refers to a file that the folder lacks.
     """
-    relative = f"assets/robots/{name.removeprefix(PREFIX)}"
-    folder = mani_skill / relative
-    if not (name.startswith(PREFIX) and folder.is_dir()):
-        raise AssetError(f"package {name!r} has no folder {folder}; call it {PREFIX}<folder>")
-    origin = _origin(name, folder, relative, "robots")
+    package = _index_package(name)
+    robot = name.removeprefix(package.prefix)
+    relative = package.robots if robot == ALL_ROBOTS else f"{package.robots}/{robot}"
+    folder = installed / relative
+    if not folder.is_dir():
+        raise AssetError(
+            f"package {name!r} has no folder {folder}; call it {package.prefix}<folder>"
+        )
+    licence = _licence(folder)
+    origin = _origin(package, name, relative, "robot", licence)
+    if robot == ALL_ROBOTS:
+        origin = replace(origin, hub_dataset=None, hub_folder=None)
+    if package.mount:
+        origin = replace(origin, mount=f"{package.mount}/{robot}")
     physics: dict[str, set[str]] = {}
     pictures: dict[str, set[str]] = {}
-    drawable = [_add_needs(folder, urdf, physics, pictures) for urdf in sorted(urdfs)]
+    drawable = [_add_needs(folder, urdf, licence[2], physics, pictures) for urdf in sorted(urdfs)]
     undrawable = [urdf for urdf, can in zip(sorted(urdfs), drawable, strict=True) if not can]
     files = (
         _asset_file(origin, folder, path, physics.get(path, set()), pictures.get(path, set()))
@@ -115,51 +158,75 @@ def build_package(name: str, mani_skill: Path, urdfs: set[str]) -> AssetPackage:
     return AssetPackage(origin, tuple(files), tuple(undrawable))
 
 
-def _origin(name: str, folder: Path, relative: str, kind: str) -> PackageOrigin:
-    """Return where the files of a package come from; ``kind`` is their folder on the Hub."""
+def _index_package(name: str) -> IndexPackage:
+    for package in INDEX_PACKAGES:
+        if name.startswith(package.prefix):
+            return package
+    choices = " or ".join(f"{package.prefix}<folder>" for package in INDEX_PACKAGES)
+    raise AssetError(f"package {name!r} is of no package on the index; call it {choices}")
+
+
+def _origin(
+    package: IndexPackage, name: str, folder: str, kind: str, licence: tuple[str, str, str]
+) -> PackageOrigin:
+    """Return where the files of a package come from; ``kind`` tells their folder on the Hub."""
     try:
-        version = metadata.version("mani_skill")
+        version = metadata.version(package.name)
     except metadata.PackageNotFoundError:
         raise AssetError(
-            f"{folder} is of no installed mani_skill, so its version is unknown"
+            f"{folder} is of no installed {package.name}, so its version is unknown"
         ) from None
-    licence, terms = _licence(folder)
     return PackageOrigin(
         name=name,
-        mani_skill=relative,
-        hub_dataset=HUB_DATASET,
-        hub_folder=f"{kind}/{name}",
-        wheel=f"mani_skill=={version}",
-        licence=licence,
-        licence_note=f"{kind.removesuffix('s')} files of mani_skill {version}, {terms}",
+        folder=folder,
+        wheel=f"{package.name}=={version}",
+        licence=licence[0],
+        licence_note=f"{kind} files of {package.name} {version}, {licence[1]}",
+        hub_dataset=package.hub_dataset,
+        hub_folder=f"{kind}s/{name}" if package.hub_dataset else None,
     )
 
 
-def _licence(folder: Path) -> tuple[str, str]:
-    """Return the short name and terms of a folder's own licence, or else of mani_skill's assets."""
-    own = folder / LICENCE_FILE
-    if not own.is_file():
-        return (
-            "CC BY-NC 4.0",
-            "Creative Commons Attribution-NonCommercial 4.0: name the authors, no commercial use",
-        )
-    beginning = " ".join(read_text(own, LARGEST_FILE).split()[:20])  # after a copyright line
-    if "Apache License Version 2.0," in beginning:
-        return "Apache-2.0", "Apache License 2.0: keep the licence file with the files"
-    raise AssetError(f"{own} is a licence this command does not know; tell it in write_manifest.py")
+def _licence(folder: Path) -> tuple[str, str, str]:
+    """Return short name and terms of a folder's licence, and the file that says so, if one does.
+
+    A folder of mani_skill's that says nothing has the licence of mani_skill's assets.
+    """
+    for file in (*LICENCE_FILES, README):
+        if (folder / file).is_file():
+            name = _named_licence(read_text(folder / file, LARGEST_FILE), readme=file == README)
+            if name in TERMS:
+                return name, TERMS[name], file
+            if file != README or name:
+                raise AssetError(
+                    f"{folder / file} is a licence this command does not know; tell it in"
+                    " write_manifest.py"
+                )
+    if "mani_skill" in folder.parts:
+        return "CC BY-NC 4.0", TERMS["CC BY-NC 4.0"], ""
+    raise AssetError(f"{folder} names no licence; its files may not be fetched")
+
+
+def _named_licence(text: str, *, readme: bool) -> str:
+    if readme:
+        found = re.search(r"^license: *(\S+)|\b(CC BY[A-Z-]* [\d.]+) license", text, re.MULTILINE)
+        return (found[1] or found[2]) if found else ""
+    if "Apache License Version 2.0," in " ".join(text.split()[:20]):  # after a copyright line
+        return "Apache-2.0"
+    return "BSD" if "Redistribution and use in source and binary forms" in text else ""
 
 
 def _add_needs(
-    folder: Path, urdf: str, physics: dict[str, set[str]], pictures: dict[str, set[str]]
+    folder: Path,
+    urdf: str,
+    licence_file: str,
+    physics: dict[str, set[str]],
+    pictures: dict[str, set[str]],
 ) -> bool:
     """Note what a URDF needs, and return whether all that its pictures need is there."""
-    references = read_references(
-        read_regular(folder / urdf, LARGEST_FILE),
-        urdf,
-        exists=lambda path: (folder / path).is_file(),
-    )
-    beside = [urdf.removesuffix(".urdf") + ".srdf", LICENCE_FILE]
-    optional = [path for path in beside if (folder / path).is_file()]
+    references = _references(folder, urdf)
+    srdf = urdf.removesuffix(".urdf") + ".srdf"
+    optional = [path for path in (srdf, licence_file) if (folder / path).is_file()]
     for path in (urdf, *optional, *references.collision):
         physics.setdefault(path, set()).add(urdf)
     visual = [*references.visual]
@@ -169,6 +236,19 @@ def _add_needs(
     for path in visual:
         pictures.setdefault(path, set()).add(urdf)
     return True
+
+
+def _references(folder: Path, urdf: str) -> UrdfReferences:
+    """Return the files a URDF refers to, relative to a folder."""
+    xml = read_regular(folder / urdf, LARGEST_FILE)
+    if b"package://" not in xml:
+        return read_references(xml, urdf, exists=lambda path: (folder / path).is_file())
+    found = read_references(xml, (folder / urdf).as_posix(), exists=os.path.isfile)
+    collision, visual = (
+        tuple(posixpath.relpath(path, folder.as_posix()) for path in paths)
+        for paths in (found.collision, found.visual)
+    )
+    return UrdfReferences(collision, visual)
 
 
 def _textures(folder: Path, mesh: str) -> list[str]:

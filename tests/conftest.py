@@ -60,13 +60,20 @@ def browser_problem() -> str | None:
 PROBLEMS = {"native": lambda: native_problem(), "browser": lambda: browser_problem()}
 
 
+def optional_problem() -> str | None:
+    """Say why robots of an optional package cannot be had, or None if they can."""
+    from tests.catalogue import optional_problem as problem
+
+    return problem()
+
+
 def pytest_xdist_auto_num_workers() -> int:
     """One process more than there are cores, because tests also wait: for deadlines, say."""
     return len(os.sched_getaffinity(0)) + 1
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    for marker, find_problem in PROBLEMS.items():
+    for marker, find_problem in {**PROBLEMS, "example_robots": optional_problem}.items():
         if item.get_closest_marker(marker) and (problem := find_problem()):
             pytest.skip(problem)
 

@@ -8,10 +8,11 @@ from pathlib import Path
 
 from robots.assets.hub_source import HubSource
 from robots.assets.manifest import AssetFile, PackageOrigin, load_manifest
+from robots.assets.packages import INDEX_PACKAGES, SourceError
 from robots.assets.progress import listing, say, size
-from robots.assets.sources import AssetSource, InstalledManiSkill, SourceError
+from robots.assets.sources import AssetSource, InstalledPackage
 from robots.assets.store import AssetStore, FileState, default_root
-from robots.assets.wheel_source import ManiSkillWheel
+from robots.assets.wheel_source import PackageWheel
 from robots.common.errors import AssetError
 from robots.urdf.summary import read_references
 
@@ -33,7 +34,7 @@ def locate(package: str, urdf: str, *, pictures: bool) -> Path:
         )
     store = AssetStore(default_root())
     ensure(files, store, default_sources())
-    return store.root / package / urdf
+    return store.path(about.file(urdf))
 
 
 def locate_file(package: str, path: str) -> Path:
@@ -56,9 +57,11 @@ def default_sources(*, offline: bool = False, revision: str | None = None) -> li
         offline: Whether to leave out those that use the network.
         revision: Revision of the Hub's dataset, if not the default.
     """
+    installed = [InstalledPackage(package) for package in INDEX_PACKAGES]
     if offline:
-        return [InstalledManiSkill()]
-    return [HubSource(revision=revision), InstalledManiSkill(), ManiSkillWheel()]
+        return [*installed]
+    wheels = [PackageWheel(package) for package in INDEX_PACKAGES]
+    return [HubSource(revision=revision), *installed, *wheels]
 
 
 def ensure(
@@ -87,14 +90,15 @@ def ensure(
             _say_licences(wanted)
         failures: list[str] = []
         for source in sources:
-            if not wanted:
-                return
-            failure = _Fetch(source, store, scratch, trust).run(wanted)
-            missing = store.unusable(wanted)
-            outcome = f"{len(wanted) - len(missing)} of {len(wanted)} files"
+            asked = [file for file in wanted if source.holds(file)]
+            if not asked:
+                continue
+            failure = _Fetch(source, store, scratch, trust).run(asked)
+            missing = store.unusable(asked)
+            outcome = f"{len(asked) - len(missing)} of {len(asked)} files"
             say(f"{source.title}: {outcome}" + (f"; {_shorten(failure)}" if failure else ""))
             failures.append(f"{source.title}: {failure}")
-            wanted = missing
+            wanted = store.unusable(wanted)
         if wanted:
             raise AssetError(_failure_text(wanted, store, failures))
 
@@ -170,9 +174,10 @@ def _expect_known_references(file: AssetFile, data: bytes) -> None:
     """Refuse a differing URDF that needs files nobody would fetch."""
     if not file.path.endswith(".urdf"):
         return
-    known = {other.path for other in load_manifest().package(file.origin.name).files}
+    around = f"/{file.origin.mount}/" if file.origin.mount else ""
+    known = {f"{around}{f.path}" for f in load_manifest().package(file.origin.name).files}
     try:
-        references = read_references(data, file.path, exists=known.__contains__)
+        references = read_references(data, f"{around}{file.path}", exists=known.__contains__)
     except AssetError as error:
         raise SourceError(f"cannot be trusted: {error}") from error
     unknown = sorted({*references.collision, *references.visual} - known)
@@ -194,11 +199,11 @@ def _shorten(text: str, length: int = 160) -> str:
 def _failure_text(wanted: list[AssetFile], store: AssetStore, failures: list[str]) -> str:
     states = listing([f"{file}: {store.state(file).value}" for file in wanted], "\n    ")
     tried = "".join(f"\n    {failure}" for failure in failures) or "\n    none"
-    wheel = wanted[0].origin.wheel
+    wheels = " ".join(sorted({file.origin.wheel for file in wanted}))
     return (
         f"{len(wanted)} robot files cannot be used in {store.root}\n"
         f"  sources tried:{tried}\n"
         f"  files:\n    {states}\n"
         f"  what to do: connect to the network and run `python -m robots.fetch_assets`, or"
-        f" `pip install {wheel}`, or copy the files into {store.root} from another machine"
+        f" `pip install {wheels}`, or copy the files into {store.root} from another machine"
     )

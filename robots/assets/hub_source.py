@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import IO, Any
 
 from robots.assets.manifest import AssetFile
+from robots.assets.packages import SourceError
 from robots.assets.progress import download_bar, listing
-from robots.assets.sources import Contents, SourceError, read_bounded
+from robots.assets.sources import Contents, read_bounded
 from robots.common.child_process import end, running
 from robots.common.errors import UnreadableFileError
 
@@ -62,11 +63,15 @@ class HubSource:
         """Name in messages."""
         return f"Hugging Face Hub at {self.endpoint}" if self.endpoint else "Hugging Face Hub"
 
+    def holds(self, file: AssetFile) -> bool:
+        """Tell whether a dataset on the Hub has a copy of a file."""
+        return file.origin.hub_dataset is not None
+
     def fetch(
         self, files: Sequence[AssetFile], scratch: Path, *, again: bool, trust: bool
     ) -> Contents:
         """Yield files as they arrive; see `robots.assets.sources.AssetSource`."""
-        for dataset in sorted({file.origin.hub_dataset for file in files}):
+        for dataset in sorted({f.origin.hub_dataset for f in files if f.origin.hub_dataset}):
             wanted = {_hub_path(f): f for f in files if f.origin.hub_dataset == dataset}
             job = {
                 "dataset": dataset,

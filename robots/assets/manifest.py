@@ -29,35 +29,47 @@ class PackageOrigin:
 
     Attributes:
         name: Package name, also its folder in the cache.
-        mani_skill: Its folder inside the mani_skill package.
-        hub_dataset: Hugging Face dataset that holds a copy.
-        hub_folder: Its folder inside the dataset.
+        folder: Its folder inside the wheel.
         wheel: Requirement whose wheel holds the files.
         licence: Short name of the licence.
         licence_note: What the licence asks for, in one sentence.
+        hub_dataset: Hugging Face dataset that holds a copy, if one does.
+        hub_folder: Its folder inside the dataset.
+        mount: Folder of the files inside the local copy's folder of the package, for URDFs that
+            name the folders around them in ``package://``; None is that folder itself.
     """
 
     name: str
-    mani_skill: str
-    hub_dataset: str
-    hub_folder: str
+    folder: str
     wheel: str
     licence: str
     licence_note: str
+    hub_dataset: str | None = None
+    hub_folder: str | None = None
+    mount: str | None = None
 
     def __post_init__(self) -> None:
         """Refuse folders that are none, or that lead elsewhere."""
         settle_fields(self, AssetError)
-        _expect_inside(self.mani_skill, f"{self.name}: mani_skill")
-        _expect_inside(self.hub_folder, f"{self.name}: hub_folder")
+        _expect_inside(self.folder, f"{self.name}: folder")
+        for name in ("hub_folder", "mount"):
+            if getattr(self, name) is not None:
+                _expect_inside(getattr(self, name), f"{self.name}: {name}")
+        if (self.hub_dataset is None) != (self.hub_folder is None):
+            raise AssetError(f"{self.name}: hub_dataset and hub_folder go together; one is missing")
         if not re.fullmatch(r"\w[\w-]{0,99}", self.name):
             raise AssetError(
                 f"a package is called {self.name!r}; its name has letters, digits, _ -"
             )
-        if not re.fullmatch(r"\w[\w.-]*/\w[\w.-]*", self.hub_dataset):
+        if self.hub_dataset and not re.fullmatch(r"\w[\w.-]*/\w[\w.-]*", self.hub_dataset):
             raise AssetError(f"{self.name}: hub_dataset is {self.hub_dataset!r}, not OWNER/NAME")
         if not re.fullmatch(r"\w[\w.-]*==\w[\w.!+-]*", self.wheel):
             raise AssetError(f"{self.name}: wheel is {self.wheel!r}, not NAME==VERSION")
+
+    @property
+    def distribution(self) -> str:
+        """Name of the package on the index whose wheel holds the files."""
+        return self.wheel.partition("==")[0]
 
 
 @dataclass(frozen=True)
@@ -234,9 +246,7 @@ class _FileJson(TypedDict):
 
 
 class _OriginJson(TypedDict):
-    mani_skill: str
-    hub_dataset: str
-    hub_folder: str
+    folder: str
     wheel: str
     licence: str
     licence_note: str
@@ -244,6 +254,9 @@ class _OriginJson(TypedDict):
 
 
 class _PackageJson(_OriginJson, total=False):
+    hub_dataset: str
+    hub_folder: str
+    mount: str
     undrawable: tuple[str, ...]
 
 
@@ -252,7 +265,7 @@ class _ManifestJson(TypedDict):
 
 
 def _package_to_json(package: AssetPackage) -> dict[str, Any]:
-    origin = {key: value for key, value in vars(package.origin).items() if key != "name"}
+    origin = {key: value for key, value in vars(package.origin).items() if key != "name" and value}
     files = {
         file.path: {
             "bytes": file.bytes,

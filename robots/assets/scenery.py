@@ -3,7 +3,7 @@
 from robots.assets.locator import FileLocator
 
 PACKAGE = "maniskill_tabletop"
-MANI_SKILL_FOLDER = "utils"  # inside mani_skill
+FOLDER = "mani_skill/utils"  # inside the wheel
 
 TABLE = FileLocator(PACKAGE, "scene_builder/table/assets/table.glb")
 GROUND_TEXTURE = FileLocator(PACKAGE, "building/assets/grid_texture.png")

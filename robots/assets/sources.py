@@ -1,14 +1,14 @@
-"""Where robot files can be had on this machine: another local copy, or an installed mani_skill."""
+"""Where robot files can be had on this machine: another local copy, or an installed package."""
 
 from __future__ import annotations
 
 import errno
 from collections.abc import Generator, Iterable, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Protocol
 
 from robots.assets.manifest import AssetFile
+from robots.assets.packages import IndexPackage, SourceError, find_package
 from robots.assets.progress import listing
 from robots.assets.store import AssetStore, FileState
 from robots.common.errors import AssetError, UnreadableFileError
@@ -16,10 +16,6 @@ from robots.common.files import read_regular
 
 # None stands for contents that are more than the file may have.
 Contents = Generator[tuple[AssetFile, bytes | None], None, None]
-
-
-class SourceError(AssetError):
-    """Why one source could not give every file it was asked for."""
 
 
 class AssetSource(Protocol):
@@ -33,6 +29,10 @@ class AssetSource(Protocol):
     @property
     def title(self) -> str:
         """Name in messages."""
+        ...
+
+    def holds(self, file: AssetFile) -> bool:
+        """Tell whether it may have a file; it is asked for no others."""
         ...
 
     def fetch(
@@ -66,6 +66,10 @@ class LocalCopy:
         self._states = frozenset(states)
         self.title = f"local copy {root}"
 
+    def holds(self, file: AssetFile) -> bool:
+        """Tell that it may have any file."""
+        return True
+
     def fetch(
         self, files: Sequence[AssetFile], scratch: Path, *, again: bool, trust: bool
     ) -> Contents:
@@ -83,38 +87,31 @@ class LocalCopy:
         expect_none(absent)
 
 
-class InstalledManiSkill:
-    """The mani_skill package of this Python, found without importing it."""
+class InstalledPackage:
+    """A package of this Python that holds robot files, found without importing it."""
 
-    name = "mani_skill"
-    title = "installed mani_skill"
+    def __init__(self, package: IndexPackage) -> None:
+        """Read from a package, wherever it is installed."""
+        self.name = package.name
+        self.title = f"installed {package.name}"
+
+    def holds(self, file: AssetFile) -> bool:
+        """Tell whether a file is of its package."""
+        return file.origin.distribution == self.name
 
     def fetch(
         self, files: Sequence[AssetFile], scratch: Path, *, again: bool, trust: bool
     ) -> Contents:
         """Yield what the package holds; see `AssetSource`."""
-        folder = find_mani_skill()
+        folder = find_package(self.name)
         absent: list[str] = []
         for file in files:
-            path = folder / file.origin.mani_skill / file.path
+            path = folder / file.origin.folder / file.path
             try:
                 yield file, read_bounded(path, file.limit(trust=trust))
             except UnreadableFileError as error:
                 absent.append(f"{path} ({error.strerror})")
         expect_none(absent)
-
-
-def find_mani_skill() -> Path:
-    """Return the folder of the installed mani_skill package, without importing it.
-
-    Raises:
-        SourceError: If it is not installed.
-    """
-    spec = find_spec("mani_skill")
-    locations = list(spec.submodule_search_locations or ()) if spec is not None else []
-    if not locations:
-        raise SourceError("mani_skill is not installed")
-    return Path(locations[0])
 
 
 def expect_none(absent: Sequence[str]) -> None:

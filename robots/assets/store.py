@@ -73,7 +73,7 @@ class AssetStore:
 
     def path(self, file: AssetFile) -> Path:
         """Return where a file is or would be."""
-        return self.root / file.origin.name / file.path
+        return self.root / file.origin.name / (file.origin.mount or "") / file.path
 
     def state(self, file: AssetFile) -> FileState:
         """Tell whether a file is there and right; hashes it once per process and change.

@@ -1,4 +1,4 @@
-"""The wheel of mani_skill as a source of robot files: downloaded once, by the user's own pip."""
+"""The wheel of a package as a source of robot files: downloaded once, by the user's own pip."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from robots.assets.manifest import AssetFile, load_manifest
+from robots.assets.packages import IndexPackage, SourceError
 from robots.assets.progress import download_bar, say
-from robots.assets.sources import Contents, SourceError, expect_none
+from robots.assets.sources import Contents, expect_none
 from robots.common.child_process import running
 
-LARGEST_DOWNLOAD = 600 * 10**6  # bytes, of all that pip writes; the wheel has 102 MB
+LARGEST_DOWNLOAD = 600 * 10**6  # bytes, of all that pip writes
 LEAST_RATE = 1000  # bytes per second
 
 _PATIENCE = 300.0  # s; pip has deadlines and retries of its own
@@ -35,18 +36,22 @@ _BAD_ARCHIVE = (
 )
 
 
-class ManiSkillWheel:
-    """The wheel of mani_skill, downloaded with the user's own pip and configuration.
+class PackageWheel:
+    """The wheel of a package, downloaded with the user's own pip and configuration.
 
     It is large, and not kept: what it has for other robots is given along with what was asked for.
     """
 
     name = "wheel"
-    title = "mani_skill wheel through pip"
 
-    def __init__(self, *, patience: float = _PATIENCE) -> None:
-        """Set how long next to nothing may arrive before pip is given up (s)."""
-        self._patience = patience
+    def __init__(self, package: IndexPackage, *, patience: float = _PATIENCE) -> None:
+        """Take the package, and how long next to nothing may arrive before pip is given up (s)."""
+        self._package, self._patience = package, patience
+        self.title = f"{package.name} wheel through pip"
+
+    def holds(self, file: AssetFile) -> bool:
+        """Tell whether a file is of its package."""
+        return file.origin.distribution == self._package.name
 
     def fetch(
         self, files: Sequence[AssetFile], scratch: Path, *, again: bool, trust: bool
@@ -55,6 +60,10 @@ class ManiSkillWheel:
         for requirement in sorted({file.origin.wheel for file in files}):
             wanted = [file for file in files if file.origin.wheel == requirement]
             with tempfile.TemporaryDirectory(dir=scratch) as folder:
+                say(
+                    f"downloading the wheel of {requirement}"
+                    f" (about {self._package.megabytes} MB) with pip"
+                )
                 wheel = _download_wheel(requirement, Path(folder), self._patience, again)
                 others = [] if again else _files_beside(wanted, requirement)
                 yield from _unpack(wheel, wanted, others, trust=trust)
@@ -88,7 +97,7 @@ def _unpack(
 
 
 def _member(file: AssetFile) -> str:
-    return f"mani_skill/{file.origin.mani_skill}/{file.path}"
+    return f"{file.origin.folder}/{file.path}"
 
 
 def _read_member(archive: zipfile.ZipFile, file: AssetFile, limit: int) -> bytes | None:
@@ -113,7 +122,6 @@ def _download_wheel(requirement: str, folder: Path, patience: float, again: bool
         f"--dest={folder}",
         requirement,
     ]
-    say(f"downloading the wheel of {requirement} (about 100 MB) with pip")
     log = folder / "pip.log"
     environment = {**os.environ, "TMPDIR": str(folder)}  # removed with the folder, come what may
     try:

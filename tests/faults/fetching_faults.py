@@ -17,8 +17,9 @@ from unittest import mock
 
 from robots.assets import wheel_source
 from robots.assets.hub_source import HubSource
+from robots.assets.packages import MANI_SKILL
 from robots.assets.store import AssetStore
-from robots.assets.wheel_source import ManiSkillWheel
+from robots.assets.wheel_source import PackageWheel
 from tests.faults.fault import GOES_ON, REFUSED, Fault
 from tests.faults.tiny_files import (
     CONTENTS,
@@ -386,7 +387,7 @@ def _of_index(
                 mock.patch.object(wheel_source, "LARGEST_DOWNLOAD", 30_000_000),
             ):
                 store = AssetStore(folder / "assets")
-                fetch(store, [ManiSkillWheel(patience=6.0)])
+                fetch(store, [PackageWheel(MANI_SKILL, patience=6.0)])
         expect_all(store)
 
     return Fault(AREA, f"wheel: {what}", run, promise)
@@ -438,4 +439,4 @@ def _no_pip(folder: Path) -> None:
         settings(folder, PATH=""),
         mock.patch.object(wheel_source, "find_spec", return_value=None),
     ):
-        fetch(AssetStore(folder / "assets"), [ManiSkillWheel()])
+        fetch(AssetStore(folder / "assets"), [PackageWheel(MANI_SKILL)])

@@ -21,7 +21,7 @@ from tests.robots.hub_server import DATASET
 
 ORIGIN = PackageOrigin(
     name="maniskill_tiny",
-    mani_skill="assets/robots/tiny",
+    folder="mani_skill/assets/robots/tiny",
     hub_dataset=DATASET,
     hub_folder="robots/maniskill_tiny",
     wheel="mani_skill==3.0.1",

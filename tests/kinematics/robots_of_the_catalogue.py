@@ -8,6 +8,7 @@ from kinematics.tree import Tree
 from layouts import Layout, Placement
 from robots import RobotRegistry
 from robots.urdf.reading import read_model
+from robots.urdf.summary import read_cleaned
 from robots.urdf.tree import kinematic_tree
 from simulation.sapien3.world import BuiltWorld
 
@@ -16,7 +17,7 @@ from simulation.sapien3.world import BuiltWorld
 def tree_of(robot: str) -> Tree:
     descriptor = RobotRegistry.load(robot)
     urdf = descriptor.urdf.locate()
-    return kinematic_tree(read_model(urdf.read_bytes(), urdf.name), descriptor.joints)
+    return kinematic_tree(read_model(read_cleaned(urdf).xml, urdf.name), descriptor.joints)
 
 
 @functools.cache

@@ -15,9 +15,10 @@ from kinematics.solve import (
     turned_within,
 )
 from robots import RobotRegistry
+from tests.catalogue import every_robot
 from tests.kinematics.robots_of_the_catalogue import random_qpos, tree_of
 
-every_robot = pytest.mark.parametrize("robot", RobotRegistry.names())
+each_robot = pytest.mark.parametrize("robot", every_robot())
 
 
 def arm_of(robot):
@@ -32,7 +33,7 @@ def starts_of(robot, count=24):
     return starts
 
 
-@every_robot
+@each_robot
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_pose_that_the_arm_can_have_is_reached(robot, turned):
     tree, free = tree_of(robot), arm_of(robot)

@@ -14,7 +14,9 @@ from kinematics.rotations import rotation_vector
 from kinematics.tree import FIXED, Tree
 from robots import DescriptorError, RobotRegistry, UnknownNameError
 from robots.urdf.reading import read_model
+from robots.urdf.summary import read_cleaned
 from robots.urdf.tree import kinematic_tree, link_index
+from tests.catalogue import every_robot
 from tests.kinematics.robots_of_the_catalogue import (
     engine_poses,
     random_qpos,
@@ -24,10 +26,10 @@ from tests.kinematics.robots_of_the_catalogue import (
 from tests.layouts.small_robots import joint, link, urdf
 
 seeds = st.integers(0, 2**32 - 1)
-every_robot = pytest.mark.parametrize("robot", RobotRegistry.names())
+each_robot = pytest.mark.parametrize("robot", every_robot())
 
 
-@every_robot
+@each_robot
 @settings(max_examples=6)
 @given(seed=seeds)
 def test_every_link_is_where_sapien_has_it(robot, seed):
@@ -38,11 +40,11 @@ def test_every_link_is_where_sapien_has_it(robot, seed):
         np.testing.assert_allclose(poses[tree.link(name)], pose, atol=5e-6, err_msg=name)
 
 
-@every_robot
+@each_robot
 def test_every_link_is_where_yourdfpy_has_it(robot):
     """By forward kinematics of its own, on the file without its shapes: it cannot read them all."""
     descriptor = RobotRegistry.load(robot)
-    root = ElementTree.fromstring(descriptor.urdf.locate().read_bytes())
+    root = ElementTree.fromstring(read_cleaned(descriptor.urdf.locate()).xml)
     for element in root.iterfind("link"):
         for part in list(element):
             element.remove(part)
@@ -60,13 +62,13 @@ def test_every_link_is_where_yourdfpy_has_it(robot):
         )
 
 
-@every_robot
+@each_robot
 def test_limits_are_sapiens(robot):
     expected = np.concatenate([made.limits for made in simulated(robot).driven])
     np.testing.assert_allclose(tree_of(robot).limits, expected, rtol=1e-6)
 
 
-@every_robot
+@each_robot
 def test_a_batch_has_the_bits_of_its_rows_and_a_part_those_of_the_whole(robot):
     tree, qpos = tree_of(robot), random_qpos(robot, 0, 50)
     poses = tree.forward(qpos)
@@ -77,7 +79,7 @@ def test_a_batch_has_the_bits_of_its_rows_and_a_part_those_of_the_whole(robot):
     np.testing.assert_array_equal(part.forward(qpos)[:, -1], poses[:, tip])
 
 
-@every_robot
+@each_robot
 @settings(max_examples=4)
 @given(seed=seeds)
 def test_jacobians_are_the_slopes_of_poses(robot, seed):

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from layouts import single
 from robots import LayoutError, RobotDescriptor, RobotRegistry
+from tests.catalogue import every_robot
 from tests.layouts.cells import hung, link_poses, mixed_cell, random_positions, skeleton
 from tests.robots.damaged_robots import BOX, REPAIRS, joint, shape, with_tip, write_damaged
 
@@ -81,7 +82,7 @@ def test_links_are_where_the_robots_own_urdfs_put_them(cell, exported):
     assert compared == DRAWS * 50
 
 
-@pytest.mark.parametrize("robot", RobotRegistry.names())
+@pytest.mark.parametrize("robot", every_robot())
 def test_links_of_any_robot_that_hangs_are_there(robot, tmp_path):
     layout = hung(robot)
     models, welds = read(layout.to_drake(tmp_path / "cell.dmd.yaml", visuals=False))

@@ -16,6 +16,7 @@ from kinematics.rotations import pose_matrix
 from layouts import Layout, Placement, face_to_face, single
 from robots import AssetError, LayoutError, LocalUrdf, RobotRegistry
 from robots.urdf.summary import read_references
+from tests.catalogue import every_robot
 from tests.layouts.cells import hung, link_poses, mixed_cell, random_positions, skeleton
 
 DRAWS = 5
@@ -65,7 +66,7 @@ def test_links_are_where_the_robots_own_urdfs_put_them(cell, merged):
     assert compared == DRAWS * 50
 
 
-@pytest.mark.parametrize("robot", RobotRegistry.names())
+@pytest.mark.parametrize("robot", every_robot())
 def test_links_of_any_robot_that_hangs_are_there(robot, tmp_path):
     layout = hung(robot)
     urdf = skeleton(layout.to_urdf(tmp_path / "cell.urdf", visuals=False))

@@ -32,6 +32,7 @@ from robots import (
     UnknownNameError,
 )
 from robots.bodies.hulls import load_model
+from tests.catalogue import every_robot
 from tests.layouts.cells import overlapping
 from tests.layouts.small_robots import (
     FOLDING,
@@ -368,7 +369,7 @@ class TestSelfCollisions:
         with pytest.raises(UnknownNameError, match=r"'lowr'\. Did you mean 'lower'\?"):
             self.fold(tmp_path, math.pi - 0.01, allowed=(("lowr", "base"),))
 
-    @pytest.mark.parametrize("name", RobotRegistry.names())
+    @pytest.mark.parametrize("name", every_robot())
     def test_no_keyframe_of_ours_has_one(self, name):
         for keyframe in RobotRegistry.load(name).keyframes:
             layout = Layout({"arm": Placement(name, keyframe=keyframe)})

@@ -11,7 +11,7 @@ import pytest
 
 from robots.assets import sources as asset_sources
 from robots.assets.manifest import AssetFile, load_manifest
-from robots.assets.sources import SourceError, find_mani_skill
+from robots.assets.packages import SourceError, find_package
 from robots.assets.store import AssetStore, default_root
 from tests.robots.hub_server import HubServer
 
@@ -24,7 +24,7 @@ def contents(file: AssetFile) -> bytes:
     store = AssetStore(REAL_ROOT)
     if store.state(file).usable:
         return store.path(file).read_bytes()
-    return (find_mani_skill() / file.origin.mani_skill / file.path).read_bytes()
+    return (find_package("mani_skill") / file.origin.folder / file.path).read_bytes()
 
 
 @pytest.fixture(autouse=True)
@@ -77,10 +77,10 @@ def hub(monkeypatch: pytest.MonkeyPatch) -> Iterator[HubServer]:
 def no_mani_skill(monkeypatch: pytest.MonkeyPatch) -> None:
     """Make this process believe that mani_skill is not installed."""
 
-    def refuse() -> Path:
-        raise SourceError("mani_skill is not installed")
+    def refuse(name: str) -> Path:
+        raise SourceError(f"{name} is not installed")
 
-    monkeypatch.setattr(asset_sources, "find_mani_skill", refuse)
+    monkeypatch.setattr(asset_sources, "find_package", refuse)
 
 
 @pytest.fixture

@@ -13,13 +13,13 @@ from robots import AssetError, RobotRegistry, UnknownNameError, UrdfLocator
 from robots.assets import store as asset_store
 from robots.assets.fetching import ensure
 from robots.assets.manifest import load_manifest
-from robots.assets.sources import InstalledManiSkill, LocalCopy, SourceError
+from robots.assets.packages import INDEX_PACKAGES, MANI_SKILL, SourceError
+from robots.assets.sources import InstalledPackage, LocalCopy
 from robots.assets.store import AssetStore, FileState, default_root
 from robots.fetch_assets import main
 from robots.urdf.summary import read_references
-from tests.robots.conftest import PANDA, contents
-
-ROBOTS = RobotRegistry.names()
+from tests.catalogue import every_robot
+from tests.robots.conftest import PANDA, REAL_ROOT, contents
 
 
 class FakeSource:
@@ -29,6 +29,9 @@ class FakeSource:
 
     def __init__(self, given: dict[str, bytes], error: str = "") -> None:
         self.given, self.error, self.asked = given, error, []
+
+    def holds(self, file) -> bool:
+        return True
 
     def fetch(self, files, scratch, *, again, trust):
         self.asked.append(([file.path for file in files], again))
@@ -41,10 +44,11 @@ def right(files) -> dict[str, bytes]:
     return {file.path: contents(file) for file in files}
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", every_robot())
 @pytest.mark.parametrize("pictures", [False, True])
 def test_locate_returns_a_urdf_whose_files_are_all_there(robot, pictures, monkeypatch):
-    monkeypatch.setattr("robots.assets.fetching.default_sources", lambda: [InstalledManiSkill()])
+    copies = [LocalCopy(REAL_ROOT), *(InstalledPackage(package) for package in INDEX_PACKAGES)]
+    monkeypatch.setattr("robots.assets.fetching.default_sources", lambda: copies)
     locator = RobotRegistry.load(robot).urdf
     package = load_manifest().package(locator.package)
     drawn = pictures and locator.file not in package.undrawable
@@ -201,7 +205,7 @@ def test_what_a_killed_fetch_left_is_removed(store, physics):
 
 def test_a_read_only_destination_is_named(read_only_folder, physics):
     with pytest.raises(AssetError, match=rf"cannot write robot files to {read_only_folder}/x:"):
-        ensure(physics, AssetStore(read_only_folder / "x"), [InstalledManiSkill()])
+        ensure(physics, AssetStore(read_only_folder / "x"), [InstalledPackage(MANI_SKILL)])
 
 
 def test_a_file_in_place_of_the_destination_is_named(tmp_path, physics):
@@ -209,7 +213,7 @@ def test_a_file_in_place_of_the_destination_is_named(tmp_path, physics):
     store = AssetStore(tmp_path / "file")
     assert store.unusable(physics) == list(physics)
     with pytest.raises(AssetError, match="cannot write robot files to .*choose another folder"):
-        ensure(physics, store, [InstalledManiSkill()])
+        ensure(physics, store, [InstalledPackage(MANI_SKILL)])
 
 
 def test_a_complete_read_only_copy_is_enough(store, physics, fill, monkeypatch):

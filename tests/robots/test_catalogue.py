@@ -13,9 +13,11 @@ import pytest
 from robots import AssetError, RobotDescriptor, RobotRegistry, UrdfLocator
 from robots.assets.manifest import AssetPackage, load_manifest
 from robots.registry import CATALOGUE
+from robots.urdf.cleaning import clean
 from robots.urdf.model import ModelJoint
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_references
+from tests.catalogue import every_robot, is_optional
 from tests.robots.conftest import contents
 
 ROBOTS = tuple(CATALOGUE)
@@ -32,23 +34,23 @@ class Robot:
     references: tuple[tuple[str, ...], tuple[str, ...]]
 
 
-@pytest.fixture(params=ROBOTS)
+@pytest.fixture(params=every_robot(quick=[name for name in ROBOTS if not is_optional(name)]))
 def robot(request) -> Robot:
     descriptor = RobotRegistry.load(request.param)
     assert isinstance(descriptor.urdf, UrdfLocator)
     package = load_manifest().package(descriptor.urdf.package)
     name = descriptor.urdf.file
-    xml = contents(next(file for file in package.files if file.path == name))
-    model = read_model(xml, name)
+    xml = contents(package.file(name))
+    model = read_model(clean(xml, name).xml, name)
     joints = {joint.name: joint for joint in model.moving}
-    references = read_references(xml, name, {file.path for file in package.files}.__contains__)
-    return Robot(
-        descriptor,
-        package,
-        joints,
-        model.links,
-        (references.collision, references.visual),
+    around = f"/{package.origin.mount}/" if package.origin.mount else ""
+    paths = {around + file.path for file in package.files}
+    references = read_references(xml, around + name, paths.__contains__)
+    collision, visual = (
+        tuple(path.removeprefix(around) for path in found)
+        for found in (references.collision, references.visual)
     )
+    return Robot(descriptor, package, joints, model.links, (collision, visual))
 
 
 def test_the_catalogue_is_sorted_and_each_descriptor_is_named_as_its_module():
@@ -97,10 +99,14 @@ def test_every_link_that_is_named_exists(robot):
 
 
 def test_grippers_have_fingers_and_material_and_sticks_do_not(robot):
-    gripper = robot.descriptor.action_split.groups.get("gripper")
-    assert (robot.descriptor.gripper_material is not None) == (gripper is not None)
-    if gripper is None or len(gripper.joints) <= 2:  # more are a hand
-        assert (robot.descriptor.fingers is not None) == (gripper is not None)
+    groups = robot.descriptor.action_split.groups
+    gripper = groups.get("gripper")
+    if gripper is not None or set(groups) == {"arm"}:
+        assert (robot.descriptor.gripper_material is not None) == (gripper is not None)
+    if gripper is None and "left_gripper" not in groups:
+        assert robot.descriptor.fingers is None
+    elif gripper is not None and len(gripper.joints) == 2:  # one jaw swings, more are a hand
+        assert robot.descriptor.fingers is not None
 
 
 def test_the_manifest_holds_every_file_that_the_urdf_refers_to(robot):
@@ -109,11 +115,11 @@ def test_the_manifest_holds_every_file_that_the_urdf_refers_to(robot):
     everything = {file.path for file in robot.package.needed(urdf, pictures=True)}
     collision, visual = robot.references
     srdf = {urdf.replace(".urdf", ".srdf")} & {file.path for file in robot.package.files}
-    assert physics - {"LICENSE"} == {urdf, *srdf, *collision}
+    assert physics - {"LICENSE", "LICENSE.txt", "README.md"} == {urdf, *srdf, *collision}
     if urdf in robot.package.undrawable:
         assert everything == physics
     else:
-        textures = {path for path in everything if path.endswith(".png")}
+        textures = {path for path in everything if path.endswith((".png", ".jpg"))}
         assert everything - textures == (physics | set(visual)) - textures
         assert set(visual) <= everything
 
@@ -130,7 +136,11 @@ def test_robots_that_cannot_be_drawn_say_so_and_only_they(robot):
 
 def test_some_robots_cannot_be_drawn():
     package = load_manifest().package("maniskill_panda")
-    assert package.undrawable == ("mobile_panda_single_arm.urdf", "panda_pinch.urdf")
+    assert package.undrawable == (
+        "mobile_panda_dual_arm.urdf",
+        "mobile_panda_single_arm.urdf",
+        "panda_pinch.urdf",
+    )
 
 
 def test_a_robot_is_at_most_sixty_lines():
@@ -141,7 +151,7 @@ def test_a_robot_is_at_most_sixty_lines():
 
 
 def test_the_numbers_name_their_source(robot):
-    assert robot.descriptor.source.startswith("mani_skill 3.0.1, ")
+    assert robot.descriptor.source.startswith(robot.package.origin.wheel.replace("==", " ") + ", ")
 
 
 def test_sizes_add_up(robot):

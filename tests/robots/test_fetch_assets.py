@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from itertools import filterfalse
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from robots import RobotRegistry
 from robots.assets.manifest import load_manifest
 from robots.assets.store import AssetStore, FileState
 from robots.fetch_assets import main
+from tests.catalogue import is_optional
 
 CHECKOUT = Path(__file__).parents[2]
 MESH = "franka_description/meshes/collision/link4.stl"
@@ -65,7 +67,7 @@ def test_all_robots_with_pictures_and_scenery_is_the_default(store, capsys):
     assert main(["--source", "mani_skill"]) == 0
     assert "scenery: complete, 2 files" in capsys.readouterr().out
     assert store.unusable(load_manifest().package("maniskill_tabletop").files) == []
-    for name in RobotRegistry.names():
+    for name in filterfalse(is_optional, RobotRegistry.names()):  # those have another source
         urdf = RobotRegistry.load(name).urdf
         package = load_manifest().package(urdf.package)
         assert store.unusable(package.needed(urdf.file, pictures=True)) == []

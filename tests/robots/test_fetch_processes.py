@@ -16,8 +16,9 @@ import pytest
 from robots import AssetError, UrdfLocator
 from robots.assets import wheel_source
 from robots.assets.fetching import ensure
+from robots.assets.packages import MANI_SKILL
 from robots.assets.store import FileState
-from robots.assets.wheel_source import ManiSkillWheel
+from robots.assets.wheel_source import PackageWheel
 from tests.robots.conftest import contents
 from tests.robots.hub_server import HubServer, stall
 
@@ -67,9 +68,10 @@ def test_a_process_killed_while_writing_leaves_no_half_file(store, physics, tmp_
     script.write_text(
         "import os, signal\n"
         "from robots import UrdfLocator\n"
-        "from robots.assets.sources import InstalledManiSkill\n"
+        "from robots.assets.packages import MANI_SKILL\n"
+        "from robots.assets.sources import InstalledPackage\n"
         "import robots.assets.fetching\n"
-        "robots.assets.fetching.default_sources = lambda: [InstalledManiSkill()]\n"
+        "robots.assets.fetching.default_sources = lambda: [InstalledPackage(MANI_SKILL)]\n"
         "real, calls = os.fsync, []\n"
         "def fsync(descriptor):\n"
         "    calls.append(descriptor)\n"
@@ -138,7 +140,7 @@ def wheel_index(tmp_path, monkeypatch, physics) -> Path:
         wheel.writestr(f"{info}/RECORD", "")
         wheel.writestr("mani_skill/__init__.py", "raise ImportError('not meant to be imported')")
         for file in physics:
-            wheel.writestr(f"mani_skill/{file.origin.mani_skill}/{file.path}", contents(file))
+            wheel.writestr(f"{file.origin.folder}/{file.path}", contents(file))
     for name in [name for name in os.environ if name.startswith("PIP_")]:
         monkeypatch.delenv(name)
     monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
@@ -148,7 +150,7 @@ def wheel_index(tmp_path, monkeypatch, physics) -> Path:
 
 
 def test_the_wheel_comes_through_pip_and_only_robot_files_are_kept(wheel_index, store, physics):
-    ensure(physics, store, [ManiSkillWheel()])
+    ensure(physics, store, [PackageWheel(MANI_SKILL)])
     assert store.unusable(physics) == []
     kept = {path for path in store.root.rglob("*") if path.is_file()}
     extra = {path.name for path in kept - {store.path(file) for file in physics}}
@@ -164,20 +166,20 @@ def test_a_wheel_without_a_file_is_named(wheel_index, store, physics):
                 new.writestr(member, old.read(member))
     smaller.replace(archive)
     with pytest.raises(AssetError, match=r"lacks 1 files: mani_skill/assets/.*/hand\.stl"):
-        ensure(physics, store, [ManiSkillWheel()])
+        ensure(physics, store, [PackageWheel(MANI_SKILL)])
 
 
 def test_what_pip_says_is_passed_on(wheel_index, store, physics):
     next(wheel_index.iterdir()).unlink()
     with pytest.raises(AssetError, match="pip failed: No matching distribution found"):
-        ensure(physics, store, [ManiSkillWheel()])
+        ensure(physics, store, [PackageWheel(MANI_SKILL)])
 
 
 def test_a_python_without_pip_is_named(store, physics, monkeypatch):
     monkeypatch.setattr(wheel_source, "find_spec", lambda name: None)
     monkeypatch.setenv("PATH", "")
     with pytest.raises(AssetError, match="this Python has no pip.*and there is no uv"):
-        ensure(physics, store, [ManiSkillWheel()])
+        ensure(physics, store, [PackageWheel(MANI_SKILL)])
 
 
 def test_uv_runs_pip_where_python_has_none(wheel_index, store, physics, monkeypatch, tmp_path):
@@ -188,5 +190,5 @@ def test_uv_runs_pip_where_python_has_none(wheel_index, store, physics, monkeypa
     uv.chmod(0o755)
     monkeypatch.setenv("PATH", f"{uv.parent}:{os.environ['PATH']}")
     monkeypatch.setattr(wheel_source, "find_spec", lambda name: None)
-    ensure(physics, store, [ManiSkillWheel()])
+    ensure(physics, store, [PackageWheel(MANI_SKILL)])
     assert store.unusable(physics) == []

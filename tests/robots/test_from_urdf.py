@@ -22,7 +22,7 @@ from robots import (
     UrdfLocator,
 )
 from robots.assets.manifest import load_manifest
-from robots.assets.sources import find_mani_skill
+from robots.assets.packages import find_package
 from robots.data_module import write_module
 from robots.from_urdf import Guess, guess_descriptor, main
 from robots.registry import CATALOGUE
@@ -48,7 +48,7 @@ def urdf_of(robot: str) -> Path:
     locator = RobotRegistry.load(robot).urdf
     assert isinstance(locator, UrdfLocator)
     package = load_manifest().package(locator.package)
-    return find_mani_skill() / package.origin.mani_skill / locator.file
+    return find_package("mani_skill") / package.origin.folder / locator.file
 
 
 def guess(robot: str) -> Guess:

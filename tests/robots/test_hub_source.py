@@ -17,7 +17,8 @@ from robots import AssetError
 from robots.assets import hub_source
 from robots.assets.fetching import ensure
 from robots.assets.hub_source import HubSource
-from robots.assets.sources import InstalledManiSkill
+from robots.assets.packages import MANI_SKILL
+from robots.assets.sources import InstalledPackage
 from robots.assets.store import FileState
 from tests.process_trees import children_of
 from tests.robots.conftest import PANDA, contents
@@ -90,7 +91,7 @@ def test_an_unhelpful_api_is_named_and_the_next_source_is_used(
     hub.fail("GET", "/api/datasets/", fault)
     with pytest.raises(AssetError, match=reason):
         fetch_from_hub(store, physics)
-    ensure(physics, store, [HubSource(), InstalledManiSkill()])
+    ensure(physics, store, [HubSource(), InstalledPackage(MANI_SKILL)])
     assert_all_verified(store, physics)
     said = capfd.readouterr().err
     assert "installed mani_skill: 11 of 11 files" in said
@@ -199,7 +200,7 @@ def test_a_server_dying_midway_leaves_the_rest_to_the_next_source(
     hub: HubServer, store, physics, capfd
 ):
     hub.fail("GET", HAND, die, times=1)
-    ensure(physics, store, [HubSource(patience=4.0), InstalledManiSkill()])
+    ensure(physics, store, [HubSource(patience=4.0), InstalledPackage(MANI_SKILL)])
     assert_all_verified(store, physics)
     said = capfd.readouterr().err
     assert "Hugging Face Hub" in said
@@ -259,7 +260,7 @@ def test_a_read_only_cache_of_the_hub_is_a_reason_to_go_on(
     hub, store, physics, monkeypatch, read_only_folder, capfd
 ):
     monkeypatch.setenv("HF_HOME", str(read_only_folder))
-    ensure(physics, store, [HubSource(), InstalledManiSkill()])
+    ensure(physics, store, [HubSource(), InstalledPackage(MANI_SKILL)])
     assert_all_verified(store, physics)
     assert "the Hub's cache cannot be written" in capfd.readouterr().err
 
@@ -267,7 +268,7 @@ def test_a_read_only_cache_of_the_hub_is_a_reason_to_go_on(
 def test_a_full_cache_of_the_hub_is_a_reason_to_go_on(hub, store, physics, monkeypatch, capfd):
     limit = "import resource as r; r.setrlimit(r.RLIMIT_FSIZE, (12_000, 12_000)); "
     monkeypatch.setattr(hub_source, "_BOOT", limit + hub_source._BOOT)
-    ensure(physics, store, [HubSource(), InstalledManiSkill()])
+    ensure(physics, store, [HubSource(), InstalledPackage(MANI_SKILL)])
     assert_all_verified(store, physics)
     assert "the Hub's cache cannot be written: File too large" in capfd.readouterr().err
 

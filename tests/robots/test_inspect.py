@@ -10,11 +10,12 @@ import pytest
 
 from robots import RobotRegistry
 from robots.inspect import find_urdf, main, report
+from tests.catalogue import every_robot
 
 ROBOTS = RobotRegistry.names()
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", every_robot())
 def test_a_report_names_every_joint_number_keyframe_and_camera(name, store):
     robot = RobotRegistry.load(name)
     text = report(robot, store)
@@ -47,12 +48,12 @@ def test_files_are_told_with_state_and_source(store, physics, fill):
 
 
 def test_without_any_copy_the_report_says_what_is_missing(store, monkeypatch):
-    from robots.assets.sources import SourceError
+    from robots.assets.packages import SourceError
 
-    def refuse() -> Path:
-        raise SourceError("mani_skill is not installed")
+    def refuse(name: str) -> Path:
+        raise SourceError(f"{name} is not installed")
 
-    monkeypatch.setattr("robots.inspect.find_mani_skill", refuse)
+    monkeypatch.setattr("robots.inspect.find_package", refuse)
     text = report(RobotRegistry.load("panda"), store)
     assert "is missing; `python -m robots.fetch_assets panda` fetches it" in text
     assert "not known without the URDF" in text

@@ -13,7 +13,7 @@ import pytest
 from robots import AssetError, UnknownNameError, write_manifest
 from robots.assets import manifest
 from robots.assets.manifest import CHECKOUT_CACHE, Manifest, load_manifest
-from robots.assets.sources import find_mani_skill
+from robots.assets.packages import find_package
 from robots.write_manifest import build_package
 
 
@@ -44,7 +44,12 @@ def test_a_stale_manifest_is_noticed_and_rewritten(tmp_path, monkeypatch, capsys
 DUTIES = {
     "CC BY-NC 4.0": "name the authors, no commercial use",
     "Apache-2.0": "keep the licence file",
+    "BSD": "keep the copyright notice",
+    "BSD-3-Clause": "keep the copyright notice",
+    "CC BY-NC-SA 4.0": "share what you change under the same terms",
+    "MPL-2.0": "what you change in the files stays under it",
 }
+WHEELS = {"maniskill_": "mani_skill==3.0.1", "example_": "example-robot-data==6.0.0"}
 APACHE = ("maniskill_koch", "maniskill_so100")
 
 
@@ -52,7 +57,8 @@ def test_every_package_says_its_origin_and_licence():
     packages = load_manifest().packages
     for package in packages.values():
         assert DUTIES[package.origin.licence] in package.origin.licence_note
-        assert package.origin.wheel == "mani_skill==3.0.1"
+        prefix = package.origin.name.partition("_")[0] + "_"
+        assert package.origin.wheel == WHEELS[prefix]
     for name in (
         "maniskill_fetch",
         "maniskill_panda",
@@ -65,7 +71,7 @@ def test_every_package_says_its_origin_and_licence():
 
 
 def test_a_licence_that_is_not_known_is_refused(tmp_path):
-    folder = tmp_path / "assets" / "robots" / "toy"
+    folder = tmp_path / "mani_skill" / "assets" / "robots" / "toy"
     folder.mkdir(parents=True)
     (folder / "LICENSE").write_text("Ask me first.")
     with pytest.raises(AssetError, match="a licence this command does not know"):
@@ -96,7 +102,7 @@ def test_the_images_that_a_collada_mesh_names_are_pictures_too():
 
 
 def test_another_robot_needs_no_more_than_writing_the_manifest_again():
-    package = build_package("maniskill_so100", find_mani_skill(), {"so100.urdf"})
+    package = build_package("maniskill_so100", find_package("mani_skill"), {"so100.urdf"})
     paths = {file.path for file in package.needed("so100.urdf", pictures=False)}
     assert {"so100.urdf", "so100.srdf", "LICENSE"} < paths
     assert any(path.startswith("meshes/") for path in paths)
@@ -104,11 +110,11 @@ def test_another_robot_needs_no_more_than_writing_the_manifest_again():
 
 def test_a_package_that_is_no_folder_of_mani_skill_is_refused():
     with pytest.raises(AssetError, match="call it maniskill_<folder>"):
-        build_package("robotiq", find_mani_skill(), {"x.urdf"})
+        build_package("robotiq", find_package("mani_skill"), {"x.urdf"})
 
 
 def test_a_urdf_that_reaches_outside_its_folder_is_refused(tmp_path):
-    folder = tmp_path / "assets" / "robots" / "toy"
+    folder = tmp_path / "mani_skill" / "assets" / "robots" / "toy"
     folder.mkdir(parents=True)
     mesh = "<collision><geometry><mesh filename='../other/x.stl'/></geometry></collision>"
     (folder / "toy.urdf").write_text(f"<robot name='toy'><link name='a'>{mesh}</link></robot>")
@@ -144,7 +150,7 @@ def test_an_installation_reads_the_manifest_of_its_package(tmp_path, monkeypatch
         ("{}", "manifest has no 'packages'"),
         ('{"packages": []}', "manifest.packages is []; it must map names to values"),
         ("[" * 100_000, "its json nests deeper than"),
-        (None, r"files\['fetch.srdf'\] has no 'sha256'"),
+        (None, r"files\['LICENSE'\] has no 'sha256'"),
     ],
 )
 def test_a_damaged_manifest_is_one_error(tmp_path, monkeypatch, text, message):

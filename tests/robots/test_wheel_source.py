@@ -14,8 +14,9 @@ import pytest
 from robots import AssetError
 from robots.assets.fetching import ensure
 from robots.assets.manifest import load_manifest
+from robots.assets.packages import MANI_SKILL
 from robots.assets.store import AssetStore, FileState
-from robots.assets.wheel_source import ManiSkillWheel
+from robots.assets.wheel_source import PackageWheel
 from tests.process_trees import children_of
 from tests.robots.conftest import PANDA, contents
 from tests.robots.processes import is_alive, wait_until
@@ -48,7 +49,7 @@ def start_fetch() -> subprocess.Popen[str]:
 def test_one_download_brings_the_files_of_all_robots_with_their_licences(
     index, store, physics, capfd
 ):
-    ensure(physics, store, [ManiSkillWheel()])
+    ensure(physics, store, [PackageWheel(MANI_SKILL)])
     assert index.downloads == 1
     assert store.unusable(SMALL) == []
     said = capfd.readouterr().err
@@ -57,7 +58,7 @@ def test_one_download_brings_the_files_of_all_robots_with_their_licences(
     index.requests.clear()
     for package in load_manifest().packages.values():  # as a demonstration does, group by group
         small = [file for file in package.files if file in set(SMALL)]
-        ensure(small, store, [ManiSkillWheel()])
+        ensure(small, store, [PackageWheel(MANI_SKILL)])
     assert index.requests == []
 
 
@@ -66,7 +67,7 @@ def test_what_comes_along_replaces_nothing_that_is_there(index, store, physics):
     mine = next(f for f in SMALL if f.origin.name == "maniskill_koch")
     store.path(mine).parent.mkdir(parents=True)
     store.path(mine).write_text("my own")
-    ensure(physics, store, [ManiSkillWheel()])
+    ensure(physics, store, [PackageWheel(MANI_SKILL)])
     assert store.path(mine).read_text() == "my own"
 
 
@@ -116,7 +117,7 @@ def test_pip_that_drips_is_given_up(index, store, physics):
 
     index.wheel_fault = drip
     with pytest.raises(AssetError, match="next to nothing arrived through pip for 4 s"):
-        ensure(physics, store, [ManiSkillWheel(patience=4.0)])
+        ensure(physics, store, [PackageWheel(MANI_SKILL, patience=4.0)])
     end.set()
 
 
@@ -124,11 +125,11 @@ def test_pip_that_drips_is_given_up(index, store, physics):
 def test_a_member_that_unpacks_to_more_than_it_may_is_not_unpacked(index, store, physics):
     bomb = physics[0]
     packed = members(physics, contents)
-    packed[f"mani_skill/{bomb.origin.mani_skill}/{bomb.path}"] = bytes(3 * 10**7)
+    packed[f"{bomb.origin.folder}/{bomb.path}"] = bytes(3 * 10**7)
     index.wheel = build_wheel(packed)
     expected = rf"twice: {bomb} \(more than {bomb.bytes:,} bytes\)"
     with pytest.raises(AssetError, match=expected):
-        ensure(physics, store, [ManiSkillWheel()])
+        ensure(physics, store, [PackageWheel(MANI_SKILL)])
     assert store.unusable(physics) == [bomb]
 
 
@@ -136,9 +137,9 @@ def test_a_member_that_unpacks_to_more_than_it_may_is_not_unpacked(index, store,
 def test_what_comes_along_and_is_wrong_is_no_reason_to_fail(index, store, physics):
     wrong = next(file for file in PANDA.files if file not in physics)
     packed = members(physics, contents)
-    packed[f"mani_skill/{wrong.origin.mani_skill}/{wrong.path}"] = b"something else"
+    packed[f"{wrong.origin.folder}/{wrong.path}"] = b"something else"
     index.wheel = build_wheel(packed)
-    ensure(physics, store, [ManiSkillWheel()])
+    ensure(physics, store, [PackageWheel(MANI_SKILL)])
     assert store.unusable(physics) == []
     assert store.state(wrong) is FileState.MISSING
     assert index.downloads == 1
@@ -151,7 +152,7 @@ def test_no_room_for_what_comes_along_is_no_reason_to_fail(index, physics, tmp_p
     try:
         store = AssetStore(tmp_path / "assets")
         index.wheel = build_wheel(members(SMALL, contents))
-        ensure(physics, store, [ManiSkillWheel()])
+        ensure(physics, store, [PackageWheel(MANI_SKILL)])
         assert store.unusable(physics) == []
     finally:
         subprocess.run(["umount", tmp_path], check=True)

@@ -36,14 +36,14 @@ def build_wheel(contents: Mapping[str, bytes]) -> bytes:
 
 def members(files: Iterable[AssetFile], contents: Callable[[AssetFile], bytes]) -> dict[str, bytes]:
     """Return what a wheel holds of some robot files."""
-    return {f"mani_skill/{f.origin.mani_skill}/{f.path}": contents(f) for f in files}
+    return {f"{f.origin.folder}/{f.path}": contents(f) for f in files}
 
 
 class WheelIndex:
     """An index with one project; use it as a context manager."""
 
-    def __init__(self, wheel: bytes) -> None:
-        self.wheel = wheel
+    def __init__(self, wheel: bytes, filename: str = WHEEL) -> None:
+        self.wheel, self.filename = wheel, filename
         self.requests: list[str] = []
         self.page_fault: Fault | None = None
         self.wheel_fault: Fault | None = None
@@ -62,7 +62,7 @@ class WheelIndex:
     @property
     def downloads(self) -> int:
         """How often the wheel was asked for."""
-        return sum(path.endswith(WHEEL) for path in self.requests)
+        return sum(path.endswith(self.filename) for path in self.requests)
 
     def settings(self) -> dict[str, str]:
         """Return what makes pip use this index and nothing else."""
@@ -91,8 +91,12 @@ class _Handler(BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         index: WheelIndex = self.server.index
         index.requests.append(self.path)
-        is_wheel = self.path.endswith(WHEEL)
-        body = index.wheel if is_wheel else f'<a href="/files/{WHEEL}">{WHEEL}</a>'.encode()
+        is_wheel = self.path.endswith(index.filename)
+        body = (
+            index.wheel
+            if is_wheel
+            else f'<a href="/files/{index.filename}">{index.filename}</a>'.encode()
+        )
         fault = index.wheel_fault if is_wheel else index.page_fault
         if fault is not None:
             fault(self, body)

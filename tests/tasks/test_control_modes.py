@@ -11,6 +11,7 @@ from robots import CONTROL_MODES, DescriptorError, RobotRegistry, TaskError, Unk
 from rollouts.playing.plan_conversion import as_positions
 from simulation.sapien3.world import BuiltWorld
 from tasks.episode import Episode, play
+from tests.catalogue import every_robot
 from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, complaints, pair
 
@@ -87,7 +88,7 @@ def test_positions_move_everything_as_the_deltas_they_come_from(task_id):
         as_positions(second, 0, deltas)
 
 
-@pytest.mark.parametrize("robot", RobotRegistry.names())
+@pytest.mark.parametrize("robot", every_robot())
 def test_the_limits_are_those_of_the_robot_files(robot):
     simulated = BuiltWorld(single({"arm": robot})).robots["arm"]
     limits = {j.name: j.limits[0] for j in simulated.driven}
@@ -102,7 +103,7 @@ def test_the_limits_are_those_of_the_robot_files(robot):
         assert (np.abs(given[endless]) == np.float32(2 * np.pi)).all()
 
 
-@pytest.mark.parametrize("robot", RobotRegistry.names())
+@pytest.mark.parametrize("robot", every_robot())
 def test_a_robot_in_another_control_mode(robot):
     deltas = RobotRegistry.load(robot)
     assert deltas.in_control_mode(CONTROL_MODES[0]) == deltas

@@ -1,0 +1,33 @@
+"""SO-101 by TheRobotStudio, a small arm with one moving jaw: 5 + 1 action numbers."""
+
+from robots.assets.locator import UrdfLocator
+from robots.descriptor import ActionSplit, GripperMaterial, JointGroup, RobotDescriptor
+
+# fmt: off
+ARM = JointGroup(
+    ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll"), lower=-0.1,
+    upper=0.1, stiffness=1000.0, damping=(10.2, 9.71, 5.87, 2.0, 0.535), force_limit=10.0,
+    delta=True,
+    limits=((-1.91986, 1.91986), (-1.74533, 1.74533), (-1.69, 1.69), (-1.65806, 1.65806),
+        (-2.74385, 2.84121)),
+)
+GRIPPER = JointGroup(
+    ("gripper",), lower=-0.174533, upper=1.74533, stiffness=1000.0, damping=0.254,
+    force_limit=10.0, reset_noise=False, limits=((-0.174533, 1.74533),),
+)
+
+SO101 = RobotDescriptor(
+    name="so101",
+    urdf=UrdfLocator("example_so_arm_description", "urdf/so101.urdf"),
+    action_split=ActionSplit(arm=ARM, gripper=GRIPPER),
+    tcp_link="gripper_frame_link",
+    gripper_material=GripperMaterial(
+        ("gripper_link", "moving_jaw_so101_v1_link"), 2.0, 2.0, 0.0, patch_radius=0.1,
+    ),
+    keyframes={
+        "rest": (0.0, 0.0, 0.0, 0.0, 0.0, 1.74533),
+    },
+    reach=0.48,  # of the TCP, from the URDF
+    source="example-robot-data 6.0.0, so_arm_description; drives from each joint's inertia",
+    allowed_collisions=(),
+)

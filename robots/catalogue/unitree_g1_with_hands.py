@@ -1,0 +1,47 @@
+"""Unitree G1 of 29 joints with hands of three fingers, on legs that stand still: 2 × (7 + 7)."""
+
+from dataclasses import replace
+
+from robots.assets.locator import UrdfLocator
+from robots.catalogue.unitree_g1 import UNITREE_G1
+from robots.descriptor import ActionSplit, GripperMaterial, JointGroup
+from robots.link_pairs import among
+
+# fmt: off
+SIDES = ("left", "right")
+GROUPS = UNITREE_G1.action_split.groups
+HAND = ("thumb_0", "thumb_1", "thumb_2", "middle_0", "middle_1", "index_0", "index_1")
+LEFT_GRIPPER = JointGroup(
+    tuple(f"left_hand_{joint}_joint" for joint in HAND), lower=-0.1, upper=0.1, delta=True,
+    stiffness=1e3, damping=2e1, force_limit=(2.45, 1.4, 1.4, 1.4, 1.4, 1.4, 1.4),
+    reset_noise=False,
+    limits=((-1.0471976, 1.0471976), (-0.61086524, 1.0471976), (0.0, 1.7453293), (-1.5707964, 0.0),
+            (-1.7453293, 0.0), (-1.5707964, 0.0), (-1.7453293, 0.0)),
+)
+RIGHT_GRIPPER = replace(
+    LEFT_GRIPPER,
+    joints=tuple(f"right_hand_{joint}_joint" for joint in HAND),
+    limits=tuple((-upper, -lower) for lower, upper in LEFT_GRIPPER.limits),
+)
+
+UNITREE_G1_WITH_HANDS = replace(
+    UNITREE_G1,
+    name="unitree_g1_with_hands",
+    urdf=UrdfLocator("example_g1_description", "urdf/g1_29dof_with_hand_rev_1_0.urdf"),
+    action_split=ActionSplit(
+        left_arm=GROUPS["left_arm"], left_gripper=LEFT_GRIPPER, right_arm=GROUPS["right_arm"],
+        right_gripper=RIGHT_GRIPPER, torso=GROUPS["torso"], legs=GROUPS["legs"]),
+    tcp_link="left_hand_palm_link",
+    tcp_position_links=("left_hand_thumb_2_link", "left_hand_index_1_link"),
+    gripper_material=GripperMaterial(
+        tuple(f"{side}_hand_{part}_link" for side in SIDES for part in HAND), 2.0, 2.0, 0.0,
+        patch_radius=0.1),
+    keyframes={"rest": (0,) * 43},
+    reach=0.629,  # of the left TCP, from the URDF
+    allowed_collisions=among(  # neighbours, and what overlaps however the joints stand
+        *((f"{side}_shoulder_pitch_link", "head_link", "logo_link") for side in SIDES),
+        *((f"{side}_wrist_yaw_link", f"{side}_hand_palm_link", f"{side}_hand_{finger}_0_link")
+          for side in SIDES for finger in ("thumb", "index", "middle")),
+        *((f"{side}_wrist_pitch_link", f"{side}_hand_palm_link") for side in SIDES),
+        *((f"{side}_hip_pitch_link", "pelvis_contour_link") for side in SIDES)),
+)
