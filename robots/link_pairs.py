@@ -11,5 +11,5 @@ def among(*groups: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
     Args:
         groups: Link names; a link may be in several groups.
     """
-    pairs = {tuple(sorted(pair)): pair for group in groups for pair in combinations(group, 2)}
-    return tuple(pairs.values())
+    pairs = (pair for group in groups for pair in combinations(group, 2))
+    return tuple({frozenset(pair): pair for pair in pairs}.values())

@@ -8,7 +8,8 @@ from robots.link_pairs import among
 
 # fmt: off
 SIDES = ("left", "right")
-FINGERS = tuple(f"{side}_gripper_{finger}_finger" for side in "lr" for finger in "lr")
+LEFT = ("l_gripper_l_finger", "l_gripper_r_finger")
+FINGERS = (*LEFT, "r_gripper_l_finger", "r_gripper_r_finger")
 BODY = ("torso", "sonar_ring", "pedestal", "collision_head_link_1", "collision_head_link_2")
 LEFT_ARM = JointGroup(
     tuple(f"left_{joint}" for joint in ("s0", "s1", "e0", "e1", "w0", "w1", "w2")),
@@ -39,7 +40,7 @@ BAXTER = RobotDescriptor(
     ),
     tcp_link="left_gripper",
     gripper_material=GripperMaterial(FINGERS, 2.0, 2.0, 0.0, patch_radius=0.1),
-    fingers=Fingers(FINGERS[:2], opening_signs=(1, 1)),
+    fingers=Fingers(LEFT, opening_signs=(1, 1)),
     keyframes={"rest": (*REST, *REST, 0.0)},
     reach=1.468,  # of the left TCP, from the URDF; data sheet 1.21 from the shoulder
     source="example-robot-data 6.0.0, baxter_description; drives from each joint's inertia",
@@ -54,6 +55,6 @@ BAXTER = RobotDescriptor(
             ("lower_forearm", "wrist", "hand_link", "gripper_base_link"))),
         *((f"{side}_wrist", f"{side}_hand_link", f"{side}_gripper_base_link", f, f"{f}_tip")
           for side in SIDES for f in FINGERS if f[0] == side[0]),
-        FINGERS[:2], FINGERS[2:],
+        LEFT, FINGERS[2:],
     ),
 )

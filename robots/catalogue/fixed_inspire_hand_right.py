@@ -1,5 +1,6 @@
 """Inspire RH56DFX right hand on its wrist, five fingers: 2 + 6 action numbers."""
 
+from dataclasses import replace
 from math import cos, pi, sin
 
 from robots.assets.locator import UrdfLocator
@@ -8,28 +9,31 @@ from robots.link_pairs import among
 
 FINGERS = ("index", "middle", "ring", "pinky")
 THUMB = ("metacarpal_base", "metacarpal", "proximal", "distal")
-THIRD = 4 / 3  # from the thumb's root to its middle joint
+SWING = ((-0.3954916, 0.38606682), (-0.44505897, 0.44505897))  # of the wrist
 
 
 def hand(side: str) -> RobotDescriptor:
     """Return a hand; it is ``left`` or ``right``."""
     hand = f"{side}_hand"
-    drive = {"stiffness": 1e3, "damping": 1e2, "force_limit": 20.0}
-    small = {"lower": -0.1, "upper": 0.1, "delta": True, **drive}
+    turn = JointGroup(
+        (f"{hand}_thumb_CMC_yaw_joint",), -0.1, 0.1, 1e3, 1e2, 20.0, delta=True,
+        limits=((-1.3089969, 0.0),),
+    )  # fmt: skip
     wrist = tuple(f"{hand}_wrist_{way}_joint" for way in ("pitch", "yaw"))
-    swing = ((-0.39549160850191506, 0.3860668305411457), (-0.445058959258554, 0.445058959258554))
-    thumb = tuple(f"{hand}_thumb_{joint}_joint" for joint in ("CMC_pitch", "MCP", "IP"))
-    turn = JointGroup((f"{hand}_thumb_CMC_yaw_joint",), limits=((-1.3089969, 0.0),), **small)
     # The joints that follow are driven like those they follow, as the URDF couples them.
-    ratios = {"multipliers": (1, THIRD, THIRD / 2), "offsets": (0, -0.0814487, -0.0407243)}
-    bend = JointGroup(thumb, -0.47, 0.0, mimic=True, reset_noise=False, **ratios, **drive)
-    groups = {"wrist": JointGroup(wrist, limits=swing, **{**small, "force_limit": 100.0})}
+    bend = JointGroup(
+        tuple(f"{hand}_thumb_{joint}_joint" for joint in ("CMC_pitch", "MCP", "IP")),
+        -0.47, 0.0, 1e3, 1e2, 20.0, mimic=True, reset_noise=False,
+        multipliers=(1.0, 4 / 3, 2 / 3), offsets=(0.0, -0.0814487, -0.0407243),
+    )  # fmt: skip
+    groups = {"wrist": replace(turn, joints=wrist, force_limit=100.0, limits=SWING)}
     groups |= {"thumb_turn": turn, "thumb": bend}
     for name in FINGERS:
         joints = (f"{hand}_{name}_MCP_joint", f"{hand}_{name}_PIP_joint")
-        ratios = {"multipliers": (1.0, 1.06399), "offsets": (0.0, -0.167348)}
-        groups[name] = JointGroup(joints, -1.33, 0.0, mimic=True, reset_noise=False,
-                                  **ratios, **drive)  # fmt: skip
+        ratios, offsets = (1.0, 1.06399), (0.0, -0.167348)
+        groups[name] = replace(
+            bend, joints=joints, lower=-1.33, multipliers=ratios, offsets=offsets
+        )
     links = tuple(f"{hand}_thumb_{part}" for part in THUMB)
     links += tuple(f"{hand}_{name}_{part}" for name in FINGERS for part in ("proximal", "middle"))
     palm = (f"{hand}_wrist_base_link", f"{hand}_wrist_link", f"{hand}_hand_base_link")

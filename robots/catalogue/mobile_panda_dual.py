@@ -5,10 +5,10 @@ from dataclasses import replace
 from robots.assets.locator import UrdfLocator
 from robots.catalogue.mobile_panda import BASE, LIFT, MOBILE_PANDA
 from robots.catalogue.panda import ARM, PANDA
-from robots.descriptor import ActionSplit, GripperMaterial, JointGroup, names
+from robots.descriptor import ActionSplit, Fingers, GripperMaterial, JointGroup, names
 
-LINKS = ("panda_leftfinger", "panda_rightfinger")
-FINGERS = tuple(f"{side}_{link}" for side in ("left", "right") for link in LINKS)
+LEFT = ("left_panda_leftfinger", "left_panda_rightfinger")
+FINGERS = (*LEFT, "right_panda_leftfinger", "right_panda_rightfinger")
 
 
 def gripper(side: str) -> JointGroup:
@@ -32,6 +32,6 @@ MOBILE_PANDA_DUAL = replace(
     ),
     tcp_link="left_panda_hand_tcp",
     gripper_material=GripperMaterial(FINGERS, 2.0, 2.0, 0.0, patch_radius=0.1),
-    fingers=replace(PANDA.fingers, links=FINGERS[:2]),
+    fingers=Fingers(LEFT),
     keyframes={"rest": (*PANDA.keyframe("rest") * 2, 0.0, 0, 0, 0)},
 )

@@ -1,6 +1,7 @@
 """Willow Garage PR2, two arms with grippers, on a base that stands still: 2 × (7 + 1) numbers."""
 
 from dataclasses import replace
+from functools import partial
 from math import pi
 
 from robots.assets.locator import UrdfLocator
@@ -8,9 +9,8 @@ from robots.descriptor import ActionSplit, GripperMaterial, JointGroup, RobotDes
 from robots.link_pairs import among
 
 # fmt: off
-STIFF = {"stiffness": 1e5, "damping": 1e5, "force_limit": 1e5}
+still = partial(JointGroup.hold, stiffness=1e5, damping=1e5, force_limit=1e5)
 TURNS = (-2 * pi, 2 * pi)  # of joints that turn without end
-HEAD = ("head_pan_joint", "head_tilt_joint", "laser_tilt_mount_joint")
 FINGERS = ("l_finger", "r_finger", "l_finger_tip", "r_finger_tip")
 HAND = (*FINGERS, "l_parallel", "r_parallel")
 LIMITS = ((-2.3213, 0.0), TURNS, (-2.094, 0.0), TURNS)
@@ -38,10 +38,10 @@ PR2 = RobotDescriptor(
     name="pr2",
     urdf=UrdfLocator("example_pr2_description", "urdf/pr2.urdf"),
     action_split=ActionSplit(
-        left_arm=LEFT_ARM, left_gripper=LEFT_GRIPPER, right_arm=RIGHT_ARM,
-        right_gripper=RIGHT_GRIPPER,
-        torso=JointGroup.hold(("torso_lift_joint",), unit="m", **STIFF),
-        head=JointGroup.hold(HEAD, **STIFF)),
+        left_arm=LEFT_ARM, left_gripper=LEFT_GRIPPER,
+        right_arm=RIGHT_ARM, right_gripper=RIGHT_GRIPPER,
+        torso=still(("torso_lift_joint",), unit="m"),
+        head=still(("head_pan_joint", "head_tilt_joint", "laser_tilt_mount_joint"))),
     tcp_link="l_gripper_tool_frame",
     gripper_material=GripperMaterial(
         tuple(f"{side}_gripper_{f}_link" for side in "lr" for f in FINGERS), 2.0, 2.0, 0.0, 0.1),

@@ -1,6 +1,7 @@
 """PAL Robotics Talos, two arms with grippers on a body that stands still: 2 × (7 + 1) numbers."""
 
 from dataclasses import replace
+from functools import partial
 
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, GripperMaterial, JointGroup, RobotDescriptor
@@ -8,7 +9,7 @@ from robots.link_pairs import among
 
 # fmt: off
 SIDES = ("left", "right")
-STIFF = {"stiffness": 1e5, "damping": 1e5, "force_limit": 1e5}
+still = partial(JointGroup.hold, stiffness=1e5, damping=1e5, force_limit=1e5)
 LIMITS = ((-2.443461, 2.443461), (-2.3561945, 0.0), (-2.5307274, 2.5307274),
           (-1.3962634, 1.3962634), (-0.6981317, 0.6981317))
 GRIPPER = ("base", "motor_double", "inner_double", "fingertip_1", "fingertip_2", "motor_single",
@@ -43,10 +44,9 @@ TALOS = RobotDescriptor(
     action_split=ActionSplit(
         left_arm=LEFT_ARM, left_gripper=LEFT_GRIPPER,
         right_arm=RIGHT_ARM, right_gripper=replace(LEFT_GRIPPER, joints=("gripper_right_joint",)),
-        torso=JointGroup.hold(("torso_1_joint", "torso_2_joint"), **STIFF),
-        head=JointGroup.hold(("head_1_joint", "head_2_joint"), **STIFF),
-        legs=JointGroup.hold(
-            tuple(f"leg_{side}_{i}_joint" for side in SIDES for i in range(1, 7)), **STIFF)),
+        torso=still(("torso_1_joint", "torso_2_joint")),
+        head=still(("head_1_joint", "head_2_joint")),
+        legs=still(tuple(f"leg_{side}_{i}_joint" for side in SIDES for i in range(1, 7)))),
     tcp_link="gripper_left_fingertip_2_link",
     gripper_material=GripperMaterial(
         tuple(f"gripper_{side}_{part}_link" for side in SIDES for part in GRIPPER), 2.0, 2.0, 0.0,

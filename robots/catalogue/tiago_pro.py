@@ -1,6 +1,7 @@
 """PAL Robotics TIAGo Pro, two arms, on a base that stands still: 2 × (7 + 1) action numbers."""
 
 from dataclasses import replace
+from functools import partial
 
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, JointGroup, RobotDescriptor
@@ -8,7 +9,7 @@ from robots.link_pairs import among
 
 # fmt: off
 SIDES, ENDS = ("left", "right"), ("front", "rear")
-STIFF = {"stiffness": 1e5, "damping": 1e5, "force_limit": 1e5}
+still = partial(JointGroup.hold, stiffness=1e5, damping=1e5, force_limit=1e5)
 BEND, WRIST, TURN = (-2.443461, 1.134464), (-1.8849556, 3.0019662), (-2.6179938, 2.6179938)
 OPEN = 0.80285144  # rad
 WHEELS = tuple(f"wheel_{end}_{side}" for end in ENDS for side in SIDES)
@@ -39,9 +40,9 @@ TIAGO_PRO = RobotDescriptor(
     action_split=ActionSplit(
         left_arm=LEFT_ARM, left_gripper=GRIPPER, right_arm=RIGHT_ARM,
         right_gripper=replace(GRIPPER, joints=JOINTS["right"]),
-        torso=JointGroup.hold(("torso_lift_joint",), unit="m", **STIFF),
-        head=JointGroup.hold(("head_1_joint", "head_2_joint"), **STIFF),
-        wheels=JointGroup.hold(tuple(f"{wheel}_joint" for wheel in WHEELS), **STIFF)),
+        torso=still(("torso_lift_joint",), unit="m"),
+        head=still(("head_1_joint", "head_2_joint")),
+        wheels=still(tuple(f"{wheel}_joint" for wheel in WHEELS))),
     tcp_link="gripper_left_base_link",
     tcp_position_links=("gripper_left_fingertip_left_link", "gripper_left_fingertip_right_link"),
     keyframes={"rest": (0.343331, 0.067992, 0.503395, -0.938694, -1.153419, 2.114344, 0.018755,

@@ -1,6 +1,7 @@
 """Unitree G1 of 29 joints, two arms on legs that stand still: 7 + 7 action numbers."""
 
 from dataclasses import replace
+from functools import partial
 
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, JointGroup, RobotDescriptor
@@ -8,7 +9,7 @@ from robots.link_pairs import among
 
 # fmt: off
 SIDES = ("left", "right")
-STIFF = {"stiffness": 1e5, "damping": 1e5, "force_limit": 1e5}
+still = partial(JointGroup.hold, stiffness=1e5, damping=1e5, force_limit=1e5)
 ARM = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_roll", "wrist_pitch",
        "wrist_yaw")
 LEG = ("hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll")
@@ -35,10 +36,10 @@ UNITREE_G1 = RobotDescriptor(
     action_split=ActionSplit(
         left_arm=LEFT_ARM,
         right_arm=RIGHT_ARM,
-        torso=JointGroup.hold(
-            tuple(f"waist_{way}_joint" for way in ("yaw", "roll", "pitch")), **STIFF),
-        legs=JointGroup.hold(
-            tuple(f"{side}_{joint}_joint" for side in SIDES for joint in LEG), **STIFF),
+        torso=still(
+            tuple(f"waist_{way}_joint" for way in ("yaw", "roll", "pitch"))),
+        legs=still(
+            tuple(f"{side}_{joint}_joint" for side in SIDES for joint in LEG)),
     ),
     tcp_link="left_rubber_hand",
     keyframes={"rest": (0,) * 29},

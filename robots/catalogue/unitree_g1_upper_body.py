@@ -10,14 +10,15 @@ HAND = ("zero", "one", "two", "three", "four", "five", "six")
 CLOSE = ("one", "three", "four", "five", "six", "palm", "elbow_roll")  # overlap, harmlessly
 THUMB = ((-0.523598, 0.523598), (-1.0, 1.2), (0.0, 1.84))
 BENDS = ((-1.84, 0.3), (-1.84, 0.0))  # of a finger
-LIMITS = {
+Limits = tuple[tuple[float, float], ...]
+LIMITS: dict[str, Limits] = {
     "arm": ((-2.9671, 2.7925), (-1.5882, 2.2515), (-2.618, 2.618), (-0.2268, 3.4208),
             (-2.0943, 2.0943)),
     "hand": (*THUMB, *BENDS, *BENDS),
 }  # fmt: skip
 
 
-def group(side: str, parts: tuple[str, ...], limits: tuple, step: float) -> JointGroup:
+def group(side: str, parts: tuple[str, ...], limits: Limits, step: float) -> JointGroup:
     """Return joints of one side (step: rad); the right side is the left one in a mirror."""
     turned = ("shoulder_roll", *HAND[1:])
     if side == "right":

@@ -34,7 +34,7 @@ def test_an_unknown_name_is_a_key_error_with_the_closest_match_and_the_choices()
         f" Choices: {', '.join(CATALOGUE)}."
         " Add your own with RobotRegistry.register(descriptor)."
     )
-    with pytest.raises(UnknownNameError, match="^unknown robot 'xyz'. Choices: fetch,"):
+    with pytest.raises(UnknownNameError, match="^unknown robot 'xyz'. Choices: ability_hand_left,"):
         RobotRegistry.load("xyz")
 
 

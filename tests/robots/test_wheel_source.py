@@ -24,7 +24,7 @@ from tests.robots.wheel_index import WheelIndex, build_wheel, members, without_p
 
 CHECKOUT = Path(__file__).parents[2]
 SMALL = [f for package in load_manifest().packages.values() for f in package.files]
-SMALL = [file for file in SMALL if file.bytes < 50_000]
+SMALL = [f for f in SMALL if f.bytes < 50_000 and f.origin.distribution == MANI_SKILL.name]
 FETCH = [sys.executable, "-m", "robots.fetch_assets", "panda", "--physics-only", "--source"]
 
 
