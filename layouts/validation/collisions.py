@@ -270,7 +270,8 @@ def _measure(one: Postures, other: Postures, posture: int, a: int, b: int) -> Ap
         pose = body.poses[posture, hull]
         place = fcl.Transform(pose[:3, :3], pose[:3, 3])
         bodies.append(fcl.CollisionObject(body.hulls[hull].geometry, place))
-    distance, points = float(fcl.distance(*bodies, request, result)), result.nearest_points
+    distance = float(fcl.distance(*bodies, request, result))
+    points: Any = result.nearest_points
     if distance <= 0.0:
         depth, points = overlap(_corners(one, posture, a), _corners(other, posture, b))
         distance = -depth

@@ -24,9 +24,15 @@ class ExcludedPair:
 
 
 def srdf_beside(urdf: Path) -> Path | None:
-    """Return the SRDF beside a URDF, or None if there is none."""
-    srdf = urdf.with_suffix(".srdf")
-    return srdf if os.path.lexists(srdf) else None
+    """Return the SRDF of a URDF's name, or None if there is none.
+
+    It lies beside the URDF, or in a folder ``srdf`` beside the URDF's, as in ROS packages.
+    """
+    beside = urdf.with_suffix(".srdf")
+    for srdf in (beside, urdf.parent.parent / "srdf" / beside.name):
+        if os.path.lexists(srdf):
+            return srdf
+    return None
 
 
 def read_excluded_pairs(urdf: Path) -> tuple[ExcludedPair, ...]:

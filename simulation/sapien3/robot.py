@@ -19,6 +19,8 @@ from simulation.sapien3.blueprint import Blueprint
 # that slide at 0.2 m/s are light: a hit that harms nothing makes them ten times as fast.
 SPEEDS = {"rad": (2.0, 2 * np.pi, 100.0), "m": (0.5, 1.0, 10.0)}
 
+_STILL = np.zeros(3, np.float32)
+
 
 class SimulatedRobot:
     """One robot of one world.
@@ -117,8 +119,8 @@ class SimulatedRobot:
         """Zero every velocity and force, leaving positions alone."""
         still = np.zeros(len(self.joints), np.float32)
         self.articulation.set_qvel(still)
-        self.articulation.set_root_linear_velocity(still[:3])
-        self.articulation.set_root_angular_velocity(still[:3])
+        self.articulation.set_root_linear_velocity(_STILL)
+        self.articulation.set_root_angular_velocity(_STILL)
         self.articulation.set_qf(still)
 
     def _set_drives(self) -> None:

@@ -11,7 +11,7 @@ import yourdfpy
 from scipy.spatial.transform import Rotation
 
 from layouts import single
-from robots import LayoutError, RobotDescriptor, RobotRegistry
+from robots import LayoutError, RobotDescriptor
 from tests.catalogue import every_robot
 from tests.layouts.cells import hung, link_poses, mixed_cell, random_positions, skeleton
 from tests.robots.damaged_robots import BOX, REPAIRS, joint, shape, with_tip, write_damaged

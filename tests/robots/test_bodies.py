@@ -13,7 +13,7 @@ from robots.bodies.hulls import load_model, read_hulls
 from robots.bodies.overlaps import always_overlapping, guess_allowed, neighbours
 from robots.data_module import write_module
 from robots.urdf.reading import read_model
-from robots.urdf.srdf import ExcludedPair
+from robots.urdf.srdf import ExcludedPair, read_excluded_pairs
 from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree
 from tests.layouts.small_robots import joint, link, robot, urdf
@@ -174,3 +174,15 @@ def test_links_left_out_as_distant_never_come_near(tmp_path):
         for one, other in left_out:
             apart = np.linalg.norm(corners[one][:, None] - corners[other], axis=-1).min()
             assert apart > MARGIN
+
+
+def test_the_srdf_of_a_ros_package_lies_in_a_folder_of_its_own(tmp_path):
+    for folder in ("urdf", "srdf"):
+        (tmp_path / folder).mkdir()
+    urdf, srdf = tmp_path / "urdf" / "toy.urdf", tmp_path / "srdf" / "toy.srdf"
+    assert read_excluded_pairs(urdf) == ()
+    srdf.write_text('<robot name="toy"><disable_collisions link1="a" link2="b"/></robot>')
+    assert read_excluded_pairs(urdf) == (ExcludedPair(("a", "b"), ""),)
+    beside = urdf.with_suffix(".srdf")
+    beside.write_text('<robot name="toy"/>')
+    assert read_excluded_pairs(urdf) == ()

@@ -22,6 +22,8 @@ def simulate(urdf) -> Simulation:
 @pytest.mark.parametrize("kind", TEXTS)
 def test_it_steps(kind, tmp_path):
     simulation = simulate(write_damaged(tmp_path, TEXTS[kind]))
+    simulation.clear([0])
+    simulation.worlds[0].stand("arm", simulation.layout["arm"].start_qpos)
     action = np.ones((1, simulation.layout["arm"].robot.action_dim), np.float32)
     for _ in range(5):
         simulation.step(action, simulation.read().joint_positions)
