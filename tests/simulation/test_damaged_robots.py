@@ -14,8 +14,8 @@ from tests.robots.damaged_robots import FINE, REPAIRS, with_tip, write_damaged
 TEXTS = {**{kind: text for kind, (text, _) in REPAIRS.items()}, **FINE}
 
 
-def simulate(urdf) -> Simulation:
-    robot = RobotDescriptor.from_urdf(urdf, quiet=True)
+def simulate(urdf, **better) -> Simulation:
+    robot = RobotDescriptor.from_urdf(urdf, quiet=True, **better)
     return Simulation(single({"arm": robot}), lambda world, _: None, 1, PhysicsSettings())
 
 
@@ -55,7 +55,7 @@ def test_mirrored_meshes_that_touch_do_not_end_the_process(tmp_path):
     lever = trimesh.creation.box((0.1, 0.2, 1.5))
     lever.apply_translation((0, 0.3, 0))
     lever.export(urdf.parent / "lever.stl")
-    simulation = simulate(urdf)
+    simulation = simulate(urdf, allowed_collisions=())
     world = worlds_below(simulation)[0]
     simulation.step(np.zeros((1, 2), np.float32), simulation.read().joint_positions)
     assert world.system.get_contacts() or world.scene.get_contacts()
