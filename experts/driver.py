@@ -8,6 +8,7 @@ import numpy as np
 
 from kinematics.rotations import Floats
 from robots import JointGroup, RobotDescriptor
+from robots.action_split import is_gripper
 
 GAIN = 2.0  # of the joint error; PhysX's drive follows about 0.4 of a target in one step
 
@@ -36,7 +37,7 @@ class ArmDriver:
         goals = dict(zip(self._arm_joints, goal, strict=True))
         parts: list[Floats] = []
         for name, group in self._groups.items():
-            if name == "gripper" or group.held:
+            if is_gripper(name) or group.held:
                 parts.append(np.full(group.size, gripper))
             else:
                 parts.append(self._towards(group, goals, qpos))

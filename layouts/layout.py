@@ -183,8 +183,9 @@ class Layout(Arrangement):
 
         Raises:
             LayoutError: If an argument makes no sense.
-            AssetError: If a robot's files cannot be found or make no sense.
-            DescriptorError: If a robot's descriptor contradicts its URDF.
+            AssetError: If no robot's files can be found and make sense. Where only some cannot,
+                a finding says so.
+            DescriptorError: If the robots' descriptors contradict their URDFs.
             MissingPackageError: If python-fcl is not installed.
         """
         from layouts.validation import validate

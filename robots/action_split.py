@@ -15,6 +15,11 @@ def names(prefix: str, first: int, last: int) -> tuple[str, ...]:
     return tuple(f"{prefix}{i}" for i in range(first, last + 1))
 
 
+def is_gripper(group: str) -> bool:
+    """Tell whether a joint group drives a gripper: it is called one, as ``left_gripper`` is."""
+    return "gripper" in group.split("_")
+
+
 @dataclass(frozen=True)
 class JointGroup:
     """Joints that are driven together, and the action numbers that drive them.

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NoReturn, Protocol, runtime_checkable
 
-from robots.action_split import ActionNumber, ActionSplit, JointGroup, names
+from robots.action_split import ActionNumber, ActionSplit, JointGroup, is_gripper, names
 from robots.common.errors import DescriptorError, UnknownNameError
 from robots.common.fields import settle_fields
 
@@ -286,11 +286,11 @@ class RobotDescriptor:
 
     @property
     def arm_joints(self) -> tuple[str, ...]:
-        """Joints of every group that is neither a ``gripper`` by its name nor held."""
+        """Joints of every group that is neither a gripper, by its name, nor held."""
         driven = [
             group
             for name, group in self.action_split.groups.items()
-            if "gripper" not in name.split("_") and not group.held
+            if not is_gripper(name) and not group.held
         ]
         return tuple(joint for group in driven for joint in group.joints)
 

@@ -11,14 +11,15 @@ from robots.common.files import read_regular
 from robots.descriptor import UrdfSource
 from robots.urdf.mesh_files import MAX_MESH_BYTES
 from robots.urdf.srdf import srdf_beside
-from robots.urdf.summary import read_references, read_urdf
+from robots.urdf.summary import read_references, read_urdf, read_written
 
 
 def asset_fingerprint(source: UrdfSource) -> str:
     """Return a SHA-256, in hex, over every file that physics reads.
 
     These are the URDF, the SRDF beside it if there is one, and the collision meshes, each with
-    its path relative to the URDF; where on this machine they are makes no difference.
+    its path relative to the URDF; where on this machine they are makes no difference. Of a xacro
+    template it is what the template makes, and the paths in that.
 
     Args:
         source: Where the URDF comes from; files are fetched and checked as for a simulation.
@@ -29,16 +30,17 @@ def asset_fingerprint(source: UrdfSource) -> str:
     urdf = source.locate()
     digest = hashlib.sha256()
     try:
-        for path in _physics_files(urdf):
+        contents = [(urdf, read_written(urdf))]
+        contents += ((path, read_regular(path, MAX_MESH_BYTES)) for path in _beside(urdf))
+        for path, data in contents:
             name = Path(os.path.relpath(path, urdf.parent)).as_posix()
-            contents = hashlib.sha256(read_regular(path, MAX_MESH_BYTES)).hexdigest()
-            digest.update(f"{contents}  {name}\n".encode())
+            digest.update(f"{hashlib.sha256(data).hexdigest()}  {name}\n".encode())
     except UnreadableFileError as error:
         raise AssetError(str(error)) from error
     return digest.hexdigest()
 
 
-def _physics_files(urdf: Path) -> list[Path]:
+def _beside(urdf: Path) -> list[Path]:
     references = read_references(read_urdf(urdf), urdf.as_posix(), exists=os.path.isfile)
     srdf = srdf_beside(urdf)
-    return [urdf, *([srdf] if srdf else []), *map(Path, references.collision)]
+    return [*([srdf] if srdf else []), *map(Path, references.collision)]

@@ -2,45 +2,38 @@
 
 from __future__ import annotations
 
-import random
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from kinematics.rotations import Floats, inverse_pose, transform
-from kinematics.solve import farthest
-from kinematics.tree import Tree
+from kinematics.rotations import Floats
 from robots.assets.locator import LocalUrdf
 from robots.bodies.allowed import joined_pairs, rigid_pairs
 from robots.bodies.hulls import Hull, counted_pairs, read_hulls
-from robots.bodies.overlaps import guess_allowed
+from robots.bodies.overlaps import guess_allowed, overlapping
 from robots.common.errors import DescriptorError
-from robots.descriptor import (
-    ActionSplit,
-    Fingers,
-    GripperMaterial,
-    JointGroup,
-    RobotDescriptor,
-)
-from robots.guessing.drives import CONTROL_STEP, Drives, alike, drive_fields
+from robots.descriptor import ActionSplit, Fingers, JointGroup, RobotDescriptor
+from robots.guessing.drives import Drives
 from robots.guessing.fingertips import Fingertips
-from robots.guessing.grippers import Gripper, find_gripper
-from robots.guessing.posture import PostureSearch
+from robots.guessing.grasps import find_fingers, find_material
+from robots.guessing.grippers import Gripper, entangled, find_gripper
+from robots.guessing.groups import arm_groups, held_groups
+from robots.guessing.posture import Posture, PostureSearch
+from robots.guessing.reach import find_reach
 from robots.guessing.stance import Stance
 from robots.guessing.tool import Tool, find_tool
-from robots.urdf.anatomy import FARTHEST_SLIDE, PARTS, Anatomy, Limb, find_anatomy
+from robots.urdf.anatomy import Anatomy, Limb, find_anatomy
 from robots.urdf.masses import read_masses
-from robots.urdf.model import ModelJoint, UrdfModel
+from robots.urdf.model import UrdfModel
 from robots.urdf.reading import read_model
 from robots.urdf.summary import parse_urdf, read_cleaned
-from robots.urdf.tree import kinematic_tree
 
-REACH_STARTS = 8  # of the search for the largest distance
+LinkPairs = tuple[tuple[str, str], ...]
+
+LISTED = 6  # pairs of links that a reason names
 
 
 @dataclass(frozen=True)
@@ -98,22 +91,23 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     cleaned = read_cleaned(path)
     parts = _look_at(path, cleaned.xml)
     main = parts.anatomy.limbs[0]
-    split, drives = _action_split(parts)
-    allowed, overlaps = guess_allowed(parts.model, path)
-    rest, stance = _rest(parts, allowed)
-    distance, measured = _reach(parts, main, rest)
+    split = _action_split(parts)
+    allowed, overlaps = _may_overlap(parts, path)
+    rest, posture = _rest(parts, allowed)
+    distance, measured = find_reach(parts.model, main, parts.tools[main.name], rest)
+    fingers, grasping = _fingers(parts, main)
     fields: dict[str, Any] = {
         "name": name or _as_name(parts.model.name or path.stem),
         "urdf": locator,
         "action_split": split,
         "tcp_link": parts.tools[main.name].link,
         "tcp_position_links": parts.tools[main.name].links,
-        "gripper_material": _material(parts.anatomy),
-        "fingers": _fingers(main),
+        "gripper_material": find_material(parts.anatomy.limbs),
+        "fingers": fingers,
         "keyframes": {"rest": tuple(rest[joint] for joint in split.joints)},
         "reach": distance,
         "source": f"guessed from {path.name}",
-        "allowed_collisions": allowed,
+        "allowed_collisions": (*allowed, *posture.overlapping),
     }
     unknown = sorted(set(overrides) - set(RobotDescriptor.__dataclass_fields__))
     if unknown:
@@ -121,9 +115,14 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
         raise DescriptorError(f"a descriptor has no fields {unknown}; it has {known}")
     tools = [tool.reason for tool in parts.tools.values()]
     repairs = [f"repaired: {repair}" for repair in cleaned.repairs]
-    about = (*parts.anatomy.reasons, *tools, *_about_grasps(parts), *drives, *stance, measured)
+    hands_too = (*_about_hands(parts), grasping) if parts.grippers else ()
+    drives = parts.drives.reasons()
+    about = (*parts.anatomy.reasons, *tools, *hands_too, *drives, *posture.reasons, measured)
     given = tuple(f"{field}: given, not guessed" for field in overrides)
-    return Guess(RobotDescriptor(**{**fields, **overrides}), (*repairs, *about, *overlaps, *given))
+    return Guess(
+        RobotDescriptor(**{**fields, **overrides}),
+        (*repairs, *about, *overlaps, *given),
+    )
 
 
 def _look_at(path: Path, xml: bytes) -> _Parts:
@@ -131,7 +130,10 @@ def _look_at(path: Path, xml: bytes) -> _Parts:
     anatomy = find_anatomy(model, path.as_posix())
     stance = Stance(model)
     hulls = read_hulls(model, path) if find_spec("fcl") and find_spec("trimesh") else ()
-    masses = read_masses(parse_urdf(xml, path.as_posix()), stance.tree)
+    bodies: dict[int, list[Floats]] = {}
+    for hull in hulls:
+        bodies.setdefault(hull.link, []).append(hull.corners)
+    masses = read_masses(parse_urdf(xml, path.as_posix()), stance.tree, bodies)
     drives = Drives(stance, masses)
     hands = [limb for limb in anatomy.limbs if limb.fingers]
     tips = {limb.name: Fingertips(stance, limb, hulls) for limb in hands}
@@ -145,155 +147,99 @@ def _as_name(text: str) -> str:
     return name if re.match(r"[a-z]", name) else f"robot_{name}".rstrip("_")
 
 
-def _action_split(parts: _Parts) -> tuple[ActionSplit, list[str]]:
+def _action_split(parts: _Parts) -> ActionSplit:
     groups: dict[str, JointGroup] = {}
-    drives = parts.drives
     for limb in parts.anatomy.limbs:
-        for name, joints in _by_unit("arm", limb.arm):
-            groups[_of(limb, name)] = _relative(joints, drives)
+        groups.update(arm_groups(limb, parts.drives))
         if limb.name in parts.grippers:
             groups.update(parts.grippers[limb.name].groups)
-    for part in PARTS:
-        for name, joints in _by_unit(part, parts.anatomy.parts.get(part, ())):
-            groups[name] = _held(joints, drives)
-    for name, joints in _by_unit("base", parts.anatomy.base):
-        groups[name] = JointGroup.hold(
-            _names(joints), stiffness=1e5, damping=1e4, force_limit=1e5, unit=joints[0].unit
-        )
-    reasons = [
-        "drives: stiffness from the inertia that hangs on each joint, critically damped, so that a"
-        f" control step of {CONTROL_STEP:g} s covers what the action asks for; forces from the"
-        " URDF's efforts",
-        "action: arm joints move per control step by up to 0.1 rad or m, or as far as their force"
-        " brings them",
-    ]
-    if drives.raised:
-        listing = ", ".join(drives.raised)
-        reasons.append(
-            f"forces: more than the URDF's efforts for {listing}, which would not bring them 0.04"
-            " rad or m in a control step"
-        )
-    return ActionSplit(**groups), reasons
+    return ActionSplit(**groups, **held_groups(parts.anatomy, parts.drives))
 
 
-def _of(limb: Limb, group: str) -> str:
-    """Return the name of a limb's group: ``arm``, ``left_arm``, or ``arm_2``."""
-    if not limb.name:
-        return group
-    return f"{group}_{limb.name}" if limb.name.isdigit() else f"{limb.name}_{group}"
+def _fingers(parts: _Parts, limb: Limb) -> tuple[Fingers | None, str]:
+    opened = parts.grippers[limb.name].postures[0] if limb.fingers else {}
+    return find_fingers(limb, parts.tips.get(limb.name), opened)
 
 
-def _by_unit(part: str, joints: Sequence[ModelJoint]) -> Iterator[tuple[str, list[ModelJoint]]]:
-    for unit, suffix in (("m", "_slide"), ("rad", "")):
-        alike = [joint for joint in joints if joint.unit == unit]
-        if alike:
-            yield part + suffix, alike
-
-
-def _relative(joints: Sequence[ModelJoint], drives: Drives) -> JointGroup:
-    made = [drives.of(joint) for joint in joints]
-    step = alike([drive.step for drive in made])
-    return JointGroup(
-        _names(joints),
-        lower=-step if isinstance(step, float) else tuple(-value for value in step),
-        upper=step,
-        delta=True,
-        unit=joints[0].unit,
-        limits=tuple(joint.span for joint in joints),
-        **drive_fields(made),
-    )
-
-
-def _held(joints: Sequence[ModelJoint], drives: Drives) -> JointGroup:
-    fields = drive_fields([drives.holding(joint) for joint in joints])
-    return JointGroup.hold(_names(joints), unit=joints[0].unit, **fields)
-
-
-def _finger_links(limb: Limb) -> tuple[str, ...]:
-    links = tuple(joint.child for joint in limb.fingers)
-    return (limb.palm, *links) if len(links) == 1 else links
-
-
-def _material(anatomy: Anatomy) -> GripperMaterial | None:
-    links = tuple(link for limb in anatomy.limbs if limb.fingers for link in _finger_links(limb))
-    return GripperMaterial(links, 2.0, 2.0, 0.0, patch_radius=0.1) if links else None
-
-
-def _fingers(limb: Limb) -> Fingers | None:
-    """Return the grasping links if both slide along their own y axis."""
-    if len(limb.fingers) != 2:
-        return None
-    one, other = limb.fingers
-    slide = all(j.type == "prismatic" and abs(j.axis[1]) > 0.99 for j in (one, other))
-    if not slide:
-        return None
-    signs = (1 if one.axis[1] > 0 else -1, 1 if other.axis[1] > 0 else -1)
-    return Fingers((one.child, other.child), opening_signs=signs)
-
-
-def _about_grasps(parts: _Parts) -> Iterator[str]:
+def _about_hands(parts: _Parts) -> Iterator[str]:
     for gripper in parts.grippers.values():
         yield from gripper.reasons
-    material = _material(parts.anatomy)
-    if material is None:
-        return
-    links = ", ".join(material.links)
-    yield f"gripper_material: friction 2 on {links}, as ManiSkill's grippers have"
-    if _fingers(parts.anatomy.limbs[0]):
-        yield "fingers: both slide along their y axis, in which they open"
-    else:
-        yield "fingers: none, so grasps go unnoticed; a Fingers(...) with two links changes that"
+    material = find_material(parts.anatomy.limbs)
+    if material is not None:
+        links = ", ".join(material.links)
+        yield f"gripper_material: friction 2 on {links}, as ManiSkill's grippers have"
 
 
-def _rest(
-    parts: _Parts, allowed: tuple[tuple[str, str], ...]
-) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return the keyframe (rad, m) and the reasons for it."""
+def _may_overlap(parts: _Parts, path: Path) -> tuple[LinkPairs, tuple[str, ...]]:
+    """Return the pairs of links that may overlap, and the reasons."""
+    allowed, reasons = guess_allowed(parts.model, path)
+    hands = _within_hands(parts, allowed)
+    if hands:
+        reasons = (*reasons, _too(hands, "of hands, which overlap while these are open"))
+    still = _still(parts, (*allowed, *hands))
+    if still:
+        reasons = (*reasons, _too(still, "of what is held still, which overlap there"))
+    return (*allowed, *hands, *still), reasons
+
+
+def _too(pairs: LinkPairs, why: str) -> str:
+    listing = ", ".join(f"{one} and {other}" for one, other in pairs[:LISTED])
+    more = f" and {len(pairs) - LISTED} pairs more" if len(pairs) > LISTED else ""
+    return f"allowed_collisions, too: {listing}{more}, {why}"
+
+
+def _within_hands(parts: _Parts, allowed: LinkPairs) -> LinkPairs:
+    """Return the pairs of a hand's links that overlap however it stands."""
+    found: dict[tuple[str, str], None] = {}
+    pairs = _counted(parts, allowed)
+    for limb in parts.anatomy.limbs:
+        if limb.name in parts.grippers:
+            gripper, ends = parts.grippers[limb.name], parts.tips[limb.name].ends
+            inside = entangled(parts.stance, limb, parts.hulls, pairs, gripper, ends)
+            found |= dict.fromkeys(inside)
+    return tuple(found)
+
+
+def _still(parts: _Parts, allowed: LinkPairs) -> LinkPairs:
+    """Return the pairs of links that no action moves and that overlap where they are held."""
+    limbs = parts.anatomy.limbs
+    driven = [joint for limb in limbs for joint in (*limb.arm, *limb.fingers)]
+    tree, model = parts.stance.tree, parts.model
+    moved = {
+        tree.link(link)
+        for joint in driven
+        for behind in model.below(joint)
+        for link in model.rigid_with(behind.child)
+    }
+    links = [hull.link for hull in parts.hulls]
+    pairs = [p for p in _counted(parts, allowed) if not moved & {links[i] for i in p}]
+    poses = parts.stance.poses(parts.stance.middle)[0]
+    overlaps = overlapping(parts.hulls, poses, pairs)
+    names = [(tree.links[links[a]], tree.links[links[b]]) for a, b in pairs]
+    found = [name for name, overlap in zip(names, overlaps, strict=True) if overlap]
+    return tuple(dict.fromkeys(found))
+
+
+def _counted(parts: _Parts, allowed: LinkPairs) -> tuple[tuple[int, int], ...]:
+    """Return the pairs of hulls whose overlaps count, by their indices."""
     excused = joined_pairs(parts.model) | rigid_pairs(parts.model)
     excused |= frozenset(map(frozenset, allowed))
-    pairs = counted_pairs(parts.stance.tree, parts.hulls, excused)
-    opened = {k: v for gripper in parts.grippers.values() for k, v in gripper.open.items()}
+    return counted_pairs(parts.stance.tree, parts.hulls, excused)
+
+
+def _rest(parts: _Parts, allowed: LinkPairs) -> tuple[dict[str, float], Posture]:
+    """Return the keyframe (rad, m), and the posture that it is."""
+    pairs = _counted(parts, allowed)
+    hands = [gripper.postures for gripper in parts.grippers.values()]
     tools = [(limb, parts.tools[limb.name]) for limb in parts.anatomy.limbs]
-    found = PostureSearch(parts.stance, tools, parts.hulls, pairs, opened).run()
-    return {**parts.stance.all_joints(found.position), **opened}, found.reasons
+    torso = parts.anatomy.parts.get("torso", ())
+    found = PostureSearch(parts.stance, tools, parts.hulls, pairs, hands, torso).run()
+    rest = parts.stance.all_joints(found.position)
+    for postures in hands:  # joints that one number drives need not mimic each other in the URDF
+        rest |= next(p for p in postures if _agree(p, rest, parts.stance))
+    return rest, found
 
 
-def _reach(parts: _Parts, limb: Limb, rest: dict[str, float]) -> tuple[float, str]:
-    tree, tool = kinematic_tree(parts.model), parts.tools[limb.name]
-    start = np.array([rest.get(joint, 0.0) for joint in tree.coordinates])
-    poses = tree.forward(start[None])[0]
-    palm = tree.link(limb.palm)
-    tips = [tree.link(link) for link in tool.origins]
-    point = transform(inverse_pose(poses[palm]), poses[tips, :3, 3]).mean(axis=0)
-    moving = [joint for joint in limb.arm if not _flies(joint)]
-    starts = _postures(tree, start, moving)
-    free = [tree.coordinates.index(joint.name) for joint in moving]
-    limits = tree.limits.copy()
-    limits[free] = np.array([joint.span for joint in moving]).reshape(-1, 2)
-    found = farthest(replace(tree, limits=limits), palm, point, starts, free)
-    if found < 0.01 or len(moving) < len(limb.arm):
-        return 1.0, "reach: 1 m, without ground, as nothing stands fixed or nothing reaches out"
-    return round(found, 3), (
-        "reach: the TCP's largest distance from the base's z axis within the joint limits;"
-        " data sheets, which measure to the flange, give less"
-    )
-
-
-def _postures(tree: Tree, rest: Floats, moving: Sequence[ModelJoint]) -> Floats:
-    """Return where the search for the reach starts: in the joints' middle, and in random places."""
-    starts = np.tile(rest, (REACH_STARTS, 1))
-    generator = random.Random(0)  # the same answer every time
-    for i, start in enumerate(starts):
-        for joint in moving:
-            position = generator.uniform(*joint.span) if i else sum(joint.span) / 2
-            start[tree.coordinates.index(joint.name)] = position
-    return starts
-
-
-def _flies(joint: ModelJoint) -> bool:
-    low, high = joint.span
-    return joint.unit == "m" and high - low > FARTHEST_SLIDE
-
-
-def _names(joints: Sequence[ModelJoint]) -> tuple[str, ...]:
-    return tuple(joint.name for joint in joints)
+def _agree(posture: Mapping[str, float], rest: Mapping[str, float], stance: Stance) -> bool:
+    leaders = [joint for joint in posture if joint in stance.index]
+    return all(abs(posture[joint] - rest[joint]) < 1e-5 for joint in leaders)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from layouts.placement import Placement
 
 ENDING = ".dmd.yaml"  # by which Drake's parser knows directives
+WORLD = "world"  # as Drake calls what everything stands in
 COPIED = ("material", "link", "joint")  # elements of a robot that are taken over
 
 
@@ -134,16 +137,35 @@ def _write_model(
             element.extend(_visuals(visuals.get(link, ()), link, folder))
             _convert_collisions(element, urdf, folder)
         robot.append(element)
+    _rename_world(robot)
     indent(robot)
     ElementTree(robot).write(folder / name, encoding="utf-8", xml_declaration=True)
+
+
+def _rename_world(robot: Element) -> None:
+    """Rename a link that is called as Drake's world; Drake would take it for that."""
+    names = {link.get("name", "") for link in robot.iterfind("link")}
+    if WORLD not in names:
+        return
+    new = next(name for i in count(1) if (name := f"{WORLD}_link{i if i > 1 else ''}") not in names)
+    ends = [*robot.iterfind("joint/parent"), *robot.iterfind("joint/child")]
+    for element, key in (*((e, "link") for e in ends), *((e, "name") for e in robot.iter("link"))):
+        if element.get(key) == WORLD:
+            element.set(key, new)
+
+
+def _file_name(link: str, kind: str, number: int) -> str:
+    """Return the name of a mesh's file, in which no link's name leads to another folder."""
+    return f"{re.sub(r'[^A-Za-z0-9_.-]', '_', link)}_{kind}_{number}.obj"
 
 
 def _visuals(parts: Sequence[Part], link: str, folder: Path) -> Iterator[Element]:
     for number, part in enumerate(parts):
         name = f"{link}_visual_{number}"
+        file = _unused(folder / _file_name(link, "visual", number))
         visual = Element("visual", name=name)
-        _save(simplified(part).mesh, folder / f"{name}.obj")
-        SubElement(SubElement(visual, "geometry"), "mesh", filename=f"{name}.obj")
+        _save(simplified(part).mesh, file)
+        SubElement(SubElement(visual, "geometry"), "mesh", filename=file.name)
         material = SubElement(visual, "material", name=name)
         SubElement(material, "color", rgba=" ".join(f"{x:.4g}" for x in part.rgba))
         yield visual
@@ -155,9 +177,18 @@ def _convert_collisions(link: Element, urdf: Path, folder: Path) -> None:
     where = f"{urdf}, link {link.get('name')!r}"
     for number, mesh in enumerate(link.iterfind("collision/geometry/mesh")):
         path = resolve(mesh.get("filename", ""), urdf.as_posix(), os.path.isfile)
-        name = f"{link.get('name')}_collision_{number}.obj"
-        _save(trimesh.util.concatenate(load_meshes(path, where, urdf.as_posix())), folder / name)
-        mesh.set("filename", name)
+        file = _unused(folder / _file_name(link.get("name", ""), "collision", number))
+        _save(trimesh.util.concatenate(load_meshes(path, where, urdf.as_posix())), file)
+        mesh.set("filename", file.name)
+
+
+def _unused(file: Path) -> Path:
+    """Return a path that no other link's mesh has taken."""
+    return next(p for i in count(1) if not (p := file if i == 1 else _numbered(file, i)).exists())
+
+
+def _numbered(file: Path, number: int) -> Path:
+    return file.with_name(f"{file.stem}_{number}{file.suffix}")
 
 
 def _save(mesh: Any, path: Path) -> None:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
 from kinematics.quaternions import quaternion_rpy
-from robots import LayoutError
+from robots import LayoutError, RobotDescriptor
+from robots.bodies.allowed import joined_pairs, read_allowed_pairs
 from robots.common.writing import written_whole
 from robots.descriptor import Vector3
 from robots.urdf.paths import resolve
@@ -43,7 +44,7 @@ def write_urdf(
         file = placement.robot.urdf.locate(pictures=visuals)
         urdf.append(_fixed_to_world(place, placement, file))
         urdf.extend(_renamed(file, place, folder, visuals=visuals))
-        semantics.extend(_excuses(srdf_beside(file), place))
+        semantics.extend(_excuses(placement.robot, file, place))
     _write(urdf, target)
     beside = target.with_suffix(".srdf")
     if len(semantics):
@@ -91,14 +92,28 @@ def _file(reference: str, urdf: Path, folder: Path | None) -> str:
     return path if folder is None else Path(os.path.relpath(path, folder)).as_posix()
 
 
-def _excuses(srdf: Path | None, place: str) -> Iterator[Element]:
-    """Yield the pairs of links that a robot's SRDF excuses from collision checks, renamed."""
-    if srdf is None:
-        return
-    for pair in parse_urdf(read_urdf(srdf), str(srdf)).iterfind("disable_collisions"):
+def _excuses(robot: RobotDescriptor, file: Path, place: str) -> Iterator[Element]:
+    """Yield the pairs of links that a robot may overlap with itself in, renamed.
+
+    They are those that its descriptor allows, or else those of the SRDF beside its URDF.
+    """
+    for pair in _pairs_of_srdf(file) if robot.allowed_collisions is None else _own(robot, file):
         for key in ("link1", "link2"):
             pair.set(key, f"{place}/{pair.get(key)}")
         yield pair
+
+
+def _pairs_of_srdf(file: Path) -> Iterator[Element]:
+    srdf = srdf_beside(file)
+    if srdf is not None:
+        yield from parse_urdf(read_urdf(srdf), str(srdf)).iterfind("disable_collisions")
+
+
+def _own(robot: RobotDescriptor, file: Path) -> Iterator[Element]:
+    model = read_model(read_urdf(file), str(file))
+    apart = read_allowed_pairs(robot, model, file) - joined_pairs(model)
+    for pair in sorted(sorted(pair) for pair in apart if pair <= model.collisions.keys()):
+        yield Element("disable_collisions", link1=pair[0], link2=pair[1], reason="Default")
 
 
 def _write(root: Element, target: Path) -> None:

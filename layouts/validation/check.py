@@ -11,7 +11,6 @@ import numpy as np
 
 from kinematics.rotations import Floats
 from layouts.arrangement import Arrangement
-from layouts.frames import table_outlines
 from layouts.placement import Placement
 from layouts.validation.advice import (
     NARROW,
@@ -21,6 +20,7 @@ from layouts.validation.advice import (
     to_start_elsewhere,
     to_touch_itself_no_more,
 )
+from layouts.validation.arguments import Rectangle, Targets, named_targets, table_tops
 from layouts.validation.collisions import (
     Approach,
     Postures,
@@ -43,12 +43,15 @@ from layouts.validation.findings import (
 from layouts.validation.reach import Reach, Solution, Workspace
 from layouts.validation.report import Report
 from layouts.validation.slabs import slab_hull
-from robots import LayoutError
+from robots import (
+    AssetError,
+    DescriptorError,
+    LayoutError,
+    RobotLayoutsError,
+    UnknownNameError,
+)
 from robots.bodies.hulls import RobotModel, load_model
 from robots.common.commands import notice
-
-Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)
-Targets = Mapping[str, Sequence[float]] | Sequence[Sequence[float]]
 
 TABLE_DEPTH = 0.9  # m; tables are solid, from their tops down
 SHALLOW = 0.005  # m; a folded arm's hulls overlap by less where its links do not
@@ -72,7 +75,7 @@ def validate(
         all(math.isfinite(x) for x in table) and table[0] < table[2] and table[1] < table[3]
     ):
         raise LayoutError(f"table is {table}; it must be x_min, y_min, x_max, y_max (m)")
-    return _Check(layout, _named_targets(targets), samples, table, seed).run(workspaces)
+    return _Check(layout, named_targets(targets), samples, table, seed).run(workspaces)
 
 
 class _Check:
@@ -87,13 +90,17 @@ class _Check:
         seed: int,
     ) -> None:
         self._layout, self._targets, self._draws = layout, targets, samples
-        self._tops = _table_tops(layout, table)
+        self._tops = table_tops(layout, table)
         self._progress = _Progress()
+        self._unread: dict[str, RobotLayoutsError] = {}
         self._models = dict(self._load())
+        if self._unread and not self._models:
+            raise next(iter(self._unread.values()))
+        self._checked = {name: layout[name] for name in self._models}
         random = np.random.default_rng(seed)
         self._robots = {
             name: stand(name, p, self._models[name], _noisy(p, samples, random))
-            for name, p in layout.items()
+            for name, p in self._checked.items()
         }
         self._surfaces = {
             name: fixed(name, slab_hull(np.array(top), TABLE_DEPTH, name), samples + 1)
@@ -103,10 +110,13 @@ class _Check:
     def _load(self) -> Iterator[tuple[str, RobotModel]]:
         for name, placement in self._layout.items():
             self._progress.tell(f"files of {name}")
-            yield name, load_model(placement.robot)
+            try:
+                yield name, load_model(placement.robot)
+            except (AssetError, DescriptorError, UnknownNameError) as error:
+                self._unread[name] = error
 
     def run(self, workspaces: bool) -> Report:
-        findings = [*self._limits(), *self._self_collisions()]
+        findings = [*self._unreadable(), *self._limits(), *self._self_collisions()]
         clearances: list[Clearance] = []
         for one, other, pairs in self._neighbours():
             found, clearance = self._compare(one, other, pairs)
@@ -125,13 +135,30 @@ class _Check:
             shared=tuple(_shared(spaces)),
             workspaces={name: space.volume for name, space in spaces.items()},
             reaches=reaches,
-            outlines={name: _outline(robot) for name, robot in self._robots.items()},
+            outlines={
+                name: _outline(self._robots[name]) if name in self._robots else ()
+                for name in self._layout
+            },
         )
+
+    def _unreadable(self) -> Iterator[Finding]:
+        for name, error in self._unread.items():
+            yield Finding(
+                "files",
+                True,
+                (name,),
+                (),
+                0.0,
+                "m",
+                f"{name} cannot be checked: {error}",
+                f"mend the files or the descriptor of {self._layout[name].robot.name}; the others"
+                f" are checked as if {name} were not there",
+            )
 
     # -- joint limits ------------------------------------------------------------------------
 
     def _limits(self) -> Iterator[Finding]:
-        for name, placement in self._layout.items():
+        for name, placement in self._checked.items():
             limits = self._models[name].kinematics.limits
             for joint, value, (low, high) in zip(
                 placement.robot.joints, placement.start_qpos, limits.tolist(), strict=True
@@ -191,11 +218,10 @@ class _Check:
         self, one: Postures, other: Postures, pairs: Sequence[tuple[int, int]] | None
     ) -> tuple[list[Finding], list[Clearance]]:
         self._progress.tell(f"{one.name} with {other.name}")
-        first = slice(0, 1)
-        still = nearest(one.only(first), other.only(first), pairs)
-        near = nearest(one, other, pairs)
-        if still is None or near is None:
+        still = nearest(one.first, other.first, pairs)
+        if still is None:
             return [], []
+        near = nearest(one, other, pairs, still) or still
         between, table = (one.name, other.name), other.name in self._surfaces
         clearance = Clearance(
             between, table, still.links, still.distance, near.links, near.distance, still.points
@@ -248,13 +274,13 @@ class _Check:
 
     def _workspaces(self) -> dict[str, Workspace]:
         spaces: dict[str, Workspace] = {}
-        for name, placement in self._layout.items():
+        for name, placement in self._checked.items():
             self._progress.tell(f"workspace of {name}")
             spaces[name] = Workspace(placement, self._models[name])
         return {name: space for name, space in spaces.items() if space.sampled}
 
     def _reaches(self) -> Iterator[TargetReach]:
-        for name, placement in self._layout.items() if self._targets else ():
+        for name, placement in self._checked.items() if self._targets else ():
             arm = Reach(placement, self._models[name])
             for target, numbers in self._targets.items():
                 self._progress.tell(f"{name} to {target}")
@@ -275,7 +301,7 @@ class _Check:
 
     def _obstacles(self, name: str, solution: Solution) -> Iterator[str]:
         """Yield what a robot touches there, itself included, with the others at their keyframes."""
-        model, first = self._models[name], slice(0, 1)
+        model = self._models[name]
         robot = stand(name, self._layout[name], model, np.array([solution.qpos]))
         around = {**self._robots, **self._surfaces}
         for obstacle, body in around.items():
@@ -283,7 +309,7 @@ class _Check:
                 touches = touching(robot, robot, model.self_pairs)
             else:
                 pairs = _moving_hulls(model) if obstacle in self._surfaces else None
-                touches = touching(robot, body.only(first), pairs)
+                touches = touching(robot, body.first, pairs)
             if touches:
                 yield obstacle
 
@@ -323,50 +349,6 @@ class _Progress:
         if now - self._told > PATIENCE:
             self._told = now
             notice(f"checking the layout: {what}")
-
-
-def _table_tops(layout: Arrangement, table: Rectangle | None) -> dict[str, tuple[Point, ...]]:
-    """Return the corners of each table's top (m): those of the layout's frames, and the one given.
-
-    The one given takes the place of a frame called ``table``.
-    """
-    tops: dict[str, tuple[Point, ...]] = {
-        name: tuple(map(tuple, corners))
-        for name, corners in table_outlines(layout.frame_poses).items()
-    }
-    if table is not None:
-        x_min, y_min, x_max, y_max = table
-        outline = ((x_min, y_min), (x_max, y_min), (x_max, y_max), (x_min, y_max))
-        tops["table"] = tuple((x, y, 0.0) for x, y in outline)
-    return tops
-
-
-def _named_targets(targets: Targets) -> dict[str, tuple[float, ...]]:
-    named = (
-        dict(targets)
-        if isinstance(targets, Mapping)
-        else {f"target {i}": target for i, target in enumerate(targets, start=1)}
-    )
-    return {name: _target(name, numbers) for name, numbers in named.items()}
-
-
-def _target(name: str, numbers: Sequence[float]) -> tuple[float, ...]:
-    try:
-        target = tuple(float(x) for x in numbers)
-    except (TypeError, ValueError):
-        target = ()
-    if len(target) not in (3, 7) or not all(math.isfinite(x) for x in target):
-        raise LayoutError(
-            f"target {name!r} is {numbers!r}; it takes x, y, z (m), or these and w, x, y, z of the"
-            " TCP's orientation"
-        )
-    length = math.hypot(*target[3:])
-    if target[3:] and abs(length - 1) > 1e-3:
-        raise LayoutError(
-            f"the quaternion {target[3:]} of target {name!r} has length {length:.4g}; a rotation"
-            " has length 1 (order w, x, y, z)"
-        )
-    return (*target[:3], *(x / length for x in target[3:]))
 
 
 def _noisy(placement: Placement, draws: int, random: np.random.Generator) -> Floats:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from robots.bodies.hulls import Hull, RobotModel
 Pairs = NDArray[np.intp]  # (n, 2): indices of hulls
 
 FAR = 10.0  # m; what is farther apart is not measured
+FEW = 8  # pairs of hulls that are measured sooner than sorted out
+ROUNDING = 1e-5  # m; of distances and directions that FCL finds by iteration
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,17 +41,38 @@ class Postures:
     low: Floats
     high: Floats
 
-    def only(self, postures: slice) -> Postures:
-        """Return some of the postures."""
-        return replace(
-            self, poses=self.poses[postures], low=self.low[postures], high=self.high[postures]
-        )
+    @cached_property
+    def first(self) -> Postures:
+        """The first posture alone."""
+        return replace(self, poses=self.poses[:1], low=self.low[:1], high=self.high[:1])
+
+    @cached_property
+    def extent(self) -> tuple[Floats, Floats]:
+        """Least and greatest corner of each hull's box around all postures, (hulls, 3) (m)."""
+        return self.low.min(axis=0), self.high.max(axis=0)
 
     def moved(self, by: Floats) -> Postures:
         """Return the same postures elsewhere, by a translation, (3,) (m)."""
         poses = self.poses.copy()
         poses[..., :3, 3] += by
         return replace(self, poses=poses, low=self.low + by, high=self.high + by)
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidates:
+    """Pairs of hulls that may be near, each in one posture.
+
+    Attributes:
+        bounds: Lower bounds of their distances, (n,) (m).
+        places: Posture, hull of one body and hull of the other, (n, 3).
+    """
+
+    bounds: Floats
+    places: NDArray[np.intp]
+
+    def only(self, which: slice | NDArray[Any]) -> _Candidates:
+        """Return some of them."""
+        return _Candidates(self.bounds[which], self.places[which])
 
 
 @dataclass(frozen=True)
@@ -91,7 +115,10 @@ def fixed(name: str, hull: Hull, postures: int) -> Postures:
 
 
 def nearest(
-    one: Postures, other: Postures, pairs: Sequence[tuple[int, int]] | None = None
+    one: Postures,
+    other: Postures,
+    pairs: Sequence[tuple[int, int]] | None = None,
+    best: Approach | None = None,
 ) -> Approach | None:
     """Return the nearest approach of two bodies over their postures; None if beyond `FAR`.
 
@@ -101,14 +128,16 @@ def nearest(
         one: Robot or table.
         other: Another, or the same for self-collisions.
         pairs: Pairs of hulls that count; all if None.
+        best: An approach that is known already; returned if no other is nearer.
     """
-    best: Approach | None = None
-    for bound, posture, a, b in _candidates(one, other, pairs):
-        if bound > (FAR if best is None else max(best.distance, 0.0)):
-            break
-        approach = _measure(one, other, posture, a, b)
+    within = FAR if best is None else max(best.distance, 0.0)
+    left = _candidates(one, other, pairs, within, best)
+    while len(left.places):
+        approach = _measure(one, other, *left.places[0].tolist())
+        left = left.only(slice(1, None))
         if best is None or approach.distance < best.distance:
             best = approach
+            left = _those_nearer(left, one, other, best)
     return best
 
 
@@ -117,8 +146,8 @@ def touching(
 ) -> list[Approach]:
     """Return all overlaps of two bodies' hulls, the deepest first; see `nearest`."""
     found = [
-        _measure(one, other, posture, a, b)
-        for _, posture, a, b in _candidates(one, other, pairs, within=0.0)
+        _measure(one, other, *place)
+        for place in _candidates(one, other, pairs, within=0.0).places.tolist()
     ]
     overlaps = [approach for approach in found if approach.distance < 0]
     return sorted(overlaps, key=lambda approach: approach.distance)
@@ -127,8 +156,8 @@ def touching(
 def nearer_than(one: Postures, other: Postures, distance: float) -> bool:
     """Tell whether two bodies come nearer than a distance (m) in any posture."""
     return any(
-        _measure(one, other, posture, a, b).distance < distance
-        for _, posture, a, b in _candidates(one, other, None, within=distance)
+        _measure(one, other, *place).distance < distance
+        for place in _candidates(one, other, None, within=distance).places.tolist()
     )
 
 
@@ -146,26 +175,89 @@ def _candidates(
     one: Postures,
     other: Postures,
     pairs: Sequence[tuple[int, int]] | None,
-    within: float = FAR,
-) -> Iterator[tuple[float, int, int, int]]:
-    """Yield a lower bound of the distance (m), posture and both hulls, the least bound first."""
-    gaps = np.maximum(
-        one.low[:, :, None] - other.high[:, None], other.low[:, None] - one.high[:, :, None]
-    )
-    bounds = np.linalg.norm(np.maximum(gaps, 0.0), axis=-1)
+    within: float,
+    best: Approach | None = None,
+) -> _Candidates:
+    """Return what may be within a distance (m) and nearer than the best, the least bound first.
+
+    Where boxes overlap the bound says nothing; of those, the nearest centres come first.
+    """
+    a, b = _near_pairs(one, other, pairs, within)
+    posture = np.arange(len(one.poses))[:, None]
+    posture, a, b = (every.ravel() for every in np.broadcast_arrays(posture, a, b))
+    if best is not None and len(a):
+        parted = _parted(one, other, posture, a, b, best)
+        posture, a, b = posture[~parted], a[~parted], b[~parted]
+    low, high = one.low[posture, a], one.high[posture, a]
+    other_low, other_high = other.low[posture, b], other.high[posture, b]
+    bounds = _box_gaps(low, high, other_low, other_high)
+    centres = np.linalg.norm(low + high - other_low - other_high, axis=-1)
+    order = np.lexsort((centres, bounds))
+    found = _Candidates(bounds, np.stack([posture, a, b], axis=-1)).only(order)
+    return found.only(found.bounds <= within)
+
+
+def _near_pairs(
+    one: Postures, other: Postures, pairs: Sequence[tuple[int, int]] | None, within: float
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the pairs of hulls whose boxes around all postures come within a distance (m)."""
+    (low, high), (other_low, other_high) = one.extent, other.extent
+    near = _box_gaps(low[:, None], high[:, None], other_low, other_high) <= within
     if pairs is not None:
-        counted = np.zeros(bounds.shape[1:], bool)
+        counted = np.zeros_like(near)
         counted[tuple(np.array(pairs, int).reshape(-1, 2).T)] = True
-        bounds = np.where(counted, bounds, np.inf)
-    # Where boxes overlap the bound says nothing; of those, the nearest centres come first.
-    centres = np.linalg.norm(
-        (one.low + one.high)[:, :, None] - (other.low + other.high)[:, None], axis=-1
-    )
-    places = np.argwhere(bounds <= within)
-    chosen = tuple(places.T)
-    for i in np.lexsort((centres[chosen], bounds[chosen])):
-        posture, a, b = places[i].tolist()
-        yield float(bounds[posture, a, b]), posture, a, b
+        near &= counted
+    a, b = np.nonzero(near)
+    return a, b
+
+
+def _box_gaps(low: Floats, high: Floats, other_low: Floats, other_high: Floats) -> Floats:
+    """Return the distances between boxes along the world's axes (m); 0 where they overlap."""
+    gaps = np.maximum(low - other_high, other_low - high)
+    return np.linalg.norm(np.maximum(gaps, 0.0), axis=-1)
+
+
+def _those_nearer(left: _Candidates, one: Postures, other: Postures, best: Approach) -> _Candidates:
+    """Return the candidates that may be nearer than the best so far."""
+    left = left.only(left.bounds <= max(best.distance, 0.0))
+    if len(left.places) < FEW:
+        return left
+    posture, a, b = left.places.T
+    return left.only(~_parted(one, other, posture, a, b, best))
+
+
+def _parted(
+    one: Postures,
+    other: Postures,
+    posture: NDArray[np.intp],
+    a: NDArray[np.intp],
+    b: NDArray[np.intp],
+    best: Approach,
+) -> NDArray[np.bool_]:
+    """Tell of pairs of hulls whether they are seen not to be nearer than the best so far.
+
+    Two convex bodies are at least as far apart as between any two parallel planes that part them.
+    Those that touch the best pair do for most others too, where robots stand apart.
+    """
+    way = np.subtract(best.points[1], best.points[0])
+    length = float(np.linalg.norm(way))
+    if best.distance <= 0.0 or length < ROUNDING:
+        return np.zeros(len(a), bool)
+    way /= length
+    gaps = -_farthest(other, b, -way)[posture, b] - _farthest(one, a, way)[posture, a]
+    return gaps > best.distance + ROUNDING
+
+
+def _farthest(body: Postures, hulls: NDArray[np.intp], way: Floats) -> Floats:
+    """Return how far some hulls reach along a direction, (postures, hulls) (m).
+
+    What it returns for other hulls means nothing.
+    """
+    own = way @ body.poses[..., :3, :3]  # the direction in the frames of the links
+    reaches = body.poses[..., :3, 3] @ way
+    for hull in np.flatnonzero(np.bincount(hulls)):
+        reaches[:, hull] += (own[:, hull] @ body.hulls[hull].corners.T).max(axis=1)
+    return reaches
 
 
 def _measure(one: Postures, other: Postures, posture: int, a: int, b: int) -> Approach:

@@ -34,8 +34,8 @@ class Finding:
     """One thing that is wrong with a layout, or nearly.
 
     Attributes:
-        kind: ``collision``, ``self-collision``, ``table``, ``joint limit``, ``target`` or
-            ``clearance``.
+        kind: ``collision``, ``self-collision``, ``table``, ``joint limit``, ``target``,
+            ``clearance`` or ``files``.
         serious: Whether it makes the layout unusable; if not, it is a warning.
         robots: Names of the robots it is about.
         links: The links that overlap, the deepest first.
@@ -144,7 +144,8 @@ class Results:
         workspaces: Volume of each robot's workspace (m³), to about a tenth; empty if they were not
             looked at. A robot that slides for many metres is left out.
         reaches: For each target and robot, whether it gets there.
-        outlines: For each robot the corners of its hulls at the keyframe, world (m).
+        outlines: For each robot the corners of its hulls at the keyframe, world (m); none for one
+            that could not be checked.
     """
 
     layout: Arrangement

@@ -92,7 +92,7 @@ def _draw_robot(plan: Axes, report: Results, index: int, name: str) -> None:
 def _behind(report: Results, name: str) -> tuple[Floats, Floats]:
     """Return the end of a robot's back (m), and the direction from its base to there."""
     base = np.array(report.layout[name].base_position[:2])
-    corners = np.array([c[:2] for hull in report.outlines[name] for c in hull]) - base
+    corners = np.array([c[:2] for hull in report.outlines[name] for c in hull] or [base]) - base
     ahead = corners.mean(axis=0)
     length = float(np.linalg.norm(ahead))
     behind = -ahead / length if length > 0.02 else np.array([0.0, -1.0])

@@ -78,8 +78,9 @@ def load_model(robot: RobotDescriptor) -> RobotModel:
     require_packages()
     urdf = robot.urdf.locate()
     beside = srdf_beside(urdf)
-    files = (template_of(urdf)[0], beside)
-    return _load(robot, urdf, tuple(os.stat(file).st_mtime_ns for file in files if file))
+    return _load(
+        robot, urdf, tuple(_modified(file) for file in (template_of(urdf)[0], beside) if file)
+    )
 
 
 def require_packages() -> None:
@@ -109,7 +110,7 @@ def read_hulls(model: UrdfModel, urdf: Path) -> tuple[Hull, ...]:
         MissingPackageError: If trimesh or python-fcl is not installed.
     """
     require_packages()
-    return _hulls(model, urdf, os.stat(template_of(urdf)[0]).st_mtime_ns)
+    return _hulls(model, urdf, _modified(template_of(urdf)[0]))
 
 
 def counted_pairs(
@@ -130,8 +131,13 @@ def counted_pairs(
     )
 
 
+def _modified(file: Path) -> int:
+    """Return when a file was changed; of a link to nowhere, the link."""
+    return os.stat(file, follow_symlinks=os.path.exists(file)).st_mtime_ns
+
+
 @lru_cache(maxsize=64)
-def _load(robot: RobotDescriptor, urdf: Path, _modified: tuple[int, ...]) -> RobotModel:
+def _load(robot: RobotDescriptor, urdf: Path, _stamps: tuple[int, ...]) -> RobotModel:
     model = read_model(read_urdf(urdf), str(urdf))
     kinematics, hulls = _tree(model, robot.joints), read_hulls(model, urdf)
     allowed = read_allowed_pairs(robot, model, urdf)
@@ -144,7 +150,7 @@ def _tree(model: UrdfModel, joints: tuple[str, ...]) -> Tree:
 
 
 @lru_cache(maxsize=64)
-def _hulls(model: UrdfModel, urdf: Path, _modified: int) -> tuple[Hull, ...]:
+def _hulls(model: UrdfModel, urdf: Path, _stamp: int) -> tuple[Hull, ...]:
     tree = kinematic_tree(model)  # every tree of a model has its links in the same order
     return tuple(
         convex_hull(tree.link(link), shape_corners(shape, urdf), shape.where)

@@ -18,9 +18,14 @@ FORCE = 100.0  # N·m, N; the least where a URDF gives no effort, as of ManiSkil
 LONGEST_STEP = 0.1  # rad, m; of an arm's joint in one control step, as of ManiSkill's Panda
 SHORTEST_STEP = 0.04  # rad, m; what ManiSkill's Panda truly goes in one control step
 # A critically damped joint with this frequency covers 96 % of a small step in CONTROL_STEP, when
-# physics advances by 0.01 s; with a force that is just so large, 93 %.
+# physics advances by 0.01 s; with a force that is `JUST_ENOUGH`, 94 %.
 FREQUENCY = 150.0  # rad/s
-JUST_ENOUGH = 4.0  # of inertia · step / CONTROL_STEP²
+JUST_ENOUGH = 6.0  # of inertia · step / CONTROL_STEP²; 4 is the least there is
+SETTLING = 0.1  # s; of a finger that goes to a place
+# Physics in single precision shakes light fingers that are driven more stiffly.
+STIFFEST = 1e3  # rad/s, of a joint's frequency
+MOST_DAMPED = 7e3  # 1/s, of a finger's damping by its inertia, as a Panda's has
+LIGHTEST = 1e-6  # kg·m², kg; of what hangs on a joint, if a URDF gives nothing that weighs
 HOLDING = 10.0  # times the force that an arm's joint would have
 POSTURES = 16  # in which the inertia is looked at
 
@@ -57,27 +62,58 @@ class Drives:
         self._inertia: Mapping[str, float] = {
             joint.name: float(value) for joint, value in zip(moving, inertia, strict=True)
         }
-        self.raised: list[str] = []  # names of joints
+        self._raised: list[str] = []  # names of joints
+
+    def reasons(self) -> list[str]:
+        """Return what was done about the drives that were asked for, one sentence each."""
+        reasons = [
+            "drives: stiffness from the inertia that hangs on each joint, critically damped, so"
+            f" that a control step of {CONTROL_STEP:g} s covers what the action asks for; forces"
+            " from the URDF's efforts",
+            f"action: arm joints move per control step by up to {LONGEST_STEP:g} rad or m, or as"
+            " far as their force brings them",
+        ]
+        if self._raised:
+            reasons.append(
+                f"forces: more than the URDF's efforts for {', '.join(self._raised)}, which would"
+                f" not bring them {SHORTEST_STEP:g} rad or m in a control step"
+            )
+        return reasons
 
     def of(self, joint: ModelJoint) -> Drive:
         """Return the drive of a joint that an action moves."""
         drive, raised = self._drive(joint)
-        if raised and joint.name not in self.raised:
-            self.raised.append(joint.name)
+        if raised and joint.name not in self._raised:
+            self._raised.append(joint.name)
         return drive
 
     def _drive(self, joint: ModelJoint) -> tuple[Drive, bool]:
         """Return a drive, and whether its force is more than the URDF's effort."""
-        inertia = self._inertia[joint.name]
-        stiffness = max(STIFFNESS, inertia * FREQUENCY**2)
-        needed = JUST_ENOUGH * inertia / CONTROL_STEP**2  # per step
+        inertia = max(self._inertia[joint.name], LIGHTEST)
+        needed = JUST_ENOUGH * inertia / CONTROL_STEP**2  # N·m, N; per rad or m of a step
         force = joint.effort or max(FORCE, needed * SHORTEST_STEP)
-        step = min(LONGEST_STEP, force / needed) if needed else LONGEST_STEP
+        step = min(LONGEST_STEP, force / needed)
         raised = step < SHORTEST_STEP
         if raised:
             force, step = needed * SHORTEST_STEP, SHORTEST_STEP
+        # What only just has the force to stop in time must begin to brake in time.
+        stiffest = STIFFEST if step == LONGEST_STEP else 2 * FREQUENCY
+        stiffness = max(STIFFNESS, inertia * FREQUENCY**2)
+        stiffness = min(stiffness, inertia * stiffest**2)
         damping = 2 * (stiffness * inertia) ** 0.5
         return Drive(*map(_rounded, (stiffness, damping, force)), step=_down(step)), raised
+
+    def gripping(self, joint: ModelJoint) -> Drive:
+        """Return the drive of a joint whose targets are places, far away at times: it takes time.
+
+        ManiSkill's Panda drives its fingers with a damping of a tenth of the stiffness.
+        """
+        drive = self.of(joint)
+        inertia = max(self._inertia[joint.name], LIGHTEST)
+        damping = min(max(drive.damping, drive.stiffness * SETTLING), inertia * MOST_DAMPED)
+        stiffness = min(drive.stiffness, damping / SETTLING)
+        force = min(drive.force_limit, FORCE)
+        return Drive(_rounded(stiffness), _rounded(damping), force, drive.step)
 
     def holding(self, joint: ModelJoint) -> Drive:
         """Return the drive of a joint that stays where it starts."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from robots.urdf.anatomy import Limb
 from robots.urdf.model import ModelJoint
 
 SHORT = 0.6  # of the longest finger; what ends before it is a knuckle, not a tip
+FOLLOWING = 0.85  # the same where all joints follow one, as in grippers with knuckles
 CAP = 0.15  # of a finger's length; its corners within it from the end make its tip
 
 
@@ -36,10 +37,13 @@ class Fingertips:
         tips = {joint.child: self._tip(joint.child) for joint in leaves}
         far = {link: float(np.linalg.norm(tip - self._palm[:3, 3])) for link, tip in tips.items()}
         longest = max(far.values(), default=0.0)
-        self.ends = tuple(link for link in tips if far[link] >= SHORT * longest)
+        led = sum(joint.mimics is None for joint in limb.fingers) == 1
+        least = (FOLLOWING if led else SHORT) * longest
+        ends = [link for link in tips if far[link] >= least]
+        self.ends = tuple([link for link in ends if words.has(link, words.TIP)] or ends)
         if len(limb.fingers) > 0 and len(self.ends) == 1:
             tips[limb.palm] = self._fixed_tip(self.ends[0], tips[self.ends[0]])
-            self.ends = (*self.ends, limb.palm)
+            self.ends = (limb.palm, *self.ends)
         self._tips = {link: tips[link] for link in self.ends}
 
     def middle(self) -> Floats:
@@ -53,17 +57,25 @@ class Fingertips:
         means = [np.mean([self._tips[link] for link in group], axis=0) for group in groups]
         return np.mean(means, axis=0)
 
-    def apart(self, positions: dict[str, float]) -> float:
+    def apart(self, positions: Mapping[str, float]) -> float:
         """Return how far the tips are from their middle (m), with some joints elsewhere."""
-        poses = self.stance.poses(self.stance.with_joints(positions))[0]
-        local = {
-            link: transform(inverse_pose(self._poses[self.stance.tree.link(link)]), tip)
-            for link, tip in self._tips.items()
-        }
-        places = np.array(
-            [transform(poses[self.stance.tree.link(link)], tip) for link, tip in local.items()]
-        )
+        places = self._places(self.stance.poses(self.stance.with_joints(positions))[0])
         return float(np.linalg.norm(places - places.mean(axis=0), axis=1).mean())
+
+    def _places(self, poses: Floats) -> Floats:
+        """Return the tips where the links have some poses, (ends, 3) (m)."""
+        links = [self.stance.tree.link(end) for end in self.ends]
+        points = np.array([self._tips[end] for end in self.ends])
+        return transform(poses[links], transform(inverse_pose(self._poses[links]), points))
+
+    def opening(self, positions: Mapping[str, float]) -> list[float]:
+        """Return for each of ``ends`` how well its y axis points away from the others, -1 … 1."""
+        poses = self.stance.poses(self.stance.with_joints(positions))[0]
+        places = self._places(poses)
+        ways = places - places.mean(axis=0)
+        ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-9)
+        axes = [poses[self.stance.tree.link(link), :3, 1] for link in self.ends]
+        return [float(axis @ way) for axis, way in zip(axes, ways, strict=True)]
 
     def finger_of(self, link: str) -> ModelJoint:
         """Return the joint with which the finger of a link begins at the hand."""

@@ -7,15 +7,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.bodies.hulls import Hull
+from robots.bodies.overlaps import overlapping
 from robots.descriptor import JointGroup
-from robots.guessing.drives import LONGEST_STEP, Drives, alike, drive_fields
+from robots.guessing.drives import Drives, drive_fields
 from robots.guessing.fingertips import Fingertips
-from robots.guessing.stance import middle_of
+from robots.guessing.groups import by_steps, name_of
+from robots.guessing.stance import Stance, middle_of
 from robots.urdf.anatomy import Limb
 from robots.urdf.model import ModelJoint
 
 SQUEEZE = 0.01  # how far beyond closed a parallel gripper's target is (m)
 SAME = 0.02  # of a range; how much two fingers' ranges may differ
+OPENINGS = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the way, in which a hand may stand
+MOST_JOINTS = 20  # of a hand whose fingers collide with each other
 NOTICEABLE = 1e-4  # m; how much opening changes the distance of the tips
 
 
@@ -25,12 +33,12 @@ class Gripper:
 
     Attributes:
         groups: Joint groups by name.
-        open: Where its joints are when it is open (rad, m).
+        postures: Where its joints are, wide open first, then less and less (rad, m).
         reasons: One sentence each.
     """
 
     groups: Mapping[str, JointGroup]
-    open: Mapping[str, float]
+    postures: tuple[Mapping[str, float], ...]
     reasons: tuple[str, ...]
 
 
@@ -51,8 +59,7 @@ def find_gripper(limb: Limb, tips: Fingertips, drives: Drives) -> Gripper:
         tips: Its finger tips.
         drives: The drives of its joints.
     """
-    name = f"{limb.name}_gripper" if limb.name in ("left", "right") else "gripper"
-    name = f"{name}_{limb.name}" if limb.name.isdigit() else name
+    name = name_of(limb, "gripper")
     followers = _followers(limb.fingers)
     leaders = [joint for joint in limb.fingers if joint.name in followers]
     merged = _merged(leaders, followers, tips)
@@ -63,20 +70,70 @@ def find_gripper(limb: Limb, tips: Fingertips, drives: Drives) -> Gripper:
         reasons = []
     if len(leaders) > 1:
         return _many(name, leaders, followers, drives)
-    group, positions, reason = _one(name, leaders[0], followers[leaders[0].name], tips, drives)
+    group, postures, reason = _one(name, leaders[0], followers[leaders[0].name], tips, drives)
     mimics = [f"{j.name} follows {j.mimics}" for j in limb.fingers if j.mimics]
     if mimics:
         reasons.append(f"{name}, mimic joints, from the URDF: {', '.join(mimics)}")
-    return Gripper({name: group}, positions, (*reasons, reason))
+    return Gripper({name: group}, postures, (*reasons, reason))
+
+
+def entangled(
+    stance: Stance,
+    limb: Limb,
+    hulls: Sequence[Hull],
+    pairs: Sequence[tuple[int, int]],
+    gripper: Gripper,
+    grasping: Sequence[str],
+) -> list[tuple[str, str]]:
+    """Return the pairs of links of a hand that overlap as it stands, which means nothing then.
+
+    In a hand that one number drives, those that overlap while it is more open than closed, and of
+    what does not grasp those that ever do: parts of one mechanism. In others, those that overlap
+    in each of the hand's postures; in hands of very many joints all,
+    as physics tells only so many sets of links apart.
+
+    Args:
+        stance: The robot.
+        limb: The limb that ends in the hand.
+        hulls: The robot's hulls.
+        pairs: Indices of hulls whose overlaps count.
+        gripper: What drives the hand.
+        grasping: The last link of each finger.
+    """
+    rigid = [stance.model.rigid_with(link) for link in _links(limb)]
+    inside = {stance.tree.link(link) for links in rigid for link in links}
+    mine = np.array([p for p in pairs if {hulls[i].link for i in p} <= inside], int).reshape(-1, 2)
+    if len(limb.fingers) > MOST_JOINTS:
+        return _names(stance, hulls, mine)
+    overlaps = np.array(
+        [
+            overlapping(hulls, stance.poses(stance.with_joints(posture))[0], mine)
+            for posture in gripper.postures
+        ]
+    )
+    always = overlaps.all(axis=0)
+    if sum(group.size for group in gripper.groups.values()) == 1:
+        open_enough = overlaps[: len(OPENINGS) // 2 + 1].any(axis=0)
+        ends = {stance.tree.link(link) for end in grasping for link in stance.model.rigid_with(end)}
+        inner = np.array([not {hulls[i].link for i in pair} <= ends for pair in mine], bool)
+        always = open_enough | (overlaps.any(axis=0) & inner)
+    return _names(stance, hulls, mine[always])
+
+
+def _names(stance: Stance, hulls: Sequence[Hull], pairs: NDArray[np.intp]) -> list[tuple[str, str]]:
+    links = [stance.tree.links[hull.link] for hull in hulls]
+    return list(dict.fromkeys((links[a], links[b]) for a, b in pairs))
+
+
+def _links(limb: Limb) -> tuple[str, ...]:
+    return (limb.palm, *(joint.child for joint in limb.fingers))
 
 
 def _followers(fingers: Sequence[ModelJoint]) -> dict[str, list[_Follower]]:
     """Return for each leading joint what follows it, itself first."""
     named = {joint.name: joint for joint in fingers}
     groups: dict[str, list[_Follower]] = {
-        joint.name: [_Follower(joint, 1.0, 0.0)]
-        for joint in fingers
-        if joint.mimics not in named
+        joint.name: [_Follower(joint, 1.0, 0.0)] for joint in fingers if joint.mimics not in named
     }
     for joint in fingers:
         if joint.name not in groups:
@@ -103,7 +160,7 @@ def _merged(
     merged = list(followers[first.name])
     for joint in leaders[1:]:
         sign = _sense(first, joint, tips) if len(leaders) == 2 else 1.0
-        low, high = joint.span
+        low, _ = joint.span
         offset = low - first.span[0] if sign > 0 else low + first.span[1]
         merged += [
             _Follower(f.joint, f.multiplier * sign, f.multiplier * _tidy(offset) + f.offset)
@@ -137,7 +194,7 @@ def _one(
     followers: Sequence[_Follower],
     tips: Fingertips,
     drives: Drives,
-) -> tuple[JointGroup, dict[str, float], str]:
+) -> tuple[JointGroup, tuple[dict[str, float], ...], str]:
     """Return the group that one number drives, where it is open, and the reason.
 
     The number grows as the hand opens: where it opens towards the leader's lower limit, it counts
@@ -162,11 +219,11 @@ def _one(
         unit=leader.unit,
         reset_noise=False,
         limits=tuple(joint.span for joint in joints),
-        **drive_fields([drives.of(joint) for joint in joints]),
+        **drive_fields([drives.gripping(joint) for joint in joints]),
     )
-    positions = {f.joint.name: _tidy(f.multiplier * high + f.offset) for f in followers}
-    where = f"{leader.name} at {positions[leader.name]:g} {leader.unit}"
-    return group, positions, f"{name}: +1 opens it, with {where}, as the finger tips part there"
+    postures = tuple(_led_to(followers, low + (high - low) * part) for part in OPENINGS)
+    where = f"{leader.name} at {postures[0][leader.name]:g} {leader.unit}"
+    return group, postures, f"{name}: +1 opens it, with {where}, as the finger tips part there"
 
 
 def _apart(tips: Fingertips, followers: Sequence[_Follower], lead: float) -> float:
@@ -185,41 +242,36 @@ def _many(
     for unit, suffix in (("rad", ""), ("m", "_slide")):
         joints = [joint for joint in alone if joint.unit == unit]
         if joints:
-            groups[name + suffix] = _each(joints, drives)
+            groups[name + suffix] = by_steps(joints, drives, reset_noise=False)
     for leader in leaders:
         if len(followers[leader.name]) > 1:
             groups[_free(f"{name}_{_identifier(leader.name)}", groups)] = _led(
                 followers[leader.name], drives
             )
     counts = f"{len(leaders)} numbers drive it, one for each joint that mimics none"
-    positions = {
-        f.joint.name: _tidy(f.multiplier * middle_of(leader) + f.offset)
-        for leader in leaders
-        for f in followers[leader.name]
+    postures: list[dict[str, float]] = []
+    for part in OPENINGS:
+        postures.append({})
+        for joint in leaders:
+            value = part * middle_of(joint) + (1 - part) * sum(joint.span) / 2
+            postures[-1].update(_led_to(followers[joint.name], value))
+    return Gripper(groups, tuple(postures), (f"{name}: {counts}",))
+
+
+def _led_to(followers: Sequence[_Follower], lead: float) -> dict[str, float]:
+    """Return where joints go, each within its limits."""
+    return {
+        f.joint.name: min(
+            max(_tidy(f.multiplier * lead + f.offset), f.joint.span[0]), f.joint.span[1]
+        )
+        for f in followers
     }
-    return Gripper(groups, positions, (f"{name}: {counts}",))
-
-
-def _each(joints: Sequence[ModelJoint], drives: Drives) -> JointGroup:
-    made = [drives.of(joint) for joint in joints]
-    steps = [min(drive.step, LONGEST_STEP) for drive in made]
-    step = alike(steps)
-    return JointGroup(
-        tuple(joint.name for joint in joints),
-        lower=-step if isinstance(step, float) else tuple(-value for value in step),
-        upper=step,
-        delta=True,
-        unit=joints[0].unit,
-        reset_noise=False,
-        limits=tuple(joint.span for joint in joints),
-        **drive_fields(made),
-    )
 
 
 def _led(followers: Sequence[_Follower], drives: Drives) -> JointGroup:
     leader = followers[0].joint
     low, high = leader.span
-    fields: dict[str, Any] = drive_fields([drives.of(f.joint) for f in followers])
+    fields: dict[str, Any] = drive_fields([drives.gripping(f.joint) for f in followers])
     return JointGroup(
         tuple(f.joint.name for f in followers),
         lower=low,

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinematics.rotations import Floats
 from robots.bodies.hulls import Hull
 from robots.bodies.overlaps import overlapping
 from robots.guessing.stance import Stance
 from robots.guessing.tool import Tool
+from robots.guessing.view import MARGIN, View
 from robots.urdf.anatomy import FARTHEST_SLIDE, Limb
+from robots.urdf.model import ModelJoint
 
 DRAWS = 1500  # random postures of a limb
-BEST = 40  # of them, refined and then looked at for overlaps
+BEST = 16  # of them, refined and then looked at for overlaps
+TRIES = 3  # rounds of that, each without the overlaps met before
 ROUNDS = 4  # of refinement, each with half the spread
-MARGIN = 0.1  # of a joint's range, which it stays away from its ends
+ROOM = 0.15  # rad, of each joint, in which nothing may overlap either
+ROOM_TRIES = 6  # random motions by so much
 OUT = 0.55  # of the reach; where the TCP is best, ahead of the limb's first joint
 NEAR, FAR = 0.35, 0.85  # of the reach; where it may be
 HEIGHT = 0.35  # of the reach, above the ground; best for an arm that stands on it
@@ -25,7 +30,9 @@ HANGING = -0.25  # of the reach, below the shoulder; best for an arm on a body
 LOW = 0.02  # m above the ground; the least of any moving link
 PLAIN = 0.5  # weight of joints that leave the posture that the search starts from
 DOWN = 0.15  # weight of a tool that does not point down
-ONE_SIDED = 0.15  # of the reach; how far aside the middle of a workspace tells a front
+ONE_SIDED = 0.25  # of the reach; how far aside the middle of a workspace tells a front
+QUARTER = np.pi / 2  # rad; to which the front is rounded, or to half of it
+NEARLY = 0.6  # rad; how near it must be to a quarter turn
 BESIDE = 0.35  # of the reach; how far the TCP may be to the side of what is ahead
 
 
@@ -35,10 +42,12 @@ class Posture:
 
     Attributes:
         position: Of the leading joints, in the order of the stance's (rad, m).
+        overlapping: Pairs of links that overlap in it all the same.
         reasons: One sentence each.
     """
 
     position: Floats
+    overlapping: tuple[tuple[str, str], ...]
     reasons: tuple[str, ...]
 
 
@@ -51,7 +60,8 @@ class PostureSearch:
         tools: Sequence[tuple[Limb, Tool]],
         hulls: Sequence[Hull],
         pairs: Sequence[tuple[int, int]],
-        opened: Mapping[str, float],
+        hands: Sequence[Sequence[Mapping[str, float]]],
+        torso: Sequence[ModelJoint],
     ) -> None:
         """Take a robot.
 
@@ -60,46 +70,95 @@ class PostureSearch:
             tools: Its limbs and their tool centre points.
             hulls: Its convex bodies; empty if they cannot be read.
             pairs: Indices of hulls that may not overlap.
-            opened: Where the leading joints of its hands are (rad, m).
+            hands: Of each hand where its joints may stand, the best first (rad, m).
+            torso: Joints that carry limbs.
         """
         self._stance, self._hulls, self._pairs = stance, hulls, np.array(pairs, int).reshape(-1, 2)
-        self._start = stance.with_joints(opened)
+        self._start = self._posed = self._opened(hands)
+        self._front = np.array([1.0, 0.0, 0.0])
         self._generator = np.random.default_rng(0)
-        self._views = [_View(stance, limb, tool) for limb, tool in tools if _searchable(limb)]
+        self._torso = torso
+        self._views = [View(stance, limb, tool) for limb, tool in tools if _searchable(limb)]
         self._ground = self._lowest()
 
     def run(self) -> Posture:
         """Return the posture with all joints at 0 or mid-range if it is fine, else a better one."""
         posture = self._start
         if not self._views:
-            return Posture(posture, ("keyframe 'rest': joints at 0, or mid-range where 0 is out",))
+            return self._made(posture, "joints at 0, or mid-range where 0 is out")
         samples = [self._draw(view, posture) for view in self._views]
         self._look(posture, samples)
         front = _as_text(self._front)
-        if not self._overlaps(posture, self._pairs).any() and self._is_fine(posture):
-            return Posture(
+        if not self._left(posture) and self._is_fine(posture):
+            return self._made(
                 posture,
-                (
-                    "keyframe 'rest': joints at 0, or mid-range where 0 is out, the gripper open;"
-                    f" free of self-collision, with the TCP ahead, towards {front}",
-                ),
+                "joints at 0, or mid-range where 0 is out, the gripper open; no links overlap, and"
+                f" the TCP is ahead, towards {front}",
             )
-        for view, drawn in zip(self._views, samples, strict=True):
-            posture = self._best(view, posture, drawn)
-        return Posture(posture, (self._said(posture, front),))
-
-    def _said(self, posture: Floats, front: str) -> str:
-        left = self._overlaps(posture, self._pairs)
-        text = (
-            "keyframe 'rest': found by search, as the joints at 0 or mid-range collide or bring the"
-            f" TCP nowhere useful; the TCP is ahead, towards {front}, where the arm's joints have"
-            " the middle of their way; the gripper is open"
+        posture = min((self._searched(start, samples) for start in self._starts()), key=self._left)
+        return self._made(
+            posture,
+            "from a search, as with the joints at 0 or mid-range links overlap, or the TCP is not"
+            f" well ahead of the robot; it is now, towards {front}, where the workspace lies; the"
+            " gripper is open",
         )
-        if not left.any():
-            return text
-        names = [self._stance.tree.links[hull.link] for hull in self._hulls]
-        one, other = self._pairs[int(np.argmax(left))]
-        return f"{text}; {names[one]} and {names[other]} still overlap"
+
+    def _made(self, position: Floats, about: str) -> Posture:
+        """Return a posture, with what overlaps in it and the reason."""
+        links = [self._stance.tree.links[hull.link] for hull in self._hulls]
+        left = self._pairs[self._overlaps(position, self._pairs)]
+        pairs = tuple(dict.fromkeys((links[a], links[b]) for a, b in left.tolist()))
+        reasons = [f"keyframe 'rest': {about}"]
+        if pairs:
+            listing = ", ".join(f"{one} and {other}" for one, other in pairs)
+            reasons.append(
+                f"allowed_collisions, too: {listing}, which overlap in the best posture there is"
+            )
+        return Posture(position, pairs, tuple(reasons))
+
+    def _starts(self) -> Iterator[Floats]:
+        """Yield the postures to search from: as it stands, and with its torso half-way up."""
+        yield self._start
+        lifts = [joint for joint in self._torso if joint.unit == "m" and joint.mimics is None]
+        if lifts and self._left(self._posed) > 0:
+            yield self._stance.with_joints({j.name: sum(j.span) / 2 for j in lifts}, self._start)
+
+    def _left(self, posture: Floats) -> int:
+        return int(self._overlaps(posture, self._pairs).sum())
+
+    def _searched(self, posture: Floats, samples: Sequence[Floats]) -> Floats:
+        """Return a posture with one limb after the other at its best."""
+        waiting = [view.links for view in self._views]
+        for view, drawn in zip(self._views, samples, strict=True):
+            waiting.pop(0)
+            pairs = self._pairs[self._touching(view.links, frozenset().union(*waiting))]
+            posture = self._best(view, posture, drawn, pairs)
+        self._posed = posture
+        return posture
+
+    def _touching(self, links: frozenset[int], apart: frozenset[int]) -> NDArray[np.bool_]:
+        """Tell of which pairs one hull is on some links, and none on others, (pairs,)."""
+        sides = [[self._hulls[i].link for i in pair] for pair in self._pairs]
+        return np.array(
+            [bool(links & {*pair}) and not apart & {*pair} for pair in sides], bool
+        )  # fmt: skip
+
+    def _opened(self, hands: Sequence[Sequence[Mapping[str, float]]]) -> Floats:
+        """Return the middle posture with every hand as open as it can be without overlaps."""
+        posture = self._stance.middle
+        for choices in hands:
+            made = [self._stance.with_joints(choice, posture) for choice in choices]
+            moved = {self._stance.tree.link(joint) for joint in self._moved(choices[0])}
+            inside = np.array(
+                [[self._hulls[i].link in moved for i in pair] for pair in self._pairs], bool
+            ).reshape(-1, 2)
+            pairs = self._pairs[inside.any(axis=1)]
+            counts = [int(self._overlaps(tried, pairs).sum()) for tried in made]
+            posture = made[counts.index(min(counts))]
+        return posture
+
+    def _moved(self, joints: Mapping[str, float]) -> list[str]:
+        return [joint.child for joint in self._stance.model.moving if joint.name in joints]
 
     def _lowest(self) -> float:
         """Return the height of the ground: of the lowest point of the root's body (m)."""
@@ -114,7 +173,7 @@ class PostureSearch:
     def _root_height(self, link: int) -> float:
         return float(self._stance.poses(self._stance.middle)[0, link, 2, 3])
 
-    def _draw(self, view: _View, posture: Floats) -> Floats:
+    def _draw(self, view: View, posture: Floats) -> Floats:
         drawn = np.tile(posture, (DRAWS, 1))
         low, high = view.room
         drawn[:, view.free] = self._generator.uniform(low, high, (DRAWS, len(view.free)))
@@ -129,7 +188,7 @@ class PostureSearch:
         ahead = np.zeros(3)
         for view, drawn in zip(self._views, samples, strict=True):
             turned = drawn.copy()
-            turned[:, view.free[0]] = posture[view.free[0]]
+            turned[:, view.free[0]] = view.limits[:, 0].mean()
             seen = drawn if len(self._views) > 1 or not view.is_upright else turned
             places = view.places(seen)
             view.reach = float(np.quantile(np.linalg.norm(places, axis=1), 0.98))
@@ -141,14 +200,17 @@ class PostureSearch:
             ahead[2] = 0.0
         clear = np.linalg.norm(ahead) >= ONE_SIDED * total
         angle = np.arctan2(ahead[1], ahead[0]) if clear else 0.0
-        nearest = np.round(angle / (np.pi / 4)) * np.pi / 4
-        angle = nearest if abs(angle - nearest) < np.pi / 10 else angle
+        quarter = np.round(angle / QUARTER) * QUARTER
+        eighth = np.round(angle / QUARTER * 2) * QUARTER / 2
+        angle = quarter if abs(angle - quarter) < NEARLY else eighth
         self._front = np.array([np.cos(angle), np.sin(angle), 0.0])
 
     def _is_fine(self, posture: Floats) -> bool:
-        return all(np.isfinite(self._cost(view, posture[None], strict=True)[0]) for view in self._views)
+        return all(
+            np.isfinite(self._cost(view, posture[None], strict=True)[0]) for view in self._views
+        )
 
-    def _cost(self, view: _View, postures: Floats, *, strict: bool = False) -> Floats:
+    def _cost(self, view: View, postures: Floats, *, strict: bool = False) -> Floats:
         """Return how bad postures are, (postures,); infinite where they are no good at all."""
         poses, place = view.look(postures)
         out = place @ self._front / view.reach
@@ -170,20 +232,49 @@ class PostureSearch:
             bad |= (np.abs(at[:, view.bounded]) > 1 - MARGIN).any(axis=1)
         return np.where(bad, np.inf if strict else cost + 10.0, cost)
 
-    def _best(self, view: _View, posture: Floats, drawn: Floats) -> Floats:
-        """Return the best posture of one limb that overlaps nothing, else the best."""
+    def _best(self, view: View, posture: Floats, drawn: Floats, pairs: NDArray[np.intp]) -> Floats:
+        """Return the best posture of one limb that overlaps nothing, else the one that does least.
+
+        Each round leaves out the postures with overlaps that the last round met.
+        """
         drawn, near = drawn.copy(), DRAWS // 2
         pulled = (drawn[:near, view.free] + self._start[view.free]) / 2
         drawn[:near, view.free] = np.clip(pulled, *view.room)
         fixed = np.delete(np.arange(len(posture)), view.free)
         drawn[:, fixed] = posture[fixed]
-        pool = self._refined(view, drawn)
-        for tried in pool:
-            if not self._overlaps(tried, self._pairs).any():
-                return tried
-        return min(pool, key=lambda tried: int(self._overlaps(tried, self._pairs).sum()))
+        counts: list[tuple[int, int, Floats]] = []
+        met = np.zeros(len(pairs), bool)
+        for _ in range(TRIES):
+            pool = self._refined(view, self._without(pairs[met], drawn, view))
+            for tried in pool:
+                overlaps = self._overlaps(tried, pairs)
+                near = overlaps.any() or self._near(view, tried, pairs)
+                if not near:
+                    return tried
+                met |= overlaps
+                counts.append((int(overlaps.sum()), len(counts), tried))
+        return min(counts)[2]
 
-    def _refined(self, view: _View, drawn: Floats) -> Floats:
+    def _near(self, view: View, posture: Floats, pairs: NDArray[np.intp]) -> bool:
+        """Tell whether a small motion of a limb from a posture makes something overlap."""
+        shape = (ROOM_TRIES, len(view.free))
+        moves = np.random.default_rng(0).choice([-ROOM, ROOM], shape)
+        for move in moves:
+            moved = posture.copy()
+            moved[view.free] += np.where(view.slides, move * ROOM, move)
+            if self._overlaps(moved, pairs).any():
+                return True
+        return False
+
+    def _without(self, pairs: NDArray[np.intp], drawn: Floats, view: View) -> Floats:
+        """Return the best of some postures in which some pairs do not overlap, or all if none."""
+        order = np.argsort(self._cost(view, drawn), kind="stable")[: DRAWS // 4]
+        if not len(pairs):
+            return drawn
+        free = [i for i in order if not self._overlaps(drawn[i], pairs).any()]
+        return drawn[free] if free else drawn
+
+    def _refined(self, view: View, drawn: Floats) -> Floats:
         low, high = view.room
         pool = drawn[np.argsort(self._cost(view, drawn), kind="stable")[:BEST]]
         spread = 0.15 * (high - low)
@@ -198,61 +289,10 @@ class PostureSearch:
             spread = spread / 2
         return pool[np.argsort(self._cost(view, pool), kind="stable")]
 
-    def _overlaps(self, posture: Floats, pairs: Floats) -> Floats:
+    def _overlaps(self, posture: Floats, pairs: NDArray[np.intp]) -> NDArray[np.bool_]:
         if not len(pairs):
             return np.zeros(0, bool)
-        return overlapping(self._hulls, self._stance.poses(posture)[0], pairs)
-
-
-class _View:
-    """One limb as the search sees it: only the links on the way to its TCP.
-
-    Attributes:
-        free: Indices of its joints among the leading ones.
-        limits: Lower and upper limits of those, (2, free) (rad, m).
-        room: The same without the margin at the ends.
-        bounded: Whether each of them turns less than a whole turn, or slides.
-        reach: How far the TCP gets from the shoulder (m).
-        shoulder: Where the first of them is, (3,) (m).
-        moving: Indices of the links that move, in the smaller tree.
-    """
-
-    def __init__(self, stance: Stance, limb: Limb, tool: Tool) -> None:
-        joints = [joint for joint in limb.arm if joint.mimics is None]
-        self.free = [stance.index[joint.name] for joint in joints]
-        spans = np.array([joint.span for joint in joints]).T
-        self.bounded = spans[1] - spans[0] < 2 * np.pi - 0.1
-        half = np.where(self.bounded, (spans[1] - spans[0]) / 2, np.pi)
-        middle = np.where(self.bounded, spans.mean(axis=0), np.clip(0.0, *spans))
-        self.limits = np.array([middle - half, middle + half])
-        margin = 1.5 * MARGIN * half * 2
-        self.room = self.limits + np.array([margin, -margin])
-        links = [stance.tree.link(name) for name in (*tool.origins, limb.palm)]
-        self._tree = stance.tree.towards(links)
-        self._tcp = [self._tree.link(name) for name in tool.origins]
-        self._palm = self._tree.link(limb.palm)
-        first = self._tree.link(joints[0].child)
-        pose = stance.poses(stance.middle)[0, stance.tree.link(joints[0].child)]
-        self.shoulder: Floats = pose[:3, 3]
-        axis = pose[:3, :3] @ self._tree.axes[first]
-        self.is_upright = abs(axis[2]) > 0.9 and not self._tree.slides[first]
-        self.moving = [i for i in range(len(self._tree.links)) if i > first]
-        self.reach = 1.0
-
-    def look(self, postures: Floats) -> tuple[Floats, Floats]:
-        """Return the poses of the limb's links, and the TCP from the shoulder, (postures, 3) (m)."""
-        poses = self._tree.forward(postures)
-        return poses, poses[:, self._tcp][..., :3, 3].mean(axis=1) - self.shoulder
-
-    def places(self, postures: Floats) -> Floats:
-        """Return the TCP from the shoulder, (postures, 3) (m)."""
-        return self.look(postures)[1]
-
-    def pointing(self, poses: Floats) -> Floats:
-        """Return which way the tool points, seen from the palm, (postures, 3); 0 if nowhere."""
-        way = poses[:, self._tcp][..., :3, 3].mean(axis=1) - poses[:, self._palm, :3, 3]
-        length = np.linalg.norm(way, axis=1, keepdims=True)
-        return np.where(length > 0.01, way / np.maximum(length, 1e-9), 0.0)
+        return np.asarray(overlapping(self._hulls, self._stance.poses(posture)[0], pairs), bool)
 
 
 def _searchable(limb: Limb) -> bool:

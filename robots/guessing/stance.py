@@ -32,13 +32,13 @@ class Stance:
         """The posture with joints at 0, or mid-range where 0 is out, (leaders,) (rad, m)."""
         return np.array([middle_of(joint) for joint in self.leaders])
 
-    def with_joints(self, positions: Mapping[str, float]) -> Floats:
-        """Return the middle posture with some leading joints elsewhere, (leaders,) (rad, m)."""
-        posture = self.middle.copy()
+    def with_joints(self, positions: Mapping[str, float], posture: Floats | None = None) -> Floats:
+        """Return a posture, or the middle one, with some leading joints elsewhere, (leaders,)."""
+        changed = (self.middle if posture is None else posture).copy()
         for joint, position in positions.items():
             if joint in self.index:
-                posture[self.index[joint]] = position
-        return posture
+                changed[self.index[joint]] = position
+        return changed
 
     def poses(self, postures: Floats) -> Floats:
         """Return the poses of all links, (postures, links, 4, 4), in the root's frame (m)."""

@@ -88,9 +88,7 @@ def _has_shape(stance: Stance, link: str) -> bool:
     return link in stance.model.collisions or link in stance.model.visuals
 
 
-def _between(
-    stance: Stance, limb: Limb, rigid: list[str], tips: Fingertips, which: str
-) -> Tool:
+def _between(stance: Stance, limb: Limb, rigid: list[str], tips: Fingertips, which: str) -> Tool:
     """Return the frame, or the mean of two, that lies nearest between the finger tips."""
     middle, everywhere = tips.middle(), stance.places(stance.tree.links)
 
@@ -107,9 +105,9 @@ def _between(
     frames = _grasping(stance, tips)
     if off(frames) <= BETWEEN:
         return _mean(limb, frames, which, off(frames))
-    choices = [(limb.palm,), *((link,) for link in rigid), frames]
+    choices: list[tuple[str, ...]] = [(limb.palm,), *((link,) for link in rigid), frames]
     distance, best = min((off(links), links) for links in choices)
-    if len(best) > 1:
+    if best == frames:
         return _mean(limb, best, which, distance)
     only = ", which is only the palm" if best == (limb.palm,) else ", the nearest to the tips"
     return Tool(best[0], (), f"{which}: the link {best[0]}{only}{_apart(distance)}")

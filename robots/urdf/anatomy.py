@@ -1,7 +1,7 @@
 """The parts of a robot: its limbs with their grippers, and what moves besides, from its URDF.
 
-Told by structure first: where the tree of joints branches, how many joints follow, how long they
-are, what mimics what. Names help where several answers fit: the generic words of `robots.urdf.words`.
+Structure comes first: where the tree of joints branches, how many joints follow, how long they are,
+what mimics what. Names help where several answers fit, by the generic words of `robots.urdf.words`.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ FARTHEST_SLIDE = 4.0  # m; a slide that goes farther is a way for a whole robot
 LONGEST_HAND = 0.4  # of the length of the arm that carries it
 LARGEST_HAND = 0.35  # m, of a hand without arm whose names do not say so
 FEWEST_ARM_JOINTS = 4  # of an arm whose names do not say so, beside other limbs
+WIDEST_FINGER = 12.6  # rad; what turns farther is no finger whose name does not say so
 WIDEST_JAW = 3.3  # rad; a joint that goes farther turns a wrist
 PARTS = ("torso", "head", "legs", "wheels", "body")  # what is no limb, in this order
 
@@ -60,7 +61,7 @@ class Anatomy:
 
 @dataclass
 class _Chain:
-    """Joints in a row that end in a hand or in nothing; ``body`` is what else moves beside."""
+    """Joints in a row that end in a hand or in nothing; ``kind`` is ``arm`` or one of `PARTS`."""
 
     joints: Joints
     fingers: Joints = ()
@@ -70,7 +71,7 @@ class _Chain:
 
 @dataclass
 class _Search:
-    """What the walk over the tree has found so far."""
+    """A walk over the tree, and what it has come to so far."""
 
     model: UrdfModel
     lengths: Lengths
@@ -150,16 +151,23 @@ def _moves_the_whole(joint: ModelJoint) -> bool:
 
 
 def _is_hand(search: _Search, link: str, nexts: Joints, path: Joints) -> bool:
-    """Tell whether a link that branches is a palm: all behind it is small, or named like fingers."""
+    """Tell whether a link that branches is a palm: what it carries is small, or called fingers."""
     behind = [search.model.below(joint) for joint in nexts]
     if any(_is_other(joints) for joints in behind):
         return False
     span = max(search.lengths.between(link, joint) for joint in nexts)
     arm = search.lengths.along(path)
     named = all(_share(joints, words.FINGER) > 0.5 for joints in behind)
+    if not named and any(_spins(joint) for joints in behind for joint in joints):
+        return False
     if named or (path and _is_called_palm(search.model, nexts)):
         return not path or span <= max(arm, LARGEST_HAND)
     return span <= LONGEST_HAND * arm if len(path) > 2 else span <= LARGEST_HAND and not path
+
+
+def _spins(joint: ModelJoint) -> bool:
+    low, high = joint.span
+    return joint.unit == "rad" and (joint.type == "continuous" or high - low > WIDEST_FINGER)
 
 
 def _is_other(joints: Joints) -> bool:
@@ -232,7 +240,7 @@ def _instead(search: _Search) -> list[_Chain]:
 
 
 def _with_jaw(search: _Search, chain: _Chain) -> _Chain:
-    """Make the last joint of an arm its gripper if it is one jaw, and the base an arm if need be."""
+    """Make the last joint of an arm its gripper, if it is a jaw."""
     fingers_only = _share(chain.joints, words.JAW) > 0.5
     if len(chain.joints) > 1 and not (chain.fingers or fingers_only) and _is_jaw(chain.joints[-1]):
         jaw = chain.joints[-1]
@@ -252,7 +260,7 @@ def _is_jaw(joint: ModelJoint) -> bool:
 
 
 def _named(search: _Search, arms: Sequence[_Chain]) -> list[Limb]:
-    """Return the limbs, named by side: as their names say, else by where they begin, else numbers."""
+    """Return the limbs, named by side as their names say, else as they stand, else by numbers."""
     if len(arms) == 1:
         (chain,) = arms
         if not chain.joints and not search.torso:  # a hand that flies
@@ -300,13 +308,11 @@ def _explain(search: _Search, limbs: Iterable[Limb], parts: Mapping[str, Joints]
         which = f"{limb.name} " if limb.name else ""
         if limb.arm:
             reasons.append(f"{which}arm: {_listing(limb.arm)}, the joints in a row to {limb.palm}")
-        count = len({joint.parent for joint in limb.fingers})
         if len(limb.fingers) > 1:
+            chains = len(search.model.moving_on(limb.palm))
             reasons.append(
-                f"{which}gripper: {_listing(limb.fingers)}, as {limb.palm} carries"
-                f" {len(search.model.moving_on(limb.palm))} short chains side by side"
-                if count
-                else ""
+                f"{which}gripper: {_listing(limb.fingers)}, as {limb.palm} carries {chains} short"
+                f" chain{'s' * (chains != 1)}{' side by side' * (chains != 1)}"
             )
         elif not limb.fingers:
             reasons.append(
@@ -330,5 +336,3 @@ def _names(joints: Iterable[ModelJoint]) -> list[str]:
 
 def _listing(joints: Iterable[ModelJoint]) -> str:
     return ", ".join(joint.name for joint in joints)
-
-

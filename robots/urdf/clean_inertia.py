@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Iterator
 from contextlib import suppress
+from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element, SubElement
 
 from robots.common.errors import AssetError, MissingPackageError
@@ -15,6 +16,9 @@ from robots.urdf.numbers import numbers_of, required_numbers
 from robots.urdf.paths import resolve
 from robots.urdf.shapes import SIZES
 from robots.urdf.text_checks import link_of
+
+if TYPE_CHECKING:
+    from kinematics.rotations import Floats
 
 DENSITY = 1000.0  # kg/m³; what SAPIEN takes for collision shapes
 THINNEST = 1e-3  # m; of a body whose shapes are thinner
@@ -47,6 +51,9 @@ def _repair(link: Element, where: str, urdf: str) -> Iterator[str]:
     moments = [_given(tensor, key, where) for key in (*MOMENTS, *PRODUCTS)]
     if weight < 0 or 0 < weight < SMALLEST:
         return
+    if tensor is not None and (products := _complete(tensor)) and _is_possible(link, where):
+        yield f"link {link.get('name')!r} has an inertia without {', '.join(products)}, taken as 0"
+        return
     what = _problem(tensor, moments)
     size = _size(link, where, urdf)
     if weight == 0 and link.find("collision") is not None:
@@ -64,6 +71,22 @@ def _repair(link: Element, where: str, urdf: str) -> Iterator[str]:
         _set_box(inertial, weight, size or _ball(weight))
         body = _in_words(weight, size)
         yield f"link {link.get('name')!r} has {words}{what}: took that of {body}"
+
+
+def _complete(tensor: Element) -> list[str]:
+    """Set the products of inertia that are missing to 0, and return their names."""
+    missing = [key for key in PRODUCTS if key not in tensor.keys()]  # noqa: SIM118
+    for key in missing:
+        tensor.set(key, "0")
+    return missing
+
+
+def _is_possible(link: Element, where: str) -> bool:
+    try:
+        expect_inertia(link, where, moves=True)
+    except AssetError:
+        return False
+    return True
 
 
 def _given(element: Element | None, key: str, where: str) -> float:
@@ -112,7 +135,9 @@ def _size(link: Element, where: str, urdf: str) -> Size | None:
 
     for kind in ("collision", "visual"):
         corners = [
-            made for shape in link.iterfind(kind) if (made := _corners(shape, where, urdf)) is not None
+            made
+            for shape in link.iterfind(kind)
+            if (made := _corners(shape, where, urdf)) is not None
         ]
         if corners:
             x, y, z = np.maximum(np.ptp(np.concatenate(corners), axis=0), THINNEST).tolist()
@@ -120,7 +145,7 @@ def _size(link: Element, where: str, urdf: str) -> Size | None:
     return None
 
 
-def _corners(element: Element, where: str, urdf: str):  # noqa: ANN202
+def _corners(element: Element, where: str, urdf: str) -> Floats | None:
     """Return the corners of what a shape fills in the link's frame, (n, 3) (m), or None."""
     import numpy as np
 
@@ -136,7 +161,7 @@ def _corners(element: Element, where: str, urdf: str):  # noqa: ANN202
     return np.asarray(own) @ pose[:3, :3].T + pose[:3, 3]
 
 
-def _own_corners(element: Element, where: str, urdf: str):  # noqa: ANN202
+def _own_corners(element: Element, where: str, urdf: str) -> Any:
     (shape,) = element.findall("geometry/*")
     if shape.tag == "mesh":
         scale = numbers_of(shape, "scale", (1.0, 1.0, 1.0), where)

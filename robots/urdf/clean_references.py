@@ -82,41 +82,52 @@ def _leads(reference: str, urdf: str) -> bool:
 
 
 def _meant(reference: str, urdf: str) -> Iterator[str]:
-    """Yield references to files that a reference may mean."""
+    """Yield references to files that a reference may mean, none of which leads where it may not."""
     folder = posixpath.dirname(urdf)
     for text in dict.fromkeys(_spellings(reference)):
         if _leads(text, urdf):
             yield text
-        for path in _paths(text, folder):
+        for path, package in _paths(text, folder):
             if found := _on_disk(path):
-                yield from _references_to(found, urdf)
+                near = Path(os.path.relpath(found, folder)).as_posix()
+                far = f"package://{posixpath.relpath(found, posixpath.dirname(package))}"
+                yield from (other for other in (near, package and far) if _leads(other, urdf))
 
 
 def _spellings(reference: str) -> Iterator[str]:
     """Yield what a reference may be short for, or a slip of."""
-    text = reference.strip().replace("\\", "/")
+    text = reference.strip().replace("\\", "/").replace("package:///", "package://")
     if match := _FIND.fullmatch(text):
         text = f"package://{match[1]}/{match[2]}"
     if text.startswith(_GAZEBO):
         text = f"package://{text.removeprefix(_GAZEBO)}"
     yield text
     if "://" not in text and not text.startswith("/"):
-        yield f"package://{text}"
+        yield f"package://{text}"  # of whoever left out the scheme
     if text.startswith("file://") and not text.startswith("file:///"):
         yield text.removeprefix("file://")
 
 
-def _paths(reference: str, folder: str) -> Iterator[str]:
-    """Yield the absolute paths that a reference may mean, whatever the case of their letters."""
+def _paths(reference: str, folder: str) -> Iterator[tuple[str, str]]:
+    """Yield absolute paths that a reference may mean, and the package that it names, if any.
+
+    The case of letters is not yet that of the files. No ``..`` leads out of a package.
+    """
     scheme, separator, rest = reference.partition("://")
     if not separator:
-        yield posixpath.normpath(posixpath.join(folder, reference))
-    elif scheme == "package":
+        yield posixpath.normpath(posixpath.join(folder, reference)), ""
+    elif scheme == "package" and ".." not in rest.split("/"):
         name, _, inside = rest.partition("/")
         for package in _packages(name, folder):
-            yield posixpath.normpath(posixpath.join(package, inside))
+            yield posixpath.normpath(f"{package}/{inside}"), package
         for parent in _around(folder):
-            yield posixpath.normpath(posixpath.join(parent, rest))
+            for package in _alike(name, parent):
+                yield posixpath.normpath(f"{package}/{inside}"), package
+
+
+def _alike(name: str, folder: str) -> list[str]:
+    """Return the folders in a folder whose name differs at most by the case of letters."""
+    return [f"{folder}/{entry}" for entry in _listing(folder) if entry.lower() == name.lower()]
 
 
 def _packages(name: str, folder: str) -> Iterator[str]:
@@ -169,15 +180,3 @@ def _listing(folder: str) -> list[str]:
         return sorted(os.listdir(folder))
     except OSError:
         return []
-
-
-def _references_to(path: str, urdf: str) -> Iterator[str]:
-    """Yield how a URDF may refer to a file: relative to its folder, or within a package."""
-    folder = posixpath.dirname(urdf)
-    packages = [package for package in _around(posixpath.dirname(path))]
-    for text in (
-        Path(os.path.relpath(path, folder)).as_posix(),
-        *(f"package://{posixpath.relpath(path, posixpath.dirname(near))}" for near in packages),
-    ):
-        if _leads(text, urdf) and resolve(text, urdf, os.path.isfile) == path:
-            yield text

@@ -22,6 +22,7 @@ from robots.urdf.clean_text import parse_damaged
 from robots.urdf.xacro_files import drop_leftovers, is_unfinished
 
 PARTS = ("link", "joint", "material")  # of a robot; the rest belongs to other programs
+VECTORS = ("xyz", "rpy", "size", "scale")  # attributes of three numbers
 
 
 @dataclass(frozen=True)
@@ -88,9 +89,22 @@ def _drop_foreign(root: Element, urdf: str) -> Iterator[str]:
         yield f"elements of other programs, left out: {listing}"
 
 
+def _drop_commas(root: Element, urdf: str) -> Iterator[str]:
+    changed = 0
+    for element in root.iter():
+        for key in VECTORS:
+            value = element.get(key, "")
+            if "," in value and len(value.replace(",", " ").split()) == 3:
+                element.set(key, value.replace(",", " "))
+                changed += 1
+    if changed:
+        yield f"commas between the numbers of vectors, left out: {changed} times"
+
+
 _STEPS: tuple[Callable[[Element, str], Iterator[str]], ...] = (
     drop_leftovers,
     _drop_foreign,
+    _drop_commas,
     repair_joints,
     repair_references,
     repair_shapes,

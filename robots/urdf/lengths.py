@@ -31,7 +31,7 @@ class Lengths:
         return self._places[joint.child]
 
     def between(self, link: str, joint: ModelJoint) -> float:
-        """Return the length from a link over a joint that it carries to the end of the chain (m)."""
+        """Return the length from a link over a joint on it to the end of the chain (m)."""
         way = np.linalg.norm(self._places[joint.child] - self._places[link])
         return float(way) + self.behind(joint)
 

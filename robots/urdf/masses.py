@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -13,6 +13,7 @@ from kinematics.rotations import Floats, rpy_pose
 from kinematics.tree import Tree
 from robots.urdf.numbers import numbers_of
 
+WATER = 1000.0  # kg/m³
 _PRODUCTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
@@ -21,7 +22,7 @@ class Masses:
     """Masses of the links of a tree, in its order.
 
     Attributes:
-        mass: (links,) (kg); 0 where the URDF gives none.
+        mass: (links,) (kg); 0 of a link without numbers and without shapes.
         centre: Centres of mass in the links' frames, (links, 3) (m).
         inertia: About those, turned as the links, (links, 3, 3) (kg·m²).
     """
@@ -30,21 +31,18 @@ class Masses:
     centre: Floats
     inertia: Floats
 
-    @cached_property
-    def total(self) -> float:
-        """The mass of the whole robot (kg)."""
-        return float(self.mass.sum())
 
-
-def read_masses(root: Element, tree: Tree) -> Masses:
-    """Return what the links of a URDF weigh.
+def read_masses(root: Element, tree: Tree, bodies: Mapping[int, Sequence[Floats]]) -> Masses:
+    """Return what the links of a URDF weigh; without numbers, as much as their shapes in water.
 
     Args:
         root: Its ``<robot>``, whose numbers make sense; see `robots.urdf.inertia`.
         tree: Its links.
+        bodies: Corners of the convex bodies of links, by index, in their frames (m).
     """
     inertial = {link.get("name"): link.find("inertial") for link in root.iterfind("link")}
     rows = [_row(inertial.get(link)) for link in tree.links]
+    rows = [row if row[0] else _of_shapes(bodies.get(i, ())) for i, row in enumerate(rows)]
     mass, centre, inertia = (np.array(column) for column in zip(*rows, strict=True))
     return Masses(mass, centre, inertia)
 
@@ -60,6 +58,23 @@ def _row(inertial: Element | None) -> tuple[float, Floats, Floats]:
     xx, xy, xz, yy, yz, zz = (numbers_of(tensor, key, (0.0,), "")[0] for key in _PRODUCTS)
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     return mass, pose[:3, 3], pose[:3, :3] @ inertia @ pose[:3, :3].T
+
+
+def _of_shapes(bodies: Sequence[Floats]) -> tuple[float, Floats, Floats]:
+    """Return mass, centre and inertia of bodies with the density of water, as SAPIEN takes it."""
+    if not bodies:
+        return 0.0, np.zeros(3), np.zeros((3, 3))
+    import trimesh
+
+    hulls: list[Any] = [trimesh.convex.convex_hull(corners) for corners in bodies]
+    mass = np.array([hull.volume * WATER for hull in hulls])
+    centres = np.array([hull.center_mass for hull in hulls])
+    centre = mass @ centres / mass.sum()
+    inertia = np.zeros((3, 3))
+    for hull, weight, off in zip(hulls, mass, centres - centre, strict=True):
+        inertia += hull.moment_inertia * WATER
+        inertia += weight * (off @ off * np.eye(3) - np.outer(off, off))
+    return float(mass.sum()), centre, inertia
 
 
 def hanging_inertia(tree: Tree, masses: Masses, poses: Floats, links: Iterable[int]) -> Floats:

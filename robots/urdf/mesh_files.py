@@ -39,7 +39,7 @@ Floats = Any
 
 
 class _NoVolumeError(AssetError):
-    """A mesh that can be read, and that nothing can touch."""
+    """A mesh that is flat; one that is empty may as well be damaged."""
 
 
 def load_scene(path: str, where: str, urdf: str | None = None, **options: Any) -> Any:
@@ -108,7 +108,7 @@ def read_corners(path: str, scale: Sequence[float], where: str, urdf: str) -> Fl
     except Exception as error:  # what the reader left behind may be anything
         raise AssetError(f"{where}: cannot read the mesh {path}: {_line(error)}") from error
     if len(corners) == 0 or len(mesh.faces) == 0:
-        raise _NoVolumeError(f"{where}: the mesh {path} is empty")
+        raise AssetError(f"{where}: the mesh {path} is empty")
     farthest = float(np.abs(corners).max())
     if not farthest <= LARGEST:
         raise AssetError(
@@ -124,7 +124,7 @@ def read_corners(path: str, scale: Sequence[float], where: str, urdf: str) -> Fl
 
 
 def has_body(path: str, scale: Sequence[float], where: str, urdf: str) -> bool:
-    """Tell whether a mesh that collides can be touched: whether it is neither empty nor flat.
+    """Tell whether a mesh that collides can be touched: whether it is not flat.
 
     A file is read once by a process, and again if it changes: reading takes trimesh milliseconds,
     and leaves garbage.

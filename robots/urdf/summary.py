@@ -51,11 +51,24 @@ def read_cleaned(path: Path) -> Cleaned:
         AssetError: As `read_urdf`.
         MissingPackageError: As `read_urdf`.
     """
+    return clean(read_written(path), path.as_posix())
+
+
+def read_written(path: Path) -> bytes:
+    """Return the contents of a URDF as they are, or of a template as it is expanded.
+
+    Args:
+        path: As of `read_cleaned`.
+
+    Raises:
+        AssetError: As `read_urdf`.
+        MissingPackageError: As `read_urdf`.
+    """
     file, arguments = template_of(path)
     contents = _read(file)
     if arguments or is_template(contents, str(file)):
         contents = expand(file, arguments)
-    return clean(contents, path.as_posix())
+    return contents
 
 
 def _read(path: Path) -> bytes:
@@ -100,6 +113,6 @@ def parse_urdf(xml: bytes, urdf: str) -> ElementTree.Element:
     root = parse_xml(xml, urdf, "a URDF")
     if root.tag != "robot":
         raise AssetError(f"{urdf} is not a URDF: it holds <{root.tag}>, not <robot>")
-    if any(XACRO in element.tag for element in root.iter()):
+    if any(f"{XACRO}}}" in element.tag for element in root.iter()):
         raise AssetError(f"{urdf} is a xacro template; only a file of its own is expanded")
     return root

@@ -22,7 +22,18 @@ LEG = (
     "leg", "hip", "thigh", "knee", "calf", "ankle", "foot", "toe", "shank", "shin", "femur",
     "tibia", "coxa", "haa", "hfe", "kfe", "upperleg", "lowerleg", "sole", "hipz",
 )  # fmt: skip
-WHEEL = ("wheel", "caster", "castor", "roller", "suspension", "steering", "steer", "track")
+WHEEL = (
+    "wheel",
+    "caster",
+    "castor",
+    "roller",
+    "suspension",
+    "steering",
+    "steer",
+    "track",
+    "rotor",
+    "propeller",
+)
 TORSO = ("torso", "waist", "spine", "trunk", "chest", "lumbar", "thoracic", "lift", "column")
 ARM = ("arm", "shoulder", "elbow", "wrist", "forearm", "upperarm", "lowerarm", "clavicle")
 TCP = ("tcp",)

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from importlib import import_module
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -19,8 +21,10 @@ from xml.etree.ElementTree import Element
 from robots.common.errors import AssetError, MissingPackageError
 from robots.urdf.clean_references import find_package
 
-XACRO = "www.ros.org/wiki/xacro"  # of the namespace {http://www.ros.org/wiki/xacro}
+XACRO = "/xacro"  # what its namespaces end in: http://www.ros.org/wiki/xacro, …
 DEFINITIONS = ("property", "arg", "macro")  # which do nothing where nothing uses them
+
+_EXPRESSION = re.compile(r"\$\{|\$\((?!find\b)")  # finding packages is left to the readers
 
 _turn = Lock()  # the package keeps what it is doing in its module
 _expanded: dict[tuple[str, str], tuple[dict[str, int], bytes]] = {}
@@ -96,15 +100,18 @@ def _expand(template: Path, arguments: Mapping[str, str]) -> tuple[list[str], by
 def _package(template: Path) -> Any:
     try:
         import xacro  # pyright: ignore[reportMissingImports]
+
+        import_module("xacro.substitution_args")  # which xacro loads when it first needs it
     except ImportError as error:
         raise MissingPackageError(
-            f"{template} is a xacro template; expanding it needs xacro: pip install xacro"
+            f"{template} is a xacro template; expanding it needs xacro: pip install xacro (ROS"
+            " is not needed)"
         ) from error
     return xacro
 
 
 @contextmanager
-def _finding(xacro: Any, template: Path) -> Iterator[None]:
+def _finding(xacro: Any, template: Path) -> Generator[None]:
     """Have ``$(find PACKAGE)`` look around the template, before ROS if that is installed."""
     substitution = xacro.substitution_args
     installed = substitution._eval_find
@@ -126,7 +133,7 @@ def _times(files: Any) -> dict[str, int]:
 def _kind(element: Element) -> str:
     """Return what an element is to xacro; nothing if it is not one of its own."""
     space, _, name = element.tag.rpartition("}")
-    return name if XACRO in space else ""
+    return name if space.endswith(XACRO) else ""
 
 
 def _outside_definitions(root: Element) -> Iterator[Element]:
@@ -139,4 +146,4 @@ def _outside_definitions(root: Element) -> Iterator[Element]:
 def _is_instruction(element: Element) -> bool:
     """Tell whether an element is an instruction to xacro, or has an expression for it."""
     texts = [*element.attrib.values(), element.text or ""]
-    return bool(_kind(element)) or any("${" in text or "$(arg" in text for text in texts)
+    return bool(_kind(element)) or any(map(_EXPRESSION.search, texts))

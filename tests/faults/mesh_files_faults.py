@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.faults.fault import GOES_ON, Fault
-from tests.faults.toy_robots import build, check, guess, mesh, read_by_all, toy
+from tests.faults.toy_robots import build, check, guess, mesh, read_by_all, read_repaired, toy
 
 AREA = "robot files"
 
@@ -48,7 +48,18 @@ def faults() -> Iterator[Fault]:
     yield _right("stl: 100 m high, scaled to 10 cm", "stl", _large, ' scale="0.001 0.001 0.001"')
 
 
+# What is as flat as a picture, and is left out.
+_FLAT = {"stl: one face", "stl: flat", "obj: flat", "glb: flat", "glb: a node of size 0"}
+
+
 def _fault(what: str, ending: str, data: Data, fifos: tuple[str, ...] = ()) -> Fault:
+    if what in _FLAT:
+
+        def repair(folder: Path) -> str:
+            return read_repaired(_robot_with(folder, f"arm.{ending}", data()))
+
+        return Fault(AREA, f"mesh {what}", repair, GOES_ON)
+
     def run(folder: Path) -> None:
         for fifo in fifos:
             os.mkfifo(folder / fifo)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from tests.faults.fault import Fault
+from tests.faults.fault import GOES_ON, Fault
 from tests.faults.toy_robots import (
     BOX,
     INERTIAL,
@@ -14,6 +14,7 @@ from tests.faults.toy_robots import (
     link,
     mesh,
     read_by_all,
+    read_repaired,
     robot,
     toy,
 )
@@ -30,7 +31,10 @@ BOMB = "<!DOCTYPE robot [" + '<!ENTITY e0 "ha">' + "".join(
 def faults() -> Iterator[Fault]:
     """Go through this area's faults of URDFs and SRDFs."""
     for what, text in _wrong_texts():
-        yield Fault(AREA, f"URDF: {what}", lambda folder, text=text: _read(folder, text))
+        if what in _REPAIRED:
+            yield Fault(AREA, f"URDF: {what}", lambda f, text=text: _repair(f, text), GOES_ON)
+        else:
+            yield Fault(AREA, f"URDF: {what}", lambda folder, text=text: _read(folder, text))
     for what, data in _wrong_bytes():
         yield Fault(AREA, f"URDF: {what}", lambda folder, data=data: _read_bytes(folder, data))
     for what, data in _wrong_srdfs():
@@ -168,6 +172,31 @@ _FLAT = {
     "capsule of radius 0": '<capsule radius="0" length="0.1"/>',
 }
 
+# What has a clear meaning all the same.
+_REPAIRED = {
+    "mass 0",
+    "moment below 0",
+    "moment 1e-300",
+    "products of inertia that no body has",
+    "no mass",
+    "no inertia",
+    "no ixy",
+    "an empty inertial",
+    "visual mesh with one scale",
+    "xacro",
+    *(f"collision {what}" for what in _FLAT),
+    *(
+        f"{kind} {what}"
+        for kind in ("collision", "visual")
+        for what in (
+            "without a shape",
+            "mesh without a file",
+            "mesh of an empty name",
+            "mesh with scale 0",
+        )
+    ),
+}
+
 _TREES = {
     "nothing inside": robot(),
     "no root": robot(
@@ -266,6 +295,12 @@ def _wrong_srdfs() -> Iterator[tuple[str, bytes]]:
 
 def _read(folder: Path, text: str) -> None:
     _read_bytes(folder, text.encode())
+
+
+def _repair(folder: Path, text: str) -> str:
+    urdf = folder / "toy.urdf"
+    urdf.write_text(text)
+    return read_repaired(urdf)
 
 
 def _read_bytes(folder: Path, data: bytes) -> None:

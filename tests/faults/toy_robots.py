@@ -100,6 +100,19 @@ def read_by_all(urdf: Path, readers: tuple[str, ...] = ("guess", "check", "build
             raise error
 
 
+def read_repaired(urdf: Path) -> str:
+    """Have a URDF guessed, checked and built that needs a repair; return what was repaired."""
+    from robots.urdf.summary import read_cleaned
+    from simulation.sapien3.world import BuiltWorld
+
+    guess(urdf)
+    check(urdf)
+    BuiltWorld(Layout({"toy": Placement(descriptor(urdf))}))
+    repairs = read_cleaned(urdf).repairs
+    assert repairs, "nothing was repaired"
+    return "repaired: " + "; ".join(repairs)
+
+
 def write_mesh(path: Path) -> None:
     """Write a box as a mesh; the ending chooses the format."""
     import trimesh

@@ -11,9 +11,10 @@ import yourdfpy
 from scipy.spatial.transform import Rotation
 
 from layouts import single
-from robots import LayoutError
+from robots import LayoutError, RobotDescriptor
 from tests.catalogue import every_robot
 from tests.layouts.cells import hung, link_poses, mixed_cell, random_positions, skeleton
+from tests.robots.damaged_robots import BOX, REPAIRS, joint, shape, with_tip, write_damaged
 
 pytestmark = pytest.mark.xdist_group("drake")  # they share one exported cell
 
@@ -153,3 +154,52 @@ def test_a_wrong_ending_is_refused(tmp_path):
     with pytest.raises(LayoutError, match=r"'arm.yaml'; the name must end in .dmd.yaml"):
         single({"arm": "so100"}).to_drake(tmp_path / "arm.yaml")
     assert list(tmp_path.iterdir()) == []
+
+
+ODD = with_tip(shape('<mesh filename="box.stl"/>') + shape('<mesh filename="box.stl"/>', "visual"))
+
+
+def written(text: str, folder: Path) -> tuple[Path, Path]:
+    """Export a robot and return the directives and its URDF."""
+    robot = RobotDescriptor.from_urdf(write_damaged(folder, text), quiet=True)
+    path = single({"arm": robot}).to_drake(folder / "cell.dmd.yaml")
+    models, _ = read(path)
+    return path, urdf_of(models["arm"])
+
+
+@pytest.mark.parametrize("taken", ["", '<link name="world_link"/>'])
+def test_a_link_called_world_is_renamed(tmp_path, taken):
+    more = taken and taken + joint("other", "base", "world_link", kind="fixed")
+    path, urdf = written(
+        ODD.replace('"base"', '"world"').replace("</robot>", "")
+        + (more.replace('"base"', '"world"') + "</robot>"),
+        tmp_path,
+    )
+    _, welds = read(path)
+    new = "world_link2" if taken else "world_link"
+    assert welds["arm"][0] == new
+    links = yourdfpy.URDF.load(str(urdf), load_meshes=False).link_map
+    assert new in links
+    assert "world" not in links
+
+
+def test_a_slash_in_a_name_leads_to_no_other_folder(tmp_path):
+    text = ODD.replace(BOX, '<mesh filename="box.stl"/>')
+    text = text.replace('"tip"', '"left/../tip"').replace('"upper"', '"left_.._tip"')
+    _, urdf = written(text, tmp_path)
+    meshes = [path.name for path in urdf.parent.iterdir() if path.suffix == ".obj"]
+    assert sorted(meshes) == [
+        "base_collision_0.obj",
+        "left_.._tip_collision_0.obj",
+        "left_.._tip_collision_0_2.obj",
+        "left_.._tip_collision_1.obj",
+        "left_.._tip_collision_2.obj",
+        "left_.._tip_visual_0.obj",
+    ]
+    loaded = yourdfpy.URDF.load(str(urdf), load_collision_meshes=True)
+    assert "left/../tip" in loaded.link_map
+
+
+def test_what_is_repaired_is_exported_repaired(tmp_path):
+    _, urdf = written(REPAIRS["a box without size"][0], tmp_path)
+    assert 'size="0 0 0"' not in urdf.read_text()

@@ -1,6 +1,7 @@
 """The merged URDF of a layout, loaded back by other programs' readers."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -114,6 +115,19 @@ def test_excused_collisions_stand_beside_it(cell, merged):
     found = [pair for pair in pairs if pair.get("link1").startswith("up/")]
     assert [(p.get("link1"), p.get("link2")) for p in found] == [
         (f"up/{p.get('link1')}", f"up/{p.get('link2')}") for p in expected
+    ]
+
+
+def test_links_that_a_descriptor_lets_overlap_stand_beside_it(tmp_path):
+    robot = replace(
+        RobotRegistry.load("so100"),
+        allowed_collisions=(("Base", "Upper_Arm"), ("Base", "Fixed_Jaw")),
+    )
+    Layout({"up": Placement(robot)}).to_urdf(tmp_path / "cell.urdf")
+    pairs = ElementTree.parse(tmp_path / "cell.srdf").getroot().findall("disable_collisions")
+    assert [(pair.get("link1"), pair.get("link2"), pair.get("reason")) for pair in pairs] == [
+        ("up/Base", "up/Fixed_Jaw", "Default"),
+        ("up/Base", "up/Upper_Arm", "Default"),
     ]
 
 

@@ -17,7 +17,12 @@ from layouts import (
     side_by_side,
     yaw_quaternion,
 )
-from layouts.validation.collisions import nearest, stand, touching
+from layouts.validation.collisions import (
+    _measure,
+    nearest,
+    stand,
+    touching,
+)
 from robots import (
     AssetError,
     DescriptorError,
@@ -41,6 +46,7 @@ from tests.layouts.small_robots import (
 )
 
 PANDAS = {"left": "panda", "right": "panda"}
+TURN = joint("turn", "base", "top", xyz="0 0 0.35")
 TABLE = (-0.7245, -1.209, 0.4845, 1.209)
 MIXED = ("panda", "panda_stick", "so100", "panda", "so100", "panda_stick", "so100", "panda")
 
@@ -248,6 +254,66 @@ class TestDistances:
         assert after.distance == pytest.approx(before.distance, abs=1e-6)
         assert after.links == before.links
         assert after.noisy_distance == pytest.approx(before.noisy_distance, abs=1e-6)
+
+
+def nearest_of_all(one, other):
+    """Return the least distance of all hulls in all postures, each measured."""
+    places = np.ndindex(len(one.poses), len(one.hulls), len(other.hulls))
+    return min(_measure(one, other, *place).distance for place in places)
+
+
+class TestNearest:
+    """What is left out of the measuring, because planes or boxes part it, is never the nearest."""
+
+    def standing(self, name, kind, random, place):
+        robot_ = RobotRegistry.load(kind)
+        limits = np.clip(load_model(robot_).kinematics.limits, -2.0, 2.0)
+        qpos = random.uniform(*limits.T, (3, len(limits)))
+        placement = Placement(robot_, place, yaw_quaternion(random.uniform(0, 6)))
+        return stand(name, placement, load_model(robot_), qpos)
+
+    @pytest.mark.parametrize("distance", [0.3, 0.6, 1.2, 3.0])
+    @pytest.mark.parametrize("kinds", [("so100", "koch"), ("panda_stick", "so100")])
+    def test_it_is_the_nearest_of_all(self, kinds, distance):
+        random = np.random.default_rng(round(distance * 10))
+        one = self.standing("one", kinds[0], random, (0.0, 0.0, 0.0))
+        other = self.standing("other", kinds[1], random, (distance, 0.2, 0.1))
+        expected = nearest_of_all(one, other)
+        first = nearest(one.first, other.first)
+        for known in (None, first):
+            assert nearest(one, other, None, known).distance == pytest.approx(expected, abs=1e-9)
+
+    def test_beyond_ten_metres_there_is_none(self):
+        random = np.random.default_rng(0)
+        one = self.standing("one", "so100", random, (0.0, 0.0, 0.0))
+        other = self.standing("other", "so100", random, (30.0, 0.0, 0.0))
+        assert nearest(one, other) is None
+
+
+class TestFiles:
+    """A robot whose files make no sense does not keep the others from being checked."""
+
+    def layout(self, tmp_path, **others):
+        text = urdf(link("base", '<mesh filename="gone.stl"/>'), link("top"), TURN)
+        broken = Placement(robot(tmp_path, text, ["turn"]), (5.0, 0.0, 0.0), (1, 0, 0, 0))
+        return Layout({"broken": broken, **others})
+
+    def test_it_is_a_finding(self, tmp_path):
+        near = {n: Placement("so100", (x, 0, 0), (1, 0, 0, 0)) for n, x in (("a", 0), ("b", 0.05))}
+        report = self.layout(tmp_path, **near).validate(targets=[(0.0, -0.2, 0.2)])
+        assert not report.ok
+        assert kinds(report) == ["files", "collision", "target"]
+        finding = report.findings[0]
+        assert finding.robots == ("broken",)
+        assert finding.what.startswith("broken cannot be checked: ")
+        assert "refers to files that do not exist: " in finding.what
+        assert "as if broken were not there" in finding.advice
+        assert {reach.robot for reach in report.reaches} == {"a", "b"}
+        assert report.picture(tmp_path / "cell.png").is_file()
+
+    def test_alone_it_is_an_error(self, tmp_path):
+        with pytest.raises(AssetError, match="refers to files that do not exist"):
+            self.layout(tmp_path).validate()
 
 
 class TestSelfCollisions:

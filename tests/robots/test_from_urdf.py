@@ -76,9 +76,15 @@ class TestQuality:
     @pytest.mark.parametrize("robot", ROBOTS)
     def test_arm_and_base_are_told_apart(self, robot):
         known, guessed = RobotRegistry.load(robot), guess(robot).descriptor
-        assert set(guessed.arm_joints) == set(known.arm_joints)
+        held = {
+            joint
+            for part in ("head", "torso", "torso_slide")
+            if (group := guessed.action_split.groups.get(part))
+            for joint in group.joints
+        }
+        assert set(guessed.arm_joints) == set(known.arm_joints) - held
         assert set(guessed.joints) == set(known.joints)
-        assert guessed.action_dim == known.action_dim
+        assert guessed.action_dim == known.action_dim - len(held)
         arm = guessed.action_split.groups["arm"]
         assert arm.delta
         if "arm" in known.action_split.groups:
@@ -115,9 +121,11 @@ class TestWhatIsSaid:
         for reason in (
             "gripper: panda_finger_joint1, panda_finger_joint2, as panda_hand carries 2",
             "arm: panda_joint1, ",
-            "mimic joints, from the URDF: panda_finger_joint2 follows panda_finger_joint1",
+            "gripper, mimic joints, from the URDF: panda_finger_joint2 follows panda_finger_joint1",
+            "gripper: +1 opens it, with panda_finger_joint1 at 0.04 m",
             "TCP: the link panda_hand_tcp, named like tcp",
-            "drives: stiffness 1000, damping 100",
+            "drives: stiffness from the inertia that hangs on each joint",
+            "keyframe 'rest': ",
             "fingers: both slide along their y axis",
             "reach: the TCP's largest distance",
         ):
@@ -132,10 +140,13 @@ class TestWhatIsSaid:
         with pytest.raises(DescriptorError, match=r"no fields \['reech'\]; it has name, urdf"):
             guess_descriptor(urdf_of("panda"), reech=0.855)
 
-    def test_a_second_arm_is_pointed_out(self):
-        dual = urdf_of("panda").with_name("mobile_panda_dual_arm.urdf")
-        reasons = guess_descriptor(dual).reasons
-        assert any("a second arm? Then make a group for each" in reason for reason in reasons)
+    def test_two_arms_have_groups_of_their_own(self):
+        dual = guess_descriptor(urdf_of("panda").with_name("mobile_panda_dual_arm.urdf")).descriptor
+        groups = dual.action_split.groups
+        assert list(groups)[:4] == ["left_arm", "left_gripper", "right_arm", "right_gripper"]
+        assert [groups[name].size for name in list(groups)[:4]] == [7, 1, 7, 1]
+        assert groups["torso_slide"].held
+        assert dual.arm_joints == (*groups["left_arm"].joints, *groups["right_arm"].joints)
 
 
 class TestModule:

@@ -50,10 +50,6 @@ BAD = {
         '<!DOCTYPE r SYSTEM "http://127.0.0.1:9/robot.dtd">' + robot(GOOD),
         "declares XML entities",
     ),
-    "template": (
-        robot(f'<x:macro xmlns:x="http://www.ros.org/wiki/xacro" name="m"/>{GOOD}'),
-        "is a xacro template; `xacro ",
-    ),
     "no link": (robot(""), "has no link"),
     "joints of one name": (
         robot(GOOD.replace('"elbow"', '"shoulder"')),
@@ -116,13 +112,9 @@ BAD = {
         ),
         "joint 'elbow' mimics itself",
     ),
-    "zero mass": (
-        robot(GOOD.replace('mass value="1"', 'mass value="0"')),
-        "link 'upper' moves, but has mass 0 kg and moments of inertia 0.1, 0.1, 0.1 kg·m²",
-    ),
-    "zero inertia": (
-        robot(GOOD.replace('izz="0.1"', 'izz="0"')),
-        "link 'upper' moves, but has mass 1 kg and moments of inertia 0.1, 0.1, 0 kg·m²",
+    "a mass below 0": (
+        robot(GOOD.replace('mass value="1"', 'mass value="-1"')),
+        "link 'upper' moves, but has mass -1 kg and moments of inertia 0.1, 0.1, 0.1 kg·m²",
     ),
     "too many links": (
         robot(
@@ -151,17 +143,9 @@ BAD = {
         robot(GOOD.replace("<box size='0.1 0.1 0.1'/>", "<cone/>")),
         "link 'upper': a collision of shape 'cone'; choices: box, sphere, cylinder, capsule, mesh",
     ),
-    "no shape": (
-        robot(GOOD.replace("<box size='0.1 0.1 0.1'/>", "")),
-        "a collision without a shape",
-    ),
-    "an inertia of no body": (
-        robot(GOOD.replace('ixy="0"', 'ixy="5"')),
-        "which no body has: around some axis it is not positive",
-    ),
-    "an incomplete inertia": (
-        robot(GOOD.replace('ixy="0"', "")),
-        "link 'upper' has no ixy in <inertia>",
+    "an inertia that is no number": (
+        robot(GOOD.replace('ixy="0"', 'ixy="nothing"')),
+        "link 'upper' has ixy='nothing' in <inertia>; 1 finite number is needed",
     ),
     "a name with a newline": (
         robot(GOOD.replace('link name="lower"', 'link name="lo&#10;wer"')),
@@ -203,6 +187,22 @@ def test_a_bad_urdf_is_refused(kind, tmp_path):
             read()
         assert reason in str(error.value)
         assert str(path) in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ('mass value="1"', 'mass value="0"', "moves, but has mass 0 kg and moments of inertia 0.1"),
+        ('izz="0.1"', 'izz="0"', "moves, but has mass 1 kg and moments of inertia 0.1, 0.1, 0"),
+        ('ixy="0"', 'ixy="5"', "which no body has: around some axis it is not positive"),
+        ('ixy="0"', "", "has no ixy in <inertia>"),
+        ("<box size='0.1 0.1 0.1'/>", "", "a collision without a shape"),
+    ],
+)
+def test_a_text_that_was_not_repaired_is_refused(old, new, reason):
+    with pytest.raises(AssetError) as error:
+        read_model(robot(GOOD.replace(old, new)).encode(), "toy.urdf")
+    assert reason in str(error.value)
 
 
 def test_what_is_only_odd_is_accepted(tmp_path):

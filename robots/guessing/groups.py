@@ -1,0 +1,83 @@
+"""The joint groups of a robot: a limb's are driven, and what is no limb is held."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from robots.descriptor import JointGroup
+from robots.guessing.drives import Drives, alike, drive_fields
+from robots.urdf.anatomy import PARTS, Anatomy, Limb
+from robots.urdf.model import ModelJoint
+
+
+def arm_groups(limb: Limb, drives: Drives) -> dict[str, JointGroup]:
+    """Return the groups of a limb's arm: its joints that turn, and those that slide.
+
+    Args:
+        limb: The limb.
+        drives: The drives of its joints.
+    """
+    return {
+        name_of(limb, name): by_steps(joints, drives) for name, joints in _by_unit("arm", limb.arm)
+    }
+
+
+def held_groups(anatomy: Anatomy, drives: Drives) -> dict[str, JointGroup]:
+    """Return the groups that stay where they start: torso, head, legs, wheels, base.
+
+    Args:
+        anatomy: The robot's parts.
+        drives: The drives of its joints.
+    """
+    groups: dict[str, JointGroup] = {}
+    for part in PARTS:
+        for name, joints in _by_unit(part, anatomy.parts.get(part, ())):
+            fields = drive_fields([drives.holding(joint) for joint in joints])
+            groups[name] = JointGroup.hold(_names(joints), unit=joints[0].unit, **fields)
+    for name, joints in _by_unit("base", anatomy.base):
+        groups[name] = JointGroup.hold(
+            _names(joints), stiffness=1e5, damping=1e4, force_limit=1e5, unit=joints[0].unit
+        )
+    return groups
+
+
+def by_steps(
+    joints: Sequence[ModelJoint], drives: Drives, *, reset_noise: bool = True
+) -> JointGroup:
+    """Return a group whose numbers move its joints by steps.
+
+    Args:
+        joints: Its joints.
+        drives: Their drives.
+        reset_noise: Whether a reset adds joint noise.
+    """
+    made = [drives.of(joint) for joint in joints]
+    steps = [drive.step for drive in made]
+    return JointGroup(
+        _names(joints),
+        lower=alike([-step for step in steps]),
+        upper=alike(steps),
+        delta=True,
+        unit=joints[0].unit,
+        reset_noise=reset_noise,
+        limits=tuple(joint.span for joint in joints),
+        **drive_fields(made),
+    )
+
+
+def name_of(limb: Limb, group: str) -> str:
+    """Return the name of a limb's group: ``arm``, ``left_arm``, or ``arm_2``."""
+    if not limb.name:
+        return group
+    return f"{group}_{limb.name}" if limb.name.isdigit() else f"{limb.name}_{group}"
+
+
+def _by_unit(part: str, joints: Sequence[ModelJoint]) -> Iterator[tuple[str, list[ModelJoint]]]:
+    for unit, suffix in (("m", "_slide"), ("rad", "")):
+        same = [joint for joint in joints if joint.unit == unit]
+        if same:
+            yield part + suffix, same
+
+
+def _names(joints: Sequence[ModelJoint]) -> tuple[str, ...]:
+    return tuple(joint.name for joint in joints)

@@ -1,0 +1,388 @@
+"""What a guess makes of robots that are written here: limbs, hands, tools, postures, drives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robots import RobotDescriptor
+from robots.bodies.hulls import load_model
+from robots.bodies.overlaps import overlapping
+from robots.from_urdf import Guess, guess_descriptor
+from robots.urdf.reading import read_model
+from robots.urdf.summary import read_urdf
+from tests.robots.urdf_parts import Parts
+
+
+def guess(parts: Parts, folder: Path, shuffled: int | None = None) -> Guess:
+    return guess_descriptor(parts.write(folder, shuffled=shuffled), "made")
+
+
+def joints_of(guessed: Guess) -> dict[str, set[str]]:
+    groups = guessed.descriptor.action_split.groups
+    return {name: set(group.joints) for name, group in groups.items()}
+
+
+def places(robot: RobotDescriptor, links: tuple[str, ...]) -> np.ndarray:
+    """Return where links are at rest, in the base's frame, (links, 3) (m)."""
+    tree = load_model(robot).kinematics
+    poses = tree.forward(np.array(robot.keyframe("rest"))[None])[0]
+    return np.array([poses[tree.link(link), :3, 3] for link in links])
+
+
+def tcp(robot: RobotDescriptor) -> np.ndarray:
+    return places(robot, robot.tcp_position_links or (robot.tcp_link,)).mean(axis=0)
+
+
+def rest_overlaps(robot: RobotDescriptor) -> int:
+    model = load_model(robot)
+    poses = model.kinematics.forward(np.array(robot.keyframe("rest"))[None])[0]
+    return int(overlapping(model.hulls, poses, model.self_pairs).sum())
+
+
+def single_arm(end: str = "tool0", **arm: tuple[float, float]) -> tuple[Parts, str]:
+    parts = Parts()
+    parts.link("base_link", 5.0, "0.1 0.1 0.1", "0 0 0.05")
+    last = parts.arm("base_link", "a", "0 0 0.12", **arm)
+    if end:
+        parts.frame(end, last, "0.05 0 0")
+    return parts, last
+
+
+def torso() -> Parts:
+    parts = Parts()
+    parts.link("trunk", 20.0, "0.2 0.2 0.6", "0 0 0.3")
+    parts.link("lifted", 10.0, "0.2 0.2 0.2", "0 0 0.1")
+    parts.joint("raise", "trunk", "lifted", "0 0 0.6", limits=(0.0, 0.3), kind="prismatic")
+    return parts
+
+
+class TestLimbs:
+    @pytest.mark.parametrize("order", [None, 1, 2, 3])
+    def test_two_arms_are_told_apart_by_where_they_stand(self, tmp_path, order):
+        parts = torso()
+        for name, y in (("b", -0.25), ("a", 0.25)):
+            last = parts.arm("lifted", name, f"0 {y} 0.1")
+            parts.jaws(last, name)
+        found = guess(parts, tmp_path, order)
+        assert list(joints_of(found))[:4] == [
+            "left_arm", "left_gripper", "right_arm", "right_gripper",
+        ]  # fmt: skip
+        arm = {f"a_joint{i}" for i in range(1, 7)}
+        assert joints_of(found)["left_arm"] == arm
+        assert joints_of(found)["left_gripper"] == {"a_slide_one", "a_slide_two"}
+        assert joints_of(found)["right_gripper"] == {"b_slide_one", "b_slide_two"}
+        assert found.descriptor.action_dim == 14
+        assert found.descriptor.action_split.groups["torso_slide"].held
+        assert set(found.descriptor.arm_joints) == arm | {f"b_joint{i}" for i in range(1, 7)}
+
+    def test_names_tell_the_sides_before_places_do(self, tmp_path):
+        parts = torso()
+        parts.arm("lifted", "left_arm", "0 -0.25 0.1")
+        parts.arm("lifted", "right_arm", "0 0.25 0.1")
+        found = joints_of(guess(parts, tmp_path))
+        assert "left_arm_joint1" in found["left_arm"]
+
+    def test_three_arms_have_numbers(self, tmp_path):
+        parts = torso()
+        for name, y in (("a", -0.3), ("b", 0.0), ("c", 0.3)):
+            parts.arm("lifted", name, f"0.1 {y} 0.1")
+        assert [name for name in joints_of(guess(parts, tmp_path)) if "arm" in name] == [
+            "arm_1", "arm_2", "arm_3",
+        ]  # fmt: skip
+
+    def test_head_wheels_and_legs_are_held_and_the_reason_says_how_to_drive_them(self, tmp_path):
+        parts = torso()
+        parts.arm("lifted", "a", "0.1 0 0.1")
+        parts.link("neck")
+        parts.joint("neck_pan", "lifted", "neck", "0 0 0.25")
+        parts.link("camera")
+        parts.joint("head_tilt", "neck", "camera", "0 0 0.05", axis="0 1 0")
+        for side, y in (("l", 0.2), ("r", -0.2)):
+            parts.link(f"{side}_wheel")
+            parts.joint(f"{side}_drive", "trunk", f"{side}_wheel", f"0 {y} 0", kind="continuous")
+            parts.link(f"{side}_thigh")
+            parts.joint(f"{side}_hip", "trunk", f"{side}_thigh", f"0.1 {y} 0", axis="0 1 0")
+            parts.link(f"{side}_shank")
+            parts.joint(f"{side}_knee", f"{side}_thigh", f"{side}_shank", "0 0 -0.2")
+        found = guess(parts, tmp_path)
+        groups = found.descriptor.action_split.groups
+        held = {name: set(group.joints) for name, group in groups.items() if group.held}
+        assert held == {
+            "torso_slide": {"raise"},
+            "head": {"neck_pan", "head_tilt"},
+            "legs": {"l_hip", "l_knee", "r_hip", "r_knee"},
+            "wheels": {"l_drive", "r_drive"},
+        }
+        assert found.descriptor.action_dim == 6
+        legs = next(reason for reason in found.reasons if reason.startswith("legs, held still"))
+        assert "a JointGroup in the place of JointGroup.hold drives it" in legs
+
+    def test_a_robot_of_legs_alone_is_driven_all_the_same(self, tmp_path):
+        parts = Parts()
+        parts.link("trunk", 5.0, "0.4 0.2 0.1")
+        for name, x, y in (("lf", 1, 1), ("rf", 1, -1), ("lh", -1, 1), ("rh", -1, -1)):
+            parts.link(f"{name}_thigh", at="0 0 -0.1")
+            at = f"{0.2 * x} {0.15 * y} 0"
+            parts.joint(f"{name}_hip", "trunk", f"{name}_thigh", at, axis="0 1 0")
+            parts.link(f"{name}_shank", at="0 0 -0.1")
+            parts.joint(f"{name}_knee", f"{name}_thigh", f"{name}_shank", "0 0 -0.2", axis="0 1 0")
+        found = guess(parts, tmp_path)
+        assert found.descriptor.action_dim == 8
+        assert any("arm: none is recognised, so the legs are driven" in r for r in found.reasons)
+
+    def test_a_strut_that_follows_the_arm_does_not_end_it(self, tmp_path):
+        parts, _ = single_arm()
+        parts.link("strut")
+        mimic = '<mimic joint="a_joint2"/>'
+        parts.joint("strut_joint", "a_link2", "strut", "0.02 0 0.1", axis="0 1 0", mimic=mimic)
+        found = guess(parts, tmp_path)
+        assert joints_of(found)["arm"] == {f"a_joint{i}" for i in range(1, 7)}
+        assert joints_of(found)["body"] == {"strut_joint"}
+
+
+def knuckles(parts: Parts, palm: str) -> None:
+    """Add a gripper of six joints of which one is driven; it is open at 0."""
+    driven = '<mimic joint="drive" multiplier="{}"/>'
+    for side, sign in (("left", 1), ("right", -1)):
+        knuckle, finger = f"{side}_outer", f"{side}_pad"
+        inner = parts.link(f"{side}_inner", 0.02, "0.04 0.01 0.02", "0.02 0 0")
+        parts.link(knuckle, 0.02, "0.05 0.01 0.02", "0.025 0 0")
+        parts.link(finger, 0.02, "0.06 0.01 0.02", "0.03 0 0")
+        leads = side == "left"
+        parts.joint(
+            "drive" if leads else "right_outer_joint", palm, knuckle, f"0.04 {0.05 * sign} 0",
+            axis="0 0 -1", limits=(0.0, 0.8) if leads else (-0.8, 0.0),
+            mimic="" if leads else driven.format(-1),
+        )  # fmt: skip
+        parts.joint(
+            f"{side}_pad_joint", knuckle, finger, "0.06 0 0", axis="0 0 1",
+            limits=(0.0, 0.8) if leads else (-0.8, 0.0), mimic=driven.format(sign),
+        )  # fmt: skip
+        parts.joint(
+            f"{side}_inner_joint", palm, inner, f"0.05 {0.02 * sign} 0", axis="0 0 -1",
+            limits=(0.0, 0.8) if leads else (-0.8, 0.0), mimic=driven.format(sign),
+        )  # fmt: skip
+
+
+class TestHands:
+    def test_a_mimic_tree_takes_one_number_that_drives_every_joint(self, tmp_path):
+        parts, last = single_arm(end="")
+        knuckles(parts, last)
+        found = guess(parts, tmp_path)
+        group = found.descriptor.action_split.groups["gripper"]
+        assert (group.size, len(group.joints)) == (1, 6)
+        low, high = group.ranges[0]
+        closed = {j: m * low + o for j, (m, o) in zip(group.joints, group.followers, strict=True)}
+        wide = {j: m * high + o for j, (m, o) in zip(group.joints, group.followers, strict=True)}
+        assert closed == pytest.approx(
+            {"drive": 0.8, "left_pad_joint": 0.8, "left_inner_joint": 0.8,
+             "right_outer_joint": -0.8, "right_pad_joint": -0.8, "right_inner_joint": -0.8}
+        )  # fmt: skip
+        assert set(wide.values()) == {0.0}  # +1 opens, though the URDF closes upwards
+        rest = dict(zip(found.descriptor.joints, found.descriptor.keyframe("rest"), strict=True))
+        assert {rest[joint] for joint in group.joints} == {0.0}
+
+    def test_a_gripper_that_turns_and_slides_is_driven_by_one_number(self, tmp_path):
+        parts, last = single_arm(end="")
+        parts.link("finger_a", 0.05, "0.06 0.01 0.02", "0.03 0 0")
+        parts.joint("screw", last, "finger_a", "0.05 0.03 0", axis="0 0 1", limits=(0.0, 0.5))
+        parts.link("finger_b", 0.05, "0.06 0.01 0.02", "0.03 0 0")
+        parts.joint(
+            "rack", last, "finger_b", "0.05 -0.03 0", axis="0 -1 0", limits=(0.0, 0.05),
+            kind="prismatic", mimic='<mimic joint="screw" multiplier="0.1"/>',
+        )  # fmt: skip
+        group = guess(parts, tmp_path).descriptor.action_split.groups["gripper"]
+        assert (group.joints, group.multipliers, group.ranges) == (
+            ("screw", "rack"), (1.0, 0.1), ((0.0, 0.5),),
+        )  # fmt: skip
+
+    @pytest.mark.parametrize("limits", [(0.0, 0.03), (-0.03, 0.0)])
+    def test_fingers_that_move_alike_or_mirrored_share_a_number(self, tmp_path, limits):
+        parts, last = single_arm(end="")
+        for name, sign in (("one", 1), ("two", -1)):
+            parts.link(f"finger_{name}", 0.05, "0.06 0.01 0.02", "0.03 0 0")
+            mirrored = limits[0] < 0 and sign < 0
+            parts.joint(
+                f"slide_{name}", last, f"finger_{name}", f"0.05 {0.008 * sign} 0",
+                axis=f"0 {1 if mirrored else sign} 0", kind="prismatic",
+                limits=limits if mirrored else (0.0, 0.03),
+            )  # fmt: skip
+        group = guess(parts, tmp_path).descriptor.action_split.groups["gripper"]
+        assert group.mimic
+        assert group.ranges == ((-0.01, 0.03),)
+        assert group.multipliers == ((1.0, -1.0) if limits[0] < 0 else ())
+
+    def test_a_hand_of_many_fingers_has_a_number_for_each_leader(self, tmp_path):
+        parts, last = single_arm(end="")
+        for i, y in enumerate((-0.03, 0.0, 0.03)):
+            near, far = f"n{i}", f"f{i}"
+            parts.link(near, 0.02, "0.03 0.01 0.01", "0.015 0 0")
+            parts.link(far, 0.02, "0.03 0.01 0.01", "0.015 0 0")
+            parts.joint(f"root{i}", last, near, f"0.05 {y} 0", axis="0 1 0", limits=(0.0, 1.5))
+            mimic = f'<mimic joint="root{i}" multiplier="0.5" offset="0.1"/>' if i else ""
+            parts.joint(f"end{i}", near, far, "0.04 0 0", limits=(0, 1.0), mimic=mimic)
+        groups = guess(parts, tmp_path).descriptor.action_split.groups
+        hand = {name: group for name, group in groups.items() if name != "arm"}
+        assert {name: (group.joints, group.mimic) for name, group in hand.items()} == {
+            "gripper": (("root0", "end0"), False),
+            "gripper_root1": (("root1", "end1"), True),
+            "gripper_root2": (("root2", "end2"), True),
+        }
+        assert groups["gripper_root1"].followers == ((1.0, 0.0), (0.5, 0.1))
+
+    def test_the_hand_of_a_robot_whose_names_say_nothing_is_told_by_its_size(self, tmp_path):
+        parts, last = single_arm(end="")
+        for i, y in enumerate((-0.03, 0.03)):
+            parts.link(f"x{i}", 0.02, "0.03 0.01 0.01", "0.015 0 0")
+            parts.joint(f"y{i}", last, f"x{i}", f"0.05 {y} 0", axis="0 0 1", limits=(-0.5, 0.5))
+        found = joints_of(guess(parts, tmp_path))
+        assert found["gripper"] == {"y0", "y1"}
+        assert len(found["arm"]) == 6
+
+    def test_a_jaw_that_opens_downwards_opens_at_plus_one(self, tmp_path):
+        parts, last = single_arm(end="")
+        parts.link("fixed_part", 0.05, "0.1 0.01 0.02", "0.07 -0.01 0")
+        parts.joint("mount", last, "fixed_part", "0.03 0 0", kind="fixed")
+        parts.link("moving_jaw", 0.05, "0.08 0.01 0.02", "0.05 0 0")
+        parts.joint("jaw", last, "moving_jaw", "0.05 0.01 0", axis="0 0 1", limits=(-1.0, 0.0))
+        upside = parts.joints[-1].replace('axis xyz="0 0 1"', 'axis xyz="0 0 -1"')
+        parts.joints[-1] = upside
+        found = guess(parts, tmp_path)
+        group = found.descriptor.action_split.groups["gripper"]
+        (multiplier, offset), (low, high) = group.followers[0], group.ranges[0]
+        assert multiplier * high + offset == -1.0
+        assert multiplier * low + offset == 0.0
+        assert len(found.descriptor.arm_joints) == 6
+
+    def test_a_wrist_that_is_called_gripper_is_no_jaw(self, tmp_path):
+        parts, _ = single_arm()
+        parts.joints = [joint.replace("a_joint6", "gripper_roll") for joint in parts.joints]
+        assert "gripper" not in joints_of(guess(parts, tmp_path))
+
+
+class TestTool:
+    def test_a_frame_between_the_fingers_goes_before_the_palm(self, tmp_path):
+        parts, last = single_arm(end="")
+        parts.jaws(last, "a")
+        parts.frame("hand_camera_frame", last, "0.11 0 0")
+        parts.frame("ee_link", last, "0 0 0")  # where the gripper is screwed on
+        parts.frame("grasptarget", last, "0.1 0 0")
+        assert guess(parts, tmp_path).descriptor.tcp_link == "grasptarget"
+
+    def test_finger_tips_go_before_the_flange(self, tmp_path):
+        parts, last = single_arm(end="")
+        parts.jaws(last, "a")
+        parts.frame("ee_link", last, "0 0 0")
+        parts.frame("tip_one", "a_finger_one", "0.06 0 0")
+        parts.frame("tip_two", "a_finger_two", "0.06 0 0")
+        robot = guess(parts, tmp_path).descriptor
+        assert robot.tcp_position_links == ("tip_one", "tip_two")
+        assert robot.tcp_link == "a_link6"
+
+    def test_without_a_frame_the_reason_says_how_far_the_tips_are(self, tmp_path):
+        parts, last = single_arm(end="")
+        for name, sign in (("one", 1), ("two", -1)):
+            finger = f"finger_{name}"
+            parts.link(finger, 0.05, "0.2 0.01 0.02", "0.15 0 0")
+            at = f"0.05 {0.01 * sign} 0"
+            parts.joint(f"s_{name}", last, finger, at, axis=f"0 {sign} 0", kind="prismatic",
+                        limits=(0.0, 0.03))  # fmt: skip
+        reason = next(r for r in guess(parts, tmp_path).reasons if r.startswith("TCP"))
+        assert "the finger tips meet" in reason
+        assert "where no frame lies" in reason
+
+    @pytest.mark.parametrize("end", ["tool0", "ee_link", "suction_cup", "flange"])
+    def test_an_arm_without_gripper_ends_in_its_tool(self, tmp_path, end):
+        parts, last = single_arm(end)
+        parts.frame("wrist_camera_link", last, "0.3 0 0")
+        assert guess(parts, tmp_path).descriptor.tcp_link == end
+
+
+class TestPosture:
+    def test_the_tcp_is_ahead_of_the_robot_above_the_ground(self, tmp_path):
+        parts, _ = single_arm()
+        robot = guess(parts, tmp_path).descriptor
+        x, y, z = tcp(robot)
+        assert x > 0.3 * robot.reach
+        assert abs(y) < 0.1
+        assert z > 0.02
+        assert rest_overlaps(robot) == 0
+
+    @pytest.mark.parametrize(("yaw", "front"), [((0.57, 2.57), (0, 1)), ((2.14, 4.14), (-1, 0))])
+    def test_front_is_where_the_arm_works(self, tmp_path, yaw, front):
+        parts, _ = single_arm(yaw=yaw)
+        robot = guess(parts, tmp_path).descriptor
+        ahead = tcp(robot)[:2]
+        assert ahead @ front > 0.3 * robot.reach
+        assert ahead @ front > 0.8 * np.linalg.norm(ahead)
+
+    def test_links_that_overlap_as_the_joints_stand_are_moved_apart(self, tmp_path):
+        parts, _ = single_arm()
+        parts.link("post", 1.0, "0.05 0.05 0.4", "0 0 0")  # where the arm reaches out at 0
+        parts.joint("post_joint", "base_link", "post", "0.3 0 0.2", kind="fixed")
+        path = parts.write(tmp_path)
+        robot = guess_descriptor(path, "made").descriptor
+        assert rest_overlaps(robot) == 0
+        model = load_model(robot)
+        poses = model.kinematics.forward(np.zeros((1, 6)))[0]
+        assert overlapping(model.hulls, poses, model.self_pairs).any()
+
+    def test_a_posture_that_is_fine_is_kept(self, tmp_path):
+        parts, _ = single_arm()
+        bent = {"a_joint2": -0.5, "a_joint3": 1.1}  # by other zeros of these joints
+        for i, joint in enumerate(parts.joints):
+            for name, angle in bent.items():
+                if f'"{name}"' in joint:
+                    parts.joints[i] = joint.replace("<origin ", f'<origin rpy="0 {angle} 0" ')
+        found = guess(parts, tmp_path)
+        assert found.descriptor.keyframe("rest") == (0.0,) * 6
+        assert any("keyframe 'rest': joints at 0" in reason for reason in found.reasons)
+
+    def test_joints_stay_away_from_their_limits(self, tmp_path):
+        parts, _ = single_arm()
+        path = parts.write(tmp_path)
+        robot = guess_descriptor(path, "made").descriptor
+        spans = {j.name: j.span for j in read_model(read_urdf(path), str(path)).moving}
+        for joint, position in zip(robot.joints, robot.keyframe("rest"), strict=True):
+            low, high = spans[joint]
+            assert low + 0.1 * (high - low) <= position <= high - 0.1 * (high - low)
+
+    def test_it_is_the_same_every_time(self, tmp_path):
+        path = single_arm()[0].write(tmp_path)
+        assert guess_descriptor(path, "a").descriptor.keyframes == (
+            guess_descriptor(path, "b").descriptor.keyframes
+        )
+
+
+class TestReasons:
+    def test_each_is_one_sentence(self, tmp_path):
+        parts = torso()
+        for name, y in (("b", -0.25), ("a", 0.25)):
+            last = parts.arm("lifted", name, f"0 {y} 0.1")
+            parts.jaws(last, name)
+        reasons = guess(parts, tmp_path).reasons
+        assert len(reasons) == len(set(reasons))
+        for reason in reasons:
+            assert "\n" not in reason
+            assert ". " not in reason
+            assert not reason.endswith(".")
+
+    def test_a_side_is_told_where_there_are_two(self, tmp_path):
+        parts = torso()
+        for name, y in (("b", -0.25), ("a", 0.25)):
+            parts.arm("lifted", name, f"0 {y} 0.1")
+        reasons = guess(parts, tmp_path).reasons
+        for start in ("left arm: a_joint1", "right arm: b_joint1", "left TCP", "right TCP"):
+            assert any(reason.startswith(start) for reason in reasons)
+
+
+def test_rotors_are_no_fingers(tmp_path):
+    parts = Parts()
+    parts.link("body", 1.0, "0.2 0.2 0.05")
+    for i, (x, y) in enumerate(((1, 1), (1, -1), (-1, 1), (-1, -1))):
+        parts.link(f"x{i}", 0.01)
+        parts.joint(f"y{i}", "body", f"x{i}", f"{0.12 * x} {0.12 * y} 0.05", kind="continuous")
+    assert not any("gripper" in name for name in joints_of(guess(parts, tmp_path)))

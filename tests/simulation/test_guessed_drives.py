@@ -1,0 +1,101 @@
+"""Robots that were only guessed reach what their actions ask for, light ones and heavy ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from layouts import single
+from robots import RobotDescriptor
+from robots.from_urdf import guess_descriptor
+from simulation import PhysicsSettings, Simulation
+from tests.robots.test_guessing import knuckles, single_arm
+from tests.robots.urdf_parts import Parts
+
+
+class Standing:
+    """A guessed robot that stands in a world of its own."""
+
+    def __init__(self, parts: Parts, folder: Path) -> None:
+        self.robot: RobotDescriptor = guess_descriptor(parts.write(folder), "made").descriptor
+        layout = single({"arm": self.robot})
+        self.simulation = Simulation(layout, lambda world, _: None, 1, PhysicsSettings())
+        self.start = np.array(self.robot.keyframe("rest"))
+
+    def again(self) -> None:
+        self.simulation.worlds[0].stand("arm", self.start)
+        self.simulation.touched()
+
+    def play(self, action: np.ndarray, steps: int = 1) -> np.ndarray:
+        """Return the joint positions after some steps (rad, m)."""
+        for _ in range(steps):
+            positions = self.simulation.read().joint_positions
+            self.simulation.step(action[None], positions)
+        return np.array(self.simulation.read().joint_positions[0])
+
+
+def weighing(mass: float, effort: float) -> Parts:
+    """Return an arm whose links all have one mass (kg), with one effort for all joints (N·m)."""
+    parts, _ = single_arm()
+    parts.links = [
+        link.replace('mass value="0.5"', f'mass value="{mass}"').replace(
+            '"0.0005"', f'"{mass * 1e-3}"'
+        )
+        for link in parts.links
+    ]
+    parts.joints = [joint.replace('effort="100.0"', f'effort="{effort}"') for joint in parts.joints]
+    return parts
+
+
+@pytest.mark.parametrize(("mass", "effort"), [(0.02, 1.0), (0.5, 100.0), (20.0, 300.0), (5.0, 0)])
+def test_one_control_step_covers_what_an_action_number_asks_for(tmp_path, mass, effort):
+    standing = Standing(weighing(mass, effort), tmp_path)
+    numbers = standing.robot.describe_action()
+    assert len(numbers) == 6
+    for number in numbers:
+        standing.again()
+        action = np.zeros(6, np.float32)
+        action[number.index] = 1.0
+        moved = standing.play(action) - standing.start
+        assert 0.04 <= number.upper <= 0.1
+        assert 0.9 <= moved[number.index] / number.upper <= 1.2, number.name
+        assert np.abs(np.delete(moved, number.index)).max() < 0.3 * number.upper, number.name
+
+
+def test_efforts_bound_the_forces_where_they_suffice(tmp_path):
+    arm = guess_descriptor(weighing(0.5, 60.0).write(tmp_path), "made").descriptor
+    assert arm.action_split.groups["arm"].force_limit == 60.0
+
+
+def test_efforts_that_move_nothing_are_raised_and_the_reason_says_so(tmp_path):
+    found = guess_descriptor(weighing(20.0, 1.0).write(tmp_path), "made")
+    forces = [drive[2] for drive in found.descriptor.action_split.groups["arm"].drives]
+    assert max(forces) > 100.0
+    assert any("more than the URDF's efforts for a_joint1" in reason for reason in found.reasons)
+
+
+def test_it_stays_where_it_stands(tmp_path):
+    standing = Standing(weighing(5.0, 100.0), tmp_path)
+    standing.again()
+    after = standing.play(np.zeros(6, np.float32), 20)
+    np.testing.assert_allclose(after, standing.start, atol=1e-3)
+
+
+def test_every_joint_of_a_mimic_tree_goes_where_its_leader_sends_it(tmp_path):
+    parts, last = single_arm(end="")
+    knuckles(parts, last)
+    standing = Standing(parts, tmp_path)
+    standing.again()
+    group = standing.robot.action_split.groups["gripper"]
+    action = np.zeros(standing.robot.action_dim, np.float32)
+    for number, steps in ((-0.5, 20), (1.0, 20)):
+        action[-1] = number
+        after = dict(zip(standing.robot.joints, standing.play(action, steps), strict=True))
+        (low, high) = group.ranges[0]
+        lead = (low + high) / 2 + number * (high - low) / 2
+        for joint, (multiplier, offset) in zip(group.joints, group.followers, strict=True):
+            assert after[joint] == pytest.approx(multiplier * lead + offset, abs=0.02), joint
+        speeds = np.abs(np.array(standing.simulation.read().joint_velocities))
+        assert speeds.max() < 1.0
