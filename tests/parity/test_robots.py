@@ -19,6 +19,9 @@ pytestmark = NATIVE
 STEPS = 100
 HEIGHT = 1.5  # m over native's ground, so that nothing touches it
 AGENTS = {
+    "allegro_hand_left": "allegro_hand_left",
+    "allegro_hand_right": "allegro_hand_right",
+    "dclaw": "dclaw",
     "fetch": "fetch",
     "floating_panda_gripper": "floating_panda_gripper",
     "koch": "koch-v1.1",
@@ -26,6 +29,7 @@ AGENTS = {
     "panda_stick": "panda_stick",
     "panda_wristcam": "panda_wristcam",
     "so100": "so100",
+    "trifingerpro": "trifingerpro",
 }
 BASE_NUMBERS = {"fetch": 2}  # of native's action, at its end; here the base stands still
 
