@@ -188,7 +188,7 @@ PLAYING = "v => v.readyState >= 2 && v.videoWidth > 0 && !v.paused && v.currentT
 
 
 class TestInABrowser:
-    pytestmark = (pytest.mark.browser, pytest.mark.xdist_group("page"))  # they share one browser
+    pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("page")]  # they share one browser
 
     def test_it_says_nothing_and_asks_for_nothing(self, visit, page_file):
         visited = visit()
