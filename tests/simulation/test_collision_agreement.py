@@ -13,13 +13,14 @@ import pytest
 from layouts import Layout, Placement
 from layouts.validation.collisions import nearest, stand
 from robots import RobotDescriptor, RobotRegistry
-from robots.assets.sources import find_mani_skill
+from robots.assets.packages import find_package
 from robots.bodies.allowed import allowed_pairs, rigid_pairs
 from robots.bodies.hulls import load_model
 from robots.urdf.reading import read_model
 from robots.urdf.srdf import read_excluded_pairs
 from robots.urdf.summary import read_urdf
 from simulation.sapien3.world import BuiltWorld
+from tests.catalogue import QUICK, every_robot
 
 POSTURES = 200
 TOUCH = 1e-3  # m; contacts that are nearer than this to one are one
@@ -87,7 +88,7 @@ def expect_agreement(descriptor):
     assert (separations[overlaps] >= TOUCH).sum() <= MISSED * overlaps.sum() + 1
 
 
-@pytest.mark.parametrize("name", sorted({*RobotRegistry.names()} - {"floating_panda_gripper"}))
+@pytest.mark.parametrize("name", every_robot(sorted({*QUICK} - {"floating_panda_gripper"})))
 def test_robots_of_the_catalogue(name):
     expect_agreement(RobotRegistry.load(name))
 
@@ -95,7 +96,7 @@ def test_robots_of_the_catalogue(name):
 @pytest.mark.native
 @pytest.mark.parametrize("file", UNKNOWN)
 def test_guessed_robots(file):
-    path = find_mani_skill() / "assets" / "robots" / file
+    path = find_package("mani_skill") / "mani_skill" / "assets" / "robots" / file
     expect_agreement(RobotDescriptor.from_urdf(path, quiet=True))
 
 
@@ -103,7 +104,7 @@ def test_guessed_robots(file):
 @pytest.mark.parametrize("file", UNKNOWN)
 def test_what_may_overlap_never_collides(file):
     """Whatever the posture, physics reports no contact of a pair that checks leave out."""
-    path = find_mani_skill() / "assets" / "robots" / file
+    path = find_package("mani_skill") / "mani_skill" / "assets" / "robots" / file
     descriptor = RobotDescriptor.from_urdf(path, quiet=True)
     world = BuiltWorld(Layout({"arm": Placement(descriptor)}))
     urdf = descriptor.urdf.locate()

@@ -9,8 +9,9 @@ from layouts import Layout, Placement
 from robots import RobotRegistry, UnknownNameError
 from simulation.sapien3.point_reach import PointReach
 from simulation.sapien3.world import BuiltWorld
+from tests.catalogue import QUICK
 
-ROBOTS = RobotRegistry.names()
+ROBOTS = QUICK
 POINT = np.array([0.01, -0.02, 0.03])
 
 

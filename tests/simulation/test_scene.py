@@ -6,9 +6,9 @@ import sapien
 import sapien.physx as physx
 from sapien.wrapper.urdf_loader import URDFLoader
 
-from robots import RobotRegistry
 from simulation.sapien3.world import BuiltWorld
 from simulation.scene import build_scene
+from tests.catalogue import every_robot
 from tests.layouts.cells import hung, link_poses, mixed_cell, random_positions
 
 DRAWS = 5
@@ -42,7 +42,7 @@ def test_links_are_where_the_urdfs_and_the_simulation_put_them(cell):
                 np.testing.assert_allclose(pose.p, expected[link.name][:3, 3], rtol=0, atol=1e-6)
 
 
-@pytest.mark.parametrize("robot", RobotRegistry.names())
+@pytest.mark.parametrize("robot", every_robot())
 def test_links_of_any_robot_that_hangs_are_there(robot):
     cell = hung(robot)
     placement, scene = cell["arm"], build_scene(cell)  # which goes if nobody holds it
