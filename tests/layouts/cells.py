@@ -33,9 +33,15 @@ def hung(robot: str) -> Layout:
     )
 
 
-def skeleton(file: Path) -> yourdfpy.URDF:
-    """Return links and joints of a URDF, without shapes: yourdfpy knows no capsules."""
+def skeleton(file: Path, *, mimics: bool = True) -> yourdfpy.URDF:
+    """Return links and joints of a URDF, without shapes: yourdfpy knows no capsules.
+
+    Without mimics each joint has a position of its own: yourdfpy follows no mimic of a mimic.
+    """
     root = ElementTree.parse(file).getroot()
+    for joint in root.findall("joint"):
+        for mimic in joint.findall("mimic") if not mimics else ():
+            joint.remove(mimic)
     for link in root.iterfind("link"):
         for shape in [*link.findall("visual"), *link.findall("collision")]:
             link.remove(shape)
@@ -50,13 +56,15 @@ def random_positions(placement: Placement, random: np.random.Generator) -> dict[
     }
     for joint in urdf.robot.joints:
         if joint.mimic is not None:
-            positions[joint.name] = positions[joint.mimic.joint]
+            ratio = 1.0 if joint.mimic.multiplier is None else joint.mimic.multiplier
+            offset = joint.mimic.offset or 0.0
+            positions[joint.name] = ratio * positions[joint.mimic.joint] + offset
     return positions
 
 
 def link_poses(placement: Placement, positions: dict[str, float]) -> dict[str, np.ndarray]:
     """Return the world pose of each link, by yourdfpy from the robot's own URDF."""
-    urdf = skeleton(placement.robot.urdf.locate())
+    urdf = skeleton(placement.robot.urdf.locate(), mimics=False)
     urdf.update_cfg({joint.name: positions[joint.name] for joint in urdf.actuated_joints})
     base = pose_matrix(placement.base_position, placement.base_quaternion)
     return {link: base @ urdf.get_transform(link) for link in urdf.link_map}
