@@ -105,6 +105,7 @@ class TestDependencies:
             "pettingzoo",
             "ray",
             "sb3",
+            "xacro",
         ):
             declared |= names_of(PROJECT["optional-dependencies"][extra])
         used = {module for room in ROOMS for module in imports_of(room, everywhere=True)}

@@ -64,7 +64,7 @@ HOSTILE_PATHS = {
 FIELDS: dict[tuple[str, ...], tuple[Mapping[str, Any], ...]] = {
     ("packages",): (NUMBERS, TEXTS, OTHERS),
     PACKAGE: (NUMBERS, TEXTS, OTHERS),
-    (*PACKAGE, "mani_skill"): (NUMBERS, TEXTS, OTHERS, HOSTILE_PATHS),
+    (*PACKAGE, "folder"): (NUMBERS, TEXTS, OTHERS, HOSTILE_PATHS),
     (*PACKAGE, "hub_dataset"): (NUMBERS, TEXTS, OTHERS, HOSTILE_PATHS),
     (*PACKAGE, "hub_folder"): (NUMBERS, TEXTS, OTHERS, HOSTILE_PATHS),
     (*PACKAGE, "wheel"): (

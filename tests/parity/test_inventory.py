@@ -113,7 +113,7 @@ def test_without_mani_skill_the_rest_is_told():
     [
         (["anymal_c"], [], "no descriptor here of its robot: anymal_c"),
         ([("panda", "anymal_c")], [], NO_REASON),
-        ([("anymal_c", "dclaw")], [], "no descriptor here of its robot: anymal_c, dclaw"),
+        ([("anymal_c", "hopper")], [], "no descriptor here of its robot: anymal_c, hopper"),
         (["panda"], ["ycb", "more"], "needs files that native downloads: ycb, more"),
         (None, [], NO_REASON),
     ],
