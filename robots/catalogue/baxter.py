@@ -26,7 +26,7 @@ LEFT_GRIPPER = JointGroup(
     stiffness=1e3, damping=1e2, force_limit=20.0, mimic=True, multipliers=(1.0, -1.0),
     unit="m", reset_noise=False, limits=((0.0, 0.020833), (-0.020833, 0.0)),
 )
-REST = (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0, 0.020833, -0.020833)  # the maker's "neutral"
+REST = (-0.55, 0.0, 0.75, 0.0, 1.26, 0.0, 0.020833, -0.020833)  # "neutral", arms turned in
 
 BAXTER = RobotDescriptor(
     name="baxter",
@@ -41,7 +41,7 @@ BAXTER = RobotDescriptor(
     tcp_link="left_gripper",
     gripper_material=GripperMaterial(FINGERS, 2.0, 2.0, 0.0, patch_radius=0.1),
     fingers=Fingers(LEFT, opening_signs=(1, 1)),
-    keyframes={"rest": (*REST, *REST, 0.0)},
+    keyframes={"rest": (-0.3, *REST, 0.3, *REST, 0.0)},
     reach=1.468,  # of the left TCP, from the URDF; data sheet 1.21 from the shoulder
     source="example-robot-data 6.0.0, baxter_description; drives from each joint's inertia",
     allowed_collisions=among(  # neighbours, and what overlaps however the joints stand
