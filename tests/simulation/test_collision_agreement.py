@@ -88,12 +88,15 @@ def expect_agreement(descriptor):
     assert (separations[overlaps] >= TOUCH).sum() <= MISSED * overlaps.sum() + 1
 
 
-@pytest.mark.parametrize("name", every_robot(sorted({*QUICK} - {"floating_panda_gripper"})))
+@pytest.mark.parametrize(
+    "name", every_robot(sorted({*QUICK} - {"floating_panda_gripper"}), quick=("panda", "so100"))
+)
 def test_robots_of_the_catalogue(name):
     expect_agreement(RobotRegistry.load(name))
 
 
 @pytest.mark.native
+@pytest.mark.long
 @pytest.mark.parametrize("file", UNKNOWN)
 def test_guessed_robots(file):
     path = find_package("mani_skill") / "mani_skill" / "assets" / "robots" / file
