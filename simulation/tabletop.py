@@ -13,6 +13,12 @@ TABLE_HEIGHT = 0.9196429
 TABLE_HALF_SIZE = (2.418 / 2, 1.209 / 2, TABLE_HEIGHT / 2)
 TABLE_POSITION = (-0.12, 0.0, -TABLE_HEIGHT)
 TABLE_QUATERNION = (cos(pi / 4), 0.0, 0.0, sin(pi / 4))  # the long side along y
+TABLE_OUTLINE = (  # x_min, y_min, x_max, y_max (m)
+    TABLE_POSITION[0] - TABLE_HALF_SIZE[1],
+    -TABLE_HALF_SIZE[0],
+    TABLE_POSITION[0] + TABLE_HALF_SIZE[1],
+    TABLE_HALF_SIZE[0],
+)
 GROUND_HEIGHT = -(3.5762787e-07 + 0.91964257)  # from the table mesh's bounding box
 
 

@@ -8,19 +8,26 @@ from functools import lru_cache
 from layouts import Layout
 from robots import LayoutError, MissingPackageError
 
+Rectangle = tuple[float, float, float, float]
 
-def refuse_collisions(layout: Layout) -> None:
-    """Refuse a layout whose robots collide with each other, themselves or the layout's tables.
+
+def refuse_collisions(layout: Layout, table: Rectangle | None = None) -> None:
+    """Refuse a layout whose robots collide with each other, themselves or a table.
 
     Looks at their keyframes and at some draws of joint noise. The verdict on a layout is
     remembered. Where python-fcl is not installed it cannot look, and warns instead.
+
+    Args:
+        layout: The layout; the tables among its frames count.
+        table: Outline of the task's own table, whose top is at z = 0: x_min, y_min, x_max, y_max
+            (m); None if it has none.
 
     Raises:
         LayoutError: If robots collide; names the links, and says what to change.
         AssetError: If robot files cannot be found.
     """
     try:
-        collisions = _collisions(layout)
+        collisions = _collisions(layout, table)
     except MissingPackageError as error:
         warnings.warn(
             f"the layout is built unchecked: {error} (or say so, with check_layout=False)",
@@ -35,7 +42,7 @@ def refuse_collisions(layout: Layout) -> None:
 
 
 @lru_cache(maxsize=256)
-def _collisions(layout: Layout) -> str:
-    findings = layout.validate(workspaces=False).findings
+def _collisions(layout: Layout, table: Rectangle | None) -> str:
+    findings = layout.validate(workspaces=False, table=table).findings
     kinds = ("collision", "self-collision", "table")
     return "\n".join(str(found) for found in findings if found.serious and found.kind in kinds)

@@ -85,7 +85,7 @@ class MultiRobotTask(Declaration, Remade):
         own = type(self)
         check_places(own.__name__, scenario.layout, own.layout, self.robot_counts)
         if scenario.check_layout and scenario.layout != own.layout:
-            refuse_collisions(scenario.layout)
+            refuse_collisions(scenario.layout, self.table.outline(scenario.layout))
         self.scenario = scenario
         self.layout = scenario.layout.in_control_mode(scenario.control_mode)
         self.num_envs = scenario.num_envs

@@ -9,11 +9,13 @@ from math import cos, isfinite, sin
 from typing import ClassVar, Literal, TypeAlias, TypedDict
 
 from kinematics.quaternions import multiplied
+from layouts import Layout
 from robots import TaskError
 from robots.common.fields import settle_fields
 from robots.descriptor import IDENTITY, Quaternion
 from simulation import Box, Friction, Shape, Sphere, World, add_table
 from simulation.shapes import Color, Coordinate, Density, Length, Lengths, Place
+from simulation.tabletop import TABLE_OUTLINE
 from simulation.world import BodyKind
 from tasks.language.props import (
     FACE_UP,
@@ -23,9 +25,11 @@ from tasks.language.props import (
     add_wide_table,
     peg_shapes,
     target_shapes,
+    wide_table_outline,
 )
 from tasks.language.randomness import EpisodeRandom
 
+Rectangle = tuple[float, float, float, float]
 Range: TypeAlias = "float | tuple[float, float]"
 """A number, or the smallest and the largest that may be drawn."""
 
@@ -369,6 +373,10 @@ class Table:
         """
         settle_fields(self, TaskError)
 
+    def outline(self, layout: Layout) -> Rectangle:
+        """Return the outline of its top: x_min, y_min, x_max, y_max (m)."""
+        return TABLE_OUTLINE
+
     def add_to(self, world: World, name: str) -> None:
         """Build it; its body is called ``table-workspace``, as in native."""
         add_table(world, textured=self.textured)
@@ -380,6 +388,10 @@ class Table:
 @dataclass(frozen=True)
 class WideTable:
     """A table under all robots of a layout, its top at z = 0, and the floor below it."""
+
+    def outline(self, layout: Layout) -> Rectangle:
+        """Return the outline of its top: x_min, y_min, x_max, y_max (m)."""
+        return wide_table_outline(layout)
 
     def add_to(self, world: World, name: str) -> None:
         """Build it; its body is called ``table``."""

@@ -6,6 +6,7 @@ from math import cos, pi, sin
 
 import numpy as np
 
+from layouts import Layout
 from robots.descriptor import Vector3
 from simulation import Box, Cylinder, Plane, Shape, Sphere, World
 from simulation.shapes import Color
@@ -126,6 +127,13 @@ def target_shapes(radius: float) -> tuple[Shape, ...]:
     )
 
 
+def wide_table_outline(layout: Layout) -> tuple[float, float, float, float]:
+    """Return the outline of that table's top: x_min, y_min, x_max, y_max (m)."""
+    bases = np.array([placement.base_position[:2] for placement in layout.values()])
+    (x_min, y_min), (x_max, y_max) = bases.min(0) - TABLE_MARGIN, bases.max(0) + TABLE_MARGIN
+    return float(x_min), float(y_min), float(x_max), float(y_max)
+
+
 def add_wide_table(world: World) -> None:
     """Add a table under all robots of a layout, its top at z = 0, and the floor below it.
 
@@ -134,9 +142,9 @@ def add_wide_table(world: World) -> None:
     Args:
         world: The world; its layout says where the bases are.
     """
-    bases = np.array([placement.base_position[:2] for placement in world.layout.values()])
-    low, high = bases.min(0) - TABLE_MARGIN, bases.max(0) + TABLE_MARGIN
-    (x, y), (half_x, half_y) = (low + high) / 2, (high - low) / 2
+    x_min, y_min, x_max, y_max = wide_table_outline(world.layout)
+    x, half_x = (x_min + x_max) / 2, (x_max - x_min) / 2
+    y, half_y = (y_min + y_max) / 2, (y_max - y_min) / 2
     slab = Box(half_size=(half_x, half_y, TABLE_THICKNESS / 2), color=WOOD)
     middle = (x, y, -TABLE_THICKNESS / 2)
     world.add("table", slab, kind="kinematic", position=middle, anchored=True)

@@ -20,10 +20,10 @@ from tasks import (
     PhysicsSettings,
     State,
     Vector3,
+    WideTable,
     World,
     add_goal,
     add_target,
-    add_wide_table,
     closeness,
     is_at_rest,
     register_task,
@@ -57,6 +57,7 @@ class Relay(MultiRobotTask):
     layout = ring(
         {"first": "panda", "second": "panda_stick", "third": "panda_wristcam"}, radius=0.8
     )
+    table = WideTable()
     robot_counts = ROBOTS
     physics = PhysicsSettings()
     max_episode_steps = 800
@@ -66,7 +67,7 @@ class Relay(MultiRobotTask):
 
     def build(self, world: World) -> None:
         """Add the table, the baton, the zones and the beacon."""
-        add_wide_table(world)
+        self.table.add_to(world, "table")
         world.add("baton", *_baton(), position=self._zones[-1])
         for robot in self.layout:
             add_target(world, ZONE_RADIUS, f"zone_{robot}")

@@ -47,7 +47,7 @@ def test_other_robots_at_the_same_places_are_checked_too():
 
 
 def test_the_tasks_own_layout_costs_nothing(monkeypatch):
-    def fail(layout):
+    def fail(layout, table):
         raise AssertionError("checked")
 
     monkeypatch.setattr("tasks.engine.task.refuse_collisions", fail)
@@ -94,3 +94,12 @@ def test_a_robot_that_collides_with_itself_is_refused():
     layout = Layout({"arm": Placement(replace(panda, keyframes={"rest": bent}))})
     with pytest.raises(LayoutError, match="arm touches itself at the keyframes: arm.panda_"):
         refuse_collisions(layout)
+
+
+def test_a_robot_inside_the_tasks_own_table_is_refused():
+    low = {name: Placement("panda", (x, 0.0, -0.5)) for name, x in (("left", -0.8), ("right", 0.8))}
+    with pytest.raises(LayoutError, match="left and table collide at the keyframes"):
+        tasks.make(TWO, layout=Layout(low))
+    three = {f"arm_{i}": Placement("panda", (i * 1.5, 0.0, -0.5)) for i in range(3)}
+    with pytest.raises(LayoutError, match="arm_0 and table collide"):
+        tasks.make("Relay-v1", layout=Layout(three))
