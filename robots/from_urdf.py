@@ -21,7 +21,7 @@ from robots.common.commands import exit_code, start
 from robots.common.errors import AssetError, MissingPackageError, UnknownNameError
 from robots.common.paths import absolute
 from robots.guess import Guess, guess
-from robots.urdf.xacro_files import template_of, with_arguments
+from robots.urdf.cleaning.xacro_files import template_of, with_arguments
 
 __all__ = ["Guess", "guess_descriptor", "main"]
 

@@ -16,17 +16,17 @@ from robots.bodies.hulls import Hull, counted_pairs, read_hulls
 from robots.bodies.overlaps import guess_allowed, overlapping
 from robots.common.errors import DescriptorError
 from robots.descriptor import ActionSplit, Fingers, JointGroup, RobotDescriptor
+from robots.guessing.anatomy import Anatomy, Limb, find_anatomy
 from robots.guessing.drives import Drives
 from robots.guessing.fingertips import Fingertips
 from robots.guessing.grasps import find_fingers, find_material
 from robots.guessing.grippers import Gripper, entangled, find_gripper
 from robots.guessing.groups import arm_groups, held_groups
+from robots.guessing.masses import read_masses
 from robots.guessing.posture import Posture, PostureSearch
 from robots.guessing.reach import find_reach
 from robots.guessing.stance import Stance
 from robots.guessing.tool import Tool, find_tool
-from robots.urdf.anatomy import Anatomy, Limb, find_anatomy
-from robots.urdf.masses import read_masses
 from robots.urdf.model import UrdfModel
 from robots.urdf.reading import read_model
 from robots.urdf.summary import parse_urdf, read_cleaned

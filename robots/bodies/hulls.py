@@ -18,6 +18,7 @@ from kinematics.tree import Tree
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
 from robots.common.errors import AssetError, MissingPackageError
 from robots.descriptor import RobotDescriptor
+from robots.urdf.cleaning.xacro_files import template_of
 from robots.urdf.mesh_files import has_volume, read_corners
 from robots.urdf.model import UrdfModel
 from robots.urdf.paths import resolve
@@ -26,7 +27,6 @@ from robots.urdf.shapes import UrdfShape
 from robots.urdf.srdf import srdf_beside
 from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree
-from robots.urdf.xacro_files import template_of
 
 SIDES = 32  # of the polygon that stands for a circle; 0.5 % of the radius is lost
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from robots.guessing.masses import Masses, hanging_inertia
 from robots.guessing.stance import Stance
-from robots.urdf.masses import Masses, hanging_inertia
 from robots.urdf.model import ModelJoint
 
 CONTROL_STEP = 0.05  # s; of a world that is not told otherwise

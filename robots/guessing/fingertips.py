@@ -8,9 +8,9 @@ import numpy as np
 
 from kinematics.rotations import Floats, inverse_pose, transform
 from robots.bodies.hulls import Hull
+from robots.guessing import words
+from robots.guessing.anatomy import Limb
 from robots.guessing.stance import Stance
-from robots.urdf import words
-from robots.urdf.anatomy import Limb
 from robots.urdf.model import ModelJoint
 
 SHORT = 0.6  # of the longest finger; what ends before it is a knuckle, not a tip

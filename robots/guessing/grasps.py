@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from robots.descriptor import Fingers, GripperMaterial
+from robots.guessing.anatomy import Limb
 from robots.guessing.fingertips import Fingertips
-from robots.urdf.anatomy import Limb
 
 ALONG = 0.7  # cosine; how well a finger's y axis must lie along the way in which it opens
 WIDE = 110.0  # degrees; of a finger that swings, as ManiSkill's SO-100 has it

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from robots.bodies.hulls import Hull
 from robots.bodies.overlaps import overlapping
 from robots.descriptor import JointGroup
+from robots.guessing.anatomy import Limb
 from robots.guessing.drives import Drives, drive_fields
 from robots.guessing.fingertips import Fingertips
 from robots.guessing.groups import by_steps, name_of
 from robots.guessing.stance import Stance, middle_of
-from robots.urdf.anatomy import Limb
 from robots.urdf.model import ModelJoint
 
 SQUEEZE = 0.01  # how far beyond closed a parallel gripper's target is (m)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from robots.descriptor import JointGroup
+from robots.guessing.anatomy import PARTS, Anatomy, Limb
 from robots.guessing.drives import Drives, alike, drive_fields
-from robots.urdf.anatomy import PARTS, Anatomy, Limb
 from robots.urdf.model import ModelJoint
 
 

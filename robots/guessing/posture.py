@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from kinematics.rotations import Floats
 from robots.bodies.hulls import Hull
 from robots.bodies.overlaps import overlapping
+from robots.guessing.anatomy import FARTHEST_SLIDE, Limb
 from robots.guessing.stance import Stance
 from robots.guessing.tool import Tool
 from robots.guessing.view import MARGIN, View
-from robots.urdf.anatomy import FARTHEST_SLIDE, Limb
 from robots.urdf.model import ModelJoint
 
 DRAWS = 1500  # random postures of a limb

@@ -11,8 +11,8 @@ import numpy as np
 from kinematics.rotations import Floats, inverse_pose, transform
 from kinematics.solve import farthest
 from kinematics.tree import Tree
+from robots.guessing.anatomy import FARTHEST_SLIDE, Limb
 from robots.guessing.tool import Tool
-from robots.urdf.anatomy import FARTHEST_SLIDE, Limb
 from robots.urdf.model import ModelJoint, UrdfModel
 from robots.urdf.tree import kinematic_tree
 

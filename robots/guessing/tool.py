@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robots.guessing import words
+from robots.guessing.anatomy import Limb
 from robots.guessing.fingertips import Fingertips
 from robots.guessing.stance import Stance
-from robots.urdf import words
-from robots.urdf.anatomy import Limb
 
 BETWEEN = 0.05  # m; a frame named like a tool counts if it is so near to the place between tips
 EXACT = 0.02  # m; farther away, the reason says so

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from kinematics.rotations import Floats
+from robots.guessing.anatomy import Limb
 from robots.guessing.stance import Stance
 from robots.guessing.tool import Tool
-from robots.urdf.anatomy import Limb
 
 MARGIN = 0.1  # of a joint's range, which it stays away from its ends
 

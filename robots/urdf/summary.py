@@ -8,9 +8,9 @@ from xml.etree import ElementTree
 
 from robots.common.errors import AssetError, UnreadableFileError
 from robots.common.files import read_regular
-from robots.urdf.cleaning import Cleaned, clean, is_template
+from robots.urdf.cleaning.cleaning import Cleaned, clean, is_template
+from robots.urdf.cleaning.xacro_files import XACRO, expand, template_of
 from robots.urdf.paths import Exists, resolve
-from robots.urdf.xacro_files import XACRO, expand, template_of
 from robots.urdf.xml_text import parse_xml
 
 MAX_URDF_BYTES = 32 << 20
@@ -45,7 +45,7 @@ def read_cleaned(path: Path) -> Cleaned:
 
     Args:
         path: A URDF or a xacro template, with its arguments if it has some; see
-            `robots.urdf.xacro_files.with_arguments`.
+            `robots.urdf.cleaning.xacro_files.with_arguments`.
 
     Raises:
         AssetError: As `read_urdf`.

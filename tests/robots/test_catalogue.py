@@ -13,7 +13,7 @@ import pytest
 from robots import AssetError, RobotDescriptor, RobotRegistry, UrdfLocator
 from robots.assets.manifest import AssetPackage, load_manifest
 from robots.registry import CATALOGUE
-from robots.urdf.cleaning import clean
+from robots.urdf.cleaning.cleaning import clean
 from robots.urdf.model import ModelJoint
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_references

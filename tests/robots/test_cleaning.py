@@ -8,7 +8,7 @@ from robots import AssetError, RobotRegistry
 from robots.from_urdf import guess_descriptor
 from robots.inspect import main as inspect_main
 from robots.registry import CATALOGUE
-from robots.urdf.cleaning import clean
+from robots.urdf.cleaning.cleaning import clean
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_cleaned
 from tests.catalogue import is_optional

@@ -13,8 +13,8 @@ import trimesh
 from robots import AssetError, LocalUrdf, RobotDescriptor
 from robots.fingerprint import asset_fingerprint
 from robots.from_urdf import main
+from robots.urdf.cleaning.xacro_files import template_of, with_arguments
 from robots.urdf.summary import read_cleaned
-from robots.urdf.xacro_files import template_of, with_arguments
 
 CHECKOUT = Path(__file__).parents[2]
 

@@ -14,12 +14,12 @@ from functools import lru_cache
 from xml.etree.ElementTree import Element, tostring
 
 from robots.common.errors import AssetError
-from robots.urdf.clean_inertia import repair_inertia
-from robots.urdf.clean_joints import repair_joints
-from robots.urdf.clean_references import file_states, repair_references
-from robots.urdf.clean_shapes import repair_shapes
-from robots.urdf.clean_text import parse_damaged
-from robots.urdf.xacro_files import drop_leftovers, is_unfinished
+from robots.urdf.cleaning.inertia import repair_inertia
+from robots.urdf.cleaning.joints import repair_joints
+from robots.urdf.cleaning.references import file_states, repair_references
+from robots.urdf.cleaning.shapes import repair_shapes
+from robots.urdf.cleaning.text import parse_damaged
+from robots.urdf.cleaning.xacro_files import drop_leftovers, is_unfinished
 
 PARTS = ("link", "joint", "material")  # of a robot; the rest belongs to other programs
 VECTORS = ("xyz", "rpy", "size", "scale")  # attributes of three numbers

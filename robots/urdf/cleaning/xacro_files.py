@@ -19,7 +19,7 @@ from urllib.parse import parse_qsl, urlencode
 from xml.etree.ElementTree import Element
 
 from robots.common.errors import AssetError, MissingPackageError
-from robots.urdf.clean_references import find_package
+from robots.urdf.cleaning.references import find_package
 
 XACRO = "/xacro"  # what its namespaces end in: http://www.ros.org/wiki/xacro, …
 DEFINITIONS = ("property", "arg", "macro")  # which do nothing where nothing uses them

@@ -1,7 +1,8 @@
 """The parts of a robot: its limbs with their grippers, and what moves besides, from its URDF.
 
 Structure comes first: where the tree of joints branches, how many joints follow, how long they are,
-what mimics what. Names help where several answers fit, by the generic words of `robots.urdf.words`.
+what mimics what. Names help where several answers fit, by the generic words of
+`robots.guessing.words`.
 """
 
 from __future__ import annotations
@@ -10,8 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from robots.common.errors import DescriptorError
-from robots.urdf import words
-from robots.urdf.lengths import Lengths
+from robots.guessing import words
+from robots.guessing.lengths import Lengths
 from robots.urdf.model import ModelJoint, UrdfModel
 
 FARTHEST_SLIDE = 4.0  # m; a slide that goes farther is a way for a whole robot

@@ -1,0 +1,1 @@
+"""Repairs of URDFs, before anything else reads them."""
