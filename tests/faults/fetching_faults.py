@@ -336,8 +336,7 @@ def _killed(number: signal.Signals) -> Callable[[Path], None]:
 
 
 def _members(**changes: bytes) -> dict[str, bytes]:
-    folder = f"mani_skill/{ORIGIN.mani_skill}"
-    return {f"{folder}/{path}": data for path, data in {**CONTENTS, **changes}.items()}
+    return {f"{ORIGIN.folder}/{path}": data for path, data in {**CONTENTS, **changes}.items()}
 
 
 def _of_wheel() -> Iterator[Fault]:

@@ -50,8 +50,12 @@ def template_of(path: Path) -> tuple[Path, dict[str, str]]:
 
 
 def is_unfinished(root: Element) -> bool:
-    """Tell whether a URDF is a template, of which more is left than definitions nobody uses."""
-    return any(map(_is_instruction, _outside_definitions(root)))
+    """Tell whether a URDF is a template, of which more is left than definitions nobody uses.
+
+    Expressions count only beside elements of xacro's: a name may hold a ``${`` of its own.
+    """
+    written_for_it = any(map(_kind, root.iter()))
+    return written_for_it and any(map(_is_instruction, _outside_definitions(root)))
 
 
 def drop_leftovers(root: Element, urdf: str) -> Iterator[str]:
