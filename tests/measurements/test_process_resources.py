@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from contextlib import contextmanager
 
 import pytest
@@ -37,6 +38,8 @@ def a_thread():
     yield
     over.set()
     thread.join()
+    while os.path.exists(f"/proc/self/task/{thread.native_id}"):  # the system's end comes later
+        time.sleep(0.001)
 
 
 @contextmanager
