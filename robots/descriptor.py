@@ -13,7 +13,7 @@ from typing import Any, NoReturn, Protocol, runtime_checkable
 
 from robots.action_split import ActionNumber, ActionSplit, JointGroup, is_gripper, names
 from robots.common.errors import DescriptorError, UnknownNameError
-from robots.common.fields import settle_fields
+from robots.common.fields import expect_unit, settle_fields
 
 __all__ = [
     "CONTROL_MODES",
@@ -38,7 +38,6 @@ Quaternion = tuple[float, float, float, float]  # wxyz
 IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 LARGEST_IMAGE = 16384  # pixels; what graphics drivers allow
-_UNIT_TOLERANCE = 1e-6  # rounding of a quaternion written with seven digits
 
 CONTROL_MODES = ("pd_joint_delta_pos", "pd_joint_pos")  # ManiSkill's names
 
@@ -151,7 +150,7 @@ class CameraMount:
         """Refuse what no camera can be."""
         settle_fields(self, DescriptorError)
         camera = f"camera {self.name!r}"
-        _expect_unit(camera, self.quaternion)
+        expect_unit(camera, self.quaternion, DescriptorError)
         for name, pixels in (("width", self.width), ("height", self.height)):
             _expect(
                 0 < pixels <= LARGEST_IMAGE,
@@ -183,7 +182,7 @@ class Home:
     def __post_init__(self) -> None:
         """Refuse a pose that is none."""
         settle_fields(self, DescriptorError)
-        _expect_unit("Home", self.quaternion)
+        expect_unit("Home", self.quaternion, DescriptorError)
 
 
 @dataclass(frozen=True)
@@ -391,15 +390,6 @@ def _expect(right: bool, otherwise: str) -> None:
 def _expect_different(what: str, names: Sequence[str]) -> None:
     twice = sorted({name for name in names if names.count(name) > 1})
     _expect(not twice, f"{what} has {', '.join(twice)} more than once")
-
-
-def _expect_unit(what: str, quaternion: Quaternion) -> None:
-    length = math.hypot(*quaternion)
-    _expect(
-        abs(length - 1) <= _UNIT_TOLERANCE,
-        f"{what}: quaternion {quaternion} has length {length:.6g}; a rotation has length 1"
-        " (order w, x, y, z)",
-    )
 
 
 class _Frozen(dict[str, tuple[float, ...]]):

@@ -11,11 +11,12 @@ import math
 import os
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, count
 
 import numpy as np
 
 from kinematics.rotations import Floats, inverse_pose, quaternion_of, transform
-from robots.action_split import ActionSplit, JointGroup
+from robots.action_split import ActionSplit, JointGroup, is_gripper
 from robots.assets.assembled import AssembledUrdf, Part, carried_by
 from robots.assets.locator import LocalUrdf
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
@@ -223,10 +224,8 @@ def on_body(
 def _robot(given: RobotLike) -> RobotDescriptor:
     if isinstance(given, RobotDescriptor):
         return given
-    if isinstance(given, str) and given in RobotRegistry.names():
-        return RobotRegistry.load(given)
     if isinstance(given, str) and not given.lower().endswith((".urdf", ".xacro")):
-        return RobotRegistry.load(given)  # which says what there is
+        return RobotRegistry.load(given)
     return RobotDescriptor.from_urdf(given, quiet=True)
 
 
@@ -237,20 +236,22 @@ def _model(source: UrdfSource) -> UrdfModel:
 
 def _gripper_joints(robot: RobotDescriptor) -> frozenset[str]:
     groups = robot.action_split.groups.items()
-    return frozenset(
-        joint
-        for name, group in groups
-        if name == "gripper" or name.endswith("_gripper")
-        for joint in group.joints
-    )
+    return frozenset(joint for name, group in groups if is_gripper(name) for joint in group.joints)
 
 
 def _gripper_of(robot: RobotDescriptor) -> tuple[RobotDescriptor, Floats, str]:
     """Return what a robot says of its gripper alone, where its arm carries it, and its root.
 
-    A robot that is nothing but a gripper is taken as it is.
+    A robot that is nothing but a gripper or a hand is taken as it is.
+
+    Raises:
+        DescriptorError: If it is an arm without a gripper that moves.
     """
     joints = _gripper_joints(robot)
+    if not joints and any("arm" in name.split("_") for name in robot.action_split.groups):
+        raise DescriptorError(
+            f"{robot.name} is an arm, and none of its joint groups is a gripper that could be taken"
+        )
     if not joints or not robot.arm_joints or joints >= set(robot.joints):
         return robot, np.eye(4), ""
     model = _model(robot.urdf)
@@ -289,9 +290,8 @@ def _flange(
         if gripper <= {below.name for below in carried}:
             return joint.child, joint.parent, joint.origin
     raise DescriptorError(
-        f"the gripper of {robot.name} is built into {first.parent!r}, which an arm joint moves;"
-        " there is nothing to take off. with_gripper needs an arm whose gripper hangs on a fixed"
-        " joint, or that has none"
+        f"the gripper of {robot.name} cannot be taken off: no fixed joint between the arm and"
+        f" {first.parent!r} carries all of it"
     )
 
 
@@ -337,7 +337,9 @@ def _apart(part: Part, robot: RobotDescriptor, without: Sequence[str] = ()) -> P
     body, tool = _model(robot.urdf), _model(part.urdf)
     kept = _names(body, {*body.links} - carried_by(body, without))
     added = _names(tool, carried_by(tool, [part.root or tool.root]))
-    return part if kept.isdisjoint(added) else replace(part, prefix="tool_")
+    prefixes = chain(("", "tool_"), (f"tool_{i}_" for i in count(2)))
+    free = next(p for p in prefixes if kept.isdisjoint({p + name for name in added}))
+    return replace(part, prefix=free)
 
 
 def _names(model: UrdfModel, links: Collection[str]) -> set[str]:

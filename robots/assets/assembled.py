@@ -4,30 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import os
-import shutil
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from kinematics.quaternions import Quaternion, Vector3, quaternion_rpy
+from kinematics.quaternions import quaternion_rpy
 from robots.assets.store import default_root
-from robots.common.errors import DescriptorError, UnknownNameError
+from robots.common.errors import DescriptorError, UnknownNameError, UnwritableFileError
+from robots.common.fields import expect_unit, settle
+from robots.common.writing import written_whole
+from robots.descriptor import IDENTITY, Quaternion, UrdfSource, Vector3
 from robots.urdf.model import UrdfModel
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model
 from robots.urdf.renaming import rename
 from robots.urdf.summary import parse_urdf, read_urdf
 
-
-class Source(Protocol):
-    """Where a URDF comes from; see `robots.descriptor.UrdfSource`."""
-
-    def locate(self, *, pictures: bool = False) -> Path:
-        """Return the path of a complete, checked URDF on this machine."""
-        ...
+URDF = "assembled.urdf"
 
 
 @dataclass(frozen=True)
@@ -43,12 +37,21 @@ class Part:
         root: Link that is fixed, of which only what it carries is taken over; the whole if empty.
     """
 
-    urdf: Source
+    urdf: UrdfSource
     link: str
     position: Vector3 = (0.0, 0.0, 0.0)
-    quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    quaternion: Quaternion = IDENTITY
     prefix: str = ""
     root: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse a pose that is none."""
+        what = f"what is fixed to {self.link!r}"
+        position = settle(self.position, Vector3, f"{what}: position", DescriptorError)
+        quaternion = settle(self.quaternion, Quaternion, f"{what}: quaternion", DescriptorError)
+        expect_unit(what, quaternion, DescriptorError)
+        object.__setattr__(self, "position", position)
+        object.__setattr__(self, "quaternion", quaternion)
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ class AssembledUrdf:
         without: Links that are cut off the body, with all that they carry.
     """
 
-    body: Source
+    body: UrdfSource
     parts: tuple[Part, ...] = ()
     without: tuple[str, ...] = ()
 
@@ -78,6 +81,7 @@ class AssembledUrdf:
             AssetError: If the files of a part cannot be found or make no sense.
             UnknownNameError: If a link that carries a part, or is cut off, does not exist.
             DescriptorError: If two parts have a link or joint of the same name, or nothing is left.
+            UnwritableFileError: If the folder cannot be written.
         """
         assembly = _Assembly(pictures=pictures)
         assembly.take(self.body, without=self.without)
@@ -96,7 +100,7 @@ class _Assembly:
         self._folders: dict[str, str] = {}  # of meshes: path → name of the link to it
 
     def take(
-        self, source: Source, prefix: str = "", root: str = "", without: Sequence[str] = ()
+        self, source: UrdfSource, prefix: str = "", root: str = "", without: Sequence[str] = ()
     ) -> str:
         """Take a URDF over, or what one link of it carries, and return the new name of its root."""
         path = source.locate(pictures=self._pictures)
@@ -135,9 +139,9 @@ class _Assembly:
         links = sorted((name, folder) for folder, name in self._folders.items())
         digest = hashlib.sha256(repr((xml, links)).encode()).hexdigest()[:16]
         folder = default_root() / "assembled" / digest
-        if not (folder / "assembled.urdf").is_file():
+        if not (folder / URDF).is_file():
             _make(folder, xml, dict(links))
-        return folder / "assembled.urdf"
+        return folder / URDF
 
     def _file(self, reference: str, urdf: Path) -> str:
         path = os.path.abspath(resolve(reference, urdf.as_posix(), os.path.isfile))
@@ -182,23 +186,20 @@ def _belongs(element: Element, links: frozenset[str], root: str) -> bool:
 
 
 def _make(folder: Path, xml: bytes, links: Mapping[str, str]) -> None:
-    """Make the folder of a URDF, whole or not at all."""
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = Path(tempfile.mkdtemp(prefix=".partial-", dir=folder.parent))
+    """Make the folder of a URDF, unless another process is faster.
+
+    Raises:
+        UnwritableFileError: If it cannot be written.
+    """
     try:
-        for name, target in links.items():
-            link = unfinished / name
-            link.parent.mkdir(exist_ok=True)
-            link.symlink_to(target, target_is_directory=True)
-        (unfinished / "assembled.urdf").write_bytes(xml)
-        unfinished.rename(folder)
-    except FileExistsError:  # another process was faster
-        pass
-    except OSError:
-        if not (folder / "assembled.urdf").is_file():
+        with written_whole(folder) as unfinished:
+            (unfinished / "meshes").mkdir(parents=True)
+            for name, target in links.items():
+                (unfinished / name).symlink_to(target, target_is_directory=True)
+            (unfinished / URDF).write_bytes(xml)
+    except UnwritableFileError:
+        if not (folder / URDF).is_file():
             raise
-    finally:
-        shutil.rmtree(unfinished, ignore_errors=True)
 
 
 def _text(values: Vector3) -> str:

@@ -14,6 +14,7 @@ from typing import Annotated, Any
 from robots.common.errors import RobotLayoutsError
 
 LARGEST = 3.4028234663852886e38  # of single precision, in which the simulator computes
+UNIT_TOLERANCE = 1e-6  # rounding of a quaternion written with seven digits
 _SHOWN = 60  # characters of a value in a message
 
 _NUMBERS = {
@@ -116,6 +117,27 @@ def settle_fields(instance: Any, error: type[RobotLayoutsError], owner: str | No
         settled = settle(value, hints[field.name], f"{owner}: {field.name}", error)
         if settled is not value:
             object.__setattr__(instance, field.name, settled)
+
+
+def expect_unit(
+    what: str, quaternion: tuple[float, float, float, float], error: type[RobotLayoutsError]
+) -> None:
+    """Refuse a quaternion that is no rotation.
+
+    Args:
+        what: Whose it is, for the message.
+        quaternion: wxyz.
+        error: What to raise.
+
+    Raises:
+        RobotLayoutsError: ``error``, if its length is not 1.
+    """
+    length = math.hypot(*quaternion)
+    if abs(length - 1) > UNIT_TOLERANCE:
+        raise error(
+            f"{what}: quaternion {quaternion} has length {length:.6g}; a rotation has length 1"
+            " (order w, x, y, z)"
+        )
 
 
 def _settle(value: Any, hint: Any, name: str) -> Any:

@@ -24,8 +24,6 @@ from layouts.validation.collisions import (
     touching,
 )
 from robots import (
-    AssetError,
-    DescriptorError,
     LayoutError,
     MissingPackageError,
     RobotRegistry,
@@ -288,32 +286,6 @@ class TestNearest:
         one = self.standing("one", "so100", random, (0.0, 0.0, 0.0))
         other = self.standing("other", "so100", random, (30.0, 0.0, 0.0))
         assert nearest(one, other) is None
-
-
-class TestFiles:
-    """A robot whose files make no sense does not keep the others from being checked."""
-
-    def layout(self, tmp_path, **others):
-        text = urdf(link("base", '<mesh filename="gone.stl"/>'), link("top"), TURN)
-        broken = Placement(robot(tmp_path, text, ["turn"]), (5.0, 0.0, 0.0), (1, 0, 0, 0))
-        return Layout({"broken": broken, **others})
-
-    def test_it_is_a_finding(self, tmp_path):
-        near = {n: Placement("so100", (x, 0, 0), (1, 0, 0, 0)) for n, x in (("a", 0), ("b", 0.05))}
-        report = self.layout(tmp_path, **near).validate(targets=[(0.0, -0.2, 0.2)])
-        assert not report.ok
-        assert kinds(report) == ["files", "collision", "target"]
-        finding = report.findings[0]
-        assert finding.robots == ("broken",)
-        assert finding.what.startswith("broken cannot be checked: ")
-        assert "refers to files that do not exist: " in finding.what
-        assert "as if broken were not there" in finding.advice
-        assert {reach.robot for reach in report.reaches} == {"a", "b"}
-        assert report.picture(tmp_path / "cell.png").is_file()
-
-    def test_alone_it_is_an_error(self, tmp_path):
-        with pytest.raises(AssetError, match="refers to files that do not exist"):
-            self.layout(tmp_path).validate()
 
 
 class TestSelfCollisions:
@@ -602,120 +574,6 @@ class TestPicture:
         monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
         with pytest.raises(MissingPackageError, match=r"pip install 'robot-layouts\[preview\]'"):
             report.picture(tmp_path / "cell.png")
-
-
-class TestBadRobots:
-    def validate(self, tmp_path, text, joints=("turn",), **more):
-        arm = robot(tmp_path, text, joints, **more)
-        return Layout({"arm": Placement(arm)}).validate()
-
-    @pytest.mark.parametrize(
-        ("text", "message"),
-        [
-            (
-                urdf(link("base"), joint("turn", "base", "base")),
-                "no link is without a joint that carries it",
-            ),
-            (
-                urdf(
-                    link("base"),
-                    link("top"),
-                    joint("turn", "base", "top"),
-                    joint("turn", "base", "top"),
-                ),
-                "more than one joint called 'turn'",
-            ),
-            (
-                urdf(link("base"), link("base"), joint("turn", "base", "base")),
-                "more than one link called 'base'",
-            ),
-            (
-                urdf(link("base"), link("top"), joint("turn", "base", "tip")),
-                "joint 'turn' names the link 'tip', which does not exist",
-            ),
-            (
-                urdf(
-                    link("base"),
-                    link("top"),
-                    link("tip"),
-                    joint("turn", "base", "top"),
-                    joint("fly", "top", "tip", kind="floating"),
-                ),
-                "joint 'fly' is 'floating'; only revolute",
-            ),
-            (
-                urdf(
-                    link("base"),
-                    link("top"),
-                    link("a"),
-                    link("b"),
-                    joint("turn", "base", "top"),
-                    joint("ab", "a", "b"),
-                    joint("ba", "b", "a"),
-                ),
-                r"the joints of links \['a', 'b'\] go in a circle",
-            ),
-            (
-                urdf(link("base"), link("top"), joint("turn", "base", "top", axis="0 0 0")),
-                "joint 'turn' has the axis 0 0 0",
-            ),
-            (
-                urdf(link("base"), link("top"), joint("turn", "base", "top", xyz="0 0 up")),
-                "joint 'turn' has xyz='0 0 up' in <origin>; 3 finite",
-            ),
-            (
-                urdf(link("base", "<cone/>"), link("top"), joint("turn", "base", "top")),
-                "a collision of shape 'cone'; choices: box, sphere",
-            ),
-            (
-                '<!DOCTYPE robot [<!ENTITY x SYSTEM "file:///etc/hostname">]>'
-                '<robot name="&x;"><link name="base"/></robot>',
-                "declares XML entities",
-            ),
-            ("<robot", "is not a URDF"),
-        ],
-    )
-    def test_an_urdf_that_makes_no_sense_is_refused(self, text, message, tmp_path):
-        with pytest.raises(AssetError, match=message):
-            self.validate(tmp_path, text)
-
-    def test_one_without_a_joint_that_moves_is_refused(self, tmp_path):
-        still = urdf(link("base"), link("top"), joint("turn", "base", "top", kind="fixed"))
-        with pytest.raises(DescriptorError, match=r"'small' has no moving joints \['turn'\]"):
-            self.validate(tmp_path, still)
-
-    def test_a_flat_shape_and_a_link_that_weighs_nothing_are_repaired(self, tmp_path):
-        nothing = '<inertial><mass value="0"/><inertia ixx="0" iyy="0" izz="0"/></inertial></link>'
-        top = link("top").replace("</link>", nothing)
-        flat = link("base", '<box size="0.1 0.1 0"/>')
-        assert self.validate(tmp_path, urdf(flat, top, joint("turn", "base", "top"))).ok
-
-    def test_a_missing_mesh_is_named(self, tmp_path):
-        shape = '<mesh filename="gone.stl"/>'
-        text = urdf(link("base", shape), link("top"), joint("turn", "base", "top"))
-        with pytest.raises(AssetError, match="gone.stl"):
-            self.validate(tmp_path, text)
-
-    @pytest.mark.parametrize("contents", ["", "not a mesh at all"])
-    def test_a_mesh_that_is_none_is_named(self, contents, tmp_path):
-        (tmp_path / "bad.stl").write_text(contents)
-        shape = '<mesh filename="bad.stl"/>'
-        text = urdf(link("base", shape), link("top"), joint("turn", "base", "top"))
-        with pytest.raises(AssetError, match="link 'base'"):
-            self.validate(tmp_path, text)
-
-    def test_an_entity_in_the_srdf_is_refused(self, tmp_path):
-        (tmp_path / "small.srdf").write_text('<!DOCTYPE r [<!ENTITY x "y">]><robot/>')
-        with pytest.raises(AssetError, match="declares XML entities"):
-            Layout({"arm": Placement(turntable(tmp_path))}).validate()
-
-    def test_a_changed_file_is_read_again(self, tmp_path):
-        arm = turntable(tmp_path)
-        before = pair(arm, 0.25).validate(workspaces=False).clearances[0].distance
-        text = (tmp_path / "small.urdf").read_text()
-        (tmp_path / "small.urdf").write_text(text.replace("0.1 0.1 0.1", "0.2 0.2 0.1"))
-        after = pair(arm, 0.25).validate(workspaces=False).clearances[0].distance
-        assert before - after == pytest.approx(0.1)
 
 
 def test_without_fcl_the_error_names_the_extra(monkeypatch):

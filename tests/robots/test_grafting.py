@@ -13,6 +13,7 @@ from layouts import face_to_face, single
 from robots import CameraMount, DescriptorError, RobotRegistry, UnknownNameError
 from robots.assets.assembled import AssembledUrdf, Part
 from robots.assets.locator import LocalUrdf
+from robots.common.errors import UnwritableFileError
 from robots.grafting import Mount, on_body, with_camera, with_gripper, with_tool
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
@@ -115,8 +116,21 @@ class TestGrippers:
         assert (after[-2:] < 0.005).all()
 
     def test_a_gripper_that_is_built_in_stays(self):
-        with pytest.raises(DescriptorError, match="gripper of so100 is built into 'Fixed_Jaw'"):
+        with pytest.raises(
+            DescriptorError,
+            match="so100 cannot be taken off: no fixed joint",
+        ):
             with_gripper(RobotRegistry.load("so100"), "panda")
+
+    def test_an_arm_that_has_none_lends_none(self):
+        with pytest.raises(DescriptorError, match="panda_stick is an arm, and none of its"):
+            with_gripper(PANDA, "panda_stick")
+
+    def test_poses_that_are_none(self):
+        with pytest.raises(DescriptorError, match="quaternion .* has length 2; a rotation has"):
+            with_gripper(PANDA, "panda", quaternion=(2, 0, 0, 0))
+        with pytest.raises(DescriptorError, match="'panda_link8': position"):
+            with_gripper(PANDA, "panda", position=(0, math.nan, 0))
 
     def test_links_that_do_not_exist(self):
         with pytest.raises(UnknownNameError, match="panda_link8"):
@@ -148,6 +162,13 @@ class TestTools:
         path.write_text(PEN.replace('"shaft"', '"panda_hand"'))
         arm = with_tool(PANDA, path, tcp_link="nib")
         assert (arm.tcp_link, "tool_panda_hand" in model_of(arm).links) == ("tool_nib", True)
+
+    def test_two_of_a_kind(self, pen):
+        arm = with_tool(with_tool(PANDA, pen, tcp_link="nib"), pen, tcp_link="nib", link="nib")
+        assert arm.tcp_link == "tool_nib"
+        third = with_tool(arm, pen, tcp_link="nib")
+        assert third.tcp_link == "tool_2_nib"
+        assert third.reach > arm.reach > PANDA.reach
 
     def test_a_camera(self):
         camera = CameraMount("wrist", "panda_hand")
@@ -212,6 +233,11 @@ class TestFiles:
         assert {process.returncode for process in running} == {0}
         assert len(places) == 1
         assert len(list((tmp_path / "shared" / "assembled").iterdir())) == 1
+
+    def test_a_folder_that_cannot_be_written(self, pen, tmp_path):
+        (tmp_path / "cache").write_text("a file")
+        with pytest.raises(UnwritableFileError, match="cannot write .*cache/assembled"):
+            AssembledUrdf(PANDA.urdf, (Part(LocalUrdf(pen), "panda_hand"),)).locate()
 
     def test_names_that_are_there_twice(self, pen):
         part = Part(LocalUrdf(pen), "panda_hand")

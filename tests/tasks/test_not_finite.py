@@ -9,17 +9,7 @@ import torch
 from robots import SimulationError, TaskError
 from simulation.sapien3.backend import worlds_below
 from tasks.maniskill.pick_cube import PickCube
-
-STILL = np.zeros((2, 8), np.float32)
-
-
-def make(cls=PickCube, **fields):
-    scenario = cls.scenario
-    for name, value in {"num_envs": 2, **fields}.items():
-        setattr(scenario, name, value)
-    env = cls(scenario)
-    env.reset(seed=0)
-    return env
+from tests.tasks.made import STILL, make
 
 
 def spoilt(env, entry, place, value):

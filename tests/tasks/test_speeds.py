@@ -12,19 +12,8 @@ from layouts import Layout, Placement
 from robots import SimulationError
 from simulation.sapien3.backend import worlds_below
 from tasks.engine.speeds import SpeedWatch
-from tasks.maniskill.pick_cube import PickCube
 from tasks.maniskill.two_robot_pick_cube import TwoRobotPickCube
-
-STILL = np.zeros((2, 8), np.float32)
-
-
-def make(cls=PickCube, **fields):
-    scenario = cls.scenario
-    for name, value in {"num_envs": 2, **fields}.items():
-        setattr(scenario, name, value)
-    env = cls(scenario)
-    env.reset(seed=0)
-    return env
+from tests.tasks.made import STILL, make
 
 
 def throw(env, number, speed):
