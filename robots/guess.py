@@ -222,9 +222,9 @@ def _still(parts: _Parts, allowed: LinkPairs) -> LinkPairs:
 
 def _counted(parts: _Parts, allowed: LinkPairs) -> tuple[tuple[int, int], ...]:
     """Return the pairs of hulls whose overlaps count, by their indices."""
-    excused = joined_pairs(parts.model) | rigid_pairs(parts.model)
-    excused |= frozenset(map(frozenset, allowed))
-    return counted_pairs(parts.stance.tree, parts.hulls, excused)
+    pairs = joined_pairs(parts.model) | rigid_pairs(parts.model)
+    pairs |= frozenset(map(frozenset, allowed))
+    return counted_pairs(parts.stance.tree, parts.hulls, pairs)
 
 
 def _rest(parts: _Parts, allowed: LinkPairs) -> tuple[dict[str, float], Posture]:

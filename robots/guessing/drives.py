@@ -12,7 +12,7 @@ from robots.guessing.masses import Masses, hanging_inertia
 from robots.guessing.stance import Stance
 from robots.urdf.model import ModelJoint
 
-CONTROL_STEP = 0.05  # s; of a world that is not told otherwise
+CONTROL_STEP = 0.05  # s; at 20 control steps a second, the default
 STIFFNESS = 1e3  # N·m/rad, N/m; the least, as of ManiSkill's Panda
 FORCE = 100.0  # N·m, N; the least where a URDF gives no effort, as of ManiSkill's Panda
 LONGEST_STEP = 0.1  # rad, m; of an arm's joint in one control step, as of ManiSkill's Panda
