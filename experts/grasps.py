@@ -34,7 +34,7 @@ def need_fingers(task: MultiRobotTask, plan: str, *robots: str) -> None:
         TaskError: If one has no fingers.
     """
     for name in robots:
-        robot = task.layout[name].robot
+        robot = task.layout.arm(name).robot
         if robot.fingers is None:
             raise TaskError(
                 f"{plan} needs fingers on {' and '.join(map(repr, robots))}; {name!r} is a"

@@ -70,7 +70,7 @@ class Rehearsal:
         """
         task, scene = self.task, self.scene()
         _check_names(script, task)
-        players = [_Player(task, name, script.get(name, ()), scene) for name in task.layout]
+        players = _players(task, script, scene)
         done: set[str] = set()
         actions: list[NDArray[np.float32]] = []
         while len(actions) < task.max_episode_steps:
@@ -98,12 +98,12 @@ class _Player:
         self, task: MultiRobotTask, robot: str, waypoints: Sequence[Waypoint], scene: Scene
     ) -> None:
         self._robot, self._waypoints = robot, list(waypoints)
-        self._driver = ArmDriver(task.layout[robot].robot)
+        self._driver = ArmDriver(task.layout.arm(robot).robot)
         if any(waypoint.to is not None for waypoint in waypoints):
             self._kinematics = task.simulation.inverse_kinematics(robot)
         if any(waypoint.at is not None for waypoint in waypoints):
             self._reach = task.simulation.point_reach(robot)
-            self._base = np.array(task.layout[robot].base_position)
+            self._base = np.array(task.layout.arm(robot).base_position)
         self._goal = self._driver.arm(scene.qpos(robot))
         self._gripper = OPEN
         self._current: Waypoint | None = None
@@ -186,6 +186,16 @@ class _Player:
         return min(reachable, key=lambda goal: float(np.abs(goal - arm).max()))
 
 
+def _players(task: MultiRobotTask, script: Script, scene: Scene) -> list[_Player]:
+    """Return who takes the action numbers, in their order, by the names that the script uses."""
+    short = task.layout.short_names
+    names = {short.get(name, name): name for name in script}
+    return [
+        _Player(task, name, script.get(name, ()), scene)
+        for name in (names.get(part, part) for part in task.layout.action_split)
+    ]
+
+
 def first_success(
     task: MultiRobotTask, seed: int, scripts: Callable[[Scene], Sequence[Script]]
 ) -> NDArray[np.float32]:
@@ -249,7 +259,7 @@ def _stack(actions: list[NDArray[np.float32]], task: MultiRobotTask) -> NDArray[
 
 def _check_names(script: Script, task: MultiRobotTask) -> None:
     for robot in script:
-        _ = task.layout[robot]
+        task.layout.arm(robot)
     names = [f"{robot}.{waypoint.name}" for robot in script for waypoint in script[robot]]
     for name in names:
         if names.count(name) > 1:

@@ -21,6 +21,7 @@ from layouts.placement import Placement, RobotLike, placed
 from robots import LayoutError, UnknownNameError
 from robots.common.bounds import FAR, checked_number, shown
 from robots.descriptor import Vector3
+from robots.limbs import BODY
 
 _Self = TypeVar("_Self", bound="Arrangement")
 
@@ -142,14 +143,61 @@ class Arrangement(Mapping[str, Placement]):
         return {name: world[name] for name in self._frames}
 
     @property
-    def action_split(self) -> dict[str, slice]:
-        """The slice of the flat action that each robot takes, in declared order."""
-        split: dict[str, slice] = {}
-        start = 0
+    def parts(self) -> dict[str, Placement]:
+        """Who takes action numbers, in their order: each robot, or its limbs if it has some.
+
+        A limb is called ``robot.limb``, and what its robot drives besides ``robot.body``. Its
+        placement holds its own part of the descriptor, and stands where the limb begins.
+        """
+        parts: dict[str, Placement] = {}
         for name, placement in self.items():
-            split[name] = slice(start, start + placement.robot.action_dim)
-            start += placement.robot.action_dim
-        return split
+            own = placement.parts
+            parts.update({f"{name}.{part}": where for part, where in own.items()})
+            parts.update({} if own else {name: placement})
+        return parts
+
+    @property
+    def arms(self) -> dict[str, Placement]:
+        """The `parts` that have a tool centre point: robots, or their limbs if they have some."""
+        return {n: part for n, part in self.parts.items() if n.rpartition(".")[2] != BODY}
+
+    @property
+    def short_names(self) -> dict[str, str]:
+        """The limbs that go by their own name: those that no other robot or limb is called like."""
+        limbs = [(part.partition(".")[2], part) for part in self.arms if part not in self]
+        names = [*self, *(limb for limb, _ in limbs)]
+        return {limb: part for limb, part in limbs if names.count(limb) == 1}
+
+    def arm(self, name: str) -> Placement:
+        """Return a robot, or a limb by its full name or its short one, described like a robot.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        known = {**self.parts, **self}
+        full = self.short_names.get(name, name)
+        if full not in known:
+            raise UnknownNameError("robot of this layout", name, [*known, *self.short_names])
+        return known[full]
+
+    def owner(self, name: str) -> str:
+        """Return the robot that an arm belongs to: itself, unless it is a limb.
+
+        Raises:
+            UnknownNameError: If there is no arm of that name.
+        """
+        self.arm(name)
+        return self.short_names.get(name, name).partition(".")[0]
+
+    @property
+    def action_split(self) -> dict[str, slice]:
+        """The slice of the flat action that each of `parts` takes, in declared order."""
+        return _slices(self.parts)
+
+    @property
+    def robot_actions(self) -> dict[str, slice]:
+        """The slice of the flat action that each robot takes, all its limbs together."""
+        return _slices(self)
 
     @property
     def action_dim(self) -> int:
@@ -203,6 +251,15 @@ class Arrangement(Mapping[str, Placement]):
 
     def _with(self: _Self, changed: Mapping[str, Placement]) -> _Self:
         return type(self)({**self._placements, **changed}, self._frames)
+
+
+def _slices(parts: Mapping[str, Placement]) -> dict[str, slice]:
+    split: dict[str, slice] = {}
+    start = 0
+    for name, placement in parts.items():
+        split[name] = slice(start, start + placement.robot.action_dim)
+        start += placement.robot.action_dim
+    return split
 
 
 def check_name(name: object) -> None:

@@ -15,13 +15,13 @@ COLUMNS = ("#", "name", "robot", "action", "base x, y, z (m)", "facing", "keyfra
 
 
 def describe(layout: Arrangement) -> str:
-    """Return a headline and one line per robot, in action order.
+    """Return a headline and one line per robot, or per limb of one, in action order.
 
     "facing" is the turn about z from the world's +x to where the robot reaches out at home
     (degrees), or the wxyz quaternion of that turn if it tilts the base. "on" is what a robot hangs
     on, where one hangs.
     """
-    split = layout.action_split
+    parts, split = layout.parts, layout.action_split
     hanging = any(placement.on is not None for placement in layout.values())
     rows = [
         (
@@ -33,9 +33,9 @@ def describe(layout: Arrangement) -> str:
             facing_text(placement),
             placement.start_keyframe,
             f"{placement.robot.reach:g}",
-            *([placement.on or "–"] if hanging else []),
+            *([layout[layout.owner(name)].on or "–"] if hanging else []),
         )
-        for number, (name, placement) in enumerate(layout.items(), start=1)
+        for number, (name, placement) in enumerate(parts.items(), start=1)
     ]
     columns = (*COLUMNS, "on") if hanging else COLUMNS
     return "\n".join([headline(layout), *_aligned([columns, *rows])])

@@ -110,6 +110,27 @@ class Placement:
         """Joint positions of ``start_keyframe``, in the order of the robot's joints (rad, m)."""
         return self.robot.keyframe(self.start_keyframe)
 
+    @property
+    def parts(self) -> dict[str, Placement]:
+        """The robot's limbs, and what it drives besides, each placed where it begins; or nothing.
+
+        They are in the world, whatever the robot hangs on.
+        """
+        pose = self.base_pose
+        parts: dict[str, Placement] = {}
+        for name, part in self.robot.parts.items():
+            limb = self.robot.limbs.get(name)
+            base = pose if limb is None else pose.then(Pose(limb.base, IDENTITY))
+            parts[name] = replace(
+                self,
+                robot=part,
+                position=base.position,
+                quaternion=base.quaternion,
+                rpy=None,
+                on=None,
+            )
+        return parts
+
     def with_robot(self, robot: RobotLike) -> Placement:
         """Return the placement with another robot, which faces the same way.
 

@@ -304,7 +304,7 @@ def _cells(layout: Arrangement, name: str) -> tuple[str, ...]:
     return (
         _shortened(name, LONGEST_NAME),
         _shortened(placement.robot.name, LONGEST_ROBOT),
-        action_text(layout.action_split[name]),
+        action_text(layout.robot_actions[name]),
         ", ".join(decimal(x) for x in placement.base_position),
         "tilted" if yaw_degrees(placement.facing) is None else facing_text(placement),
         decimal(placement.robot.reach),

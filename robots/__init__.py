@@ -28,6 +28,7 @@ from robots.descriptor import (
     GripperMaterial,
     Home,
     JointGroup,
+    Limb,
     RobotDescriptor,
 )
 from robots.registry import RobotRegistry
@@ -45,6 +46,7 @@ __all__ = [
     "Home",
     "JointGroup",
     "LayoutError",
+    "Limb",
     "LocalUrdf",
     "MissingPackageError",
     "RecordingError",

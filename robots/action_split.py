@@ -88,16 +88,16 @@ class JointGroup:
         cls,
         joints: tuple[str, ...],
         *,
-        stiffness: float,
-        damping: float,
-        force_limit: float,
+        stiffness: float = 1e5,
+        damping: float = 1e5,
+        force_limit: float = 1e5,
         unit: str = "rad",
     ) -> JointGroup:
         """Return a group that is held where the layout starts it, and takes no action number.
 
         Args:
             joints: Joint names.
-            stiffness: See `JointGroup`; 0 makes the drive a brake.
+            stiffness: See `JointGroup`; stiff unless given; 0 makes the drive a brake.
             damping: See `JointGroup`.
             force_limit: See `JointGroup`.
             unit: ``"rad"`` or ``"m"``.

@@ -10,7 +10,7 @@ from os import PathLike, fspath
 from typing import Any
 
 from robots.action_split import ActionSplit, names
-from robots.descriptor import Home, RobotDescriptor
+from robots.descriptor import RobotDescriptor
 
 WIDTH = 100
 _HOMES = {"LocalUrdf": "robots.assets.locator", "UrdfLocator": "robots.assets.locator"}
@@ -100,7 +100,7 @@ def _arguments(value: Any) -> list[tuple[str, Any]]:
         given = getattr(value, field.name)
         if field.default is not MISSING and field.default == given:
             continue
-        if isinstance(given, Home) and given == Home():
+        if field.default_factory is not MISSING and field.default_factory() == given:
             continue
         needed.append((f"{field.name}=", given))
     return needed

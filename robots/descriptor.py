@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
 import sys
@@ -13,7 +12,20 @@ from typing import Any, NoReturn, Protocol, runtime_checkable
 
 from robots.action_split import ActionNumber, ActionSplit, JointGroup, is_gripper, names
 from robots.common.errors import DescriptorError, UnknownNameError
-from robots.common.fields import expect_unit, settle_fields
+from robots.common.fields import settle_fields
+from robots.limbs import check_limbs, parts_of
+from robots.parts import (
+    IDENTITY,
+    CameraMount,
+    Fingers,
+    GripperMaterial,
+    Home,
+    Limb,
+    Quaternion,
+    Vector3,
+    expect,
+    expect_different,
+)
 
 __all__ = [
     "CONTROL_MODES",
@@ -25,19 +37,13 @@ __all__ = [
     "GripperMaterial",
     "Home",
     "JointGroup",
+    "Limb",
     "Quaternion",
     "RobotDescriptor",
     "UrdfSource",
     "Vector3",
     "names",
 ]
-
-Vector3 = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]  # wxyz
-
-IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
-
-LARGEST_IMAGE = 16384  # pixels; what graphics drivers allow
 
 CONTROL_MODES = ("pd_joint_delta_pos", "pd_joint_pos")  # ManiSkill's names
 
@@ -49,140 +55,6 @@ class UrdfSource(Protocol):
     def locate(self, *, pictures: bool = False) -> Path:
         """Return the path of a complete, checked URDF on this machine."""
         ...
-
-
-@dataclass(frozen=True)
-class GripperMaterial:
-    """Contact material of the links that touch what is grasped.
-
-    Attributes:
-        links: Link names.
-        static_friction: Coefficient (dimensionless).
-        dynamic_friction: Coefficient (dimensionless).
-        restitution: Coefficient (dimensionless).
-        patch_radius: PhysX torsional patch radius and its minimum (m).
-    """
-
-    links: tuple[str, ...]
-    static_friction: float
-    dynamic_friction: float
-    restitution: float = 0.0
-    patch_radius: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Refuse links that are none, and numbers that no contact has."""
-        settle_fields(self, DescriptorError)
-        _expect(bool(self.links), "GripperMaterial: links is empty; name the links that touch")
-        _expect_different("GripperMaterial: links", self.links)
-        for name in ("static_friction", "dynamic_friction", "patch_radius"):
-            value = getattr(self, name)
-            _expect(value >= 0, f"GripperMaterial: {name} is {value}; it must not be negative")
-        _expect(
-            0 <= self.restitution <= 1,
-            f"GripperMaterial: restitution is {self.restitution}; it must be between 0 and 1",
-        )
-
-
-@dataclass(frozen=True)
-class Fingers:
-    """Two links that grasp, and how their contact forces show a grasp.
-
-    An object is grasped while each finger feels at least ``min_force`` from it, at an angle of at
-    most ``max_angle`` to the direction in which that finger opens.
-
-    Attributes:
-        links: The two finger links.
-        opening_signs: For each finger, the sign of its own y axis that points to opening.
-        min_force: Smallest contact force of each finger (N).
-        max_angle: Largest angle between force and opening direction (degrees).
-    """
-
-    links: tuple[str, str]
-    opening_signs: tuple[int, int] = (1, -1)
-    min_force: float = 0.5
-    max_angle: float = 85.0
-
-    def __post_init__(self) -> None:
-        """Refuse links that are not two, and numbers that tell no grasp."""
-        settle_fields(self, DescriptorError)
-        _expect_different("Fingers: links", self.links)
-        _expect(
-            set(self.opening_signs) <= {1, -1},
-            f"Fingers: opening_signs is {self.opening_signs}; each must be 1 or -1",
-        )
-        _expect(
-            self.min_force >= 0,
-            f"Fingers: min_force is {self.min_force} N; it must not be negative",
-        )
-        _expect(
-            0 <= self.max_angle <= 180,
-            f"Fingers: max_angle is {self.max_angle} degrees; it must be between 0 and 180",
-        )
-
-
-@dataclass(frozen=True)
-class CameraMount:
-    """A camera that rides on a link.
-
-    Attributes:
-        name: Camera name.
-        link: Link it is fixed to.
-        position: In the link's frame (m).
-        quaternion: wxyz, in the link's frame; the camera looks along its own +x, z up.
-        width: Image width (pixels).
-        height: Image height (pixels).
-        fov: Vertical field of view (rad).
-        near: Near plane (m).
-        far: Far plane (m).
-    """
-
-    name: str
-    link: str
-    position: Vector3 = (0.0, 0.0, 0.0)
-    quaternion: Quaternion = IDENTITY
-    width: int = 128
-    height: int = 128
-    fov: float = math.pi / 2
-    near: float = 0.01
-    far: float = 100.0
-
-    def __post_init__(self) -> None:
-        """Refuse what no camera can be."""
-        settle_fields(self, DescriptorError)
-        camera = f"camera {self.name!r}"
-        expect_unit(camera, self.quaternion, DescriptorError)
-        for name, pixels in (("width", self.width), ("height", self.height)):
-            _expect(
-                0 < pixels <= LARGEST_IMAGE,
-                f"{camera}: {name} is {pixels} pixels; it must be between 1 and {LARGEST_IMAGE}",
-            )
-        _expect(
-            0 < self.fov < math.pi, f"{camera}: fov is {self.fov} rad; it must be between 0 and pi"
-        )
-        _expect(
-            0 < self.near < self.far,
-            f"{camera}: near is {self.near} m and far {self.far} m; it must be 0 < near < far",
-        )
-
-
-@dataclass(frozen=True)
-class Home:
-    """Where a robot stands when a layout does not say otherwise.
-
-    Attributes:
-        position: Base position in the world (m).
-        quaternion: Base orientation, wxyz.
-        keyframe: Name of the keyframe it starts from.
-    """
-
-    position: Vector3 = (0.0, 0.0, 0.0)
-    quaternion: Quaternion = IDENTITY
-    keyframe: str = "rest"
-
-    def __post_init__(self) -> None:
-        """Refuse a pose that is none."""
-        settle_fields(self, DescriptorError)
-        expect_unit("Home", self.quaternion, DescriptorError)
 
 
 @dataclass(frozen=True)
@@ -207,6 +79,9 @@ class RobotDescriptor:
         allowed_collisions: Pairs of links that may overlap, besides those that a joint joins and
             those that are rigid with each other; checks and physics let them. None takes what
             ManiSkill's loader takes: of the SRDF beside the URDF the pairs of reason ``Default``.
+        limbs: The arms of a robot that has several, by name, such as ``left`` and ``right``;
+            ``tcp_link``, ``fingers`` and ``reach`` are then those of the first one. A robot without
+            limbs is one arm.
     """
 
     name: str
@@ -222,32 +97,35 @@ class RobotDescriptor:
     cameras: tuple[CameraMount, ...] = ()
     home: Home = field(default_factory=Home)
     allowed_collisions: tuple[tuple[str, str], ...] | None = None
+    limbs: Mapping[str, Limb] = field(default_factory=dict[str, Limb])
 
     def __post_init__(self) -> None:
         """Freeze the keyframes and refuse contradictions."""
         named = isinstance(self.name, str) and self.name.isprintable()
         settle_fields(self, DescriptorError, owner=self.name if named else None)
-        _expect(
+        expect(
             re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", self.name) is not None,
             f"robot name {self.name!r} must be a letter followed by letters, digits and _",
         )
-        _expect(self.reach > 0, f"{self.name}: reach is {self.reach} m; it must be positive")
-        _expect_different(f"{self.name}: tcp_position_links", self.tcp_position_links)
-        _expect_different(f"{self.name}: cameras", [camera.name for camera in self.cameras])
+        expect(self.reach > 0, f"{self.name}: reach is {self.reach} m; it must be positive")
+        expect_different(f"{self.name}: tcp_position_links", self.tcp_position_links)
+        expect_different(f"{self.name}: cameras", [camera.name for camera in self.cameras])
         pairs = self.allowed_collisions or ()
         for i, pair in enumerate(pairs):
-            _expect_different(f"{self.name}: allowed_collisions[{i}]", pair)
+            expect_different(f"{self.name}: allowed_collisions[{i}]", pair)
         written = [" and ".join(sorted(pair)) for pair in pairs]
-        _expect_different(f"{self.name}: allowed_collisions", written)
+        expect_different(f"{self.name}: allowed_collisions", written)
         frozen = {key: tuple(float(x) for x in qpos) for key, qpos in self.keyframes.items()}
         for key, qpos in frozen.items():
-            _expect(
+            expect(
                 len(qpos) == self.dof,
                 f"{self.name}: keyframe {key!r} has {len(qpos)} numbers;"
                 f" the robot has {self.dof} joints ({', '.join(self.joints)})",
             )
         object.__setattr__(self, "keyframes", _Frozen(frozen))
         self.keyframe(self.home.keyframe)
+        object.__setattr__(self, "limbs", _Frozen(self.limbs))
+        check_limbs(self)
 
     @classmethod
     def from_urdf(
@@ -292,6 +170,15 @@ class RobotDescriptor:
         from robots.grafting import with_gripper
 
         return with_gripper(self, gripper, **details)
+
+    @property
+    def parts(self) -> Mapping[str, RobotDescriptor]:
+        """Who takes the action numbers of a robot with limbs, in their order; else nothing.
+
+        Each limb by its name, and what is driven besides as ``body``, described like a robot: own
+        joint groups, keyframes, TCP, fingers and reach.
+        """
+        return parts_of(self)
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -382,17 +269,7 @@ class RobotDescriptor:
         return tuple(numbers)
 
 
-def _expect(right: bool, otherwise: str) -> None:
-    if not right:
-        raise DescriptorError(otherwise)
-
-
-def _expect_different(what: str, names: Sequence[str]) -> None:
-    twice = sorted({name for name in names if names.count(name) > 1})
-    _expect(not twice, f"{what} has {', '.join(twice)} more than once")
-
-
-class _Frozen(dict[str, tuple[float, ...]]):
+class _Frozen(dict[str, Any]):
     """A dict that hashes by its items and refuses to change (and still pickles)."""
 
     def __hash__(self) -> int:  # type: ignore[override]
@@ -402,7 +279,7 @@ class _Frozen(dict[str, tuple[float, ...]]):
         return (_Frozen, (dict(self),))
 
     def _refuse(self, *_: object, **__: object) -> NoReturn:
-        raise TypeError("keyframes are frozen; use dataclasses.replace to change them")
+        raise TypeError("a descriptor is frozen; use dataclasses.replace to change it")
 
     __setitem__ = __delitem__ = __ior__ = pop = clear = popitem = _refuse
     update = setdefault = _refuse  # pyright: ignore[reportAssignmentType]

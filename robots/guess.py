@@ -24,9 +24,10 @@ from robots.guessing.grippers import Gripper, entangled, find_gripper
 from robots.guessing.groups import arm_groups, held_groups
 from robots.guessing.masses import read_masses
 from robots.guessing.posture import Posture, PostureSearch
-from robots.guessing.reach import find_reach
+from robots.guessing.reach import find_base, find_reach
 from robots.guessing.stance import Stance
 from robots.guessing.tool import Tool, find_tool
+from robots.parts import Limb as LimbDescription
 from robots.urdf.model import UrdfModel
 from robots.urdf.reading import read_model
 from robots.urdf.summary import parse_urdf, read_cleaned
@@ -108,6 +109,7 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
         "reach": distance,
         "source": f"guessed from {path.name}",
         "allowed_collisions": (*allowed, *posture.overlapping),
+        "limbs": _limbs(parts, rest),
     }
     unknown = sorted(set(overrides) - set(RobotDescriptor.__dataclass_fields__))
     if unknown:
@@ -159,6 +161,21 @@ def _action_split(parts: _Parts) -> ActionSplit:
 def _fingers(parts: _Parts, limb: Limb) -> tuple[Fingers | None, str]:
     opened = parts.grippers[limb.name].postures[0] if limb.fingers else {}
     return find_fingers(limb, parts.tips.get(limb.name), opened)
+
+
+def _limbs(parts: _Parts, rest: Mapping[str, float]) -> dict[str, LimbDescription]:
+    """Return the limbs of a robot that has several."""
+    limbs: dict[str, LimbDescription] = {}
+    for limb in parts.anatomy.limbs if len(parts.anatomy.limbs) > 1 else ():
+        tool, base = parts.tools[limb.name], find_base(parts.model, limb, rest)
+        limbs[limb.name] = LimbDescription(
+            tool.link,
+            find_reach(parts.model, limb, tool, rest, base)[0],
+            base,
+            _fingers(parts, limb)[0],
+            tool.links,
+        )
+    return limbs
 
 
 def _about_hands(parts: _Parts) -> Iterator[str]:

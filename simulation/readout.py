@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
+from itertools import compress
 from typing import Generic, Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -111,6 +112,9 @@ class ReadoutIndex:
     The frames are the backend's, then the tool centre points that lie between links. The joints of
     each robot are in the order of its descriptor.
 
+    The limbs of a robot are robots here, by their full names and, where these are nobody else's, by
+    their short ones; links and base are then those of the whole robot.
+
     Attributes:
         robots: What is known of each robot, in layout order.
         frames: Number of frames.
@@ -140,7 +144,7 @@ class ReadoutIndex:
         self.bodies.update(built.bodies)
         self.links: Places[Places[int]] = Places(_ROBOT)
         self.tcps: Places[int] = Places(_ROBOT)
-        self.joints: Places[slice] = Places(_ROBOT)
+        self.joints: Places[slice | list[int]] = Places(_ROBOT)
         self.arm_joints: Places[slice | list[int]] = Places(_ROBOT)
         self.fingers: Places[Fingers | None] = Places(_ROBOT)
         self.grippers: Places[tuple[list[int], np.float32]] = Places(_ROBOT)
@@ -151,8 +155,11 @@ class ReadoutIndex:
         self.velocities: Declared[Velocity] = Declared()
         self.forces: Declared[Pair] = Declared()
         self._grasps: dict[tuple[str, str], list[int]] = {}
+        self._owners: dict[str, str] = {}
         for name, placement in layout.items():
             self._add_robot(name, placement.robot, built.robots[name])
+        for short, name in layout.short_names.items():
+            self._add_name(short, name)
 
     def velocity(self, body: str, kind: Literal["linear", "angular"]) -> int:
         """Return the number of a body's velocity, declaring it if it is new."""
@@ -163,7 +170,7 @@ class ReadoutIndex:
         """Return the number of the force of a body on a link, declaring it if it is new."""
         self.links[robot].expect(link)
         self.bodies.expect(body)
-        return self.forces.number(Pair(robot, link, body))
+        return self.forces.number(Pair(self._owners[robot], link, body))
 
     def grasp(self, robot: str, body: str) -> list[int]:
         """Return the numbers of the forces of a body on both fingers of a robot that has some."""
@@ -179,27 +186,68 @@ class ReadoutIndex:
         links: Places[int] = Places(f"link of {name}")
         links.update(built.links)
         self.links[name] = links
-        arm, gripper = list[int](), list[int]()
-        for i, joint in enumerate(descriptor.joints, self.dof):
-            (arm if joint in descriptor.arm_joints else gripper).append(i)
-        self.arm_joints[name] = _as_slice(arm)
-        widest = sum(built.limits[i - self.dof, 1] for i in gripper)
-        self.grippers[name] = gripper, np.float32(widest)
         order = list(built.loaded_order)
         self.loaded_order[name] = None if order == sorted(order) else order
         self.bases[name] = links[built.root]
-        self.joints[name] = slice(self.dof, self.dof + descriptor.dof)
+        places = range(self.dof, self.dof + descriptor.dof)
+        self._add_arm(name, name, descriptor, places, built.limits)
+        for part, own in descriptor.parts.items():
+            joints = [descriptor.joints.index(joint) for joint in own.joints]
+            at = [places[i] for i in joints]
+            self._add_arm(f"{name}.{part}", name, own, at, built.limits[joints])
         self.dof += descriptor.dof
+
+    def _add_arm(
+        self,
+        name: str,
+        owner: str,
+        descriptor: RobotDescriptor,
+        joints: Sequence[int],
+        limits: Floats,
+    ) -> None:
+        """Add what is known of a robot or a part of it by its descriptor.
+
+        Args:
+            name: Its name.
+            owner: Name of the robot.
+            descriptor: Its descriptor, or its part of the robot's.
+            joints: Places of its joints, in layout order.
+            limits: Their lower and upper limits, (dof, 2) (rad, m).
+        """
+        self._owners[name] = owner
+        self.links[name], self.bases[name] = self.links[owner], self.bases[owner]
+        arm = [joint in descriptor.arm_joints for joint in descriptor.joints]
+        self.joints[name] = _as_slice(list(joints))
+        self.arm_joints[name] = _as_slice(list(compress(joints, arm)))
+        gripper = [i for i, in_arm in enumerate(arm) if not in_arm]
+        widest = np.float32(sum(limits[gripper, 1]))
+        self.grippers[name] = [joints[i] for i in gripper], widest
         self.fingers[name] = descriptor.fingers
-        self.tcps[name] = self._tcp_frame(links, descriptor)
+        self.tcps[name] = self._tcp_frame(self.links[owner], descriptor)
+
+    def _add_name(self, short: str, name: str) -> None:
+        """Let a limb go by another name, too."""
+        for places in (
+            self.links,
+            self.bases,
+            self._owners,
+            self.joints,
+            self.arm_joints,
+            self.grippers,
+            self.fingers,
+            self.tcps,
+        ):
+            places[short] = places[name]
 
     def _tcp_frame(self, links: Places[int], descriptor: RobotDescriptor) -> int:
         orientation = links[descriptor.tcp_link]
         if not descriptor.tcp_position_links:
             return orientation
-        self.mean_frames.append((orientation, [links[x] for x in descriptor.tcp_position_links]))
-        self.frames += 1
-        return self.frames - 1
+        between = orientation, [links[x] for x in descriptor.tcp_position_links]
+        if between not in self.mean_frames:
+            self.mean_frames.append(between)
+            self.frames += 1
+        return self.frames - len(self.mean_frames) + self.mean_frames.index(between)
 
 
 class FramePairs:

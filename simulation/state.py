@@ -110,8 +110,8 @@ class State:
         Looks at poses and joints.
         """
         index = self._index
-        for robot, links in index.links.items():
-            parts = [self.all_poses[frame] for frame in links.values()]
+        for robot in index.robots:
+            parts = [self.all_poses[frame] for frame in index.links[robot].values()]
             parts += [self.qpos(robot), self.qvel(robot)]
             if (env := _first_not_finite(np.concatenate(parts, 1))) is not None:
                 return Lost(f"robot {robot!r}", env, robot)

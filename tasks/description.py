@@ -226,7 +226,7 @@ def action_table(layout: Layout) -> Table:
     """Return one row per action number: whose it is, and what its extremes do."""
     rows = _table("#", "robot", "number", "lowest", "highest", "unit", numbers=(0, 3, 4))
     for place, part in layout.action_split.items():
-        for number in layout[place].robot.describe_action():
+        for number in layout.arm(place).robot.describe_action():
             sign = "+" if number.relative else ""
             rows.add_row(
                 str(part.start + number.index),

@@ -63,7 +63,7 @@ def stand_up(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
         TaskError: If the arm has no fingers, or cannot reach the peg.
     """
     need_fingers(task, "standing a peg up", ARM)
-    base = np.array(task.layout[ARM].base_position)
+    base = np.array(task.layout.arm(ARM).base_position)
     return first_success(
         task, seed, lambda scene: [_StandUp(style, base, scene).script() for style in STYLES]
     )

@@ -66,7 +66,7 @@ def insert_peg(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
         TaskError: If the arm has no fingers, or cannot reach what it should.
     """
     need_fingers(task, "inserting a peg", ARM)
-    base = np.array(task.layout[ARM].base_position)
+    base = np.array(task.layout.arm(ARM).base_position)
     return first_success(
         task,
         seed,

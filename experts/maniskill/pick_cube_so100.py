@@ -102,10 +102,10 @@ def pick_small_cube(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
         TaskError: If the arm has no fingers, or is not an SO-100, or cannot reach the cube.
     """
     need_fingers(task, "picking the cube", ARM)
-    if ROLL not in task.layout[ARM].robot.arm_joints:
+    if ROLL not in task.layout.arm(ARM).robot.arm_joints:
         raise TaskError(
             f"picking the small cube needs a robot with jaws that roll about {ROLL!r};"
-            f" {ARM!r} is a {task.layout[ARM].robot.name}"
+            f" {ARM!r} is a {task.layout.arm(ARM).robot.name}"
         )
 
     def attempts(rehearsal: Rehearsal) -> Iterator[Attempt]:

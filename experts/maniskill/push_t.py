@@ -68,8 +68,8 @@ class _Pusher:
     def __init__(self, task: MultiRobotTask, scene: Scene, random: np.random.Generator) -> None:
         self._task, self._scene = task, scene
         self._kinematics = task.simulation.inverse_kinematics(ARM)
-        self._driver = ArmDriver(task.layout[ARM].robot)
-        self._base = np.array(task.layout[ARM].base_position)
+        self._driver = ArmDriver(task.layout.arm(ARM).robot)
+        self._base = np.array(task.layout.arm(ARM).base_position)
         self._contacts = contacts()
         self._planner = PushPlanner(
             BODY, self._contacts, _planar(scene, OUTLINE), self._base[:2], random

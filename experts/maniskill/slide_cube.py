@@ -54,7 +54,7 @@ def slide(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
     Raises:
         TaskError: If the arm cannot reach the cube.
     """
-    base = np.array(task.layout[ARM].base_position)
+    base = np.array(task.layout.arm(ARM).base_position)
     return first_success(
         task, seed, lambda scene: [_script(style, base, scene) for style in STYLES]
     )

@@ -71,7 +71,7 @@ def stack_for_two(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
         TaskError: If an arm has no fingers, or cannot reach what it should.
     """
     need_fingers(task, "stacking cubes", STACKER, LAYER)
-    base = np.array(task.layout[LAYER].base_position)
+    base = np.array(task.layout.arm(LAYER).base_position)
     return first_success(
         task,
         seed,

@@ -55,7 +55,7 @@ def stack_for_four(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
         TaskError: If an arm has no fingers, or cannot reach what it should.
     """
     need_fingers(task, "stacking cubes", *ORDER)
-    bases = {place: np.array(task.layout[place].base_position) for place in ORDER}
+    bases = {place: np.array(task.layout.arm(place).base_position) for place in ORDER}
     return first_success(task, seed, lambda scene: [_script(style, bases) for style in STYLES])
 
 

@@ -62,9 +62,9 @@ def pass_on(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
 
 def _script(style: Style, task: MultiRobotTask) -> Script:
     zones = [np.array([*zone, 0.0]) for zone in find_zones(task.layout)]
-    names = list(task.layout)
+    names = list(task.layout.arms)
     script: dict[str, tuple[Waypoint, ...]] = {}
-    for i, (name, placement) in enumerate(task.layout.items()):
+    for i, (name, placement) in enumerate(task.layout.arms.items()):
         part = _Part(style, name, placement, zones[i - 1], zones[i])
         script[name] = part.waypoints(after=names[i - 1] if i else None)
     return script

@@ -62,7 +62,7 @@ def push_and_pick(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
         TaskError: If the picker has no fingers, or an arm cannot reach what it should.
     """
     need_fingers(task, "picking the cube", PICKER)
-    forward = heading(*(np.array(task.layout[name].base_position) for name in (PUSHER, PICKER)))
+    forward = heading(*(np.array(task.layout.arm(name).base_position) for name in (PUSHER, PICKER)))
     return first_success(
         task, seed, lambda scene: [_script(style, forward, scene) for style in STYLES]
     )

@@ -274,20 +274,21 @@ class _Check:
 
     def _workspaces(self) -> dict[str, Workspace]:
         spaces: dict[str, Workspace] = {}
-        for name, placement in self._checked.items():
+        for name, robot in self._arms():
             self._progress.tell(f"workspace of {name}")
-            spaces[name] = Workspace(placement, self._models[name])
+            arm = self._layout.arm(name).robot
+            spaces[name] = Workspace(self._checked[robot], self._models[robot], arm)
         return {name: space for name, space in spaces.items() if space.sampled}
 
     def _reaches(self) -> Iterator[TargetReach]:
-        for name, placement in self._checked.items() if self._targets else ():
-            arm = Reach(placement, self._models[name])
+        for name, robot in self._arms() if self._targets else ():
+            arm = self._arm(name)
             for target, numbers in self._targets.items():
                 self._progress.tell(f"{name} to {target}")
                 quaternion = np.array(numbers[3:]) if len(numbers) == 7 else None
                 solutions = arm.solve(np.array(numbers[:3]), quaternion)
                 solved = [s for s in solutions if s.solved]
-                free = next((s for s in solved if not any(self._obstacles(name, s))), None)
+                free = next((s for s in solved if not any(self._obstacles(robot, s))), None)
                 best = free or solutions[0]
                 yield TargetReach(
                     target,
@@ -295,7 +296,7 @@ class _Check:
                     free is not None,
                     best.missing,
                     best.turn_missing,
-                    tuple(self._obstacles(name, best)) if solved and free is None else (),
+                    tuple(self._obstacles(robot, best)) if solved and free is None else (),
                     best.qpos,
                 )
 
@@ -334,8 +335,18 @@ class _Check:
 
     def _gets_to(self, name: str, target: tuple[float, ...]) -> bool:
         """Tell whether a robot reaches the place of a target, however turned."""
-        arm = Reach(self._layout[name], self._models[name])
-        return arm.solve(np.array(target[:3]), None)[0].solved
+        return self._arm(name).solve(np.array(target[:3]), None)[0].solved
+
+    def _arms(self) -> Iterator[tuple[str, str]]:
+        """Yield the arms of the robots that can be checked, each with its robot."""
+        for name in self._layout.arms:
+            robot = self._layout.owner(name)
+            if robot in self._checked:
+                yield name, robot
+
+    def _arm(self, name: str) -> Reach:
+        robot = self._layout.owner(name)
+        return Reach(self._layout[robot], self._models[robot], self._layout.arm(name).robot)
 
 
 class _Progress:

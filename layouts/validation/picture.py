@@ -148,7 +148,7 @@ def _draw_target(plan: Axes, report: Results, name: str, position: tuple[float, 
     _write(plan, np.array(position[:2]), np.array([0.0, 1.0]), name, colour, size=9)
     for reach in own:
         if reach.reached:
-            x, y, _ = report.layout[reach.robot].base_position
+            x, y, _ = report.layout.arm(reach.robot).base_position
             plan.plot([x, position[0]], [y, position[1]], ":", color=GOOD, linewidth=1, zorder=1)
 
 

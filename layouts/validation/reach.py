@@ -40,28 +40,31 @@ class Solution:
 
 
 class Reach:
-    """Inverse kinematics of one placed robot, from many starts.
+    """Inverse kinematics of one placed robot, or of a limb of it, from many starts.
 
     Joints outside the arm stay at the placement's keyframe.
     """
 
-    def __init__(self, placement: Placement, model: RobotModel) -> None:
+    def __init__(
+        self, placement: Placement, model: RobotModel, arm: RobotDescriptor | None = None
+    ) -> None:
         """Take a robot.
 
         Args:
             placement: Where it stands.
             model: Its links.
+            arm: The limb, described like a robot; None for a robot that is one arm.
 
         Raises:
             UnknownNameError: If the robot has no such TCP links.
         """
-        robot = placement.robot
+        robot, arm = placement.robot, arm or placement.robot
         self._kinematics = model.kinematics
         self._base = pose_matrix(placement.base_position, placement.base_quaternion)
         self._start = np.array(placement.start_qpos)
-        self._arm = [robot.joints.index(joint) for joint in robot.arm_joints]
-        self._tcp = link_index(model.kinematics, robot.tcp_link)
-        self._points = tcp_links(robot, model)
+        self._arm = [robot.joints.index(joint) for joint in arm.arm_joints]
+        self._tcp = link_index(model.kinematics, arm.tcp_link)
+        self._points = tcp_links(arm, model)
         self._starts = _starts(robot, placement, model, self._arm)
 
     def solve(self, position: Floats, quaternion: Floats | None = None) -> list[Solution]:
@@ -112,10 +115,12 @@ class Workspace:
             many metres.
     """
 
-    def __init__(self, placement: Placement, model: RobotModel) -> None:
-        """Sample the workspace of a placed robot."""
+    def __init__(
+        self, placement: Placement, model: RobotModel, arm: RobotDescriptor | None = None
+    ) -> None:
+        """Sample the workspace of a placed robot; see `Reach`."""
         base = pose_matrix(placement.base_position, placement.base_quaternion)
-        points = _workspace_points(placement.robot, model)
+        points = _workspace_points(placement.robot, model, arm or placement.robot)
         cells = np.floor((points @ base[:3, :3].T + base[:3, 3]) / VOXEL).astype(np.int64)
         self.cells = np.unique(cells @ np.array([1 << 40, 1 << 20, 1]))
         self.volume = len(self.cells) * VOXEL**3
@@ -127,12 +132,12 @@ class Workspace:
 
 
 @lru_cache(maxsize=64)
-def _workspace_points(robot: RobotDescriptor, model: RobotModel) -> Floats:
-    arm = [robot.joints.index(joint) for joint in robot.arm_joints]
+def _workspace_points(robot: RobotDescriptor, model: RobotModel, own: RobotDescriptor) -> Floats:
+    arm = [robot.joints.index(joint) for joint in own.arm_joints]
     start = np.array(robot.keyframe(robot.home.keyframe))
     qpos = np.tile(start, (WORKSPACE_SAMPLES, 1))
     qpos[:, arm] = scattered(model.kinematics.limits[arm], WORKSPACE_SAMPLES)
-    points = tcp_links(robot, model)
+    points = tcp_links(own, model)
     tree = model.kinematics.towards(points)
     at = [tree.link(model.kinematics.links[point]) for point in points]
     return tree.forward(qpos)[:, at][..., :3, 3].mean(axis=1)

@@ -5,11 +5,11 @@ from dataclasses import replace
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, Fingers, GripperMaterial, JointGroup, RobotDescriptor
 from robots.link_pairs import among
+from robots.parts import both_sides
 
 # fmt: off
 SIDES = ("left", "right")
-LEFT = ("l_gripper_l_finger", "l_gripper_r_finger")
-FINGERS = (*LEFT, "r_gripper_l_finger", "r_gripper_r_finger")
+FINGERS = tuple(f"{s}_gripper_{f}_finger" for s in "lr" for f in "lr")
 BODY = ("torso", "sonar_ring", "pedestal", "collision_head_link_1", "collision_head_link_2")
 LEFT_ARM = JointGroup(
     tuple(f"left_{joint}" for joint in ("s0", "s1", "e0", "e1", "w0", "w1", "w2")),
@@ -32,19 +32,19 @@ BAXTER = RobotDescriptor(
     name="baxter",
     urdf=UrdfLocator("example_baxter_description", "urdf/baxter.urdf"),
     action_split=ActionSplit(
-        left_arm=LEFT_ARM,
-        left_gripper=LEFT_GRIPPER,
+        left_arm=LEFT_ARM, left_gripper=LEFT_GRIPPER,
         right_arm=replace(LEFT_ARM, joints=tuple(f"right{j[4:]}" for j in LEFT_ARM.joints)),
         right_gripper=replace(LEFT_GRIPPER, joints=tuple(f"r{j[1:]}" for j in LEFT_GRIPPER.joints)),
-        head=JointGroup.hold(("head_pan",), stiffness=1e5, damping=1e5, force_limit=1e5),
+        head=JointGroup.hold(("head_pan",)),
     ),
-    tcp_link="left_gripper",
+    tcp_link="left_gripper", fingers=Fingers(FINGERS[:2]),
     gripper_material=GripperMaterial(FINGERS, 2.0, 2.0, 0.0, patch_radius=0.1),
-    fingers=Fingers(LEFT, opening_signs=(1, 1)),
+    limbs=both_sides("{side}_gripper", 1.201, (0.064, 0.259, 0.1296),
+                     Fingers(("{s}_gripper_l_finger", "{s}_gripper_r_finger"))),
     keyframes={"rest": (-0.3, *REST, 0.3, *REST, 0.0)},
     reach=1.468,  # of the left TCP, from the URDF; data sheet 1.21 from the shoulder
     source="example-robot-data 6.0.0, baxter_description; drives from each joint's inertia",
-    allowed_collisions=among(  # neighbours, and what overlaps however the joints stand
+    allowed_collisions=among(
         (*BODY, "head", "screen"),
         *((*BODY, f"{side}_upper_shoulder", f"{side}_lower_shoulder") for side in SIDES),
         *(tuple(f"{side}_{part}" for part in parts) for side in SIDES for parts in (
@@ -55,6 +55,6 @@ BAXTER = RobotDescriptor(
             ("lower_forearm", "wrist", "hand_link", "gripper_base_link"))),
         *((f"{side}_wrist", f"{side}_hand_link", f"{side}_gripper_base_link", f, f"{f}_tip")
           for side in SIDES for f in FINGERS if f[0] == side[0]),
-        LEFT, FINGERS[2:],
+        FINGERS[:2], FINGERS[2:],
     ),
 )

@@ -6,6 +6,7 @@ from robots.assets.locator import UrdfLocator
 from robots.catalogue.mobile_panda import BASE, LIFT, MOBILE_PANDA
 from robots.catalogue.panda import ARM, PANDA
 from robots.descriptor import ActionSplit, Fingers, GripperMaterial, JointGroup, names
+from robots.parts import both_sides
 
 LEFT = ("left_panda_leftfinger", "left_panda_rightfinger")
 FINGERS = (*LEFT, "right_panda_leftfinger", "right_panda_rightfinger")
@@ -33,5 +34,11 @@ MOBILE_PANDA_DUAL = replace(
     tcp_link="left_panda_hand_tcp",
     gripper_material=GripperMaterial(FINGERS, 2.0, 2.0, 0.0, patch_radius=0.1),
     fingers=Fingers(LEFT),
+    limbs=both_sides(
+        "{side}_panda_hand_tcp",
+        0.947,
+        (0.0808, 0.3012, 0.42),
+        Fingers(("{side}_panda_leftfinger", "{side}_panda_rightfinger")),
+    ),
     keyframes={"rest": (*PANDA.keyframe("rest") * 2, 0.0, 0, 0, 0)},
 )

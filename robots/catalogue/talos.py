@@ -1,15 +1,14 @@
 """PAL Robotics Talos, two arms with grippers on a body that stands still: 2 × (7 + 1) numbers."""
 
 from dataclasses import replace
-from functools import partial
 
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, GripperMaterial, JointGroup, RobotDescriptor
 from robots.link_pairs import among
+from robots.parts import both_sides
 
 # fmt: off
 SIDES = ("left", "right")
-still = partial(JointGroup.hold, stiffness=1e5, damping=1e5, force_limit=1e5)
 LIMITS = ((-2.443461, 2.443461), (-2.3561945, 0.0), (-2.5307274, 2.5307274),
           (-1.3962634, 1.3962634), (-0.6981317, 0.6981317))
 GRIPPER = ("base", "motor_double", "inner_double", "fingertip_1", "fingertip_2", "motor_single",
@@ -44,17 +43,17 @@ TALOS = RobotDescriptor(
     action_split=ActionSplit(
         left_arm=LEFT_ARM, left_gripper=LEFT_GRIPPER,
         right_arm=RIGHT_ARM, right_gripper=replace(LEFT_GRIPPER, joints=("gripper_right_joint",)),
-        torso=still(("torso_1_joint", "torso_2_joint")),
-        head=still(("head_1_joint", "head_2_joint")),
-        legs=still(tuple(f"leg_{side}_{i}_joint" for side in SIDES for i in range(1, 7)))),
+        torso=JointGroup.hold(("torso_1_joint", "torso_2_joint")),
+        head=JointGroup.hold(("head_1_joint", "head_2_joint")),
+        legs=JointGroup.hold(tuple(f"leg_{s}_{i}_joint" for s in SIDES for i in range(1, 7)))),
     tcp_link="gripper_left_fingertip_2_link",
     gripper_material=GripperMaterial(
-        tuple(f"gripper_{side}_{part}_link" for side in SIDES for part in GRIPPER), 2.0, 2.0, 0.0,
-        patch_radius=0.1),
+        tuple(f"gripper_{s}_{part}_link" for s in SIDES for part in GRIPPER), 2.0, 2.0, 0.0, 0.1),
     keyframes={"rest": (*LEFT_REST, *RIGHT_REST, *(0,) * 16)},
+    limbs=both_sides("gripper_{side}_fingertip_2_link", 0.898, (0.0, 0.1575, 0.3042)),
     reach=1.055,  # of the left TCP, from the URDF
     source="example-robot-data 6.0.0, talos_data; drives from the inertia behind each joint",
-    allowed_collisions=among(  # neighbours, and what overlaps however the joints stand
+    allowed_collisions=among(
         *(wrist(side) for side in SIDES),
         *((f"leg_{side}_{i}_link", f"leg_{side}_{i + 2}_link") for side in SIDES for i in (1, 4)),
         ("head_1_link", "rgbd_link"), ("base_link", "torso_2_link")))

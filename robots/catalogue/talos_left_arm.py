@@ -29,4 +29,5 @@ TALOS_LEFT_ARM = replace(
     keyframes={"rest": (1.45, 0.6, -1.07, -1.59, 0.9, 0.0, 0.0)},
     reach=0.898,  # of the TCP, from the URDF
     allowed_collisions=among(wrist("left")),
+    limbs={},
 )

@@ -1,13 +1,10 @@
 """PAL Robotics TIAGo without a hand, whose base and torso stand still: 7 action numbers."""
 
-from functools import partial
-
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, JointGroup, RobotDescriptor
 from robots.link_pairs import among
 
 # fmt: off
-still = partial(JointGroup.hold, stiffness=1e5, damping=1e5, force_limit=1e5)
 ARM = JointGroup(
     tuple(f"arm_{i}_joint" for i in range(1, 8)),
     lower=(-0.04, -0.04, -0.055, -0.065, -0.1, -0.1, -0.1),
@@ -18,9 +15,9 @@ ARM = JointGroup(
     limits=((0.0, 2.7488935), (-1.5707964, 1.0908308), (-3.5342917, 1.5707964), (-0.3926991,
         2.3561945), (-2.0943952, 2.0943952), (-1.4137167, 1.4137167), (-2.0943952, 2.0943952)),
 )
-TORSO_SLIDE = still(("torso_lift_joint",), unit="m")
-HEAD = still(("head_1_joint", "head_2_joint"))
-WHEELS = still(("wheel_right_joint", "wheel_left_joint"))
+TORSO_SLIDE = JointGroup.hold(("torso_lift_joint",), unit="m")
+HEAD = JointGroup.hold(("head_1_joint", "head_2_joint"))
+WHEELS = JointGroup.hold(("wheel_right_joint", "wheel_left_joint"))
 
 TIAGO = RobotDescriptor(
     name="tiago",

@@ -1,15 +1,14 @@
 """Unitree G1 of 29 joints, two arms on legs that stand still: 7 + 7 action numbers."""
 
 from dataclasses import replace
-from functools import partial
 
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, JointGroup, RobotDescriptor
 from robots.link_pairs import among
+from robots.parts import both_sides
 
 # fmt: off
 SIDES = ("left", "right")
-still = partial(JointGroup.hold, stiffness=1e5, damping=1e5, force_limit=1e5)
 ARM = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_roll", "wrist_pitch",
        "wrist_yaw")
 LEG = ("hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll")
@@ -36,13 +35,14 @@ UNITREE_G1 = RobotDescriptor(
     action_split=ActionSplit(
         left_arm=LEFT_ARM,
         right_arm=RIGHT_ARM,
-        torso=still(
+        torso=JointGroup.hold(
             tuple(f"waist_{way}_joint" for way in ("yaw", "roll", "pitch"))),
-        legs=still(
+        legs=JointGroup.hold(
             tuple(f"{side}_{joint}_joint" for side in SIDES for joint in LEG)),
     ),
     tcp_link="left_rubber_hand",
     keyframes={"rest": (0,) * 29},
+    limbs=both_sides("{side}_rubber_hand", 0.451, (0.0, 0.1002, 0.2918)),
     reach=0.552,  # of the left TCP, from the URDF
     source="example-robot-data 6.0.0, g1_description; drives from the inertia behind each joint",
     allowed_collisions=among(  # neighbours, and what overlaps however the joints stand

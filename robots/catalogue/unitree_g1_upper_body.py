@@ -3,6 +3,7 @@
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, GripperMaterial, Home, JointGroup, RobotDescriptor
 from robots.link_pairs import among
+from robots.parts import both_sides
 
 SIDES = ("left", "right")
 ARM = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow_pitch", "elbow_roll")
@@ -48,6 +49,7 @@ UNITREE_G1_UPPER_BODY = RobotDescriptor(
     ),  # fmt: skip
     keyframes={"standing": (0,) * 25, "rest": (0,) * 25},
     home=Home(position=(0.0, 0.0, 0.755)),
+    limbs=both_sides("{side}_tcp_link", 0.531, (-0.0025, 0.104, 0.2593)),
     reach=0.64,  # of the left TCP, from the URDF
     source="mani_skill 3.0.1, agents/robots/unitree_g1/g1_upper_body.py",
     allowed_collisions=among(

@@ -19,4 +19,5 @@ UNITREE_G1_UPPER_BODY_RIGHT_ARM = replace(
         others=JointGroup.hold(OTHERS, stiffness=0.0, damping=1e2, force_limit=1e10),
     ),
     tcp_link="right_tcp_link",
+    limbs={},
 )

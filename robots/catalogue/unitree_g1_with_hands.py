@@ -6,6 +6,7 @@ from robots.assets.locator import UrdfLocator
 from robots.catalogue.unitree_g1 import UNITREE_G1
 from robots.descriptor import ActionSplit, GripperMaterial, JointGroup
 from robots.link_pairs import among
+from robots.parts import both_sides
 
 # fmt: off
 SIDES = ("left", "right")
@@ -37,6 +38,9 @@ UNITREE_G1_WITH_HANDS = replace(
         tuple(f"{side}_hand_{part}_link" for side in SIDES for part in HAND), 2.0, 2.0, 0.0,
         patch_radius=0.1),
     keyframes={"rest": (0,) * 43},
+    limbs=both_sides(
+        "{side}_hand_palm_link", 0.529, (0.0, 0.1002, 0.2918),
+        tcp_position_links=("{side}_hand_thumb_2_link", "{side}_hand_index_1_link")),
     reach=0.629,  # of the left TCP, from the URDF
     allowed_collisions=among(  # neighbours, and what overlaps however the joints stand
         *((f"{side}_shoulder_pitch_link", "head_link", "logo_link") for side in SIDES),

@@ -13,14 +13,34 @@ from kinematics.solve import farthest
 from kinematics.tree import Tree
 from robots.guessing.anatomy import FARTHEST_SLIDE, Limb
 from robots.guessing.tool import Tool
+from robots.parts import Vector3
 from robots.urdf.model import ModelJoint, UrdfModel
 from robots.urdf.tree import kinematic_tree
 
 STARTS = 8  # of the search for the largest distance
 
 
+def find_base(model: UrdfModel, limb: Limb, rest: Mapping[str, float]) -> Vector3:
+    """Return where a limb's first joint is, in the robot's frame (m).
+
+    Args:
+        model: What the robot's URDF describes.
+        limb: The limb.
+        rest: Where the joints are (rad, m).
+    """
+    tree = kinematic_tree(model)
+    start = np.array([rest.get(joint, 0.0) for joint in tree.coordinates])
+    first = (*limb.arm, *limb.fingers)[0]
+    x, y, z = tree.forward(start[None])[0][tree.link(first.child), :3, 3].round(4).tolist()
+    return x, y, z
+
+
 def find_reach(
-    model: UrdfModel, limb: Limb, tool: Tool, rest: Mapping[str, float]
+    model: UrdfModel,
+    limb: Limb,
+    tool: Tool,
+    rest: Mapping[str, float],
+    base: Vector3 = (0.0, 0.0, 0.0),
 ) -> tuple[float, str]:
     """Return a limb's reach (m), and how it was found.
 
@@ -29,9 +49,13 @@ def find_reach(
         limb: The limb.
         tool: Its tool centre point.
         rest: Where the other joints are (rad, m).
+        base: Where the vertical is that the reach is measured from, in the robot's frame (m).
     """
     tree = kinematic_tree(model)
     start = np.array([rest.get(joint, 0.0) for joint in tree.coordinates])
+    origins = tree.origins.copy()
+    origins[tree.parents == 0, :2, 3] -= base[:2]
+    tree = replace(tree, origins=origins)
     poses = tree.forward(start[None])[0]
     palm = tree.link(limb.palm)
     tips = [tree.link(link) for link in tool.origins]

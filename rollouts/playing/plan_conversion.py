@@ -65,7 +65,7 @@ def as_positions(
     next(happening)
     for row, _ in zip(positions, happening, strict=True):
         targets = iter(task.simulation.drive_targets[0].tolist())
-        for robot, part in task.action_split.items():
+        for robot, part in task.layout.robot_actions.items():
             _write_targets(task.layout[robot].robot, targets, row[part])
     return positions
 

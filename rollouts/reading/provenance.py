@@ -60,7 +60,7 @@ def describe_layout(layout: Layout) -> dict[str, dict[str, Any]]:
     Raises:
         AssetError: If robot files cannot be found.
     """
-    split = layout.action_split
+    split = layout.robot_actions
     return {
         name: {
             "robot": placement.robot.name,

@@ -17,11 +17,11 @@ from simulation.sapien3.world import BuiltWorld
 
 
 class ArmModel:
-    """The kinematic model of one robot of a world; joints that are not the arm's stay at zero.
+    """The kinematic model of one arm of a world; other joints stay where the layout starts them.
 
     Attributes:
         joints: The arm's joints, in the order of everything here.
-        places: Where they are among all joints in the descriptor's order.
+        places: Where they are among those of the robot, or of the limb if the arm is one.
         low: Their lower limits (rad).
         high: Their upper limits (rad).
         base: Pose of the robot's base in the world.
@@ -39,19 +39,25 @@ class ArmModel:
         Raises:
             UnknownNameError: If the layout has no such robot, or the robot no such TCP link.
         """
-        descriptor, simulated = world.layout[robot].robot, world.robots[robot]
+        owner = world.layout.owner(robot)
+        descriptor, simulated = world.layout.arm(robot).robot, world.robots[owner]
+        placement = world.layout[owner]
+        whole = placement.robot.joints
         self.joints = descriptor.arm_joints
         self.base = simulated.base_pose
         self.model: Any = simulated.articulation.create_pinocchio_model()
         self.tcp = simulated.articulation.links.index(simulated.link(descriptor.tcp_link))
         self.places = np.array([descriptor.joints.index(joint) for joint in self.joints])
-        self._order = np.array(simulated.active_index)  # of the descriptor's joints in SAPIEN's
+        order = np.array(simulated.active_index)  # of the robot's joints in SAPIEN's
+        self._start = np.empty(len(order))
+        self._start[order] = placement.start_qpos
+        self._order = order[[whole.index(joint) for joint in descriptor.joints]]
         limits = np.concatenate([joint.limits for joint in simulated.joints])
         self.low, self.high = limits[self._order[self.places]].astype(float).T
 
     def tcp_pose(self, arm: Any) -> sapien.Pose:
         """Return where arm joints, (arm joints,) (rad), bring the TCP link, in the world."""
-        qpos = np.zeros(len(self._order))
+        qpos = self._start.copy()
         qpos[self._order[self.places]] = arm
         self.model.compute_forward_kinematics(qpos)
         return self.base * self.model.get_link_pose(self.tcp)
@@ -66,11 +72,11 @@ class ArmModel:
 
         Args:
             target: Of the TCP link, in the frame of the robot's base.
-            start: All joints in the descriptor's order, (dof,) (rad, m); those that are not the
-                arm's stay there.
+            start: All joints of the robot or limb in its descriptor's order, (dof,) (rad, m); those
+                that are not the arm's stay there.
             settings: What ``compute_inverse_kinematics`` takes besides.
         """
-        initial, mask = np.empty(len(self._order)), np.zeros(len(self._order), np.int32)
+        initial, mask = self._start.copy(), np.zeros(len(self._start), np.int32)
         initial[self._order] = start
         mask[self._order[self.places]] = 1
         qpos, converged, _ = self.model.compute_inverse_kinematics(

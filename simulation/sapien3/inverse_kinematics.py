@@ -42,7 +42,7 @@ class InverseKinematics:
             UnknownNameError: If the layout has no such robot, or the robot no such TCP link.
             SimulationError: If the robot's TCP is not a link but a mean of several.
         """
-        descriptor = world.layout[robot].robot
+        descriptor = world.layout.arm(robot).robot
         if descriptor.tcp_position_links:
             raise SimulationError(
                 f"inverse kinematics needs a TCP that is a link; that of {descriptor.name} is the"

@@ -86,7 +86,7 @@ class ActionReader:
     def _refuse_number(self, flat: NDArray[np.float32]) -> None:
         env, column = (int(i) for i in np.argwhere(~np.isfinite(flat))[0])
         name, part = next((n, p) for n, p in self._split.items() if p.start <= column < p.stop)
-        number = self._layout[name].robot.describe_action()[column - part.start]
+        number = self._layout.arm(name).robot.describe_action()[column - part.start]
         raise ActionError(
             f"action number {column} is {flat[env, column]} in environment {env}: that is number"
             f" {number.index} ({number.name}) of robot {name!r}; nothing was moved"

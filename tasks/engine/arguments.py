@@ -95,6 +95,8 @@ def wants_rebuild(options: Mapping[str, Any] | None) -> bool:
 def check_places(task: str, layout: Layout, own: Layout, robot_counts: range | None) -> None:
     """Refuse a layout whose places are not the task's; their order is the layout's own.
 
+    A limb takes the place that it is called like.
+
     Args:
         task: The task's name.
         layout: The layout.
@@ -105,16 +107,22 @@ def check_places(task: str, layout: Layout, own: Layout, robot_counts: range | N
         TaskError: If the places are wrong.
     """
     if robot_counts is not None:
-        if len(layout) not in robot_counts:
+        if len(layout.arms) not in robot_counts:
             raise TaskError(
                 f"{task} takes {robot_counts[0]} to {robot_counts[-1]} robots;"
-                f" the layout has {len(layout)}: {list(layout)}"
+                f" the layout has {len(layout.arms)}: {list(layout.arms)}"
             )
-    elif set(layout) != set(own):
+    elif not _fill(layout, own):
         raise TaskError(
-            f"{task} has the places {list(own)}; the layout has {list(layout)}."
+            f"{task} has the places {list(own)}; the layout has {list(layout.arms)}."
             " Give the layout's robots the names of the places"
         )
+
+
+def _fill(layout: Layout, places: Collection[str]) -> bool:
+    """Whether the arms of a layout take just these places, one each."""
+    short = {full: name for name, full in layout.short_names.items()}
+    return {short.get(arm, arm) for arm in layout.arms} == set(places)
 
 
 def check_info(task: str, info: Collection[str]) -> None:

@@ -1,4 +1,4 @@
-"""A task as a PettingZoo environment: one agent per robot, named as its place in the layout."""
+"""A task as a PettingZoo environment: an agent per robot or limb, named as in the layout."""
 
 from __future__ import annotations
 
@@ -18,8 +18,10 @@ from tasks.engine.observation import space_of
 from tasks.engine.remade import Remade
 from tasks.fronts.numbers import info_row, row, stepper
 from tasks.language.randomness import FirstSeeds
-from tasks.native.format import observation_keys
+from tasks.native.format import native_places, observation_keys
 from tasks.registry import make
+
+JOINTS = ("qpos", "qvel")
 
 Observation = Any
 """An array, or with images a mapping of them."""
@@ -32,14 +34,15 @@ _Space = TypeVar("_Space", bound=Space[Any])
 class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
     """What `tasks.parallel_env` gives: every robot observes and acts for itself.
 
-    A robot observes its own joint positions and velocities, then all that the task observes
-    besides joints (TCP poses, objects, goals), and where images are asked for, what the task's
-    cameras and its own see. Its action is its own slice of the task's. All
-    robots end together: when the task succeeds or is truncated, ``agents`` is emptied.
+    The limbs of a robot that has several are agents of their own. A robot observes its own joint
+    positions and velocities, then all that the task observes besides joints (TCP poses, objects,
+    goals), and where images are asked for, what the task's cameras and its own see. Its action is
+    its own slice of the task's. All robots end together: when the task succeeds or is truncated,
+    ``agents`` is emptied.
 
     Attributes:
         task: The task, with one environment.
-        possible_agents: The robots' places, in declared order.
+        possible_agents: The robots' places, or their limbs, as in the task's ``action_split``.
         agents: The same during an episode, else nothing.
         observed: Robot → the numbers of the task's flat observation that it observes.
     """
@@ -73,8 +76,11 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         self._step = stepper(self.task)
         self._first = FirstSeeds(1)
         self._seed = self.task.seeds[0]
-        self.possible_agents = list(self.task.layout)
+        self.possible_agents = list(self.task.action_split)
         self.agents: list[str] = []
+        layout, index = self.task.layout, self.task.simulation.index
+        self._robots = {name: layout.owner(name) for name in self.possible_agents}
+        self._joints = {name: native_places(index, layout, name) for name in self.possible_agents}
         self.observed = self._observed() if self.task.observation_slices else {}
         bounds = self.task.single_action_space
         self._action_spaces = {
@@ -172,29 +178,31 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     def _observed(self) -> dict[str, NDArray[np.intp]]:
         slices = self.task.observation_slices
-        joints = {n: (f"{n}.qpos", f"{n}.qvel") for n in self.possible_agents}
-        owned = {key for keys in joints.values() for key in keys}
-        shared = [key for key in slices if key not in owned]
+        joints = {f"{robot}.{kind}" for robot in self.task.layout for kind in JOINTS}
+        shared = [np.arange(part.start, part.stop) for k, part in slices.items() if k not in joints]
         return {
-            name: np.concatenate([np.arange(slices[k].start, slices[k].stop) for k in keys])
-            for name, keys in ((name, [*own, *shared]) for name, own in joints.items())
+            name: np.concatenate(
+                [slices[f"{self._robots[name]}.{kind}"].start + own for kind in JOINTS] + shared
+            )
+            for name, own in self._joints.items()
         }
 
     def _observations(self, obs: Any) -> dict[str, Observation]:
         whole = row(obs)
         return {name: self._own(name, whole) for name in self.possible_agents}
 
-    def _own(self, robot: str, whole: Any) -> Any:
-        """Return what one robot observes of all that is observed."""
+    def _own(self, agent: str, whole: Any) -> Any:
+        """Return what one robot or limb observes of all that is observed."""
         if not isinstance(whole, Mapping):
-            return whole[self.observed[robot]]
+            return whole[self.observed[agent]]
         own = dict(whole)
         if "state" in whole:
-            own["state"] = whole["state"][self.observed[robot]]
+            own["state"] = whole["state"][self.observed[agent]]
         if "agent" in whole:
-            key = observation_keys(self.task.layout)[robot]
-            own["agent"] = whole["agent"] if key is None else whole["agent"][key]
-        cameras = self.task.observer.seen_by(robot)
+            key = observation_keys(self.task.layout)[self._robots[agent]]
+            joints = whole["agent"] if key is None else whole["agent"][key]
+            own["agent"] = {kind: rows[self._joints[agent]] for kind, rows in joints.items()}
+        cameras = self.task.observer.seen_by(self._robots[agent])
         for kind in ("sensor_param", "sensor_data"):
             if kind in whole:
                 own[kind] = {name: whole[kind][name] for name in cameras}

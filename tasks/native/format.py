@@ -68,6 +68,25 @@ def declared_joints(index: ReadoutIndex, robot: str, rows: NDArray[Any]) -> NDAr
     return rows if order is None else rows[..., np.argsort(order)]
 
 
+def native_places(index: ReadoutIndex, layout: Layout, arm: str) -> NDArray[np.intp]:
+    """Return where the joints of a robot, or of a limb, stand among its robot's in native's order.
+
+    A robot's stand as native has them, a limb's in the order of its own descriptor.
+
+    Args:
+        index: Knows native's order.
+        layout: Whose robot or limb.
+        arm: Its name.
+    """
+    owner = layout.owner(arm)
+    joints = layout[owner].robot.joints
+    if arm == owner:
+        return np.arange(len(joints))
+    declared = np.arange(len(joints))
+    order = native_joints(index, owner, declared).tolist()
+    return np.array([order.index(joints.index(j)) for j in layout.arm(arm).robot.joints], np.intp)
+
+
 def read_state_dict(simulation: Simulation, state: State) -> StateDict:
     """Return every pose and velocity as rows in native's format.
 

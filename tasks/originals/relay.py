@@ -69,13 +69,13 @@ class Relay(MultiRobotTask):
         """Add the table, the baton, the zones and the beacon."""
         self.table.add_to(world, "table")
         world.add("baton", *_baton(), position=self._zones[-1])
-        for robot in self.layout:
+        for robot in self.layout.arms:
             add_target(world, ZONE_RADIUS, f"zone_{robot}")
         add_goal(world, 0.02, "beacon")
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the baton into the last zone, the beacon over the first."""
-        for robot, (x, y, _) in zip(self.layout, self._zones, strict=True):
+        for robot, (x, y, _) in zip(self.layout.arms, self._zones, strict=True):
             world.set_pose(f"zone_{robot}", (x, y, TARGET_HEIGHT), FACE_UP)
         x, y = rng.uniform_between([-START_OFFSET] * 2, [START_OFFSET] * 2).tolist()
         last_x, last_y, _ = map(rounded, self._zones[-1])
@@ -111,7 +111,7 @@ class Relay(MultiRobotTask):
             "baton_to_zone_pos": self._next_zone(state, visited) - state.position("baton"),
             "share_visited": floats(visited) / len(self._zones),
         }
-        for robot in self.layout:
+        for robot in self.layout.arms:
             parts[f"{robot}_tcp_pose"] = state.tcp_pose(robot)
             parts[f"{robot}_tcp_to_baton_pos"] = state.tcp_offset(robot, "baton")
         return parts
@@ -119,7 +119,7 @@ class Relay(MultiRobotTask):
     def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Zones visited, and for the next its robot's reach (0.3) and the way (0.6); 1 in all."""
         visited = info["zones_visited"]
-        ways = [state.tcp_distance(robot, "baton") for robot in self.layout]
+        ways = [state.tcp_distance(robot, "baton") for robot in self.layout.arms]
         turn = minimum(visited, len(ways) - 1)
         reach, carry = closeness(
             stack(ways)[turn, state.env_ids],
@@ -178,12 +178,13 @@ def find_zones(layout: Layout) -> tuple[tuple[float, float], ...]:
         TaskError: If neighbours are so far apart, or of so different reach and so near, that no
             such place is in reach of both.
     """
-    names = list(layout)
-    bases = [placement.base_position[:2] for placement in layout.values()]
+    arms = layout.arms
+    names = list(arms)
+    bases = [placement.base_position[:2] for placement in arms.values()]
     middle_x, middle_y = (sum(along) / len(bases) for along in zip(*bases, strict=True))
     zones: list[tuple[float, float]] = []
     for i, j in pairwise([*range(len(names)), 0]):
-        first, second = (layout[names[k]].robot.reach for k in (i, j))
+        first, second = (arms[names[k]].robot.reach for k in (i, j))
         (x, y), (end_x, end_y) = bases[i], bases[j]
         way_x, way_y = end_x - x, end_y - y
         apart = sqrt(way_x * way_x + way_y * way_y)

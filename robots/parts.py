@@ -1,0 +1,226 @@
+"""What a descriptor holds besides joint groups: fingers, cameras, limbs, where a robot stands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from robots.common.errors import DescriptorError
+from robots.common.fields import expect_unit, settle_fields
+
+Vector3 = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]  # wxyz
+
+IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+LARGEST_IMAGE = 16384  # pixels; what graphics drivers allow
+
+
+@dataclass(frozen=True)
+class GripperMaterial:
+    """Contact material of the links that touch what is grasped.
+
+    Attributes:
+        links: Link names.
+        static_friction: Coefficient (dimensionless).
+        dynamic_friction: Coefficient (dimensionless).
+        restitution: Coefficient (dimensionless).
+        patch_radius: PhysX torsional patch radius and its minimum (m).
+    """
+
+    links: tuple[str, ...]
+    static_friction: float
+    dynamic_friction: float
+    restitution: float = 0.0
+    patch_radius: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse links that are none, and numbers that no contact has."""
+        settle_fields(self, DescriptorError)
+        expect(bool(self.links), "GripperMaterial: links is empty; name the links that touch")
+        expect_different("GripperMaterial: links", self.links)
+        for name in ("static_friction", "dynamic_friction", "patch_radius"):
+            value = getattr(self, name)
+            expect(value >= 0, f"GripperMaterial: {name} is {value}; it must not be negative")
+        expect(
+            0 <= self.restitution <= 1,
+            f"GripperMaterial: restitution is {self.restitution}; it must be between 0 and 1",
+        )
+
+
+@dataclass(frozen=True)
+class Fingers:
+    """Two links that grasp, and how their contact forces show a grasp.
+
+    An object is grasped while each finger feels at least ``min_force`` from it, at an angle of at
+    most ``max_angle`` to the direction in which that finger opens.
+
+    Attributes:
+        links: The two finger links.
+        opening_signs: For each finger, the sign of its own y axis that points to opening.
+        min_force: Smallest contact force of each finger (N).
+        max_angle: Largest angle between force and opening direction (degrees).
+    """
+
+    links: tuple[str, str]
+    opening_signs: tuple[int, int] = (1, -1)
+    min_force: float = 0.5
+    max_angle: float = 85.0
+
+    def __post_init__(self) -> None:
+        """Refuse links that are not two, and numbers that tell no grasp."""
+        settle_fields(self, DescriptorError)
+        expect_different("Fingers: links", self.links)
+        expect(
+            set(self.opening_signs) <= {1, -1},
+            f"Fingers: opening_signs is {self.opening_signs}; each must be 1 or -1",
+        )
+        expect(
+            self.min_force >= 0,
+            f"Fingers: min_force is {self.min_force} N; it must not be negative",
+        )
+        expect(
+            0 <= self.max_angle <= 180,
+            f"Fingers: max_angle is {self.max_angle} degrees; it must be between 0 and 180",
+        )
+
+
+@dataclass(frozen=True)
+class CameraMount:
+    """A camera that rides on a link.
+
+    Attributes:
+        name: Camera name.
+        link: Link it is fixed to.
+        position: In the link's frame (m).
+        quaternion: wxyz, in the link's frame; the camera looks along its own +x, z up.
+        width: Image width (pixels).
+        height: Image height (pixels).
+        fov: Vertical field of view (rad).
+        near: Near plane (m).
+        far: Far plane (m).
+    """
+
+    name: str
+    link: str
+    position: Vector3 = (0.0, 0.0, 0.0)
+    quaternion: Quaternion = IDENTITY
+    width: int = 128
+    height: int = 128
+    fov: float = math.pi / 2
+    near: float = 0.01
+    far: float = 100.0
+
+    def __post_init__(self) -> None:
+        """Refuse what no camera can be."""
+        settle_fields(self, DescriptorError)
+        camera = f"camera {self.name!r}"
+        expect_unit(camera, self.quaternion, DescriptorError)
+        for name, pixels in (("width", self.width), ("height", self.height)):
+            expect(
+                0 < pixels <= LARGEST_IMAGE,
+                f"{camera}: {name} is {pixels} pixels; it must be between 1 and {LARGEST_IMAGE}",
+            )
+        expect(
+            0 < self.fov < math.pi, f"{camera}: fov is {self.fov} rad; it must be between 0 and pi"
+        )
+        expect(
+            0 < self.near < self.far,
+            f"{camera}: near is {self.near} m and far {self.far} m; it must be 0 < near < far",
+        )
+
+
+@dataclass(frozen=True)
+class Home:
+    """Where a robot stands when a layout does not say otherwise.
+
+    Attributes:
+        position: Base position in the world (m).
+        quaternion: Base orientation, wxyz.
+        keyframe: Name of the keyframe it starts from.
+    """
+
+    position: Vector3 = (0.0, 0.0, 0.0)
+    quaternion: Quaternion = IDENTITY
+    keyframe: str = "rest"
+
+    def __post_init__(self) -> None:
+        """Refuse a pose that is none."""
+        settle_fields(self, DescriptorError)
+        expect_unit("Home", self.quaternion, DescriptorError)
+
+
+@dataclass(frozen=True)
+class Limb:
+    """An arm of a robot that has several, with its gripper.
+
+    Attributes:
+        tcp_link: Link whose frame orients its tool centre point.
+        reach: Largest distance of the TCP from the vertical through ``base`` (m).
+        base: Where its first joint is at home, in the robot's frame (m).
+        fingers: The links that grasp, if it has any.
+        tcp_position_links: Links whose mean origin is the TCP position; ``tcp_link`` if empty.
+        groups: Its joint groups, which follow one another in the action. Empty takes those that
+            have the limb's name among their words: of ``left``, ``left_arm`` and ``left_gripper``.
+    """
+
+    tcp_link: str
+    reach: float
+    base: Vector3 = (0.0, 0.0, 0.0)
+    fingers: Fingers | None = None
+    tcp_position_links: tuple[str, ...] = ()
+    groups: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse a reach that is none, and links that are named twice."""
+        settle_fields(self, DescriptorError)
+        expect(self.reach > 0, f"Limb: reach is {self.reach} m; it must be positive")
+        expect_different("Limb: tcp_position_links", self.tcp_position_links)
+
+
+def both_sides(
+    tcp_link: str,
+    reach: float,
+    base: Vector3,
+    fingers: Fingers | None = None,
+    tcp_position_links: tuple[str, ...] = (),
+) -> dict[str, Limb]:
+    """Return the limbs ``left`` and ``right`` of a robot whose sides mirror each other.
+
+    In names of links, ``{side}`` stands for ``left`` or ``right`` and ``{s}`` for ``l`` or ``r``.
+
+    Args:
+        tcp_link: See `Limb`.
+        reach: See `Limb` (m).
+        base: Of the left limb (m); the right one's has the other sign of y.
+        fingers: See `Limb`.
+        tcp_position_links: See `Limb`.
+    """
+
+    def named(links: tuple[str, ...], side: str) -> tuple[str, ...]:
+        return tuple(link.format(side=side, s=side[0]) for link in links)
+
+    x, y, z = base
+    return {
+        side: Limb(
+            *named((tcp_link,), side),
+            reach,
+            (x, sign * y, z),
+            fingers and replace(fingers, links=named(fingers.links, side)),
+            named(tcp_position_links, side),
+        )
+        for side, sign in (("left", 1), ("right", -1))
+    }
+
+
+def expect(right: bool, otherwise: str) -> None:
+    """Raise a `DescriptorError` that says what is wrong, unless all is right."""
+    if not right:
+        raise DescriptorError(otherwise)
+
+
+def expect_different(what: str, names: Sequence[str]) -> None:
+    """Raise a `DescriptorError` if a name is given twice."""
+    twice = sorted({name for name in names if names.count(name) > 1})
+    expect(not twice, f"{what} has {', '.join(twice)} more than once")
