@@ -13,9 +13,16 @@ from experts.driver import ArmDriver
 from experts.geometry import heading
 from experts.script import OPEN, Pose, Scene, Script, Waypoint
 from kinematics.rotations import Floats, inverse, rotate
+from kinematics.solve import by_way
+from layouts import Layout
 from robots import TaskError, UnknownNameError
+from simulation.overlaps import RobotsAlone
 from tasks import MultiRobotTask
 from tasks.episode import REBUILT
+
+
+PATIENCE = 40  # control steps without progress after which an arm counts as blocked
+PROGRESS = 1e-3  # rad
 
 
 @dataclass(frozen=True)
@@ -48,6 +55,7 @@ class Rehearsal:
             check_layout=False,  # it was checked when the task was made
         )
         self.task = type(task)(scenario)
+        self._alone = RobotsAlone(self.task.layout, scenario.physics)
 
     def begin(self, seed: int) -> Scene:
         """Start the episode of a seed in a freshly built world, and return what it looks like."""
@@ -70,7 +78,7 @@ class Rehearsal:
         """
         task, scene = self.task, self.scene()
         _check_names(script, task)
-        players = _players(task, script, scene)
+        players = _players(task, script, scene, self._alone)
         done: set[str] = set()
         actions: list[NDArray[np.float32]] = []
         while len(actions) < task.max_episode_steps:
@@ -95,12 +103,18 @@ class _Player:
     """Takes one robot through its waypoints."""
 
     def __init__(
-        self, task: MultiRobotTask, robot: str, waypoints: Sequence[Waypoint], scene: Scene
+        self,
+        task: MultiRobotTask,
+        robot: str,
+        waypoints: Sequence[Waypoint],
+        scene: Scene,
+        alone: RobotsAlone,
     ) -> None:
         self._robot, self._waypoints = robot, list(waypoints)
         self._driver = ArmDriver(task.layout.arm(robot).robot)
         if any(waypoint.to is not None for waypoint in waypoints):
             self._kinematics = task.simulation.inverse_kinematics(robot)
+            self._posture = _Posture(alone, task.layout, robot)
         if any(waypoint.at is not None for waypoint in waypoints):
             self._reach = task.simulation.point_reach(robot)
             self._base = np.array(task.layout.arm(robot).base_position)
@@ -128,6 +142,14 @@ class _Player:
         self._elapsed += 1
         return self._driver.action(self._goal, self._gripper, scene.qpos(self._robot))
 
+    def _check_progress(self, away: float) -> None:
+        """Give up if the arm is kept from its goal: for `PATIENCE` steps it came no nearer."""
+        if away < self._nearest_yet - PROGRESS:
+            self._nearest_yet, self._waited = away, 0
+        self._waited += 1
+        if self._waited > PATIENCE:
+            raise _StuckError(f"{self.place} is blocked {away:.2f} rad before its end")
+
     def _check_time(self, done: set[str]) -> None:
         most = self._current and self._current.most
         if most is not None and self._elapsed >= most and self.place not in done:
@@ -139,6 +161,7 @@ class _Player:
         if (waypoint.to, waypoint.turn, waypoint.at) != (None, None, None):
             away = np.abs(self._driver.arm(scene.qpos(self._robot)) - self._goal).max()
             if away > waypoint.near:
+                self._check_progress(float(away))
                 return False
         return waypoint.until is None or waypoint.until(scene)
 
@@ -152,21 +175,26 @@ class _Player:
     def _begin(self, waypoint: Waypoint, scene: Scene) -> None:
         self._current, self._gripper = waypoint, waypoint.gripper
         self._begun, self._elapsed = self._begun + 1, 0
+        self._nearest_yet, self._waited = np.inf, 0
         if waypoint.to is not None:
-            self._goal = self._nearest(waypoint.to(scene), scene.qpos(self._robot))
+            self._goal = self._nearest(waypoint.to(scene), scene)
         elif waypoint.turn is not None:
             arm = self._driver.arm(scene.qpos(self._robot))
             self._goal = arm + waypoint.turn(arm)
         elif waypoint.at is not None:
             self._goal = self._reaching(waypoint.at(scene), scene)
 
-    def _nearest(self, poses: Sequence[Pose], qpos: Floats) -> Floats:
-        goals = [self._kinematics.solve(*pose, qpos) for pose in poses]
-        reachable = [goal for goal in goals if goal is not None]
-        if not reachable:
+    def _nearest(self, poses: Sequence[Pose], scene: Scene) -> Floats:
+        """Return the arm joints with the shortest way to one of the poses.
+
+        Those at which the robot is inside itself are passed over, if there are others.
+        """
+        qpos = scene.qpos(self._robot)
+        goals = [goal for pose in poses for goal in self._kinematics.solutions(*pose, qpos)]
+        if not goals:
             raise _StuckError(f"{self.place} is out of reach")
-        arm = self._driver.arm(qpos)
-        return min(reachable, key=lambda goal: float(np.abs(goal - arm).max()))
+        goals = by_way(goals, self._driver.arm(qpos))
+        return next((goal for goal in goals if self._posture.is_free(goal, scene)), goals[0])
 
     def _reaching(self, place: Floats, scene: Scene) -> Floats:
         """Return arm joints that bring the TCP to a place.
@@ -186,12 +214,30 @@ class _Player:
         return min(reachable, key=lambda goal: float(np.abs(goal - arm).max()))
 
 
-def _players(task: MultiRobotTask, script: Script, scene: Scene) -> list[_Player]:
+class _Posture:
+    """Tells whether a robot is inside itself with one of its arms somewhere."""
+
+    def __init__(self, alone: RobotsAlone, layout: Layout, arm: str) -> None:
+        self._alone, self._owner = alone, layout.owner(arm)
+        joints = layout[self._owner].robot.joints
+        self._places = [joints.index(joint) for joint in layout.arm(arm).robot.arm_joints]
+
+    def is_free(self, arm: Floats, scene: Scene) -> bool:
+        """Return whether that is so at some arm joints (rad), other joints being as they are."""
+        qpos = scene.qpos(self._owner)
+        qpos[self._places] = arm
+        overlaps = self._alone.overlaps({self._owner: qpos})
+        return not any(o.one.robot == o.other.robot == self._owner for o in overlaps)
+
+
+def _players(
+    task: MultiRobotTask, script: Script, scene: Scene, alone: RobotsAlone
+) -> list[_Player]:
     """Return who takes the action numbers, in their order, by the names that the script uses."""
     short = task.layout.short_names
     names = {short.get(name, name): name for name in script}
     return [
-        _Player(task, name, script.get(name, ()), scene)
+        _Player(task, name, script.get(name, ()), scene, alone)
         for name in (names.get(part, part) for part in task.layout.action_split)
     ]
 

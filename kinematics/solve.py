@@ -174,9 +174,9 @@ def turned_within(angles: Floats, low: Floats, high: Floats) -> Floats | None:
     return angles if ((angles >= low) & (angles <= high)).all() else None
 
 
-def nearest(candidates: Iterable[Floats], to: Floats) -> Floats | None:
-    """Return the candidate whose farthest joint has the shortest way, or None of none."""
-    return min(candidates, key=lambda joints: np.abs(joints - to).max(), default=None)
+def by_way(candidates: Iterable[Floats], start: Floats) -> list[Floats]:
+    """Return candidates by the way of their farthest joint from ``start``, the shortest first."""
+    return sorted(candidates, key=lambda joints: float(np.abs(joints - start).max()))
 
 
 def descend_by_differences(

@@ -28,6 +28,7 @@ from robots.descriptor import (
     Fingers,
     GripperMaterial,
     Home,
+    Limb,
     Quaternion,
     RobotDescriptor,
     UrdfSource,
@@ -82,10 +83,12 @@ def with_gripper(
         name: Registry name; None joins both names.
 
     Raises:
-        DescriptorError: If the present gripper is no part of its own that could be taken off.
+        DescriptorError: If the present gripper is no part of its own that could be taken off, or
+            the robot has limbs.
         UnknownNameError: If there is no such link or robot.
         AssetError: If files cannot be found or make no sense.
     """
+    _refuse_limbs(robot, "another gripper")
     tool, origin, root = _gripper_of(_robot(gripper))
     present = _gripper_joints(robot)
     mount, without = robot.tcp_link, ()
@@ -147,6 +150,12 @@ def with_tool(
         urdf=urdf,
         tcp_link=part.prefix + tcp_link,
         tcp_position_links=(),
+        limbs={
+            key: replace(limb, tcp_link=part.prefix + tcp_link, tcp_position_links=())
+            if limb.tcp_link == part.link
+            else limb
+            for key, limb in robot.limbs.items()
+        },
         allowed_collisions=_allowed(urdf, [(robot, "")]),
     )
     return replace(made, reach=_reach(robot, made))
@@ -171,8 +180,9 @@ def on_body(
 ) -> RobotDescriptor:
     """Return one robot made of several that stand on one body: a pedestal, a torso, a gantry.
 
-    Its joint groups are called ``NAME_GROUP`` (``left_arm``, ``left_gripper``), its links and
-    joints ``NAME_LINK``. Tool centre point, fingers and reach are the first robot's.
+    Each is a limb of it. Its joint groups are called ``NAME_GROUP`` (``left_arm``,
+    ``left_gripper``), its links and joints ``NAME_LINK``. Tool centre point, fingers and reach are
+    the first robot's.
 
     Args:
         name: Registry name.
@@ -180,7 +190,7 @@ def on_body(
         mounts: The robots by name, in the order of the action.
 
     Raises:
-        DescriptorError: If there is no robot, or something moves in the body.
+        DescriptorError: If there is no robot, one has limbs, or something moves in the body.
         UnknownNameError: If there is no such link or robot.
         AssetError: If files cannot be found or make no sense.
     """
@@ -191,6 +201,8 @@ def on_body(
     if model.moving:
         raise DescriptorError(f"the body moves ({model.moving[0].name}); only its robots may")
     robots = {key: _robot(mount.robot) for key, mount in mounts.items()}
+    for key, robot in robots.items():
+        _refuse_limbs(robot, f"a body, as {key!r}")
     parts = [
         Part(robots[key].urdf, m.link or model.root, m.position, m.quaternion, prefix=f"{key}_")
         for key, m in mounts.items()
@@ -218,7 +230,36 @@ def on_body(
         reach=first.reach + math.hypot(*parts[0].position[:2]),
         source=" and ".join(dict.fromkeys(robot.source for robot in robots.values())),
         allowed_collisions=_allowed(urdf, [(r, f"{key}_") for key, r in robots.items()]),
+        limbs=_limbs(dict(zip(robots, named, strict=True)), model, parts),
     )
+
+
+def _refuse_limbs(robot: RobotDescriptor, onto: str) -> None:
+    if robot.limbs:
+        raise DescriptorError(
+            f"{robot.name} has the limbs {', '.join(robot.limbs)}, and cannot be joined with"
+            f" {onto}; join each arm first, and put the arms on one body with on_body"
+        )
+
+
+def _limbs(
+    robots: Mapping[str, RobotDescriptor], body: UrdfModel, parts: Sequence[Part]
+) -> dict[str, Limb]:
+    """Return robots, as they are named on a body, as the limbs of one robot."""
+    tree = kinematic_tree(body)
+    places = tree.forward(np.zeros((1, len(tree.coordinates))))[0]
+    limbs: dict[str, Limb] = {}
+    for (key, robot), part in zip(robots.items(), parts, strict=True):
+        x, y, z = transform(places[tree.link(part.link)], np.array(part.position)).tolist()
+        limbs[key] = Limb(
+            robot.tcp_link,
+            robot.reach,
+            (x, y, z),
+            robot.fingers,
+            robot.tcp_position_links,
+            tuple(f"{key}_{group}" for group in robot.action_split.groups),
+        )
+    return limbs
 
 
 def _robot(given: RobotLike) -> RobotDescriptor:

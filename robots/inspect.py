@@ -87,6 +87,11 @@ def report(robot: RobotDescriptor, store: AssetStore) -> str:
             f"numbers from  {robot.source}",
             f"reach         {robot.reach:g} m from the base axis",
             f"TCP link      {robot.tcp_link}",
+            *(
+                f"limb          {name}: TCP {limb.tcp_link}, reach {limb.reach:g} m from"
+                f" ({_row(limb.base)}) m"
+                for name, limb in robot.limbs.items()
+            ),
             f"home          position {_row(robot.home.position)} m, quaternion wxyz"
             f" {_row(robot.home.quaternion)}, keyframe {robot.home.keyframe!r}",
             f"URDF          {remark}",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
@@ -30,10 +31,10 @@ def check_limbs(robot: RobotDescriptor) -> None:
         return
     owners = _owners(robot)
     for name in robot.limbs:
-        if not name.isalnum() or name == BODY:
+        if re.fullmatch(r"\w+", name) is None or name == BODY:
             raise DescriptorError(
-                f"{robot.name}: {name!r} names no limb; letters and digits are needed, and {BODY!r}"
-                " is taken by what is no limb"
+                f"{robot.name}: {name!r} names no limb; letters, digits and _ are needed, and"
+                f" {BODY!r} is taken by what is no limb"
             )
         groups = [robot.action_split.groups[g] for g, owner in owners.items() if owner == name]
         if not any(group.size for group in groups):

@@ -161,6 +161,12 @@ class PoseSolver(Protocol):
         """Return arm joints near all joints ``start_qpos``, or None if none were found."""
         ...
 
+    def solutions(
+        self, position: Numbers, quaternion: Numbers, start_qpos: Numbers, /
+    ) -> list[Joints]:
+        """Return all that were found, the one with the shortest way first."""
+        ...
+
 
 class PointSolver(Protocol):
     """Solves for the arm joints, in the order of ``joints``, that bring a point of a TCP link."""

@@ -2,17 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from layouts import Layout
-from simulation.backend import Overlap
+from simulation.backend import Joints, Overlap
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
 from simulation.simulation import Simulation
 from simulation.world import World
 
 DEPTH = 1e-3  # m; what rests on something sinks in by less
+
+
+class RobotsAlone:
+    """A layout's robots in a world of their own, to try postures in."""
+
+    def __init__(self, layout: Layout, physics: PhysicsSettings | None = None) -> None:
+        """Build the world.
+
+        Args:
+            layout: The robots.
+            physics: Solver settings; None is SAPIEN's own defaults.
+
+        Raises:
+            RobotLayoutsError: If a robot cannot be built.
+        """
+        timestep = (physics or SAPIEN_DEFAULTS).timestep
+        self._simulation = Simulation(layout, empty, 1, physics, control_frequency=1 / timestep)
+        self._still = np.zeros((1, layout.action_dim), np.float32)
+
+    def overlaps(self, postures: Mapping[str, Joints] | None = None) -> list[Overlap]:
+        """Return what overlaps by more than `DEPTH`, the deepest first.
+
+        Takes one step of physics.
+
+        Args:
+            postures: Joint positions of robots, each (dof,) in its descriptor's order (rad, m); the
+                others stand where the layout starts them.
+        """
+        alone = self._simulation
+        stand(alone)
+        for name, qpos in (postures or {}).items():
+            alone.worlds[0].stand(name, qpos)
+        alone.step(self._still, alone.read().joint_positions)
+        return deepest(alone.overlaps(0))
 
 
 def starting_overlaps(layout: Layout, physics: PhysicsSettings | None = None) -> list[Overlap]:
@@ -27,12 +61,7 @@ def starting_overlaps(layout: Layout, physics: PhysicsSettings | None = None) ->
     Raises:
         RobotLayoutsError: If a robot cannot be built.
     """
-    timestep = (physics or SAPIEN_DEFAULTS).timestep
-    alone = Simulation(layout, empty, 1, physics, control_frequency=1 / timestep)
-    stand(alone)
-    still = np.zeros((1, layout.action_dim), np.float32)
-    alone.step(still, alone.read().joint_positions)
-    return deepest(alone.overlaps(0))
+    return RobotsAlone(layout, physics).overlaps()
 
 
 def stand(simulation: Simulation) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experts.geometry import backed_off, gripper_facing, heading, squared, turn, yaw_of
-from experts.grasps import holding, need_fingers
+from experts.grasps import QUARTERS, holding, need_fingers
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
 from kinematics.rotations import Floats, multiply
@@ -33,6 +33,8 @@ class Style:
         height: Of the cube when it changes hands (m).
         half: How far from the cube's middle each gripper holds it (m).
         beyond: How far beyond the middle between the bases it changes hands, towards the taker (m).
+        any_side: Whether the giver picks by any two faces, not only from where the taker is not:
+            for arms that stand side by side.
     """
 
     pick_tilt: float = radians(15)
@@ -41,6 +43,7 @@ class Style:
     height: float = 0.22
     half: float = 0.014
     beyond: float = 0.0
+    any_side: bool = False
 
 
 # How the taker may lean on its way to the goal, as changes of its tilt; the quickest is taken.
@@ -55,6 +58,11 @@ STYLES = (
     Style(beyond=-0.04),
     Style(pick_tilt=0.0, give_tilt=radians(40), take_tilt=radians(50)),
     Style(pick_tilt=0.0, height=0.3, give_tilt=radians(50), take_tilt=radians(40)),
+    *(
+        Style(pick_tilt=0.0, give_tilt=lean, take_tilt=lean, height=height, any_side=True)
+        for height in (0.22, 0.3, 0.36, 0.15)
+        for lean in (radians(60), radians(75))
+    ),
 )
 
 
@@ -82,8 +90,11 @@ class _HandOver:
         self.style = style
         self.forward = heading(giver_base, taker_base)
         self.ahead = np.array([np.cos(self.forward), np.sin(self.forward), 0.0])
-        middle = (giver_base + taker_base) / 2 + style.beyond * self.ahead
-        self.meeting = np.array([*middle[:2], style.height])
+        middle = (giver_base + taker_base) / 2
+        # Between the arms, and as far to the side as (0, 0), about which cube and goal are.
+        aside = middle @ self.ahead * self.ahead - middle
+        meeting = middle + aside + style.beyond * self.ahead
+        self.meeting = np.array([*meeting[:2], style.height])
 
     def script(self) -> Script:
         cube_held = partial(Scene.grasps, robot=GIVER, body=CUBE)
@@ -107,8 +118,12 @@ class _HandOver:
 
     def pick(self, scene: Scene, back: float) -> list[Pose]:
         position, quaternion = scene.body(CUBE)
-        direction = squared(self.forward, yaw_of(quaternion))
-        return [self._grip(position, direction, self.style.pick_tilt, back)]
+        yaw, tilt = yaw_of(quaternion), self.style.pick_tilt
+        if self.style.any_side:
+            sides = [yaw + turn * np.pi / 2 for turn in QUARTERS]
+        else:
+            sides = [squared(self.forward, yaw)]
+        return [self._grip(position, side, tilt, back) for side in sides]
 
     def present(self, scene: Scene) -> list[Pose]:
         return [

@@ -9,7 +9,7 @@ from robots.parts import both_sides
 
 # fmt: off
 SIDES = ("left", "right")
-FINGERS = tuple(f"{s}_gripper_{f}_finger" for s in "lr" for f in "lr")
+FINGERS = tuple(f"{s}_gripper_{f}_finger_tip" for s in "lr" for f in "lr")
 BODY = ("torso", "sonar_ring", "pedestal", "collision_head_link_1", "collision_head_link_2")
 LEFT_ARM = JointGroup(
     tuple(f"left_{joint}" for joint in ("s0", "s1", "e0", "e1", "w0", "w1", "w2")),
@@ -38,9 +38,9 @@ BAXTER = RobotDescriptor(
         head=JointGroup.hold(("head_pan",)),
     ),
     tcp_link="left_gripper", fingers=Fingers(FINGERS[:2]),
-    gripper_material=GripperMaterial(FINGERS, 2.0, 2.0, 0.0, patch_radius=0.1),
+    gripper_material=GripperMaterial((*FINGERS, *(f[:-4] for f in FINGERS)), 2.0, 2.0, 0.0, patch_radius=0.1),
     limbs=both_sides("{side}_gripper", 1.201, (0.064, 0.259, 0.1296),
-                     Fingers(("{s}_gripper_l_finger", "{s}_gripper_r_finger"))),
+                     Fingers(("{s}_gripper_l_finger_tip", "{s}_gripper_r_finger_tip"))),
     keyframes={"rest": (-0.3, *REST, 0.3, *REST, 0.0)},
     reach=1.468,  # of the left TCP, from the URDF; data sheet 1.21 from the shoulder
     source="example-robot-data 6.0.0, baxter_description; drives from each joint's inertia",
@@ -53,8 +53,8 @@ BAXTER = RobotDescriptor(
             ("upper_elbow", "lower_elbow", "upper_forearm", "upper_forearm_visual",
              "lower_forearm", "wrist"),
             ("lower_forearm", "wrist", "hand_link", "gripper_base_link"))),
-        *((f"{side}_wrist", f"{side}_hand_link", f"{side}_gripper_base_link", f, f"{f}_tip")
+        *((f"{side}_wrist", f"{side}_hand_link", f"{side}_gripper_base_link", f[:-4], f)
           for side in SIDES for f in FINGERS if f[0] == side[0]),
-        FINGERS[:2], FINGERS[2:],
+        *(tuple(f[:-4] for f in pair) for pair in (FINGERS[:2], FINGERS[2:])),
     ),
 )

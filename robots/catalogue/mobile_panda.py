@@ -5,19 +5,19 @@ from dataclasses import replace
 from robots.assets.locator import UrdfLocator
 from robots.catalogue.panda import ARM, PANDA
 from robots.descriptor import ActionSplit, Fingers, GripperMaterial, Home, JointGroup, names
+from robots.link_pairs import among
 
 FINGERS = ("right_panda_leftfinger", "right_panda_rightfinger")
-# ManiSkill has files of this robot and no agent: lift and base are driven like Fetch's torso and
-# its stiff body.
+# ManiSkill has files of this robot and no agent. The lift carries 20 kg, or twice that.
 LIFT = JointGroup(
     ("linear_actuator_height",),
     unit="m",
     lower=-0.1,
     upper=0.1,
     delta=True,
-    stiffness=1e3,
-    damping=1e2,
-    force_limit=100.0,
+    stiffness=1e5,
+    damping=1e4,
+    force_limit=1e4,
     reset_noise=False,
     limits=((0.0, 1.6),),
 )
@@ -41,6 +41,7 @@ MOBILE_PANDA = replace(
     fingers=Fingers(FINGERS),
     keyframes={"rest": (*PANDA.keyframe("rest"), 0.0, 0, 0, 0)},
     home=Home(position=(-1.05, 0.0, -0.9196429)),  # on the floor, where Fetch stands
+    allowed_collisions=among(("right_panda_link7", "right_panda_hand")),
     reach=1.26,  # of the TCP, from the URDF
     source="mani_skill 3.0.1, agents/robots/panda/panda.py and agents/robots/fetch/fetch.py",
 )

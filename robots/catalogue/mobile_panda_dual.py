@@ -6,6 +6,7 @@ from robots.assets.locator import UrdfLocator
 from robots.catalogue.mobile_panda import BASE, LIFT, MOBILE_PANDA
 from robots.catalogue.panda import ARM, PANDA
 from robots.descriptor import ActionSplit, Fingers, GripperMaterial, JointGroup, names
+from robots.link_pairs import among
 from robots.parts import both_sides
 
 LEFT = ("left_panda_leftfinger", "left_panda_rightfinger")
@@ -40,5 +41,6 @@ MOBILE_PANDA_DUAL = replace(
         (0.0808, 0.3012, 0.42),
         Fingers(("{side}_panda_leftfinger", "{side}_panda_rightfinger")),
     ),
+    allowed_collisions=among(*((f"{s}_panda_link7", f"{s}_panda_hand") for s in ("left", "right"))),
     keyframes={"rest": (*PANDA.keyframe("rest") * 2, 0.0, 0, 0, 0)},
 )

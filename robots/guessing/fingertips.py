@@ -15,6 +15,7 @@ from robots.urdf.model import ModelJoint
 
 SHORT = 0.6  # of the longest finger; what ends before it is a knuckle, not a tip
 FOLLOWING = 0.85  # the same where all joints follow one, as in grippers with knuckles
+PAD = 0.02  # of a finger's length; a pad that ends so near the finger's end is what touches
 CAP = 0.15  # of a finger's length; its corners within it from the end make its tip
 
 
@@ -68,13 +69,31 @@ class Fingertips:
         points = np.array([self._tips[end] for end in self.ends])
         return transform(poses[links], transform(inverse_pose(self._poses[links]), points))
 
+    def touching(self, end: str) -> str:
+        """Return the link that touches what a finger holds: of those rigid with ``end`` the last.
+
+        Where pads or tips are links of their own, fixed to one that moves, they have the corners
+        that are farthest from the palm.
+        """
+        rigid = {self.stance.tree.link(link): link for link in self.stance.model.rigid_with(end)}
+        far = {
+            rigid[hull.link]: float(np.linalg.norm(corners - self._palm[:3, 3], axis=1).max())
+            for hull in self._hulls
+            if hull.link in rigid
+            for corners in (transform(self._poses[hull.link], hull.corners),)
+        }
+        farthest = max(far.values(), default=0.0)
+        near = [link for link, reach in far.items() if reach >= farthest * (1 - PAD)]
+        return end if end in near or not near else near[-1]
+
     def opening(self, positions: Mapping[str, float]) -> list[float]:
-        """Return for each of ``ends`` how well its y axis points away from the others, -1 … 1."""
+        """Return for each finger how well `touching`'s y axis points away from the others, -1 … 1."""
         poses = self.stance.poses(self.stance.with_joints(positions))[0]
         places = self._places(poses)
         ways = places - places.mean(axis=0)
         ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-9)
-        axes = [poses[self.stance.tree.link(link), :3, 1] for link in self.ends]
+        links = [self.stance.tree.link(self.touching(end)) for end in self.ends]
+        axes = [poses[link, :3, 1] for link in links]
         return [float(axis @ way) for axis, way in zip(axes, ways, strict=True)]
 
     def finger_of(self, link: str) -> ModelJoint:

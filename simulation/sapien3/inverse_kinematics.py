@@ -10,7 +10,7 @@ import sapien
 from numpy.typing import NDArray
 
 from kinematics.rotations import Floats
-from kinematics.solve import nearby, nearest, turned_within
+from kinematics.solve import by_way, nearby, turned_within
 from robots import SimulationError
 from simulation.sapien3.arm_model import ArmModel
 from simulation.sapien3.world import BuiltWorld
@@ -53,11 +53,16 @@ class InverseKinematics:
         self._keyframes = np.array([*descriptor.keyframes.values()], float)
 
     def solve(self, position: Numbers, quaternion: Numbers, start_qpos: Numbers) -> Floats | None:
-        """Return arm joints that bring the TCP to a pose, or None if none were found.
+        """Return the first of `solutions`, or None if there are none."""
+        return next(iter(self.solutions(position, quaternion, start_qpos)), None)
+
+    def solutions(
+        self, position: Numbers, quaternion: Numbers, start_qpos: Numbers
+    ) -> list[Floats]:
+        """Return arm joints that bring the TCP to a pose, within the joint limits.
 
         Tries from where the robot is, from its keyframes, and from the same few places around
-        where it is. Of the solutions within the joint limits it takes the one whose farthest
-        joint has the shortest way to go.
+        where it is. The first solution is the one whose farthest joint has the shortest way to go.
 
         Args:
             position: Of the TCP in the world (m).
@@ -66,7 +71,7 @@ class InverseKinematics:
                 sought near them.
 
         Returns:
-            Positions in the order of ``joints``, shape (arm joints,) (rad).
+            Positions in the order of ``joints``, each (arm joints,) (rad).
         """
         target = self._arm.base.inv() * sapien.Pose(list(position), list(quaternion))
         all_joints = np.asarray(start_qpos, float)
@@ -84,7 +89,7 @@ class InverseKinematics:
                 arm = turned_within(arm, self._arm.low, self._arm.high)
             if arm is not None:
                 found.append(arm)
-        return nearest(found, all_joints[self._arm.places])
+        return by_way(found, all_joints[self._arm.places])
 
     def forward(self, arm_qpos: Numbers) -> tuple[Floats, Floats]:
         """Return where arm joints bring the TCP: position (3,) (m) and quaternion (4,) wxyz, world.

@@ -6,10 +6,10 @@ import pytest
 from kinematics.solve import (
     NEAR_ENOUGH,
     Goal,
+    by_way,
     descend_by_differences,
     farthest,
     nearby,
-    nearest,
     scattered,
     solve,
     turned_within,
@@ -121,10 +121,12 @@ class TestParts:
         np.testing.assert_allclose(turned, [0.5, 6.0])
         assert turned_within(np.array([2.0, 6.0]), low, high) is None
 
-    def test_the_nearest_is_that_of_the_shortest_longest_way(self):
+    def test_the_first_is_that_of_the_shortest_longest_way(self):
         candidates = [np.array([3.0, 0.0]), np.array([2.0, 2.0])]
-        assert nearest(candidates, np.zeros(2)) is candidates[1]
-        assert nearest([], np.zeros(2)) is None
+        first, last = by_way(candidates, np.zeros(2))
+        assert first is candidates[1]
+        assert last is candidates[0]
+        assert by_way([], np.zeros(2)) == []
 
     def test_places_nearby_differ_in_the_moving_joints_alone(self):
         places = nearby(np.array([1.0, 2.0, 3.0]), [0, 2], 5, 0.1)

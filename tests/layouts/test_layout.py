@@ -51,8 +51,9 @@ class TestActionSplit:
     def test_slices_partition_the_flat_action(self, robots):
         layout = in_a_row(robots)
         numbers = list(range(layout.action_dim))
-        parts = [numbers[part] for part in layout.action_split.values()]
-        assert [number for part in parts for number in part] == numbers
+        for split in (layout.action_split, layout.robot_actions):
+            parts = [numbers[part] for part in split.values()]
+            assert [number for part in parts for number in part] == numbers
 
     @given(named_robots, st.randoms(use_true_random=False))
     def test_permuting_robots_permutes_slices_and_nothing_else(self, robots, random):
@@ -60,14 +61,15 @@ class TestActionSplit:
         names = list(layout)
         random.shuffle(names)
         permuted = Layout({name: layout[name] for name in names})
-        assert list(permuted.action_split) == names
+        assert list(permuted.robot_actions) == names
+        assert list(dict.fromkeys(map(permuted.owner, permuted.action_split))) == names
         assert dict(permuted) == dict(layout)
         flat = {
             name: [f"{name}/{number}" for number in range(placement.robot.action_dim)]
             for name, placement in layout.items()
         }
         joined = [number for name in names for number in flat[name]]
-        assert {name: joined[part] for name, part in permuted.action_split.items()} == flat
+        assert {name: joined[part] for name, part in permuted.robot_actions.items()} == flat
 
 
 class TestReplaceRobots:
@@ -230,7 +232,8 @@ class TestText:
     def test_facing_is_where_the_robot_reaches_whatever_its_bases_x_axis(self):
         for robot in RobotRegistry.names():
             row = str(side_by_side({"arm": robot}, spacing=1.0, keyframe=None)).splitlines()[2]
-            assert row.split()[4:8] == ["0,", "0,", "0", "0°"]
+            assert row.split()[7] == "0°"
+            assert RobotRegistry.load(robot).limbs or row.split()[4:7] == ["0,", "0,", "0"]
 
     def test_a_tilted_base_shows_its_quaternion(self):
         layout = Layout({"arm": Placement("panda", quaternion=(0.6, 0.8, 0.0, 0.0))})
