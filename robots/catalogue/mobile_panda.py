@@ -12,8 +12,8 @@ FINGERS = ("right_panda_leftfinger", "right_panda_rightfinger")
 LIFT = JointGroup(
     ("linear_actuator_height",),
     unit="m",
-    lower=-0.1,
-    upper=0.1,
+    lower=-0.02,
+    upper=0.02,
     delta=True,
     stiffness=1e5,
     damping=1e4,

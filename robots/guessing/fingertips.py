@@ -87,7 +87,7 @@ class Fingertips:
         return end if end in near or not near else near[-1]
 
     def opening(self, positions: Mapping[str, float]) -> list[float]:
-        """Return for each finger how well `touching`'s y axis points away from the others, -1 … 1."""
+        """Return for each finger how well its y axis points away from the others, -1 … 1."""
         poses = self.stance.poses(self.stance.with_joints(positions))[0]
         places = self._places(poses)
         ways = places - places.mean(axis=0)

@@ -57,7 +57,9 @@ def test_a_whole_robot_is_an_arm_too():
 
 
 def test_an_unknown_arm_names_those_that_there_are():
-    with pytest.raises(UnknownNameError, match=r"'lefft'. Did you mean 'left'. Choices: cell.left, cell.right"):
+    with pytest.raises(
+        UnknownNameError, match=r"'lefft'. Did you mean 'left'. Choices: cell.left, cell.right"
+    ):
         CELL.arm("lefft")
 
 

@@ -1,0 +1,114 @@
+"""Two-arm tasks with one robot that has both arms."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+import pytest
+import torch
+
+import tasks
+from experts.registry import find_expert
+from layouts import Layout, Placement
+from robots import TaskError
+from tests.catalogue import optional_problem
+
+TWO = "TwoRobotPickCube-v1"
+# High behind the table, as its column reaches 1.6 m down: what is looked at here needs no reach.
+CELL = Layout({"cell": Placement("mobile_panda_dual", position=(2.5, 0.0, 1.0), rpy=(0, 0, pi))})
+# Baxter behind the table's far edge, its left arm on the side of the cube.
+BAXTER = {"cell": ("baxter", (0.7, 0.0, 0.2))}
+
+
+@pytest.fixture(scope="module")
+def env():
+    env = tasks.make(TWO, num_envs=2, layout=CELL)
+    yield env
+    env.close()
+
+
+def test_limbs_take_the_places_that_they_are_called_like(env):
+    assert env.action_split == CELL.action_split
+    state = env.simulation.read()
+    for place, first in (("left", 0), ("right", 9)):
+        full = f"cell.{place}"
+        np.testing.assert_array_equal(state.qpos(place), state.qpos("cell")[:, first : first + 9])
+        np.testing.assert_array_equal(state.tcp_pose(place), state.tcp_pose(full))
+        hand = state.link_pose("cell", f"{place}_panda_hand_tcp")
+        np.testing.assert_array_equal(state.tcp_pose(place), hand)
+        assert state.arm_qvel(place).shape == (2, 7)
+        np.testing.assert_allclose(state.gripper_opening(full), 1.0, atol=1e-5)
+        assert not state.is_grasping(place, "cube").any()
+    np.testing.assert_array_equal(state.qpos("cell.body"), state.qpos("cell")[:, 18:19])
+    apart = state.tcp_position("left") - state.tcp_position("right")
+    assert (np.abs(apart[:, 1]) > 0.2).all()
+
+
+def test_an_action_by_name_moves_that_limb_alone(env):
+    env.reset(seed=0)
+    before = env.simulation.read().qpos("cell").copy()
+    still = {
+        "cell.left": np.zeros((2, 8)),
+        "cell.right": np.zeros((2, 8)),
+        "cell.body": [[0.0]] * 2,
+    }
+    still = {name: np.array(numbers, np.float32) for name, numbers in still.items()}
+    still["cell.left"][:, 7] = still["cell.right"][:, 7] = 1.0  # grippers stay open
+    moved = {**still, "cell.right": np.ones((2, 8), np.float32)}
+    env.step(moved)
+    way = np.abs(env.simulation.read().qpos("cell") - before)
+    assert (way[:, 9:16] > 0.01).all()
+    assert (way[:, :7] < 0.005).all()
+
+
+def test_the_observation_is_that_of_two_robots_with_joints_once():
+    own = tasks.make(TWO, layout=CELL, obs_mode="state_dict")
+    obs, _ = own.reset(seed=0)
+    assert obs["agent"]["qpos"].shape == (1, 22)
+    assert set(obs["extra"]) == set(tasks.make(TWO, obs_mode="state_dict").start[0]["extra"])
+    flat = tasks.make(TWO, layout=CELL)
+    assert flat.observation_slices["cell.qpos"] == slice(0, 22)
+
+
+def test_every_limb_is_an_agent():
+    pytest.importorskip("pettingzoo")
+    env = tasks.parallel_env(TWO, layout=CELL)
+    assert env.possible_agents == ["cell.left", "cell.right", "cell.body"]
+    observations, _ = env.reset(seed=0)
+    state = env.task.simulation.read()
+    for name, dof in (("cell.left", 9), ("cell.right", 9), ("cell.body", 1)):
+        joints = np.concatenate([state.qpos(name)[0], state.qvel(name)[0]])
+        np.testing.assert_array_equal(observations[name][: 2 * dof], joints)
+        assert observations[name].shape == env.observation_space(name).shape
+    env.step({name: env.action_space(name).sample() for name in env.agents})
+
+
+def test_places_that_no_limb_takes_are_refused():
+    with pytest.raises(TaskError, match=r"places \['left', 'right'\]; .* \['cell'\]"):
+        tasks.make(TWO, layout=Layout({"cell": Placement("panda")}))
+
+
+@pytest.mark.parametrize("mode", ["pd_joint_delta_pos", "pd_joint_pos"])
+def test_control_modes_are_those_of_the_whole_robot(mode):
+    env = tasks.make(TWO, layout=CELL, control_mode=mode)
+    assert env.action_split == CELL.action_split
+    low = env.single_action_space.low
+    assert (low[:7] < -1.5).any() == (mode == "pd_joint_pos")
+
+
+@pytest.mark.example_robots
+def test_baxter_hands_over():
+    if problem := optional_problem():
+        pytest.skip(problem)
+    layout = Layout(
+        {n: Placement(robot, position=p, rpy=(0, 0, pi)) for n, (robot, p) in BAXTER.items()}
+    )
+    env = tasks.make(TWO, layout=layout)
+    plan = find_expert(TWO)
+    for seed in (0, 1):
+        actions = plan(env, seed)
+        env.reset(seed=seed, options={"reconfigure": True})
+        for action in actions:
+            *_, info = env.step(torch.from_numpy(action)[None])
+        assert info["success"].item()
