@@ -305,6 +305,7 @@ class MultiRobotTask(Declaration, Remade):
         self._elapsed[ids] = 0
         self._speeds.begin(ids)
         state = self._read()
+        self.simulation.hold(state)
         self.memory.renew(self.remember(state), ids)
         self.begin_episodes(state, ids)
         info = self._info(state)
