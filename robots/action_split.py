@@ -95,7 +95,9 @@ class JointGroup:
             ("frame", self.frame, FRAMES),
         ):
             if given not in known:
-                raise DescriptorError(unknown_name_message(f"{name} of a joint group", given, known))
+                raise DescriptorError(
+                    unknown_name_message(f"{name} of a joint group", given, known)
+                )
         self._refuse_bad_drives()
         self._refuse_bad_followers()
         self._refuse_bad_commands()

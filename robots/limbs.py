@@ -104,4 +104,6 @@ def _described(robot: RobotDescriptor, name: str, groups: Sequence[str]) -> Robo
         limb = robot.limbs[name]
         own = {field: getattr(limb, field) for field in _SHARED}
         own["cameras"] = tuple(c for c in robot.cameras if name in c.name.split("_"))
-    return replace(robot, action_split=split, keyframes=keyframes, limbs={}, control_modes={}, **own)
+    return replace(
+        robot, action_split=split, keyframes=keyframes, limbs={}, control_modes={}, **own
+    )

@@ -86,6 +86,11 @@ class ModeController:
             if part.group.asks.tcp
         ]
         self._controls = [ToolControl(list(g)) for _, g in groupby(tools, _alike)]
+        self._tools = {
+            tool.numbers.start: (control, place)
+            for control in self._controls
+            for place, tool in enumerate(control.tools)
+        }
         self.targets: Floats = np.zeros((0, positions.dof), np.float32)
         self._kept = [part for part in driven if part.group.target]
         self.remembered = [
@@ -152,6 +157,16 @@ class ModeController:
         """Return the numbers of `remembered`, each (N, size) (rad, m, wxyz)."""
         return [self._rows(part) for part in self._kept]
 
+    def restore(self, which: int, rows: Floats, env_ids: Sequence[int]) -> None:
+        """Let some worlds remember other numbers.
+
+        Args:
+            which: Which of `remembered`.
+            rows: Shape (worlds, size).
+            env_ids: Which worlds.
+        """
+        self._rows(self._kept[which])[env_ids] = rows
+
     # -- inside ------------------------------------------------------------------------------
 
     def _scaled(self, action: Floats) -> Floats:
@@ -159,13 +174,11 @@ class ModeController:
         return centre + half * np.minimum(np.maximum(action, low), high)
 
     def _rows(self, part: _Driven) -> Floats:
+        """Return a view of what is remembered of a joint group."""
         if not part.group.asks.tcp:
             return self.targets[:, part.joints.start : part.joints.stop]
-        for control in self._controls:
-            for place, tool in enumerate(control.tools):
-                if tool.numbers == part.numbers:
-                    return control.poses[place :: len(control.tools)]
-        raise AssertionError(part)
+        control, place = self._tools[part.numbers.start]
+        return control.poses[place :: len(control.tools)]
 
 
 def _driven(layout: Layout) -> Iterable[_Driven]:

@@ -23,9 +23,7 @@ _FACTORS = np.array(
         [[9, 9], [9, 9], [9, 9], [0, 5], [0, 2], [9, 9], [3, 5], [3, 2], [9, 9]],
     ]
 )
-_FACTOR_SIGNS = np.array(
-    [[1, -1, 1, 1, -1, -1, -1, 1, 1], [1, 1, 1, 1, 1, 1, 1, 1, 1]], np.float32
-)
+_FACTOR_SIGNS = np.array([[1, -1, 1, 1, -1, -1, -1, 1, 1], [1, 1, 1, 1, 1, 1, 1, 1, 1]], np.float32)
 
 # Of a quaternion of a matrix: the diagonal's signs, then how the rest is read off.
 _DIAGONAL = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], np.float32)

@@ -71,9 +71,7 @@ class ToolControl:
         self._tcp_frames = [index.tcps[tool.arm] for tool in self.tools]
         self._link_frames = [link[tool.tcp_link] for link, tool in links]
         self._root_frames = [
-            index.bases[tool.robot]
-            if tool.group.root_link is None
-            else link[tool.group.root_link]
+            index.bases[tool.robot] if tool.group.root_link is None else link[tool.group.root_link]
             for link, tool in links
         ]
         self._followers = [
@@ -117,9 +115,7 @@ class ToolControl:
             ways = poses.product(*pair)
         return np.concatenate([spots + moved, poses.upright(ways)], 1)
 
-    def follow(
-        self, wanted: Floats, state: State, env_ids: Iterable[int], targets: Floats
-    ) -> None:
+    def follow(self, wanted: Floats, state: State, env_ids: Iterable[int], targets: Floats) -> None:
         """Write the joint targets that bring TCPs where they are wanted; they stay where they fail.
 
         Args:

@@ -318,7 +318,7 @@ class MultiRobotTask(Declaration, Remade):
         """Read spaces and slices off the first observation."""
         state, mode = self._state, self.observer.mode
         parts = self.observe(state, self._info(state)) if mode.flat else {}
-        self.observation_slices = self.observer.slices(state, parts)
+        self.observation_slices = self.observer.slices(self.simulation, state, parts)
         if not mode.nothing:
             self.single_observation_space = space_of(self.start[0], batched=True)
             self.observation_space = batch_space(self.single_observation_space, self.num_envs)
