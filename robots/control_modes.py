@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from robots.action_split import ActionSplit, JointGroup, is_gripper
+from robots.common.bounds import shown
 from robots.common.errors import DescriptorError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -62,6 +63,29 @@ CONTROL_MODES = tuple(MODES)  # ManiSkill's names
 def modes_of(robot: RobotDescriptor) -> tuple[str, ...]:
     """Return the names of the modes that may be asked of a robot: ManiSkill's, then its own."""
     return (*CONTROL_MODES, *(name for name in robot.control_modes if name not in MODES))
+
+
+def read_mode(text: str) -> str | dict[str, str]:
+    """Return the control mode that a text names, or those by arm: ``left=pd_joint_pos,right=…``.
+
+    Raises:
+        DescriptorError: If it is neither.
+    """
+    if "=" not in text:
+        return text
+    pairs = [part.partition("=")[::2] for part in text.split(",")]
+    names = [arm.strip() for arm, _ in pairs]
+    if not all(arm.strip() and mode.strip() for arm, mode in pairs) or len(set(names)) < len(names):
+        raise DescriptorError(
+            f"control mode {shown(text)} makes no sense; a name such as {CONTROL_MODES[0]!r} is"
+            " needed, or one for each arm: 'left=pd_ee_pose,right=pd_joint_pos'"
+        )
+    return {arm.strip(): mode.strip() for arm, mode in pairs}
+
+
+def plain_mode(mode: str | Mapping[str, str]) -> str | dict[str, str]:
+    """Return a control mode, or those by arm, as plain data."""
+    return mode if isinstance(mode, str) else dict(mode)
 
 
 def in_mode(robot: RobotDescriptor, mode: str | Mapping[str, str]) -> RobotDescriptor:

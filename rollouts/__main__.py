@@ -13,6 +13,7 @@ from robots.common.commands import exit_code, start
 COMMANDS = {
     "record": "rollouts.recording.record_command",
     "evaluate": "rollouts.evaluate_command",
+    "convert": "rollouts.recording.convert_command",
     "replay": "rollouts.playing.replay_command",
     "export": "rollouts.export.command",
     "view": "rollouts.view_command",

@@ -15,7 +15,7 @@ from robots import RobotDescriptor
 from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
 from tasks import MultiRobotTask
 from tasks.episode import States
-from tasks.native.format import articulation_keys, declared_joints
+from tasks.native.format import articulation_keys, declared_joints, mode_by_arm
 
 Floats = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -204,11 +204,13 @@ def make_task(file: TrajectoryFile, *, pictures: bool = False) -> MultiRobotTask
         TrajectoryError: If it is not the world of the recording even so.
     """
     recorded = file.simulation or {}
+    layout = recorded_layout(file.layout) if file.layout else None
+    own = layout or tasks.get_task_class(file.task_id).scenario.layout
     task = tasks.make(
         file.task_id,
-        layout=recorded_layout(file.layout) if file.layout else None,
+        layout=layout,
         obs_mode="none",
-        control_mode=file.control_mode,
+        control_mode=mode_by_arm(file.control_mode, own),
         render_mode="rgb_array" if pictures else None,
         **{name: recorded[name] for name in ("control_frequency",) if name in recorded},
     )

@@ -13,6 +13,7 @@ from robots import TaskError
 from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
 from tasks import MultiRobotTask, get_task_class, make
 from tasks.episode import States, play
+from tasks.native.format import mode_by_arm
 
 Start = Literal["seed", "state"]
 STARTS: tuple[Start, ...] = ("seed", "state")
@@ -132,7 +133,9 @@ def task_for(file: TrajectoryFile) -> MultiRobotTask:
         TrajectoryError: If the file's layout, robot files, physics or actions are not those of
             the task here.
     """
-    task = make(file.task_id, obs_mode="none", control_mode=file.control_mode)
+    layout = get_task_class(file.task_id).scenario.layout
+    mode = mode_by_arm(file.control_mode, layout)
+    task = make(file.task_id, obs_mode="none", control_mode=mode)
     file.expect(task.task_id, task.layout.action_dim)
     file.expect_world(task)
     return task

@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
+from dataclasses import fields as fields_of
 from typing import Any
 
 from layouts import Layout
+from robots import JointGroup
 from robots.common.files import parse_json
 from robots.fingerprint import asset_fingerprint
 from rollouts.reading.json_fields import (
@@ -45,6 +47,9 @@ LAYOUT = maybe(
 )
 SIMULATION = maybe(fields({}, {"physics": maybe(OBJECT), "control_frequency": NUMBER}))
 
+# Fields that joint groups did not have when earlier recordings were made.
+_LATER = ("command", "target", "frame", "root_link")
+
 _SHOWN = 4  # differences that a message names
 _ABSENT = "nothing"
 
@@ -71,13 +76,19 @@ def describe_layout(layout: Layout) -> dict[str, dict[str, Any]]:
             "qpos_noise": placement.qpos_noise,
             "action": [split[name].start, split[name].stop],
             "joint_groups": {
-                group: asdict(joints)
+                group: _describe_group(joints)
                 for group, joints in placement.robot.action_split.groups.items()
             },
             "assets": asset_fingerprint(placement.robot.urdf),
         }
         for name, placement in layout.items()
     }
+
+
+def _describe_group(group: JointGroup) -> dict[str, Any]:
+    """Return a joint group's fields, without those for control modes where they say nothing."""
+    quiet = {field.name: field.default for field in fields_of(group) if field.name in _LATER}
+    return {k: v for k, v in asdict(group).items() if k not in quiet or v != quiet[k]}
 
 
 def describe_simulation(task: MultiRobotTask) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -121,7 +121,7 @@ def record(
     *,
     workers: int | None = None,
     episode_timeout: float | None = EPISODE_SECONDS,
-    control_mode: str = CONTROL_MODES[0],
+    control_mode: str | Mapping[str, str] = CONTROL_MODES[0],
     on_event: Callable[[Summary, Event | None], None] = lambda summary, event: None,
 ) -> Summary:
     """Record the episodes of some seeds; those that are in the folder already are kept.
@@ -136,7 +136,7 @@ def record(
             but this one.
         episode_timeout: Seconds that an episode may take in a worker until that is ended and the
             episode played again, three times in all; None if it may take for ever.
-        control_mode: Control mode of the recorded actions.
+        control_mode: Control mode of the recorded actions, or those by arm.
         on_event: Called once at the start without an event, and after every event.
 
     Raises:

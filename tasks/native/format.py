@@ -46,6 +46,14 @@ def observation_keys(layout: Layout) -> dict[str, str | None]:
     return {name: f"{p.robot.name}-{i}" for i, (name, p) in enumerate(layout.items())}
 
 
+def mode_by_arm(mode: str | Mapping[str, str], layout: Layout) -> str | dict[str, str]:
+    """Return a recorded control mode with the layout's names of arms for native's of robots."""
+    if isinstance(mode, str):
+        return mode
+    places = {key: place for place, key in observation_keys(layout).items() if key is not None}
+    return {places.get(name, name): own for name, own in mode.items()}
+
+
 def articulation_keys(layout: Layout) -> dict[str, str]:
     """Return native's state-dict key of each robot."""
     if len(layout) == 1:
