@@ -13,7 +13,7 @@ from typing import Any, NoReturn, Protocol, runtime_checkable
 from robots.action_split import ActionNumber, ActionSplit, JointGroup, is_gripper, names
 from robots.common.errors import DescriptorError, UnknownNameError
 from robots.common.fields import settle_fields
-from robots.limbs import check_limbs, parts_of
+from robots.limbs import share_out
 from robots.parts import (
     IDENTITY,
     CameraMount,
@@ -125,7 +125,7 @@ class RobotDescriptor:
         object.__setattr__(self, "keyframes", _Frozen(frozen))
         self.keyframe(self.home.keyframe)
         object.__setattr__(self, "limbs", _Frozen(self.limbs))
-        check_limbs(self)
+        self._owners()
 
     @classmethod
     def from_urdf(
@@ -178,7 +178,12 @@ class RobotDescriptor:
         Each limb by its name, and what is driven besides as ``body``, described like a robot: own
         joint groups, keyframes, TCP, fingers and reach.
         """
-        return parts_of(self)
+        owners = self._owners()
+        return {
+            part: self._described(part, [group for group, owner in owners.items() if owner == part])
+            for part in dict.fromkeys(owners.values())
+            if part is not None
+        }
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -226,6 +231,32 @@ class RobotDescriptor:
         """The least and the largest value of each action number."""
         groups = self.action_split.groups.values()
         return tuple(bounds for group in groups for bounds in group.bounds)
+
+    def _owners(self) -> dict[str, str | None]:
+        """Return whose each joint group is, if there are limbs."""
+        if not self.limbs:
+            return {}
+        try:
+            return share_out(self.limbs, self.action_split)
+        except DescriptorError as error:
+            raise DescriptorError(f"{self.name}: {error}") from None
+
+    def _described(self, part: str, groups: Sequence[str]) -> RobotDescriptor:
+        """Return what is said of a part, as of a robot of its own."""
+        split = ActionSplit(**{group: self.action_split.groups[group] for group in groups})
+        places = [self.joints.index(joint) for joint in split.joints]
+        limb = self.limbs.get(part)
+        return replace(
+            self,
+            action_split=split,
+            keyframes={key: [qpos[i] for i in places] for key, qpos in self.keyframes.items()},
+            tcp_link=limb.tcp_link if limb else self.tcp_link,
+            tcp_position_links=limb.tcp_position_links if limb else self.tcp_position_links,
+            fingers=limb and limb.fingers,
+            reach=limb.reach if limb else self.reach,
+            cameras=tuple(c for c in self.cameras if part in c.name.split("_")),
+            limbs={},
+        )
 
     def in_control_mode(self, mode: str) -> RobotDescriptor:
         """Return the robot with the actions of a control mode.
