@@ -11,14 +11,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import pi
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from robots.action_split import ActionSplit, JointGroup, is_gripper
 from robots.common.bounds import shown
-from robots.common.errors import DescriptorError, UnknownNameError
-
-if TYPE_CHECKING:
-    from robots.descriptor import RobotDescriptor
+from robots.common.errors import DescriptorError
 
 # mani_skill 3.0.1, agents/robots/panda/panda.py
 SPEED = 1.0  # rad/s or m/s, of an action number of 1
@@ -60,11 +56,6 @@ MODES: Mapping[str, ControlMode] = MappingProxyType(
 CONTROL_MODES = tuple(MODES)  # ManiSkill's names
 
 
-def modes_of(robot: RobotDescriptor) -> tuple[str, ...]:
-    """Return the names of the modes that may be asked of a robot: ManiSkill's, then its own."""
-    return (*CONTROL_MODES, *(name for name in robot.control_modes if name not in MODES))
-
-
 def read_mode(text: str) -> str | dict[str, str]:
     """Return the control mode that a text names, or those by arm: ``left=pd_joint_pos,right=…``.
 
@@ -88,83 +79,50 @@ def plain_mode(mode: str | Mapping[str, str]) -> str | dict[str, str]:
     return mode if isinstance(mode, str) else dict(mode)
 
 
-def in_mode(robot: RobotDescriptor, mode: str | Mapping[str, str]) -> RobotDescriptor:
-    """Return a robot with the actions of a control mode; see `RobotDescriptor.in_control_mode`."""
-    parts = robot.parts or {robot.name: robot}
-    chosen = dict.fromkeys(parts, mode) if isinstance(mode, str) else dict(mode)
-    for name, own in chosen.items():
-        if name not in parts:
-            raise UnknownNameError(f"limb of {robot.name}", name, parts)
-        if own not in modes_of(robot):
-            raise UnknownNameError("control mode", own, modes_of(robot))
-    changed: dict[str, JointGroup] = {}
-    for name, own in chosen.items():
-        if own != CONTROL_MODES[0] or own in robot.control_modes:
-            limb = not robot.limbs or name in robot.limbs
-            changed.update(_groups(robot, parts[name].action_split, own, limb=limb))
-    if all(robot.action_split.groups[name] == group for name, group in changed.items()):
-        return robot
-    return replace(robot, action_split=robot.action_split.replace(**changed))
-
-
-def check_modes(robot: RobotDescriptor) -> None:
-    """Refuse modes of a robot's own that drive groups which it does not have.
-
-    Raises:
-        DescriptorError: If there are any.
-    """
-    for mode, groups in robot.control_modes.items():
-        for name, group in groups.items():
-            own = robot.action_split.groups.get(name)
-            if own is None or own.joints != group.joints:
-                raise DescriptorError(
-                    f"{robot.name}: control mode {mode!r} drives {name!r} with joints"
-                    f" {', '.join(group.joints)}; the action split has no such group"
-                )
-
-
-def _groups(
-    robot: RobotDescriptor, split: ActionSplit, mode: str, *, limb: bool
+def driven_in(
+    mode: str, split: ActionSplit, own: Mapping[str, JointGroup], *, has_tcp: bool = True
 ) -> dict[str, JointGroup]:
-    """Return the joint groups that a mode changes, of a robot or one of its parts.
+    """Return the joint groups that a control mode changes, of a robot or one of its limbs.
 
     Args:
-        robot: The robot.
-        split: What the part drives.
         mode: Name of the mode.
-        limb: Whether the part has a TCP.
+        split: What the robot or limb drives, as declared.
+        own: Groups that the robot drives in a way of its own in this mode.
+        has_tcp: Whether there is a TCP to move.
+
+    Raises:
+        DescriptorError: If what the mode needs is missing: joint limits, or an arm.
     """
-    own = {n: group for n, group in robot.control_modes.get(mode, {}).items() if n in split}
-    if mode not in MODES:
-        return own
+    changed = {name: group for name, group in own.items() if name in split}
+    if mode == CONTROL_MODES[0] or mode not in MODES:
+        return changed
     asked = MODES[mode]
     relative = {n: g for n, g in split.groups.items() if g.delta and n not in own}
     if asked.command == "position":
-        return own | {name: _by_position(group, asked) for name, group in relative.items()}
+        return changed | {name: _by_position(group, asked) for name, group in relative.items()}
     arms = {name: group for name, group in relative.items() if not is_gripper(name)}
-    if asked.command.startswith("tcp"):
-        if own or not limb:
-            return own
-        name = _arm(robot, list(arms), mode)
-        return {name: _by_tcp(arms[name], asked)}
-    if not arms and not own and limb:
-        raise DescriptorError(
-            f"{robot.name} has no joint group that {mode!r} could drive: none is relative in"
-            f" {CONTROL_MODES[0]!r}, but for grippers"
-        )
-    return own | {name: _by_velocity(group, asked) for name, group in arms.items()}
+    if asked.command in ("velocity", "position_velocity"):
+        if not arms and not changed and has_tcp:
+            raise DescriptorError(
+                f"there is no joint group that {mode!r} could drive: but for grippers, none is"
+                f" relative in {CONTROL_MODES[0]!r}"
+            )
+        return changed | {name: _by_velocity(group, asked) for name, group in arms.items()}
+    if any(group.asks.tcp for group in changed.values()) or not has_tcp:
+        return changed
+    arm = _arm(mode, split, list(arms))
+    return changed | {arm: _by_tcp(arms[arm], asked)}
 
 
-def _arm(robot: RobotDescriptor, groups: Sequence[str], mode: str) -> str:
+def _arm(mode: str, split: ActionSplit, groups: Sequence[str]) -> str:
     """Return the group whose joints bring the TCP somewhere."""
     named = [name for name in groups if "arm" in name.split("_")]
     for choice in (groups, named):
         if len(choice) == 1:
             return choice[0]
     raise DescriptorError(
-        f"{robot.name} cannot be driven in {mode!r}, which moves its TCP: of its joint groups,"
-        f" {', '.join(robot.action_split)}, not one alone is its arm. Call one 'arm', or give it"
-        f" control_modes={{{mode!r}: {{...}}}}"
+        f"{mode!r} moves the TCP, and of the joint groups {', '.join(split)} not one alone is the"
+        f" arm. Call one 'arm', or say it in control_modes={{{mode!r}: {{...}}}}"
     )
 
 

@@ -6,15 +6,15 @@ import os
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NoReturn, Protocol, runtime_checkable
 
 from robots.action_split import ActionNumber, ActionSplit, JointGroup, is_gripper, names
 from robots.common.errors import DescriptorError, UnknownNameError
 from robots.common.fields import settle_fields
-from robots.control_modes import CONTROL_MODES, check_modes, in_mode
-from robots.limbs import check_limbs, parts_of
+from robots.control_modes import CONTROL_MODES, MODES, driven_in
+from robots.limbs import share_out
 from robots.parts import (
     IDENTITY,
     CameraMount,
@@ -129,10 +129,10 @@ class RobotDescriptor:
         object.__setattr__(self, "keyframes", _Frozen(frozen))
         self.keyframe(self.home.keyframe)
         object.__setattr__(self, "limbs", _Frozen(self.limbs))
-        check_limbs(self)
+        self._owners()
         modes = {mode: _Frozen(groups) for mode, groups in self.control_modes.items()}
         object.__setattr__(self, "control_modes", _Frozen(modes))
-        check_modes(self)
+        self._check_modes()
 
     @classmethod
     def from_urdf(
@@ -185,7 +185,12 @@ class RobotDescriptor:
         Each limb by its name, and what is driven besides as ``body``, described like a robot: own
         joint groups, keyframes, TCP, fingers and reach.
         """
-        return parts_of(self)
+        owners = self._owners()
+        return {
+            part: self._described(part, [group for group, owner in owners.items() if owner == part])
+            for part in dict.fromkeys(owners.values())
+            if part is not None
+        }
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -234,6 +239,49 @@ class RobotDescriptor:
         groups = self.action_split.groups.values()
         return tuple(bounds for group in groups for bounds in group.bounds)
 
+    def _owners(self) -> dict[str, str | None]:
+        """Return whose each joint group is, if there are limbs."""
+        if not self.limbs:
+            return {}
+        try:
+            return share_out(self.limbs, self.action_split)
+        except DescriptorError as error:
+            raise DescriptorError(f"{self.name}: {error}") from None
+
+    def _described(self, part: str, groups: Sequence[str]) -> RobotDescriptor:
+        """Return what is said of a part, as of a robot of its own."""
+        split = ActionSplit(**{group: self.action_split.groups[group] for group in groups})
+        places = [self.joints.index(joint) for joint in split.joints]
+        limb = self.limbs.get(part)
+        return replace(
+            self,
+            action_split=split,
+            keyframes={key: [qpos[i] for i in places] for key, qpos in self.keyframes.items()},
+            tcp_link=limb.tcp_link if limb else self.tcp_link,
+            tcp_position_links=limb.tcp_position_links if limb else self.tcp_position_links,
+            fingers=limb and limb.fingers,
+            reach=limb.reach if limb else self.reach,
+            cameras=tuple(c for c in self.cameras if part in c.name.split("_")),
+            limbs={},
+            control_modes={},
+        )
+
+    def _check_modes(self) -> None:
+        """Refuse modes of the robot's own that drive groups which it does not have."""
+        for mode, groups in self.control_modes.items():
+            for name, group in groups.items():
+                own = self.action_split.groups.get(name)
+                if own is None or own.joints != group.joints:
+                    raise DescriptorError(
+                        f"{self.name}: control mode {mode!r} drives {name!r} with joints"
+                        f" {', '.join(group.joints)}; the action split has no such group"
+                    )
+
+    @property
+    def modes(self) -> tuple[str, ...]:
+        """The control modes that may be asked of it: ManiSkill's, then its own."""
+        return (*CONTROL_MODES, *(name for name in self.control_modes if name not in MODES))
+
     def in_control_mode(self, mode: str | Mapping[str, str]) -> RobotDescriptor:
         """Return the robot with the actions of a control mode.
 
@@ -248,7 +296,23 @@ class RobotDescriptor:
             UnknownNameError: If there is no such control mode, or no such limb.
             DescriptorError: If the robot lacks what the mode needs: joint limits, or an arm.
         """
-        return in_mode(self, mode)
+        parts = self.parts or {self.name: self}
+        chosen = dict.fromkeys(parts, mode) if isinstance(mode, str) else mode
+        changed: dict[str, JointGroup] = {}
+        for part, name in chosen.items():
+            if part not in parts:
+                raise UnknownNameError(f"limb of {self.name}", part, parts)
+            if name not in self.modes:
+                raise UnknownNameError("control mode", name, self.modes)
+            split, own = parts[part].action_split, self.control_modes.get(name, {})
+            try:
+                has_tcp = not self.limbs or part in self.limbs
+                changed.update(driven_in(name, split, own, has_tcp=has_tcp))
+            except DescriptorError as error:
+                raise DescriptorError(f"{self.name}: {error}") from None
+        if all(self.action_split.groups[name] == group for name, group in changed.items()):
+            return self
+        return replace(self, action_split=self.action_split.replace(**changed))
 
     def describe_action(self) -> tuple[ActionNumber, ...]:
         """Return name, unit and range of every action number, in order."""

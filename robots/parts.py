@@ -198,20 +198,19 @@ def both_sides(
         tcp_position_links: See `Limb`.
     """
 
-    def named(links: tuple[str, ...], side: str) -> tuple[str, ...]:
-        return tuple(link.format(side=side, s=side[0]) for link in links)
+    def named(link: str, side: str) -> str:
+        return link.format(side=side, s=side[0])
 
-    x, y, z = base
-    return {
-        side: Limb(
-            *named((tcp_link,), side),
-            reach,
-            (x, sign * y, z),
-            fingers and replace(fingers, links=named(fingers.links, side)),
-            named(tcp_position_links, side),
+    def limb(side: str, sign: int) -> Limb:
+        return Limb(
+            tcp_link=named(tcp_link, side),
+            reach=reach,
+            base=(base[0], sign * base[1], base[2]),
+            fingers=fingers and replace(fingers, links=[named(f, side) for f in fingers.links]),
+            tcp_position_links=tuple(named(link, side) for link in tcp_position_links),
         )
-        for side, sign in (("left", 1), ("right", -1))
-    }
+
+    return {"left": limb("left", 1), "right": limb("right", -1)}
 
 
 def expect(right: bool, otherwise: str) -> None:

@@ -43,6 +43,10 @@ class Places(dict[str, Place]):
         """Refuse an unknown name."""
         raise UnknownNameError(self.kind, name, self)
 
+    def rename(self, name: str, also: str) -> None:
+        """Let something go by another name, too."""
+        self[also] = self[name]
+
     def expect(self, *names: str) -> None:
         """Refuse unknown names."""
         for name in names:
@@ -155,7 +159,7 @@ class ReadoutIndex:
         self.velocities: Declared[Velocity] = Declared()
         self.forces: Declared[Pair] = Declared()
         self._grasps: dict[tuple[str, str], list[int]] = {}
-        self._owners: dict[str, str] = {}
+        self._owners: Places[str] = Places(_ROBOT)
         for name, placement in layout.items():
             self._add_robot(name, placement.robot, built.robots[name])
         for short, name in layout.short_names.items():
@@ -237,7 +241,7 @@ class ReadoutIndex:
             self.fingers,
             self.tcps,
         ):
-            places[short] = places[name]
+            places.rename(name, short)
 
     def _tcp_frame(self, links: Places[int], descriptor: RobotDescriptor) -> int:
         orientation = links[descriptor.tcp_link]

@@ -37,7 +37,7 @@ BAXTER = RobotDescriptor(
         right_gripper=replace(LEFT_GRIPPER, joints=tuple(f"r{j[1:]}" for j in LEFT_GRIPPER.joints)),
         head=JointGroup.hold(("head_pan",)),
     ),
-    tcp_link="left_gripper", fingers=Fingers(FINGERS[:2]),
+    tcp_link="left_gripper", fingers=Fingers((FINGERS[0], FINGERS[1])),
     gripper_material=GripperMaterial((*FINGERS, *(f[:-4] for f in FINGERS)), 2.0, 2.0, 0.0, 0.1),
     limbs=both_sides("{side}_gripper", 1.201, (0.064, 0.259, 0.1296),
                      Fingers(("{s}_gripper_l_finger_tip", "{s}_gripper_r_finger_tip"))),

@@ -23,12 +23,13 @@ LEFT_ARM = JointGroup(
 RIGHT_ARM = replace(
     LEFT_ARM, joints=tuple(f"r{joint[1:]}" for joint in LEFT_ARM.joints),
     limits=((-2.2853982, 0.7146018), (-0.5236, 1.3963), (-3.9, 0.8), *LIMITS))
-FINGERTIPS = Fingers(tuple(f"l_gripper_{f}_finger_tip_link" for f in "lr"), max_angle=110.0)
+TIPS = ("{s}_gripper_l_finger_tip_link", "{s}_gripper_r_finger_tip_link")
+LEFT_TIPS = Fingers((TIPS[0].format(s="l"), TIPS[1].format(s="l")), max_angle=110.0)
 # The URDF turns one of these against its limits; here all turn alike, as on the robot.
 LEFT_GRIPPER = JointGroup(
     tuple(f"l_gripper_{j}_joint" for j in (*FINGERS, "l_parallel_root", "r_parallel_root")), 0.0,
     0.548, stiffness=1e2, damping=1e1, force_limit=100.0, mimic=True, reset_noise=False)
-RIGHT_GRIPPER = replace(LEFT_GRIPPER, joints=tuple(f"r{j[1:]}" for j in LEFT_GRIPPER.joints))
+RIGHT_HAND = replace(LEFT_GRIPPER, joints=tuple(f"r{j[1:]}" for j in LEFT_GRIPPER.joints))
 LEFT_REST = (0.501771, 0.020107, 2.22013, -1.07038, 0.340878, -0.742479, -0.142704)
 RIGHT_REST = (-0.501771, 0.020107, -2.22013, -1.07038, -0.340878, -0.742479, 0.142704)
 
@@ -36,15 +37,14 @@ PR2 = RobotDescriptor(
     name="pr2",
     urdf=UrdfLocator("example_pr2_description", "urdf/pr2.urdf"),
     action_split=ActionSplit(
-        left_arm=LEFT_ARM, left_gripper=LEFT_GRIPPER,
-        right_arm=RIGHT_ARM, right_gripper=RIGHT_GRIPPER,
+        left_arm=LEFT_ARM, left_gripper=LEFT_GRIPPER, right_arm=RIGHT_ARM, right_gripper=RIGHT_HAND,
         torso=JointGroup.hold(("torso_lift_joint",), unit="m"),
         head=JointGroup.hold(("head_pan_joint", "head_tilt_joint", "laser_tilt_mount_joint"))),
-    tcp_link="l_gripper_tool_frame", fingers=FINGERTIPS, gripper_material=GripperMaterial(
+    tcp_link="l_gripper_tool_frame", fingers=LEFT_TIPS, gripper_material=GripperMaterial(
         tuple(f"{side}_gripper_{f}_link" for side in "lr" for f in FINGERS), 2.0, 2.0, 0.0, 0.1),
     keyframes={"rest": (*LEFT_REST, *(0.548,) * 6, *RIGHT_REST, *(0.548,) * 6, *(0,) * 4)},
-    limbs=both_sides("{s}_gripper_tool_frame", 1.001, (-0.05, 0.188, 0.7907), replace(
-        FINGERTIPS, links=tuple(f"{{s}}{link[1:]}" for link in FINGERTIPS.links))),
+    limbs=both_sides("{s}_gripper_tool_frame", 1.001, (-0.05, 0.188, 0.7907),
+                     replace(LEFT_TIPS, links=TIPS)),
     reach=1.195,  # of the left TCP, from the URDF
     source="example-robot-data 6.0.0, pr2_description; drives from the inertia behind each joint",
     allowed_collisions=among(

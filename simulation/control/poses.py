@@ -36,7 +36,8 @@ _TWO, _ONE = np.float32(2), np.float32(1)
 
 def product(a: Floats, b: Floats) -> Floats:
     """Return products of quaternions, (n, 4); of either sign."""
-    terms = a[:, :, None] * (b[:, _MET] * _SIGNS)
+    factors: Floats = b[:, _MET] * _SIGNS
+    terms: Floats = a[:, :, None] * factors
     return terms[:, 0] + terms[:, 1] + terms[:, 2] + terms[:, 3]
 
 
@@ -73,7 +74,7 @@ def rotation(angles: Floats) -> Floats:
     np.multiply(numbers[:, 0], numbers[:, 4], out=numbers[:, 7])
     numbers[:, 8], numbers[:, 9] = 1.0, 0.0
     factors = numbers[:, _FACTORS]
-    products = factors[..., 0] * factors[..., 1] * _FACTOR_SIGNS
+    products: Floats = factors[..., 0] * factors[..., 1] * _FACTOR_SIGNS
     return quaternion(products[:, 0] + products[:, 1])
 
 

@@ -61,6 +61,7 @@ class PoseFollower:
             raise DescriptorError(
                 f"{robot.descriptor.name}: none of {', '.join(joints)} moves {link}"
             )
+        self._pose: Any = sapien.Pose
         self._model: Any = PinocchioModel(tree.text, _GRAVITY)
         self._model.set_joint_order(active)
         self._model.set_link_order(links)
@@ -77,7 +78,7 @@ class PoseFollower:
         """Return the joints, or None; see `simulation.backend.PoseFollower`."""
         found, solved, _ = self._model.compute_inverse_kinematics(
             self._link,
-            sapien.Pose(position, quaternion),
+            self._pose(position, quaternion),
             initial_qpos=qpos[self._taken],
             active_qmask=self._mask,
             max_iterations=_MAX_ITERATIONS,

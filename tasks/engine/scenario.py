@@ -12,7 +12,6 @@ import numpy as np
 from layouts import Layout
 from robots import CONTROL_MODES, TaskError, UnknownNameError
 from robots.common.bounds import checked_choice, checked_flag, checked_whole, shown
-from robots.control_modes import modes_of
 from simulation import SAPIEN_DEFAULTS, Camera, PhysicsSettings
 from simulation.physics import substeps
 from tasks.engine.observation import read_mode
@@ -118,7 +117,7 @@ def check_control_mode(layout: Layout, mode: object) -> None:
         TaskError: If it is none, or names an arm that there is not.
     """
     if not isinstance(mode, Mapping):
-        known = dict.fromkeys(m for p in layout.values() for m in modes_of(p.robot))
+        known = dict.fromkeys(m for p in layout.values() for m in p.robot.modes)
         checked_choice("control_mode", mode, tuple(known), TaskError)
         return
     for arm, own in mode.items():
@@ -126,7 +125,7 @@ def check_control_mode(layout: Layout, mode: object) -> None:
             robot = layout[layout.owner(arm)].robot
         except UnknownNameError as error:
             raise TaskError(f"control_mode: {error}") from None
-        checked_choice(f"control_mode of {arm!r}", own, modes_of(robot), TaskError)
+        checked_choice(f"control_mode of {arm!r}", own, robot.modes, TaskError)
 
 
 def _check_count(num_envs: object) -> None:
