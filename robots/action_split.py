@@ -157,6 +157,13 @@ class JointGroup:
                 f"{self.joints} take {self.command!r}; a group that is held or mimics takes"
                 " positions only"
             )
+        if self.asks.drive and len(self.joints) != 3:
+            raise DescriptorError(
+                f"{self.joints} take {self.command!r}, which needs three joints: along x, along y,"
+                " about z"
+            )
+        if self.command == "tcp_position" and not self.delta:
+            raise DescriptorError(f"{self.joints} take 'tcp_position', which is a delta only")
 
     def _refuse_bad_ranges(self) -> None:
         for name, value in (("lower", self.lower), ("upper", self.upper)):

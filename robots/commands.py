@@ -32,12 +32,15 @@ class Command:
         place: Whether there are three for the position of the TCP (m).
         turn: Whether there are three for its orientation: angles about x, y and z of the frame
             that is turned, in this order (rad).
+        drive: Whether there are two for a base that rolls: its speed forward and that of its turn.
+            Its joints slide along x and y and turn about z, in this order.
     """
 
     positions: bool = False
     velocities: bool = False
     place: bool = False
     turn: bool = False
+    drive: bool = False
 
     @property
     def tcp(self) -> bool:
@@ -60,6 +63,8 @@ class Command:
             named += [(axis, "m") for axis in _PLACE]
         if self.turn:
             named += [(axis, "rad") for axis in _TURN]
+        if self.drive:
+            named += [("forward", "m/s"), ("turn", "rad/s")]
         return tuple(named)
 
 
@@ -70,6 +75,7 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "position_velocity": Command(positions=True, velocities=True),
         "tcp_position": Command(place=True),
         "tcp_pose": Command(place=True, turn=True),
+        "base_velocity": Command(drive=True),
     }
 )
 """What a `robots.JointGroup` can be asked for, by name."""

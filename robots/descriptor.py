@@ -321,6 +321,9 @@ class RobotDescriptor:
             if group.held:
                 continue
             driven = [(joint,) for joint in group.joints] * 2  # by positions, and by velocities
+            if group.asks.drive:
+                driven = [group.joints[:2], group.joints[2:]]
+            each = not (group.mimic or group.asks.tcp)
             for i, ((moved, unit), (lower, upper)) in enumerate(
                 zip(group.numbers, group.ranges, strict=not group.mimic)
             ):
@@ -332,7 +335,7 @@ class RobotDescriptor:
                         index=len(numbers),
                         name=group_name if group.mimic else f"{group_name}.{moved}",
                         group=group_name,
-                        joints=group.joints if group.mimic or group.asks.tcp else driven[i],
+                        joints=driven[i] if each else group.joints,
                         unit=f"{unit} per step" if relative else unit,
                         lower=-lower if turned else lower,
                         upper=lower if turned else upper,

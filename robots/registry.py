@@ -16,6 +16,7 @@ CATALOGUE = {
     "baxter": "robots.catalogue.baxter:BAXTER",
     "dclaw": "robots.catalogue.dclaw:DCLAW",
     "fetch": "robots.catalogue.fetch:FETCH",
+    "fetch_driving": "robots.catalogue.fetch_driving:FETCH_DRIVING",
     "fixed_inspire_hand_left": "robots.catalogue.fixed_inspire_hand_left:FIXED_INSPIRE_HAND_LEFT",
     "fixed_inspire_hand_right": (
         "robots.catalogue.fixed_inspire_hand_right:FIXED_INSPIRE_HAND_RIGHT"

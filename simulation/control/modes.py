@@ -13,7 +13,7 @@ from robots import JointGroup
 from simulation.backend import Backend
 from simulation.control.tcp import Tool, ToolControl
 from simulation.controller import JointPositionController
-from simulation.maths import Floats
+from simulation.maths import Floats, cos, sin
 from simulation.readout import ReadoutIndex
 from simulation.state import State
 
@@ -64,7 +64,10 @@ class ModeController:
         driven = list(_driven(layout))
         self._from_target = np.zeros(positions.dof, bool)
         self._velocity_joints, self._velocity_numbers = _velocities(driven)
-        self.moves = len(self._velocity_joints) > 0
+        self._bases = [
+            (part.joints.start, part.numbers.start) for part in driven if part.group.asks.drive
+        ]
+        self.moves = len(self._velocity_joints) > 0 or bool(self._bases)
         for part in driven:
             if part.group.target and part.group.asks.positions:
                 self._from_target[part.joints.start : part.joints.stop] = True
@@ -135,6 +138,11 @@ class ModeController:
             return targets, None
         velocities = np.zeros_like(targets)
         velocities[:, self._velocity_joints] = scaled[:, self._velocity_numbers]
+        for joint, number in self._bases:
+            heading, forward = present[:, joint + 2], scaled[:, number]
+            velocities[:, joint] = cos(heading) * forward
+            velocities[:, joint + 1] = sin(heading) * forward
+            velocities[:, joint + 2] = scaled[:, number + 1]
         return targets, velocities
 
     def recall(self) -> list[Floats]:

@@ -23,6 +23,7 @@ AGENTS = {
     "allegro_hand_right": "allegro_hand_right",
     "dclaw": "dclaw",
     "fetch": "fetch",
+    "fetch_driving": "fetch",
     "floating_panda_gripper": "floating_panda_gripper",
     "koch": "koch-v1.1",
     "panda": "panda",
@@ -39,7 +40,7 @@ DELTAS = CONTROL_MODES[0]
 # joints without an arm. The long tests try every mode that native's agent has.
 MODES = (
     ("fetch", "pd_ee_delta_pose"),
-    ("fetch", "pd_joint_pos"),
+    ("fetch_driving", "pd_joint_pos"),
     ("koch", "pd_joint_pos"),
     ("trifingerpro", "pd_joint_delta_pos_vel"),
 )
