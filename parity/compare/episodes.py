@@ -91,12 +91,18 @@ def recorded_control_mode(path: Path) -> str | None:
     """Return the control mode that a file was recorded in, or None if it does not say.
 
     Raises:
-        TrajectoryError: If the file cannot be read.
+        TrajectoryError: If the file cannot be read, or each arm has a mode of its own: native makes
+            all robots of a task in one.
     """
     if path.suffix != ".h5":
         return None
     with TrajectoryFile(path) as file:
-        return file.control_mode
+        mode = file.control_mode
+    if isinstance(mode, str):
+        return mode
+    raise TrajectoryError(
+        f"{path} was recorded in a control mode for each arm; native's tasks have one for all"
+    )
 
 
 def find_demonstrations(folder: Path) -> dict[str, list[Path]]:

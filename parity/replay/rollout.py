@@ -281,6 +281,7 @@ def _play_native(
     env: MultiRobotTask, episode: Episode, film: Path | None, on_step: Callable[[str], None]
 ) -> Arrays:
     mode, size = env.scenario.control_mode, PICTURE_SIZE if film else None
+    assert isinstance(mode, str)  # a recording with a mode for each arm was refused
     side = NativeSide(env.task_id, control_mode=mode, picture_size=size)
     native, keys = side.envs[0], articulation_keys(env.layout)
 

@@ -2,7 +2,7 @@
 
 The episode is played in both. What its joints were driven to is the reference; at every step it is
 put into the words of the other mode, from where the robots then are. Where a step of the other mode
-is too short, several are taken.
+is too short, several are taken. If the task is not solved then, other numbers of them are tried.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from tasks.episode import REBUILT, follow, moments
 
 Floats = NDArray[np.float64]
 
-_MOST_STEPS = 4  # for one of the reference, as in ManiSkill's replay_trajectory
+_PATIENCE = (4, 1, 10)  # steps for one of the reference; ManiSkill's replay_trajectory takes 4
 _SETTLING = 10  # steps at the end, while the task is not solved
 _NEARLY = 1.0 + 1e-6  # of a normalised number that is just at its bound
 
@@ -60,20 +60,41 @@ def converted(
     """
     reference = followed(source, seed, actions)
     writer = ActionWriter(source, task)
+    written: list[NDArray[np.float32]] = []
+    for most in _PATIENCE:
+        written, solved = _written(writer, reference, task, seed, most)
+        if solved:
+            break
+    return np.array(written, np.float32)
+
+
+def _written(
+    writer: ActionWriter, reference: Reference, task: MultiRobotTask, seed: int, most: int
+) -> tuple[list[NDArray[np.float32]], bool]:
+    """Return the actions of one try, and whether they solve the task.
+
+    Args:
+        writer: Writes them.
+        reference: What they are to reach.
+        task: Is stepped.
+        seed: The episode.
+        most: Steps that may be taken for one of the reference.
+    """
     task.reset(seed, options=REBUILT)
+    steps = len(reference.numbers)
     written: list[NDArray[np.float32]] = []
     solved = False
-    for step in range(len(actions) + _SETTLING):
-        if step >= len(actions) and solved:
+    for step in range(steps + _SETTLING):
+        if step >= steps and solved:
             break
-        for _ in range(_MOST_STEPS):
-            numbers, enough = writer.write(reference, min(step, len(actions) - 1))
+        for _ in range(most):
+            numbers, enough = writer.write(reference, min(step, steps - 1))
             written.append(numbers)
             info = task.advance(numbers[None])[-1]
             solved = bool(info["success"][0])
             if enough:
                 break
-    return np.array(written, np.float32)
+    return written, solved
 
 
 def followed(task: MultiRobotTask, seed: int, actions: NDArray[np.float32]) -> Reference:
