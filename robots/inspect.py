@@ -20,7 +20,7 @@ from robots.assets.manifest import AssetFile, AssetPackage, load_manifest
 from robots.assets.packages import SourceError, find_package
 from robots.assets.progress import size
 from robots.assets.store import AssetStore, FileState, default_root
-from robots.common.commands import exit_code, print_error, start
+from robots.common.commands import exit_code, print_error, program, start
 from robots.descriptor import JointGroup, RobotDescriptor
 from robots.fetch_assets import describe_file
 from robots.registry import RobotRegistry
@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0, or 1 if files are unreadable or a robot that is tried does not work, or 2 if a robot
         does not exist.
     """
-    parser = argparse.ArgumentParser(prog="python -m robots.inspect", description=__doc__)
+    parser = argparse.ArgumentParser(prog=program("robots.inspect"), description=__doc__)
     parser.add_argument("robots", nargs="*", metavar="ROBOT", help="robots to report on")
     parser.add_argument(
         "--try", action="store_true", dest="tries", help="stand, step and move them in physics"

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 
-from robots.common.commands import exit_code, start
+from robots.common.commands import exit_code, program, start
 
 # Command -> its module, with DESCRIPTION, add_arguments(parser) and run(options).
 COMMANDS = {
@@ -44,7 +44,7 @@ def _demo(options: argparse.Namespace) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m rollouts", description=__doc__)
+    parser = argparse.ArgumentParser(prog=program("rollouts"), description=__doc__)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     demo = commands.add_parser("demo", help="let an expert play a task, ten seeds by default")
     add = demo.add_argument

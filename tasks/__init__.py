@@ -21,6 +21,10 @@ Writing a task (`tasks.vocabulary` lists every name; functions of arrays are in 
 ``python -m tasks list`` prints a table of all tasks. Importing this loads neither torch nor sapien.
 """
 
+from kinematics.own_rooms import expect_own
+
+expect_own("robots", "layouts", "simulation")
+
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

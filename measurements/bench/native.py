@@ -25,7 +25,7 @@ from measurements.bench.settings import Benchmark, Settings
 from measurements.bench.steps import PHYSICS, Played
 from parity.compare.native_env import make_native, make_native_front, native_action
 from robots import RobotLayoutsError, TaskError
-from robots.common.commands import start
+from robots.common.commands import program, start
 from robots.common.writing import write_whole
 from tasks import MultiRobotTask, get_task_class, list_clones
 
@@ -159,7 +159,7 @@ def _native_vector(task_id: str) -> Generator[AsyncVectorEnv | None]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit code."""
-    parser = argparse.ArgumentParser(prog="python -m parity bench", description=__doc__)
+    parser = argparse.ArgumentParser(prog=f"{program('parity')} bench", description=__doc__)
     add_arguments(parser)
     parser.epilog = f"Benchmarks: {', '.join(benchmarks(()))}. All of them take some minutes."
     parser.add_argument("--record", action="store_true", help=f"keep all of it in {RECORD.name}")
