@@ -12,6 +12,7 @@ from rich.console import Console
 from layouts.view_command import add_page_options, page_words, show
 from robots import RobotLayoutsError, TaskError
 from robots.common.commands import exit_code, print_error, program, start
+from tasks.cell_options import add_cell_options, chosen_cell
 from tasks.description import (
     TaskFacts,
     declared_facts,
@@ -66,7 +67,7 @@ def _list(options: argparse.Namespace) -> int:
 
 
 def _describe(options: argparse.Namespace) -> None:
-    env = make(options.task)
+    env = make(options.task, **chosen_cell(options))
     console = _console()
     for part in describe(env):
         console.print(part, soft_wrap=isinstance(part, str))
@@ -76,10 +77,14 @@ def _describe(options: argparse.Namespace) -> None:
 def _view(options: argparse.Namespace) -> int:
     """Show a task as it is reset, or hand a recording over to the room that reads recordings."""
     if options.demo is not None:
+        if cell := chosen_cell(options):
+            raise TaskError(
+                f"--demo takes no --{' and no --'.join(cell)}: the recording says who stands where"
+            )
         words = ["view", options.demo, "--task", options.task, "--episode", str(options.episode)]
         command: Any = import_module(RECORDINGS)
         return command.main([*words, *page_words(options)])
-    env = make(options.task, obs_mode="none")
+    env = make(options.task, obs_mode="none", **chosen_cell(options))
     env.reset(options.seed)
     status = show(lambda: task_cell(env, f"{env.task_id}, seed {options.seed}"), options)
     env.close()
@@ -107,6 +112,7 @@ def _parser() -> argparse.ArgumentParser:
     every.set_defaults(run=_list)
     one = commands.add_parser("describe", help="print everything about a task")
     one.add_argument("task", metavar="TASK", help=TASK_HELP)
+    add_cell_options(one)
     one.set_defaults(run=_describe)
     view = commands.add_parser(
         "view",
@@ -117,6 +123,7 @@ def _parser() -> argparse.ArgumentParser:
     view.add_argument("--seed", type=int, default=0, metavar="N", help="of the reset (0)")
     view.add_argument("--demo", metavar="FILE", help="an h5 file of recorded episodes")
     view.add_argument("--episode", type=int, default=0, metavar="N", help="the Nth of them (0)")
+    add_cell_options(view)
     add_page_options(view)
     view.set_defaults(run=_view)
     return parser

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from importlib import import_module
+from os import PathLike
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from layouts import Layout, Placement
@@ -198,9 +199,11 @@ def make(
         task_id: Its id or another of its names.
         num_envs: Number of environments in this process.
         robots: Other robots for some places: a mapping place → robot, or one robot for a task
-            with one place. A robot that lacks its place's keyframe starts from its home's.
+            with one place; by name, descriptor, or the path of a URDF to guess it from. One that
+            lacks its place's keyframe starts from its home's.
         layout: Another layout with the task's places, in any order; for a task over any number of
-            robots, with places of any names.
+            robots, with places of any names. ``bystanders="hold"`` or ``"act"`` lets more robots
+            stand there.
         obs_mode: ``"state"``, ``"state_dict"``, ``"none"``, or what cameras see: ``"rgb"``,
             ``"rgbd"`` and others; see `tasks.Scenario`.
         reward_mode: One of the task's reward modes; None takes native's default.
@@ -248,7 +251,7 @@ def _replace_robots(layout: Layout, robots: RobotLike | Mapping[str, RobotLike])
     if isinstance(robots, Mapping):
         changed = {place: _stand(layout[place], robot) for place, robot in robots.items()}
         return Layout({**layout, **changed}, layout.frames)
-    if len(layout) == 1 and isinstance(robots, (str, RobotDescriptor)):
+    if len(layout) == 1 and isinstance(robots, (str, PathLike, RobotDescriptor)):
         return _replace_robots(layout, {next(iter(layout)): robots})
     given = [robots] if isinstance(robots, (str, RobotDescriptor)) else robots
     names = [name for name in given if isinstance(name, str)] if isinstance(given, list) else []

@@ -126,7 +126,7 @@ class Catalogue(Mapping[str, Value]):
             registered in this process; None for what is built in, or says nothing of itself.
         """
         home, known = self.home(name), self._known(name)
-        if known in self.lines and home == self.lines[known]:
+        if known is not None and home == self.lines.get(known):
             return None
         for point in self._points(name):
             if point.dist is not None:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 from robots import RecordingError, UnreadableFileError
 from robots.common.files import open_regular, read_text
 from robots.common.writing import PARTIAL, write_whole
+from rollouts.reading.guessed_robots import describe_guessed
 from rollouts.reading.provenance import describe_layout, describe_simulation, differences, listing
 from rollouts.reading.summary import MAX_JSON
 from rollouts.recording.disk import claim, disk_errors
@@ -31,6 +32,7 @@ from rollouts.recording.trajectory_writer import join, read_joined
 from tasks import MultiRobotTask
 from tasks.episode import PlayedEpisode
 from tasks.native.format import observation_keys
+from tasks.registry import full_name
 
 __all__ = ["Recorder", "describe_layout"]
 
@@ -264,9 +266,11 @@ class Recorder:
 
 def _header(task: MultiRobotTask, source: str, source_desc: str | None) -> dict[str, Any]:
     """Return what the json and the attributes of every file say about all episodes."""
+    name, guessed = full_name(type(task)), describe_guessed(task.scenario.layout)
     return {
         "env_info": {
             "env_id": task.task_id,
+            **({"module": name.rpartition(":")[0]} if ":" in name else {}),
             "env_kwargs": {
                 "obs_mode": "none",
                 "reward_mode": task.reward_mode,
@@ -279,6 +283,7 @@ def _header(task: MultiRobotTask, source: str, source_desc: str | None) -> dict[
         "source_desc": source_desc,
         "layout": describe_layout(task.layout),
         "simulation": describe_simulation(task),
+        **({"guessed": guessed} if guessed else {}),
     }
 
 

@@ -1,4 +1,4 @@
-"""Checks of what a task is asked for: which environments, which seeds, which places."""
+"""Checks of what a task is asked for: which environments, which seeds."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-from layouts import Layout
 from robots import TaskError, unknown_name_message
 from robots.common.bounds import checked_flag, shown
 
@@ -90,31 +89,6 @@ def wants_rebuild(options: Mapping[str, Any] | None) -> bool:
         TaskError: If they make no sense.
     """
     return bool(checked_options(options, (RECONFIGURE,)).get(RECONFIGURE, False))
-
-
-def check_places(task: str, layout: Layout, own: Layout, robot_counts: range | None) -> None:
-    """Refuse a layout whose places are not the task's; their order is the layout's own.
-
-    Args:
-        task: The task's name.
-        layout: The layout.
-        own: The task's own layout.
-        robot_counts: How many robots it may have, under any names; None for the places of ``own``.
-
-    Raises:
-        TaskError: If the places are wrong.
-    """
-    if robot_counts is not None:
-        if len(layout) not in robot_counts:
-            raise TaskError(
-                f"{task} takes {robot_counts[0]} to {robot_counts[-1]} robots;"
-                f" the layout has {len(layout)}: {list(layout)}"
-            )
-    elif set(layout) != set(own):
-        raise TaskError(
-            f"{task} has the places {list(own)}; the layout has {list(layout)}."
-            " Give the layout's robots the names of the places"
-        )
 
 
 def check_info(task: str, info: Collection[str]) -> None:

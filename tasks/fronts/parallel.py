@@ -39,7 +39,7 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     Attributes:
         task: The task, with one environment.
-        possible_agents: The robots' places, in declared order.
+        possible_agents: The places of the robots that take action numbers, in declared order.
         agents: The same during an episode, else nothing.
         observed: Robot → the numbers of the task's flat observation that it observes.
     """
@@ -73,7 +73,8 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         self._step = stepper(self.task)
         self._first = FirstSeeds(1)
         self._seed = self.task.seeds[0]
-        self.possible_agents = list(self.task.layout)
+        split = self.task.action_split
+        self.possible_agents = [name for name, part in split.items() if part.stop > part.start]
         self.agents: list[str] = []
         self.observed = self._observed() if self.task.observation_slices else {}
         bounds = self.task.single_action_space
