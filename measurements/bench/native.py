@@ -169,6 +169,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         if options.record and (options.only or options.task):
             raise BenchmarkError("a record holds every benchmark; leave out --only and --task")
         settings = settings_of(options)
+        if settings.making:
+            raise BenchmarkError("native takes no layout and no other robots; leave them out")
         task_ids = settings.tasks if options.task else list_clones()
         _expect_clones(task_ids)
         status, report = run_benchmarks(options, benchmarks(task_ids), settings)
