@@ -54,6 +54,10 @@ COMMANDS: Mapping[str, Command] = {
     "robots guess": Command("robots.from_urdf", "guess a robot from its URDF"),
     "robots manifest": Command("robots.write_manifest", "list the files of the robots"),
     "robots survey": Command("measurements.robots.__main__", "guess many robots, and judge that"),
+    "new task": Command("tasks.new_task", "write the file of a task, its expert and its test"),
+    "new robot": Command(
+        "robots.new_robot", "write the file of a robot from its URDF, and its test"
+    ),
     "parity": Command("parity.__main__", "comparisons with native ManiSkill"),
 }
 
