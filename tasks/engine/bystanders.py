@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from layouts import Layout
-from robots import ActionSplit, JointGroup, RobotDescriptor, TaskError
+from robots import TaskError
 from tasks.language.needs import ACT, HOLD, Needs
 
 BYSTANDERS = (None, HOLD, ACT)
@@ -82,26 +82,9 @@ def settled(
     """Return a layout in which the robots without a place hold still, if they are to."""
     if robot_counts is not None or bystanders != HOLD:
         return layout
-    others = {name: held(layout[name].robot) for name in layout if name not in own}
+    others = {
+        name: replace(placement.robot, action_split=placement.robot.action_split.held())
+        for name, placement in layout.items()
+        if name not in own
+    }
     return layout.replace_robots(**others) if others else layout
-
-
-def held(robot: RobotDescriptor) -> RobotDescriptor:
-    """Return a robot that takes no action number, and is held where it starts."""
-    groups = {name: _held(group) for name, group in robot.action_split.groups.items()}
-    return replace(robot, action_split=ActionSplit(**groups))
-
-
-def _held(group: JointGroup) -> JointGroup:
-    return replace(
-        group,
-        lower=-1.0,
-        upper=1.0,
-        delta=False,
-        mimic=False,
-        multipliers=(),
-        offsets=(),
-        normalised=True,
-        reset_noise=False,
-        held=True,
-    )
