@@ -227,9 +227,10 @@ def _preset(count: int) -> _Preset:
     if count == 1:
         return _Preset("single", "", single)
     if count == 2:
-        by_reach = partial(face_to_face, spacing="auto")
-        return _Preset("face_to_face", ', spacing="auto"', by_reach)
-    return _Preset("ring", ', radius="auto"', partial(ring, radius="auto"))
+        by_reach = partial(face_to_face, spacing="auto", keyframe=None)
+        return _Preset("face_to_face", ', spacing="auto", keyframe=None', by_reach)
+    by_reach = partial(ring, radius="auto", keyframe=None)
+    return _Preset("ring", ', radius="auto", keyframe=None', by_reach)
 
 
 def _written(robot: str) -> str:
