@@ -129,7 +129,7 @@ def find_urdf(robot: RobotDescriptor, store: AssetStore) -> tuple[Path | None, s
 
 
 def _fetch_hint(robot: RobotDescriptor) -> str:
-    return f"`python -m robots.fetch_assets {robot.name}` fetches it"
+    return f"`{program('robots.fetch_assets')} {robot.name}` fetches it"
 
 
 def _catalogue(robots: Iterable[RobotDescriptor]) -> Iterator[str]:

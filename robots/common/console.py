@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from importlib import import_module, metadata
 from typing import Any, NamedTuple, NoReturn
 
@@ -103,8 +104,9 @@ def _run(command: Command, words: Sequence[str]) -> int:
             for name, about in COMMANDS.items()
         }
     )
-    if (folder := os.getcwd()) not in sys.path:
-        sys.path.append(folder)
+    with suppress(OSError):  # it may have been deleted
+        if (folder := os.getcwd()) not in sys.path:
+            sys.path.append(folder)
     module: Any = import_module(command.module)
     return module.main([*command.words, *words])
 

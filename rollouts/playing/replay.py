@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from robots import TaskError
+from robots.common.commands import program
 from rollouts.reading.recorded_task import task_class, task_for
 from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
 from tasks import MultiRobotTask, get_task_class
@@ -134,7 +135,7 @@ def find_official(task_id: str) -> Path:
     if not playable:
         raise TrajectoryError(
             f"there is no recording of {task_id} in {folder} that can be played; give a file, or"
-            f" record one with `python -m rollouts record`{''.join(reasons)}"
+            f" record one with `{program('rollouts')} record`{''.join(reasons)}"
         )
     return min(playable)[1]
 

@@ -13,6 +13,8 @@ from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
 from tasks import MultiRobotTask, get_task_class, make
 from tasks.language.needs import ACT, HOLD
 
+MOST_ROBOTS = 64  # each takes memory, whoever wrote the file
+
 
 def task_class(file: TrajectoryFile, task_id: str | None = None) -> type[MultiRobotTask]:
     """Return the class of the task that a file was recorded in.
@@ -92,6 +94,11 @@ def _recorded(
 ) -> dict[str, Any]:
     """Return the layout of a recording as arguments of `tasks.make`, none if it is the task's."""
     described, guessed = file.layout or {}, file.guessed or {}
+    if len(described) > MOST_ROBOTS:
+        raise TrajectoryError(
+            f"{file.path} has a layout of {len(described)} robots; {MOST_ROBOTS} are the most that"
+            " are built for a recording"
+        )
     placements: dict[str, Placement] = {}
     for place, about in described.items():
         try:

@@ -36,7 +36,8 @@ from tasks.registry import full_name
 
 __all__ = ["Recorder", "describe_layout"]
 
-SOURCE = ("source_type", "source_desc")  # may change from one resumption to the next
+# What may change from one resumption to the next, and what earlier versions did not write.
+NOT_COMPARED = ("source_type", "source_desc", "guessed")
 
 
 class _Entry(NamedTuple):
@@ -225,11 +226,7 @@ class Recorder:
             part.unlink()
 
     def _expect_same(self, path: Path, header: Mapping[str, Any]) -> None:
-        before, now = (
-            {name: value for name, value in about.items() if name not in SOURCE}
-            for about in (header, self._header)
-        )
-        found = differences(before, now)
+        found = differences(_compared(header), _compared(self._header))
         if found:
             raise RecordingError(
                 f"{path} was recorded with something else, so this recording cannot go on there"
@@ -285,6 +282,13 @@ def _header(task: MultiRobotTask, source: str, source_desc: str | None) -> dict[
         "simulation": describe_simulation(task),
         **({"guessed": guessed} if guessed else {}),
     }
+
+
+def _compared(header: Mapping[str, Any]) -> dict[str, Any]:
+    about = {name: value for name, value in header.items() if name not in NOT_COMPARED}
+    if isinstance(info := about.get("env_info"), dict):
+        about["env_info"] = {name: value for name, value in info.items() if name != "module"}
+    return about
 
 
 def _expect_file_or_nothing(path: Path) -> None:
