@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from os import PathLike
 
 from kinematics.quaternions import inverted, multiplied, normalised
 from layouts.frames import ORIGIN, Pose, check_pose, declared_quaternion
-from robots import LayoutError, RobotDescriptor, RobotRegistry
+from robots import LayoutError, RobotDescriptor
 from robots.common.bounds import as_float, shown
 from robots.descriptor import IDENTITY, Quaternion, Vector3
+from robots.named import named_robot
 
-RobotLike = str | RobotDescriptor
+RobotLike = str | PathLike[str] | RobotDescriptor
 
 LARGEST_NOISE = 1.0  # rad; of twice that, a joint starts anywhere
 
@@ -153,17 +155,18 @@ def faced(robot: RobotDescriptor, turn: Quaternion) -> Quaternion:
 
 
 def load_robot(robot: RobotLike) -> RobotDescriptor:
-    """Return a descriptor as it is, or look a name up in the registry.
+    """Return a descriptor as it is, look a name up, or guess the robot of a URDF by its path.
 
     Raises:
-        LayoutError: If it is neither.
+        LayoutError: If it is none of these.
         UnknownNameError: If no robot has that name.
+        AssetError: If it is the path of no usable URDF.
     """
     if isinstance(robot, RobotDescriptor):
         return robot
-    if not isinstance(robot, str):
+    if not isinstance(robot, (str, PathLike)):
         raise LayoutError(f"robot is {shown(robot)}; it takes a robot's name or a RobotDescriptor")
-    return RobotRegistry.load(robot)
+    return named_robot(robot)
 
 
 def check_robots(robots: object) -> None:

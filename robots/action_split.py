@@ -218,6 +218,9 @@ class ActionSplit(Mapping[str, slice]):
         settle(groups, Mapping[str, JointGroup], "ActionSplit", DescriptorError)
         if not any(group.size for group in groups.values()):
             raise DescriptorError("an action split needs at least one joint group to drive")
+        self._lay_out(groups)
+
+    def _lay_out(self, groups: Mapping[str, JointGroup]) -> None:
         joints = [joint for group in groups.values() for joint in group.joints]
         twice = sorted({joint for joint in joints if joints.count(joint) > 1})
         if twice:
@@ -276,9 +279,30 @@ class ActionSplit(Mapping[str, slice]):
         """Return a split with some groups exchanged (new names go to the end)."""
         return ActionSplit(**{**self.groups, **groups})
 
+    def held(self, *groups: str) -> ActionSplit:
+        """Return a split in which groups take no number and are held where they start.
+
+        Args:
+            groups: Their names; all if none is given.
+        """
+        still = groups or self.groups
+        return _split_from_groups(
+            {name: _held(g) if name in still else g for name, g in self.groups.items()}
+        )
+
+
+def _held(group: JointGroup) -> JointGroup:
+    still = JointGroup.hold(
+        group.joints, stiffness=0.0, damping=0.0, force_limit=0.0, unit=group.unit
+    )
+    drives = ("stiffness", "damping", "force_limit", "friction", "limits")
+    return replace(still, **{name: getattr(group, name) for name in drives})
+
 
 def _split_from_groups(groups: dict[str, JointGroup]) -> ActionSplit:
-    return ActionSplit(**groups)
+    split = ActionSplit.__new__(ActionSplit)  # one that nobody drives is no mistake here
+    split._lay_out(groups)  # pyright: ignore[reportPrivateUsage]
+    return split
 
 
 @dataclass(frozen=True)

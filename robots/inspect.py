@@ -7,7 +7,6 @@ robots are stood, stepped and moved in physics instead, and the report is what w
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Iterable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -20,9 +19,10 @@ from robots.assets.manifest import AssetFile, AssetPackage, load_manifest
 from robots.assets.packages import SourceError, find_package
 from robots.assets.progress import size
 from robots.assets.store import AssetStore, FileState, default_root
-from robots.common.commands import exit_code, print_error, start
+from robots.common.commands import exit_code, print_error, program, start
 from robots.descriptor import JointGroup, RobotDescriptor
 from robots.fetch_assets import describe_file
+from robots.named import named_robot
 from robots.registry import RobotRegistry
 from robots.urdf.model import ModelJoint
 from robots.urdf.reading import read_model
@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0, or 1 if files are unreadable or a robot that is tried does not work, or 2 if a robot
         does not exist.
     """
-    parser = argparse.ArgumentParser(prog="python -m robots.inspect", description=__doc__)
+    parser = argparse.ArgumentParser(prog=program("robots.inspect"), description=__doc__)
     parser.add_argument("robots", nargs="*", metavar="ROBOT", help="robots to report on")
     parser.add_argument(
         "--try", action="store_true", dest="tries", help="stand, step and move them in physics"
@@ -50,21 +50,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return exit_code(lambda: (_try if options.tries else _print)(options.robots))
 
 
-def load(name_or_path: str) -> RobotDescriptor:
-    """Return a robot of the catalogue, or the guess of a URDF, by its path."""
-    if name_or_path.endswith(".urdf") or os.path.isfile(name_or_path):
-        return RobotDescriptor.from_urdf(name_or_path, quiet=True)
-    return RobotRegistry.load(name_or_path)
-
-
 def _try(names: Sequence[str]) -> int:
     command: Any = import_module(TRY_COMMAND)
-    return command.run([load(name) for name in names])
+    return command.run([named_robot(name) for name in names])
 
 
 def _print(names: Sequence[str]) -> int:
     for name in names:
-        print(report(load(name), AssetStore(default_root())))
+        print(report(named_robot(name), AssetStore(default_root())))
     if names:
         return 0
     robots, failures = RobotRegistry.load_all()
@@ -141,7 +134,7 @@ def find_urdf(robot: RobotDescriptor, store: AssetStore) -> tuple[Path | None, s
 
 
 def _fetch_hint(robot: RobotDescriptor) -> str:
-    return f"`python -m robots.fetch_assets {robot.name}` fetches it"
+    return f"`{program('robots.fetch_assets')} {robot.name}` fetches it"
 
 
 def _catalogue(robots: Iterable[RobotDescriptor]) -> Iterator[str]:

@@ -1,5 +1,9 @@
 """Many episodes: experts that solve tasks, playing them, recording them, judging policies."""
 
+from kinematics.own_rooms import expect_own
+
+expect_own("robots", "layouts", "simulation", "tasks", "experts")
+
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

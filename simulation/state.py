@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cache, wraps
 from typing import Any, Concatenate, Literal, ParamSpec, TypeVar
+from warnings import warn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -301,6 +302,12 @@ class State:
         """
         fingers = self._index.fingers[robot]
         if fingers is None:
+            warn(
+                f"{robot!r} has no fingers, so that is_grasping({robot!r}, {body!r}) is false for"
+                " ever; a task that needs them says so in `needs`",
+                RuntimeWarning,
+                stacklevel=3,
+            )
             return np.zeros(self.num_envs, bool)
         pairs = self._index.grasp(robot, body)
         forces = self._all_forces(pairs[-1])

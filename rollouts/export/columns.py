@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-import tasks
-from layouts import Layout, Placement
 from robots import RobotDescriptor
-from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
+from rollouts.reading.trajectory import Trajectory, TrajectoryError
 from tasks import MultiRobotTask
 from tasks.episode import States
 from tasks.native.format import articulation_keys, declared_joints
@@ -188,49 +184,6 @@ def succeeded(trajectory: Trajectory) -> bool:
             " episodes, without only_successes"
         )
     return bool(trajectory.success[-1])
-
-
-def make_task(file: TrajectoryFile, *, pictures: bool = False) -> MultiRobotTask:
-    """Make the task of a recording, with its robots where they stood.
-
-    Args:
-        file: The recording.
-        pictures: Whether to draw its worlds.
-
-    Raises:
-        UnknownNameError: If there is no such task or robot.
-        TaskError: If the task cannot be made like that.
-        AssetError: If robot files cannot be found.
-        TrajectoryError: If it is not the world of the recording even so.
-    """
-    recorded = file.simulation or {}
-    task = tasks.make(
-        file.task_id,
-        layout=recorded_layout(file.layout) if file.layout else None,
-        obs_mode="none",
-        control_mode=file.control_mode,
-        render_mode="rgb_array" if pictures else None,
-        **{name: recorded[name] for name in ("control_frequency",) if name in recorded},
-    )
-    file.expect(task.task_id, task.layout.action_dim)
-    file.expect_world(task)
-    return task
-
-
-def recorded_layout(described: Mapping[str, Mapping[str, Any]]) -> Layout:
-    """Return the layout that `rollouts.reading.provenance.describe_layout` described."""
-    return Layout(
-        {
-            place: Placement(
-                robot["robot"],
-                tuple(robot["position"]),
-                tuple(robot["quaternion"]),
-                robot["keyframe"],
-                robot["qpos_noise"],
-            )
-            for place, robot in described.items()
-        }
-    )
 
 
 def _done(trajectory: Trajectory) -> Flags:

@@ -1,4 +1,4 @@
-"""Checks of what a task is asked for: which environments, which seeds, which places."""
+"""Checks of what a task is asked for: which environments, which seeds."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-from layouts import Layout
 from robots import TaskError, unknown_name_message
 from robots.common.bounds import checked_flag, shown
 
@@ -90,39 +89,6 @@ def wants_rebuild(options: Mapping[str, Any] | None) -> bool:
         TaskError: If they make no sense.
     """
     return bool(checked_options(options, (RECONFIGURE,)).get(RECONFIGURE, False))
-
-
-def check_places(task: str, layout: Layout, own: Layout, robot_counts: range | None) -> None:
-    """Refuse a layout whose places are not the task's; their order is the layout's own.
-
-    A limb takes the place that it is called like.
-
-    Args:
-        task: The task's name.
-        layout: The layout.
-        own: The task's own layout.
-        robot_counts: How many robots it may have, under any names; None for the places of ``own``.
-
-    Raises:
-        TaskError: If the places are wrong.
-    """
-    if robot_counts is not None:
-        if len(layout.arms) not in robot_counts:
-            raise TaskError(
-                f"{task} takes {robot_counts[0]} to {robot_counts[-1]} robots;"
-                f" the layout has {len(layout.arms)}: {list(layout.arms)}"
-            )
-    elif not _fill(layout, own):
-        raise TaskError(
-            f"{task} has the places {list(own)}; the layout has {list(layout.arms)}."
-            " Give the layout's robots the names of the places"
-        )
-
-
-def _fill(layout: Layout, places: Collection[str]) -> bool:
-    """Whether the arms of a layout take just these places, one each."""
-    short = {full: name for name, full in layout.short_names.items()}
-    return {short.get(arm, arm) for arm in layout.arms} == set(places)
 
 
 def check_info(task: str, info: Collection[str]) -> None:

@@ -14,6 +14,7 @@ from robots import CONTROL_MODES, TaskError, UnknownNameError
 from robots.common.bounds import checked_choice, checked_flag, checked_whole, shown
 from simulation import SAPIEN_DEFAULTS, Camera, PhysicsSettings
 from simulation.physics import substeps
+from tasks.engine.bystanders import BYSTANDERS
 from tasks.engine.observation import read_mode
 
 SIMULATORS = ("sapien3",)
@@ -43,6 +44,9 @@ class Scenario:
         cameras: Cameras to observe with, in the place of the task's own; empty takes those. Those
             of the robots come after.
         simulator: ``"sapien3"``.
+        bystanders: What the layout's robots do that have no place in the task: ``"hold"`` still and
+            take no action number, or ``"act"``, with action numbers of their own. None refuses
+            them.
         check_layout: Whether to refuse a layout whose robots collide; the task's own layout is
             never checked.
     """
@@ -59,6 +63,7 @@ class Scenario:
     headless: bool = True
     cameras: Sequence[Camera] = field(default_factory=list[Camera])
     simulator: str = "sapien3"
+    bystanders: str | None = None
     check_layout: bool = True
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -94,6 +99,7 @@ class Scenario:
             ("simulator", SIMULATORS),
             ("control_mode", CONTROL_MODES),
             ("render_mode", RENDER_MODES),
+            ("bystanders", BYSTANDERS),
             ("reward_mode", (None, *reward_modes)),
         ):
             checked_choice(name, getattr(self, name), choices, TaskError)

@@ -12,17 +12,18 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 from torch import Tensor
 
+from layouts import Layout
 from robots import SimulationError, TaskError
 from simulation import Simulation, State, World
 from simulation.maths import Floats, all_finite
 from tasks.engine.actions import ActionReader
 from tasks.engine.arguments import (
     check_info,
-    check_places,
     checked_ids,
     checked_seeds,
     wants_rebuild,
 )
+from tasks.engine.bystanders import check_needs, check_places, settled
 from tasks.engine.declaration import Declaration, Info
 from tasks.engine.finite import NotFinite, refuse_observation, refuse_reward, refuse_state
 from tasks.engine.layout_check import refuse_collisions
@@ -83,11 +84,11 @@ class MultiRobotTask(Declaration, Remade):
         """
         scenario.check(self.reward_modes)
         own = type(self)
-        check_places(own.__name__, scenario.layout, own.layout, self.robot_counts)
+        layout = own.built_layout(scenario)
         if scenario.check_layout and scenario.layout != own.layout:
             refuse_collisions(scenario.layout, self.table.outline(scenario.layout))
         self.scenario = scenario
-        self.layout = scenario.layout.in_control_mode(scenario.control_mode)
+        self.layout = layout
         self.num_envs = scenario.num_envs
         self.obs_mode = scenario.obs_mode
         self.reward_mode = scenario.reward_mode or self.reward_modes[0]
@@ -122,6 +123,20 @@ class MultiRobotTask(Declaration, Remade):
         self._responds = type(self).respond is not Declaration.respond
         self.start = self._begin(list(range(self.num_envs)), reconfigured=True)
         self._describe_observation()
+
+    @classmethod
+    def built_layout(cls, scenario: Scenario) -> Layout:
+        """Return the layout that a task of a scenario is built with, in its control mode.
+
+        Raises:
+            TaskError: If its places are not the task's, or a robot lacks what its place needs.
+            DescriptorError: If a robot lacks the joint limits that the control mode needs.
+        """
+        name, own, given = cls.__name__, cls.layout, scenario.layout
+        check_places(name, given, own, cls.robot_counts, scenario.bystanders)
+        check_needs(name, given, given if cls.robot_counts else own, cls.needs)
+        still = settled(given, own, cls.robot_counts, scenario.bystanders)
+        return still.in_control_mode(scenario.control_mode)
 
     @property
     def seeds(self) -> list[int]:

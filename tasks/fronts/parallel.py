@@ -42,7 +42,8 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     Attributes:
         task: The task, with one environment.
-        possible_agents: The robots' places, or their limbs, as in the task's ``action_split``.
+        possible_agents: The places that take action numbers, or the limbs, as in the task's
+            ``action_split``.
         agents: The same during an episode, else nothing.
         observed: Robot → the numbers of the task's flat observation that it observes.
     """
@@ -76,7 +77,8 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         self._step = stepper(self.task)
         self._first = FirstSeeds(1)
         self._seed = self.task.seeds[0]
-        self.possible_agents = list(self.task.action_split)
+        split = self.task.action_split
+        self.possible_agents = [name for name, part in split.items() if part.stop > part.start]
         self.agents: list[str] = []
         layout, index = self.task.layout, self.task.simulation.index
         self._robots = {name: layout.owner(name) for name in self.possible_agents}

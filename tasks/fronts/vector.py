@@ -117,7 +117,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         self.num_envs, self.num_workers, self.render_mode = num_envs, workers, render_mode
         frames = round(scenario.control_frequency)
         self.metadata = {**self.metadata, "autoreset_mode": mode, "render_fps": frames}  # type: ignore[misc]
-        layout = scenario.layout.in_control_mode(scenario.control_mode)
+        layout = cls.built_layout(scenario)
         self.action_split = layout.action_split
         self._reader = ActionReader(layout, num_envs)
         self._seeds = [cls.first_seed + i for i in range(num_envs)]

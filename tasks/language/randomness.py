@@ -111,12 +111,18 @@ class EpisodeRandom:
         Args:
             layout: The robots, and how large the noise of each is.
             shared: Whether all robots get the same numbers.
+
+        A robot that takes no action number gets no noise, and nothing is drawn for it: episodes
+        begin as they do without it.
         """
+        acting = {name: place for name, place in layout.items() if place.robot.action_dim}
+        still = {n: np.zeros(p.robot.dof) for n, p in layout.items() if n not in acting}
         if not shared:
-            return {n: self.normal(p.qpos_noise, p.robot.dof) for n, p in layout.items()}
-        largest = max(placement.robot.dof for placement in layout.values())
-        noise = self.normal(max(p.qpos_noise for p in layout.values()), largest)
-        return {name: noise[: placement.robot.dof] for name, placement in layout.items()}
+            noise = {n: self.normal(p.qpos_noise, p.robot.dof) for n, p in acting.items()}
+            return {**noise, **still}
+        largest = max(placement.robot.dof for placement in acting.values())
+        common = self.normal(max(p.qpos_noise for p in acting.values()), largest)
+        return {**{name: common[: p.robot.dof] for name, p in acting.items()}, **still}
 
     def yaw_quaternion(self, low: float = 0.0, high: float = 2 * np.pi) -> Tensor:
         """Draw a rotation about z by an angle in [low, high), as a wxyz quaternion (4,), w ≥ 0.
