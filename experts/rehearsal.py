@@ -20,7 +20,6 @@ from simulation.overlaps import RobotsAlone
 from tasks import MultiRobotTask
 from tasks.episode import REBUILT
 
-
 PATIENCE = 40  # control steps without progress after which an arm counts as blocked
 PROGRESS = 1e-3  # rad
 
