@@ -174,7 +174,7 @@ def _bounds(joint: ModelJoint) -> tuple[str, str]:
 
 
 def _drives(robot: RobotDescriptor) -> Iterator[str]:
-    rows = [("group", "joints", "stiffness", "damping", "force limit", "friction")]
+    rows = [("group", "joints", "stiffness", "damping", "force limit", "friction", "armature")]
     for name, group in robot.action_split.groups.items():
         force, per = ("N", "N/m") if group.unit == "m" else ("N·m", "N·m/rad")
         rows.append(
@@ -185,6 +185,7 @@ def _drives(robot: RobotDescriptor) -> Iterator[str]:
                 f"{_numbers(group.damping)} {per.replace('/', '·s/')}",
                 f"{_numbers(group.force_limit)} {force}",
                 f"{group.friction:g}",
+                f"{_numbers(group.armature)} {'kg' if group.unit == 'm' else 'kg·m²'}",
             )
         )
     return _table(rows)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,10 @@ SETTLING = 0.1  # s; of a finger that goes to a place
 STIFFEST = 1e3  # rad/s, of a joint's frequency
 MOST_DAMPED = 7e3  # 1/s, of a finger's damping by its inertia, as a Panda's has
 LIGHTEST = 1e-6  # kg·m², kg; of what hangs on a joint, if a URDF gives nothing that weighs
+# Links push each other: where two axes line up, one joint's motion turns the other by as much, and
+# PhysX parts light joints from heavy ones only roughly. Motors and gears have inertia of their own;
+# a gear that is chosen well makes the joint feel as much of it as of its load. Half is enough.
+ARMATURE = 0.5  # of the inertia that hangs on the joint
 HOLDING = 10.0  # times the force that an arm's joint would have
 POSTURES = 16  # in which the inertia is looked at
 
@@ -38,12 +42,14 @@ class Drive:
         stiffness: N·m/rad or N/m.
         damping: N·m·s/rad or N·s/m.
         force_limit: N·m or N.
+        armature: kg·m² or kg.
         step: How far it goes in one control step (rad or m).
     """
 
     stiffness: float
     damping: float
     force_limit: float
+    armature: float
     step: float
 
 
@@ -59,8 +65,9 @@ class Drives:
         moving = stance.model.moving
         links = [stance.tree.link(joint.child) for joint in moving]
         inertia = hanging_inertia(stance.tree, masses, stance.poses(postures), links)
-        self._inertia: Mapping[str, float] = {
-            joint.name: float(value) for joint, value in zip(moving, inertia, strict=True)
+        self._hanging: Mapping[str, float] = {
+            joint.name: max(float(value), LIGHTEST)
+            for joint, value in zip(moving, inertia, strict=True)
         }
         self._raised: list[str] = []  # names of joints
 
@@ -70,6 +77,7 @@ class Drives:
             "drives: stiffness from the inertia that hangs on each joint, critically damped, so"
             f" that a control step of {CONTROL_STEP:g} s covers what the action asks for; forces"
             " from the URDF's efforts",
+            "armature: motors and gears add half of the inertia that hangs on each joint",
             f"action: arm joints move per control step by up to {LONGEST_STEP:g} rad or m, or as"
             " far as their force brings them",
         ]
@@ -89,7 +97,7 @@ class Drives:
 
     def _drive(self, joint: ModelJoint) -> tuple[Drive, bool]:
         """Return a drive, and whether its force is more than the URDF's effort."""
-        inertia = max(self._inertia[joint.name], LIGHTEST)
+        inertia = self._inertia(joint)
         needed = JUST_ENOUGH * inertia / CONTROL_STEP**2  # N·m, N; per rad or m of a step
         force = joint.effort or max(FORCE, needed * SHORTEST_STEP)
         step = min(LONGEST_STEP, force / needed)
@@ -101,7 +109,13 @@ class Drives:
         stiffness = max(STIFFNESS, inertia * FREQUENCY**2)
         stiffness = min(stiffness, inertia * stiffest**2)
         damping = 2 * (stiffness * inertia) ** 0.5
-        return Drive(*map(_rounded, (stiffness, damping, force)), step=_down(step)), raised
+        armature = ARMATURE * self._hanging[joint.name]
+        numbers = map(_rounded, (stiffness, damping, force, armature))
+        return Drive(*numbers, step=_down(step)), raised
+
+    def _inertia(self, joint: ModelJoint) -> float:
+        """Return what a joint's drive moves: what hangs on it, and its motor and gear."""
+        return (1 + ARMATURE) * self._hanging[joint.name]
 
     def gripping(self, joint: ModelJoint) -> Drive:
         """Return the drive of a joint whose targets are places, far away at times: it takes time.
@@ -109,24 +123,26 @@ class Drives:
         ManiSkill's Panda drives its fingers with a damping of a tenth of the stiffness.
         """
         drive = self.of(joint)
-        inertia = max(self._inertia[joint.name], LIGHTEST)
+        inertia = self._inertia(joint)
         damping = min(max(drive.damping, drive.stiffness * SETTLING), inertia * MOST_DAMPED)
         stiffness = min(drive.stiffness, damping / SETTLING)
         force = min(drive.force_limit, FORCE)
-        return Drive(_rounded(stiffness), _rounded(damping), force, drive.step)
+        return replace(
+            drive, stiffness=_rounded(stiffness), damping=_rounded(damping), force_limit=force
+        )
 
     def holding(self, joint: ModelJoint) -> Drive:
         """Return the drive of a joint that stays where it starts."""
         drive, _ = self._drive(joint)
         force = max(drive.force_limit, FORCE) * HOLDING
-        return Drive(drive.stiffness, drive.damping, _rounded(force), drive.step)
+        return replace(drive, force_limit=_rounded(force))
 
 
 def drive_fields(drives: Sequence[Drive]) -> dict[str, Any]:
     """Return the fields of a JointGroup that drive its joints."""
     return {
         name: alike([getattr(drive, name) for drive in drives])
-        for name in ("stiffness", "damping", "force_limit")
+        for name in ("stiffness", "damping", "force_limit", "armature")
     }
 
 
