@@ -22,8 +22,9 @@ SHORTEST_STEP = 0.04  # rad, m; what ManiSkill's Panda truly goes in one control
 FREQUENCY = 150.0  # rad/s
 JUST_ENOUGH = 6.0  # of inertia · step / CONTROL_STEP²; 4 is the least there is
 SETTLING = 0.1  # s; of a finger that goes to a place
-# Physics in single precision shakes light fingers that are driven more stiffly.
-STIFFEST = 1e3  # rad/s, of a joint's frequency
+# Of a joint's frequency (rad/s). Physics in single precision shakes light links that are driven
+# more stiffly; and fingers, which touch each other, fly off.
+STIFFEST, STIFFEST_FINGER = 1e3, 2 * FREQUENCY
 MOST_DAMPED = 7e3  # 1/s, of a finger's damping by its inertia, as a Panda's has
 LIGHTEST = 1e-6  # kg·m², kg; of what hangs on a joint, if a URDF gives nothing that weighs
 # Links push each other: where two axes line up, one joint's motion turns the other by as much, and
@@ -90,12 +91,19 @@ class Drives:
 
     def of(self, joint: ModelJoint) -> Drive:
         """Return the drive of a joint that an action moves."""
-        drive, raised = self._drive(joint)
+        return self._noted(joint, STIFFEST)
+
+    def finger(self, joint: ModelJoint) -> Drive:
+        """Return the drive of a finger's joint that an action moves by steps."""
+        return self._noted(joint, STIFFEST_FINGER)
+
+    def _noted(self, joint: ModelJoint, stiffest: float) -> Drive:
+        drive, raised = self._drive(joint, stiffest)
         if raised and joint.name not in self._raised:
             self._raised.append(joint.name)
         return drive
 
-    def _drive(self, joint: ModelJoint) -> tuple[Drive, bool]:
+    def _drive(self, joint: ModelJoint, stiffest: float) -> tuple[Drive, bool]:
         """Return a drive, and whether its force is more than the URDF's effort."""
         inertia = self._inertia(joint)
         needed = JUST_ENOUGH * inertia / CONTROL_STEP**2  # N·m, N; per rad or m of a step
@@ -105,7 +113,7 @@ class Drives:
         if raised:
             force, step = needed * SHORTEST_STEP, SHORTEST_STEP
         # What only just has the force to stop in time must begin to brake in time.
-        stiffest = STIFFEST if step == LONGEST_STEP else 2 * FREQUENCY
+        stiffest = stiffest if step == LONGEST_STEP else 2 * FREQUENCY
         stiffness = max(STIFFNESS, inertia * FREQUENCY**2)
         stiffness = min(stiffness, inertia * stiffest**2)
         damping = 2 * (stiffness * inertia) ** 0.5
@@ -133,7 +141,7 @@ class Drives:
 
     def holding(self, joint: ModelJoint) -> Drive:
         """Return the drive of a joint that stays where it starts."""
-        drive, _ = self._drive(joint)
+        drive, _ = self._drive(joint, STIFFEST)
         force = max(drive.force_limit, FORCE) * HOLDING
         return replace(drive, force_limit=_rounded(force))
 
