@@ -21,7 +21,7 @@ SHORTEST_STEP = 0.04  # rad, m; what ManiSkill's Panda truly goes in one control
 # physics advances by 0.01 s; with a force that is `JUST_ENOUGH`, 94 %.
 FREQUENCY = 150.0  # rad/s
 JUST_ENOUGH = 6.0  # of inertia · step / CONTROL_STEP²; 4 is the least there is
-SETTLING = 0.1  # s; of a finger that goes to a place
+SETTLING = {"m": 0.1, "rad": 0.2}  # s; of a finger that goes to a place
 # Of a joint's frequency (rad/s). Physics in single precision shakes light links that are driven
 # more stiffly; and fingers, which touch each other, fly off.
 STIFFEST, STIFFEST_FINGER = 1e3, 2 * FREQUENCY
@@ -128,12 +128,13 @@ class Drives:
     def gripping(self, joint: ModelJoint) -> Drive:
         """Return the drive of a joint whose targets are places, far away at times: it takes time.
 
-        ManiSkill's Panda drives its fingers with a damping of a tenth of the stiffness.
+        ManiSkill's Panda drives its fingers, which slide, with a damping of a tenth of the
+        stiffness. Fingers that turn go a longer way, and hit harder.
         """
-        drive = self.of(joint)
+        drive, settling = self.of(joint), SETTLING[joint.unit]
         inertia = self._inertia(joint)
-        damping = min(max(drive.damping, drive.stiffness * SETTLING), inertia * MOST_DAMPED)
-        stiffness = min(drive.stiffness, damping / SETTLING)
+        damping = min(max(drive.damping, drive.stiffness * settling), inertia * MOST_DAMPED)
+        stiffness = min(drive.stiffness, damping / settling)
         force = min(drive.force_limit, FORCE)
         return replace(
             drive, stiffness=_rounded(stiffness), damping=_rounded(damping), force_limit=force
