@@ -204,6 +204,7 @@ class RobotDescriptor:
         fingers: The links that grasp, if it has any.
         cameras: Cameras on its links.
         home: Default standing place and keyframe.
+        tcp_offset: From there to the TCP, in the frame of ``tcp_link`` (m).
         allowed_collisions: Pairs of links that may overlap, besides those that a joint joins and
             those that are rigid with each other; checks and physics let them. None takes what
             ManiSkill's loader takes: of the SRDF beside the URDF the pairs of reason ``Default``.
@@ -222,6 +223,7 @@ class RobotDescriptor:
     cameras: tuple[CameraMount, ...] = ()
     home: Home = field(default_factory=Home)
     allowed_collisions: tuple[tuple[str, str], ...] | None = None
+    tcp_offset: Vector3 = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         """Freeze the keyframes and refuse contradictions."""

@@ -27,7 +27,8 @@ from robots.registry import RobotRegistry
 from robots.urdf.model import ModelJoint
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_cleaned, read_urdf
-from robots.urdf.tree import kinematic_tree, link_index
+from robots.urdf.tcp import find_tcp
+from robots.urdf.tree import kinematic_tree
 
 TRY_COMMAND = "simulation.try_command"  # with run(robots)
 
@@ -86,7 +87,7 @@ def report(robot: RobotDescriptor, store: AssetStore) -> str:
         f"{robot.name}: {robot.summary}": [
             f"numbers from  {robot.source}",
             f"reach         {robot.reach:g} m from the base axis",
-            f"TCP link      {robot.tcp_link}",
+            f"TCP           {_tcp(robot)}",
             f"home          position {_row(robot.home.position)} m, quaternion wxyz"
             f" {_row(robot.home.quaternion)}, keyframe {robot.home.keyframe!r}",
             f"URDF          {remark}",
@@ -209,14 +210,21 @@ def _keyframes(robot: RobotDescriptor, urdf: Path | None) -> Iterator[str]:
 
 
 def _tcp_places(robot: RobotDescriptor, urdf: Path) -> dict[str, Sequence[float]]:
-    """Return the TCP link's position at each keyframe, in the base frame (m)."""
+    """Return where the TCP is at each keyframe, in the base frame (m)."""
     model = read_model(read_urdf(urdf), urdf.name)
     others = [joint.name for joint in model.moving if joint.name not in robot.joints]
     tree = kinematic_tree(model, [*robot.joints, *others])
     qpos = np.zeros((len(robot.keyframes), len(tree.coordinates)))
     qpos[:, : robot.dof] = list(robot.keyframes.values())
-    places = tree.forward(qpos)[:, link_index(tree, robot.tcp_link), :3, 3]
+    places = find_tcp(robot, tree).places(tree.forward(qpos))
     return dict(zip(robot.keyframes, places.tolist(), strict=True))
+
+
+def _tcp(robot: RobotDescriptor) -> str:
+    links = robot.tcp_position_links
+    text = f"the middle of {', '.join(links)}, turned as {robot.tcp_link}" if links else ""
+    offset = f", {_row(robot.tcp_offset)} m from it" if any(robot.tcp_offset) else ""
+    return f"{text or robot.tcp_link}{offset}"
 
 
 def _gripper(robot: RobotDescriptor) -> Iterator[str]:

@@ -32,10 +32,9 @@ def find_reach(
     """
     tree = kinematic_tree(model)
     start = np.array([rest.get(joint, 0.0) for joint in tree.coordinates])
-    poses = tree.forward(start[None])[0]
+    poses = tree.forward(start[None])
     palm = tree.link(limb.palm)
-    tips = [tree.link(link) for link in tool.origins]
-    point = transform(inverse_pose(poses[palm]), poses[tips, :3, 3]).mean(axis=0)
+    point = transform(inverse_pose(poses[0, palm]), tool.on(tree).places(poses)[0])
     moving = [joint for joint in limb.arm if not _flies(joint)]
     starts = _postures(tree, start, moving)
     free = [tree.coordinates.index(joint.name) for joint in moving]

@@ -91,9 +91,9 @@ def _follows(joint: Element, fixed: set[str | None], urdf: str) -> bool:
 
 
 def _turn_followers(joints: list[Element], urdf: str) -> Iterator[str]:
-    """Turn the multipliers of joints that mimic others out of their own limits, whose sign is wrong.
+    """Turn the multipliers of joints that mimic others, where the sign is wrong.
 
-    Their limits leave them no way to follow, and with the other sign all of it.
+    Their limits leave them no way to follow then, and with the other sign all of it.
     """
     named = {joint.get("name"): joint for joint in joints}
     for joint in joints:
