@@ -103,6 +103,11 @@ def _between(stance: Stance, limb: Limb, rigid: list[str], tips: Fingertips, whi
 
     ends = [link for link in rigid if words.is_tool(link) or words.has(link, words.HAND)]
     ends += [limb.palm] if words.has(limb.palm, words.HAND) else []
+    still = tuple(link for link in rigid if words.has(link, words.TIP))
+    if len(still) > 1:  # of fingers that are fixed
+        if off(still) <= BETWEEN:
+            return _mean(limb, still, which, off(still))
+        ends = [link for link in ends if link not in still]
     named = min(((off((link,)), link) for link in ends), default=(np.inf, ""))
     if named[0] <= BETWEEN:
         reason = f"{which}: the link {named[1]}, which lies between the finger tips"

@@ -99,13 +99,13 @@ def _turn_followers(joints: list[Element], urdf: str) -> Iterator[str]:
     for joint in joints:
         mimic = joint.find("mimic")
         leader = None if mimic is None else named.get(mimic.get("joint"))
-        spans = [_span(one, urdf) for one in (joint, leader)]
-        if mimic is None or spans[0] is None or spans[1] is None:
+        own, led = _span(joint, urdf), _span(leader, urdf)
+        if mimic is None or own is None or led is None:
             continue
         where = f"{urdf}: joint {joint.get('name')!r}"
         (factor,) = numbers_of(mimic, "multiplier", (1.0,), where)
         (offset,) = numbers_of(mimic, "offset", (0.0,), where)
-        ways = [_within(*spans, sign * factor, offset) for sign in (1, -1)]
+        ways = [_within(own, led, sign * factor, offset) for sign in (1, -1)]
         if ways[0] < NOTHING and ways[1] > 1 - NOTHING:
             mimic.set("multiplier", f"{-factor:.17g}")
             yield (
