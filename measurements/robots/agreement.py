@@ -56,8 +56,8 @@ def compare(robot: RobotDescriptor, postures: int = POSTURES) -> Agreement:
         RobotLayoutsError: If it cannot be built.
     """
     model = load_model(robot)
-    limits = np.clip(model.kinematics.limits, -_WIDEST, _WIDEST)
-    drawn = np.random.default_rng(1).uniform(*limits.T, (postures, len(limits)))
+    low, high = np.clip(model.kinematics.limits, -_WIDEST, _WIDEST).T
+    drawn = np.random.default_rng(1).uniform(low, high, (postures, len(low)))
     both = physics = checks = 0
     for qpos, seen in zip(drawn, _in_physics(robot, drawn), strict=True):
         found = _in_checks(model, qpos)
