@@ -44,6 +44,9 @@ class JointGroup:
             (``unit``); 0 if empty.
         held: Whether no action number drives the group: its joints are held where the layout
             starts them. ``lower`` and ``upper`` then mean nothing.
+        armature: Inertia of motor and gear as the joint feels it (kg·m² or kg), one number for all
+            joints or one per joint; a URDF has none. It keeps apart joints whose links push each
+            other.
         unit: ``"rad"`` or ``"m"``.
         friction: Joint friction coefficient (dimensionless).
         reset_noise: Whether a reset adds joint noise to this group.
@@ -69,6 +72,7 @@ class JointGroup:
     multipliers: tuple[float, ...] = ()
     offsets: tuple[float, ...] = ()
     held: bool = False
+    armature: float | tuple[float, ...] = 0.0
 
     def __post_init__(self) -> None:
         """Refuse empty groups, repeated joints, inverted ranges and non-physical drives."""
@@ -92,6 +96,7 @@ class JointGroup:
         damping: float = 1e5,
         force_limit: float = 1e5,
         unit: str = "rad",
+        armature: float | tuple[float, ...] = 0.0,
     ) -> JointGroup:
         """Return a group that is held where the layout starts it, and takes no action number.
 
@@ -101,20 +106,21 @@ class JointGroup:
             damping: See `JointGroup`.
             force_limit: See `JointGroup`.
             unit: ``"rad"`` or ``"m"``.
+            armature: See `JointGroup`.
         """
         return cls(
             joints, -1.0, 1.0, stiffness, damping, force_limit, unit=unit, held=True,
-            reset_noise=False,
+            reset_noise=False, armature=armature,
         )  # fmt: skip
 
     def _refuse_bad_drives(self) -> None:
-        for name in ("stiffness", "damping", "force_limit"):
+        for name in ("stiffness", "damping", "force_limit", "armature"):
             given = getattr(self, name)
             if isinstance(given, tuple) and len(given) != len(self.joints):
                 raise DescriptorError(
                     f"{name} has {len(given)} numbers; the group has joints {self.joints}"
                 )
-        for name in ("stiffness", "damping", "force_limit", "friction"):
+        for name in ("stiffness", "damping", "force_limit", "friction", "armature"):
             for value in _spread(getattr(self, name), 1):
                 if value < 0:
                     raise DescriptorError(f"{name} is {value}; it must not be negative")
@@ -161,6 +167,11 @@ class JointGroup:
         """Stiffness, damping and force limit of each joint."""
         numbers = (self.stiffness, self.damping, self.force_limit)
         return tuple(zip(*(_spread(value, len(self.joints)) for value in numbers), strict=True))
+
+    @property
+    def armatures(self) -> tuple[float, ...]:
+        """Armature of each joint (kg·m² or kg)."""
+        return _spread(self.armature, len(self.joints))
 
     @property
     def followers(self) -> tuple[tuple[float, float], ...]:

@@ -27,7 +27,8 @@ from robots.registry import RobotRegistry
 from robots.urdf.model import ModelJoint
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_cleaned, read_urdf
-from robots.urdf.tree import kinematic_tree, link_index
+from robots.urdf.tcp import find_tcp
+from robots.urdf.tree import kinematic_tree
 
 TRY_COMMAND = "simulation.try_command"  # with run(robots)
 
@@ -79,7 +80,7 @@ def report(robot: RobotDescriptor, store: AssetStore) -> str:
         f"{robot.name}: {robot.summary}": [
             f"numbers from  {robot.source}",
             f"reach         {robot.reach:g} m from the base axis",
-            f"TCP link      {robot.tcp_link}",
+            f"TCP           {_tcp(robot)}",
             *(
                 f"limb          {name}: TCP {limb.tcp_link}, reach {limb.reach:g} m from"
                 f" ({_row(limb.base)}) m"
@@ -172,7 +173,7 @@ def _bounds(joint: ModelJoint) -> tuple[str, str]:
 
 
 def _drives(robot: RobotDescriptor) -> Iterator[str]:
-    rows = [("group", "joints", "stiffness", "damping", "force limit", "friction")]
+    rows = [("group", "joints", "stiffness", "damping", "force limit", "friction", "armature")]
     for name, group in robot.action_split.groups.items():
         force, per = ("N", "N/m") if group.unit == "m" else ("N·m", "N·m/rad")
         rows.append(
@@ -183,6 +184,7 @@ def _drives(robot: RobotDescriptor) -> Iterator[str]:
                 f"{_numbers(group.damping)} {per.replace('/', '·s/')}",
                 f"{_numbers(group.force_limit)} {force}",
                 f"{group.friction:g}",
+                f"{_numbers(group.armature)} {'kg' if group.unit == 'm' else 'kg·m²'}",
             )
         )
     return _table(rows)
@@ -206,14 +208,21 @@ def _keyframes(robot: RobotDescriptor, urdf: Path | None) -> Iterator[str]:
 
 
 def _tcp_places(robot: RobotDescriptor, urdf: Path) -> dict[str, Sequence[float]]:
-    """Return the TCP link's position at each keyframe, in the base frame (m)."""
+    """Return where the TCP is at each keyframe, in the base frame (m)."""
     model = read_model(read_urdf(urdf), urdf.name)
     others = [joint.name for joint in model.moving if joint.name not in robot.joints]
     tree = kinematic_tree(model, [*robot.joints, *others])
     qpos = np.zeros((len(robot.keyframes), len(tree.coordinates)))
     qpos[:, : robot.dof] = list(robot.keyframes.values())
-    places = tree.forward(qpos)[:, link_index(tree, robot.tcp_link), :3, 3]
+    places = find_tcp(robot, tree).places(tree.forward(qpos))
     return dict(zip(robot.keyframes, places.tolist(), strict=True))
+
+
+def _tcp(robot: RobotDescriptor) -> str:
+    links = robot.tcp_position_links
+    text = f"the middle of {', '.join(links)}, turned as {robot.tcp_link}" if links else ""
+    offset = f", {_row(robot.tcp_offset)} m from it" if any(robot.tcp_offset) else ""
+    return f"{text or robot.tcp_link}{offset}"
 
 
 def _gripper(robot: RobotDescriptor) -> Iterator[str]:

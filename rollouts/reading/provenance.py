@@ -8,6 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from layouts import Layout
+from robots import JointGroup
 from robots.common.files import parse_json
 from robots.fingerprint import asset_fingerprint
 from rollouts.reading.json_fields import (
@@ -71,13 +72,21 @@ def describe_layout(layout: Layout) -> dict[str, dict[str, Any]]:
             "qpos_noise": placement.qpos_noise,
             "action": [split[name].start, split[name].stop],
             "joint_groups": {
-                group: asdict(joints)
+                group: _describe_group(joints)
                 for group, joints in placement.robot.action_split.groups.items()
             },
             "assets": asset_fingerprint(placement.robot.urdf),
         }
         for name, placement in layout.items()
     }
+
+
+def _describe_group(group: JointGroup) -> dict[str, Any]:
+    """Return the fields of a joint group; recordings of old know no armature, so 0 is left out."""
+    described = asdict(group)
+    if not any(group.armatures):
+        del described["armature"]
+    return described
 
 
 def describe_simulation(task: MultiRobotTask) -> dict[str, Any]:
