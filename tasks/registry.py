@@ -98,6 +98,15 @@ def register_task(*names: str) -> Callable[[TaskClass], TaskClass]:
         )
 
     def register(cls: TaskClass) -> TaskClass:
+        from tasks.engine.declared import check_declaration  # it loads torch, as the class has
+        from tasks.engine.task import MultiRobotTask
+
+        if not (isinstance(cls, type) and issubclass(cls, MultiRobotTask)):
+            raise TaskError(
+                f"@register_task({names[0]!r}) is above {shown(cls)}; it takes a subclass of"
+                " tasks.MultiRobotTask"
+            )
+        check_declaration(cls)
         for name in names:
             if (owner := TASKS.home(name)) not in (None, f"{cls.__module__}:{cls.__qualname__}"):
                 raise TaskError(f"the name {name!r} is already taken by {owner}")
