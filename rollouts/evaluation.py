@@ -75,8 +75,8 @@ class Evaluation:
         """Seed → control steps."""
         return {seed: score.steps for seed, score in self.scores.items()}
 
-    def __str__(self) -> str:
-        """Return it as a few lines."""
+    def __repr__(self) -> str:
+        """Show it as a few lines."""
         failed = [seed for seed, success in self.successes.items() if not success]
         lines = [
             f"{self.task}, {self.policy}: {len(self.scores) - len(failed)} of {len(self.scores)}"
@@ -174,7 +174,9 @@ def _one_by_one(event: Event) -> list[Event]:
 
 def _raise(error: Exception, seeds: Sequence[int | None]) -> NoReturn:
     """Raise an error that says at which seeds it happened."""
-    which = f"seed {seeds[0]}" if len(seeds) == 1 else f"one of the seeds {', '.join(map(str, seeds))}"
+    which = (
+        f"seed {seeds[0]}" if len(seeds) == 1 else f"one of the seeds {', '.join(map(str, seeds))}"
+    )
     error.args = (f"{which}: {error}", *error.args[1:])
     raise error
 

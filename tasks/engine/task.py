@@ -26,6 +26,7 @@ from tasks.engine.arguments import (
 )
 from tasks.engine.declaration import Declaration, Info
 from tasks.engine.declared import check_declaration
+from tasks.engine.display import task_html, task_text
 from tasks.engine.finite import NotFinite, refuse_observation, refuse_reward, refuse_state
 from tasks.engine.layout_check import refuse_collisions
 from tasks.engine.memory import Memory
@@ -127,6 +128,14 @@ class MultiRobotTask(Declaration, Remade):
         self._responds = type(self).respond is not Declaration.respond
         self.start = self._begin(list(range(self.num_envs)), reconfigured=True)
         self._describe_observation()
+
+    def __repr__(self) -> str:
+        """Show what it is and what was made of it, in a few lines."""
+        return task_text(self)
+
+    def _repr_html_(self) -> str:
+        """Show a notebook the same, with the layout's picture."""
+        return task_html(self)
 
     @property
     def seeds(self) -> list[int]:
