@@ -7,7 +7,7 @@ from contextlib import closing
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from statistics import mean
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import torch
 
@@ -30,6 +30,11 @@ from rollouts.playing.together import Player, is_batched, play_together
 from tasks import MultiRobotTask, Scenario, get_task_class
 from tasks.episode import Policy, Score, follow
 from tasks.registry import make_scenario
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from tasks.engine.making import MakingFields
 
 EXPERT = "expert"
 
@@ -102,7 +107,7 @@ def evaluate(
     executor: Executor | None = None,
     episode_timeout: float | None = EPISODE_SECONDS,
     on_event: Callable[[Event], None] = lambda event: None,
-    **making: Any,
+    **making: Unpack[MakingFields],
 ) -> Evaluation:
     """Let a policy play the episodes of some seeds, and tell how they went.
 

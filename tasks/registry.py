@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from layouts import Layout, Placement
 from layouts.placement import RobotLike, load_robot
@@ -14,6 +14,9 @@ from robots.common.bounds import shown
 from robots.common.catalogue import Catalogue, reason
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from tasks.engine.making import ScenarioFields
     from tasks.engine.scenario import Scenario
     from tasks.engine.task import MultiRobotTask
 
@@ -173,7 +176,7 @@ def make(
     layout: Layout | None = None,
     obs_mode: str = "state",
     reward_mode: str | None = None,
-    **fields: Any,
+    **fields: Unpack[ScenarioFields],
 ) -> MultiRobotTask:
     """Make a task.
 
@@ -206,7 +209,7 @@ def make_scenario(
     layout: Layout | None = None,
     obs_mode: str = "state",
     reward_mode: str | None = None,
-    **fields: Any,
+    **fields: Unpack[ScenarioFields],
 ) -> Scenario:
     """Return the scenario that `make` makes a task of, for the same arguments.
 
