@@ -1,4 +1,4 @@
-"""The keywords that tasks are made with, for type checkers: a misspelt one is an error there, too."""
+"""The keywords that tasks are made with: for type checkers a misspelt one is an error, too."""
 
 from __future__ import annotations
 
