@@ -1,7 +1,7 @@
 """Scripted experts: for a task and a seed, the actions that solve it.
 
 Finding experts:
-    find_expert, list_experts, register_expert: By the id of their task.
+    find_expert, list_experts, register_expert: An `Expert` by the id of its task.
 
 Writing one, which is a function of a task and a seed:
     first_success: Tries scripts in a private copy of the task; the actions of the first that works.

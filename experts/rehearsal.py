@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from experts.driver import ArmDriver
 from experts.geometry import heading
 from experts.script import OPEN, Pose, Scene, Script, Waypoint
+from experts.tips import pose_solver
 from kinematics.rotations import Floats, inverse, rotate
 from robots import TaskError, UnknownNameError
 from tasks import MultiRobotTask
@@ -118,7 +119,7 @@ class _Player:
         self._robot, self._waypoints = robot, list(waypoints)
         self._driver = ArmDriver(task.layout[robot].robot)
         if any(waypoint.to is not None for waypoint in waypoints):
-            self._kinematics = task.simulation.inverse_kinematics(robot)
+            self._kinematics = pose_solver(task, robot)
         if any(waypoint.at is not None for waypoint in waypoints):
             self._reach = task.simulation.point_reach(robot)
             self._base = np.array(task.layout[robot].base_position)
