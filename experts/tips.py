@@ -24,6 +24,7 @@ from tasks import MultiRobotTask
 _TURN_WORTH = 0.01  # m of error that a turn by 1 rad is worth: place comes first
 _PLACE, _TURN = 0.003, 0.35  # m and rad that may be missing
 _AXES = np.eye(3)[1:]  # how it opens, and its approach
+_SHORT = 1e-4  # m; shorter ways have no direction
 _POSTURES = 9  # of the gripper between its limits, of which the most closed and the next count
 
 
@@ -94,7 +95,9 @@ def pose_solver(task: MultiRobotTask, robot: str) -> PoseSolver | TipSolver:
 
 @lru_cache(maxsize=64)
 def gripper_turn(robot: RobotDescriptor) -> Floats | None:
-    """Return what turns the TCP link into the gripper's frame, wxyz; None if the TCP is a link.
+    """Return what turns the TCP link into the gripper's frame, wxyz.
+
+    None if the TCP is a link, or its tips do not say how the gripper opens.
 
     Args:
         robot: Whose gripper.
@@ -117,9 +120,10 @@ def gripper_turn(robot: RobotDescriptor) -> Floats | None:
         qpos[places] = low + share * (high - low)
         postures.append(_tips(tree, robot, qpos))
     shut, ajar, *_ = sorted(postures, key=_gap)
-    approach = _unit(shut.mean(0))
-    apart = ajar[-1] - ajar[0]
+    approach, apart = _unit(shut.mean(0)), ajar[-1] - ajar[0]
     opening = _unit(apart - apart @ approach * approach)
+    if not (approach.any() and opening.any()):
+        return None
     return quaternion_of(np.stack([np.cross(opening, approach), opening, approach], 1))
 
 
@@ -141,4 +145,6 @@ def _gap(tips: Floats) -> float:
 
 
 def _unit(vector: Floats) -> Floats:
-    return vector / np.linalg.norm(vector)
+    """Return a vector of length 1; of length 0 if it has hardly any."""
+    length = np.linalg.norm(vector)
+    return vector / length if length > _SHORT else np.zeros(3)
