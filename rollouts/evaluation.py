@@ -161,12 +161,12 @@ def evaluate(
     scores: dict[int, Score] = {}
     with closing(play_all(executor, job, list(together))) as events:
         for event in events:
-            if event.error is not None:
-                _raise(event.error, together.get(event.seed or 0, (event.seed,)))
             for single in _one_by_one(event):
                 on_event(single)
                 if single.seed is not None and isinstance(single.result, Score):
                     scores[single.seed] = single.result
+            if event.error is not None:
+                _raise(event.error, [event.seed] if event.seed is None else together[event.seed])
     return Evaluation(cls.task_id, name, {seed: scores[seed] for seed in seeds})
 
 
