@@ -131,7 +131,8 @@ class MultiRobotTask(Declaration, Remade):
 
     def __repr__(self) -> str:
         """Show what it is and what was made of it, in a few lines."""
-        return task_text(self)
+        made = "observation_slices" in vars(self)
+        return task_text(self) if made else object.__repr__(self)
 
     def _repr_html_(self) -> str:
         """Show a notebook the same, with the layout's picture."""
