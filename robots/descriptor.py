@@ -218,6 +218,17 @@ class RobotDescriptor:
         counts = {"joint": self.dof, "action number": self.action_dim}
         return ", ".join(f"{count} {what}{'s' * (count != 1)}" for what, count in counts.items())
 
+    def __repr__(self) -> str:
+        """Show name, sizes and reach; the fields are many."""
+        return f"RobotDescriptor({self.name!r}: {self.summary}, reach {self.reach:g} m)"
+
+    def _repr_html_(self) -> str:
+        """Show a notebook the table of action numbers."""
+        from robots.display import robot_html
+
+        text = f"{self.summary}, reach {self.reach:g} m"
+        return robot_html(self.name, text, self.describe_action())
+
     def keyframe(self, name: str) -> tuple[float, ...]:
         """Return the joint positions of a keyframe (rad, m), in the order of ``joints``.
 

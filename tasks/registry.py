@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from importlib import import_module
 from os import PathLike
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from layouts import Layout, Placement
 from layouts.placement import RobotLike, load_robot
@@ -15,6 +15,9 @@ from robots.common.bounds import shown
 from robots.common.catalogue import Catalogue, reason
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from tasks.engine.making import ScenarioFields
     from tasks.engine.scenario import Scenario
     from tasks.engine.task import MultiRobotTask
 
@@ -100,6 +103,15 @@ def register_task(*names: str) -> Callable[[TaskClass], TaskClass]:
         )
 
     def register(cls: TaskClass) -> TaskClass:
+        from tasks.engine.declared import check_declaration  # it loads torch, as the class has
+        from tasks.engine.task import MultiRobotTask
+
+        if not (isinstance(cls, type) and issubclass(cls, MultiRobotTask)):
+            raise TaskError(
+                f"@register_task({names[0]!r}) is above {shown(cls)}; it takes a subclass of"
+                " tasks.MultiRobotTask"
+            )
+        check_declaration(cls)
         for name in names:
             if (owner := TASKS.home(name)) not in (None, f"{cls.__module__}:{cls.__qualname__}"):
                 raise TaskError(f"the name {name!r} is already taken by {owner}")
@@ -191,7 +203,7 @@ def make(
     layout: Layout | None = None,
     obs_mode: str = "state",
     reward_mode: str | None = None,
-    **fields: Any,
+    **fields: Unpack[ScenarioFields],
 ) -> MultiRobotTask:
     """Make a task.
 
@@ -226,7 +238,7 @@ def make_scenario(
     layout: Layout | None = None,
     obs_mode: str = "state",
     reward_mode: str | None = None,
-    **fields: Any,
+    **fields: Unpack[ScenarioFields],
 ) -> Scenario:
     """Return the scenario that `make` makes a task of, for the same arguments.
 

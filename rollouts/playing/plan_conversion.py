@@ -17,11 +17,15 @@ DELTAS = CONTROL_MODES[0]  # which all experts speak
 
 
 class Planner:
-    """What an expert does in the episodes of a task, in the task's control mode."""
+    """What an expert does in the episodes of a task, in the task's control mode.
+
+    Attributes:
+        reason: Why its last plan does not solve the episode, in words, if the expert says so.
+    """
 
     def __init__(self, task: MultiRobotTask, expert: Expert) -> None:
         """Make a task in deltas for the expert to plan for, if this one is in another mode."""
-        self._task, self._expert = task, expert
+        self._task, self._expert, self.reason = task, expert, ""
         self._converts = task.scenario.control_mode != DELTAS
         if self._converts:
             self._task = type(task)(replace(task.scenario, control_mode=DELTAS))
@@ -29,6 +33,7 @@ class Planner:
     def __call__(self, seed: int) -> NDArray[np.float32]:
         """Return the actions (T, A) of the episode that ``seed`` begins."""
         actions = self._expert(self._task, seed)
+        self.reason = getattr(actions, "reason", "")
         return as_positions(self._task, seed, actions) if self._converts else actions
 
     def close(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +79,8 @@ class _Player:
     def __call__(self, seed: int) -> tuple[Score, bytes]:
         """Play and encode the episode of a seed."""
         episode = play(self._env, seed, self._plan(seed))
-        return episode.score, self._writer.encode(episode)
+        reason = "" if episode.solved else self._plan.reason
+        return replace(episode.score, reason=reason), self._writer.encode(episode)
 
     def close(self) -> None:
         """Let the worlds go."""

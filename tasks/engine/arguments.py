@@ -14,6 +14,7 @@ from robots import TaskError, unknown_name_message
 from robots.common.bounds import checked_flag, shown
 
 RECONFIGURE = "reconfigure"  # option of a reset, and in its info: whether worlds are rebuilt
+ELAPSED = "elapsed_steps"  # in info: control steps since the reset
 SEED = "seed"  # in the info of fronts: what the random streams began with
 
 

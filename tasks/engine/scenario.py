@@ -15,6 +15,7 @@ from robots.common.bounds import checked_choice, checked_flag, checked_whole, sh
 from simulation import SAPIEN_DEFAULTS, Camera, PhysicsSettings
 from simulation.physics import substeps
 from tasks.engine.bystanders import BYSTANDERS
+from tasks.engine.display import scenario_html, scenario_text
 from tasks.engine.observation import read_mode
 
 SIMULATORS = ("sapien3",)
@@ -72,6 +73,14 @@ class Scenario:
         if name not in known:
             raise UnknownScenarioField("scenario field", name, known)
         object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        """Show the fields that differ from their defaults."""
+        return scenario_text(self)
+
+    def _repr_html_(self) -> str:
+        """Show a notebook the same, with the layout's picture."""
+        return scenario_html(self)
 
     @property
     def draws(self) -> bool:

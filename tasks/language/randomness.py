@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from layouts import Layout
+from robots import TaskError
 
 
 class FirstSeeds:
@@ -87,12 +88,31 @@ class EpisodeRandom:
         self.restart_numpy()
 
     def uniform(self, *shape: int) -> Tensor:
-        """Draw float32 numbers in [0, 1) from the torch stream."""
-        return torch.rand(shape, generator=self.torch)
+        """Draw float32 numbers in [0, 1) from the torch stream.
+
+        Raises:
+            TaskError: If a length is none.
+        """
+        try:
+            return torch.rand(shape, generator=self.torch)
+        except (TypeError, RuntimeError):
+            raise TaskError(
+                f"rng.uniform takes the shape of what is drawn, whole numbers; given: {shape}."
+                " uniform_between([low, …], [high, …]) draws between bounds"
+            ) from None
 
     def uniform_between(self, low: Sequence[float], high: Sequence[float]) -> Tensor:
-        """Draw one float32 number between each pair of bounds from the torch stream."""
+        """Draw one float32 number between each pair of bounds from the torch stream.
+
+        Raises:
+            TaskError: If they are no two rows of as many numbers.
+        """
         lowest, highest = torch.tensor(low), torch.tensor(high)
+        if lowest.ndim != 1 or lowest.shape != highest.shape:
+            raise TaskError(
+                "rng.uniform_between takes the lower bounds and the upper ones, as many:"
+                f" ([low, …], [high, …]); given: {low}, {high}"
+            )
         return self.uniform(1, len(low))[0] * (highest - lowest) + lowest
 
     def torch_normal(self, std: float, count: int) -> Tensor:
