@@ -272,6 +272,14 @@ class MultiRobotTask(Declaration, Remade):
         self.observer.changed(ids)
         self._read()
 
+    def flat_state(self) -> Floats:
+        """Return what ``obs_mode="state"`` observes, (N, D), whatever the task's own mode is."""
+        state = self._state
+        parts = self.observe(state, self._info(state))
+        return Observer(self.layout, read_mode("state"), (), ()).observe(
+            self.simulation, state, parts
+        )
+
     def render(self) -> np.ndarray:
         """Return a picture of every environment, (N, 512, 512, 3) uint8.
 

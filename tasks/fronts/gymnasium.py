@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots import TaskError
-from tasks.engine.arguments import checked_seeds
+from tasks.engine.arguments import checked_seeds, own_options
 from tasks.engine.observation import space_of
 from tasks.engine.remade import Remade
 from tasks.fronts.numbers import info_row, row, stepper
@@ -69,7 +69,7 @@ class GymnasiumTask(Remade, gymnasium.Env[Any, NDArray[np.float32]]):
 
         Args:
             seed: Seed of the episode; None lets the random streams run on, from entropy.
-            options: ``{"reconfigure": True}`` rebuilds the world.
+            options: ``{"reconfigure": True}`` rebuilds the world; others are ignored.
 
         Returns:
             Observation and info.
@@ -77,8 +77,9 @@ class GymnasiumTask(Remade, gymnasium.Env[Any, NDArray[np.float32]]):
         Raises:
             TaskError: If an argument makes no sense; nothing is reset then.
         """
+        known = own_options(options)
         own = self._first.fill(checked_seeds(seed, (0,)), (0,))
-        obs, info = self.task.reset(own, options)
+        obs, info = self.task.reset(own, known)
         self._first.given((0,))
         self._seed = self.task.seeds[0]
         super().reset(seed=own[0])

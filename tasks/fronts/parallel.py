@@ -13,7 +13,7 @@ from pettingzoo import ParallelEnv
 
 from robots import TaskError, UnknownNameError
 from robots.common.bounds import shown
-from tasks.engine.arguments import RECONFIGURE, checked_options, checked_seeds
+from tasks.engine.arguments import checked_seeds, own_options
 from tasks.engine.observation import space_of
 from tasks.engine.remade import Remade
 from tasks.fronts.numbers import info_row, row, stepper
@@ -42,6 +42,9 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         possible_agents: The robots' places, in declared order.
         agents: The same during an episode, else nothing.
         observed: Robot → the numbers of the task's flat observation that it observes.
+        observation_spaces: Robot → what it observes.
+        action_spaces: Robot → what it may do.
+        state_space: Of what `state` returns.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -77,20 +80,21 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         self.agents: list[str] = []
         self.observed = self._observed() if self.task.observation_slices else {}
         bounds = self.task.single_action_space
-        self._action_spaces = {
+        self.action_spaces = {
             name: Box(bounds.low[part], bounds.high[part], dtype=np.float32)
             for name, part in self.task.action_split.items()
         }
         start = self._observations(self.task.start[0])
-        self._observation_spaces = {name: space_of(own) for name, own in start.items()}
+        self.observation_spaces = {name: space_of(own) for name, own in start.items()}
+        self.state_space = space_of(self.state())
 
     def observation_space(self, agent: str) -> Space[Observation]:
         """Return what a robot observes; always the same object."""
-        return _look_up(self._observation_spaces, agent)
+        return _look_up(self.observation_spaces, agent)
 
     def action_space(self, agent: str) -> Space[NDArray[np.float32]]:
         """Return what a robot may do; always the same object."""
-        return _look_up(self._action_spaces, agent)
+        return _look_up(self.action_spaces, agent)
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -100,8 +104,7 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         Args:
             seed: Seed of the episode; None lets the random streams run on, the first time from one
                 that the system's entropy gives. ``info["seed"]`` is what they began with.
-            options: ``{"reconfigure": True}`` rebuilds the world; as PettingZoo's checks demand,
-                other options are ignored.
+            options: ``{"reconfigure": True}`` rebuilds the world; others are ignored.
 
         Returns:
             Observation and info of every robot.
@@ -109,10 +112,9 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         Raises:
             TaskError: If an argument makes no sense; nothing is reset then.
         """
-        known = checked_options(options, options or ())
-        rebuilt = {key: value for key, value in known.items() if key == RECONFIGURE}
+        known = own_options(options)
         own = self._first.fill(checked_seeds(seed, (0,)), (0,))
-        obs, info = self.task.reset(own, rebuilt)
+        obs, info = self.task.reset(own, known)
         self._first.given((0,))
         self._seed = self.task.seeds[0]
         self.agents = list(self.possible_agents)
@@ -155,6 +157,10 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
             dict.fromkeys(agents, late),
             self._infos(own_info),
         )
+
+    def state(self) -> NDArray[np.float32]:
+        """Return what all robots together would observe as ``"state"``, flat, for critics."""
+        return self.task.flat_state()[0]
 
     def render(self) -> NDArray[np.uint8]:
         """Return a picture, (512, 512, 3) uint8.
