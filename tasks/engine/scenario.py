@@ -33,6 +33,8 @@ class Scenario:
             see (needs a Vulkan driver): ``"rgb"``, ``"rgbd"``, or any of ``rgb``, ``depth``,
             ``segmentation`` and ``position`` joined by ``+``, and to them ``state`` or
             ``state_dict``, without which images come only with what a real robot senses.
+            ``"lerobot"`` and ``"robomimic"`` give the columns that exports in these formats hold,
+            under their names, so that a policy trained on one plays here as it is.
         reward_mode: One of the task's modes; None takes its first.
         control_mode: ``"pd_joint_delta_pos"``, or ``"pd_joint_pos"`` for actions that are joint
             positions.

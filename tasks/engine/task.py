@@ -346,9 +346,10 @@ class MultiRobotTask(Declaration, Remade):
         return info
 
     def _observation(self, state: State, info: Info) -> Any:
-        if self.observer.mode.nothing:
+        mode = self.observer.mode
+        if mode.nothing:
             return {}
-        parts = self.observe(state, info)
+        parts = {} if mode.columns else self.observe(state, info)
         try:
             return self.observer.observe(self.simulation, state, parts)
         except NotFinite:
