@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
+from gymnasium import logger
 from numpy.typing import NDArray
 
 from robots import TaskError
@@ -98,12 +99,15 @@ class GymnasiumTask(Remade, gymnasium.Env[Any, NDArray[np.float32]]):
         ended = bool(terminated[0])
         return row(obs), reward[0].item(), ended, False, info_row(info, self._seed)
 
-    def render(self) -> NDArray[np.uint8]:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
         """Return a picture, (512, 512, 3) uint8.
 
-        Raises:
-            TaskError: If it was not made with ``render_mode="rgb_array"``.
+        Without ``render_mode="rgb_array"`` there is none, which a warning says: Gymnasium's
+        interface has it so, and trainers call this unasked.
         """
+        if self.render_mode is None:
+            logger.warn("this task draws no pictures; make it with render_mode='rgb_array'")
+            return None
         return self.task.render()[0]
 
     def close(self) -> None:

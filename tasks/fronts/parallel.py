@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
+from gymnasium import logger
 from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
@@ -163,12 +164,15 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         """Return what all robots together would observe as ``"state"``, flat, for critics."""
         return self.task.flat_state()[0]
 
-    def render(self) -> NDArray[np.uint8]:
+    def render(self) -> NDArray[np.uint8] | None:
         """Return a picture, (512, 512, 3) uint8.
 
-        Raises:
-            TaskError: If it was not made with ``render_mode="rgb_array"``.
+        Without ``render_mode="rgb_array"`` there is none, which a warning says: Gymnasium's
+        interface has it so, and trainers call this unasked.
         """
+        if self.render_mode is None:
+            logger.warn("this task draws no pictures; make it with render_mode='rgb_array'")
+            return None
         return self.task.render()[0]
 
     def close(self) -> None:

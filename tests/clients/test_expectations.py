@@ -99,6 +99,13 @@ def test_options_of_others_are_ignored(pair):
         tasks.make(PUSH).reset(options={"video": True})
 
 
+def test_where_nothing_is_drawn_there_is_no_picture(pair):
+    for env in (gymnasium.make(f"RobotLayouts/{PUSH}"), pair):
+        env.reset(seed=0)
+        with pytest.warns(UserWarning, match="make it with render_mode='rgb_array'"):
+            assert env.render() is None
+
+
 def test_spaces_of_all_robots_by_name(pair):
     for name in pair.possible_agents:
         assert pair.observation_spaces[name] is pair.observation_space(name)
