@@ -1,5 +1,6 @@
 """Packages of others, each in an environment of its own, used as their documentation says."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,11 @@ from tests.clients.environments import ROOT, new_environment, play
 
 HERE = Path(__file__).parent
 CLIENTS = ("cleanrl", "minari", "rllib", "skrl", "supersuit", "tianshou", "torchrl")
+LARGE = {  # that bring gigabytes of CUDA, and are not installed for a test
+    "lerobot": "LeRobot needs Python 3.12, 'lerobot[dataset]' by constraints/lerobot.txt and"
+    " integrations/lerobot_env_robot_layouts",
+    "robomimic": "robomimic needs torchvision, which fits no CPU build of torch from the index",
+}
 
 pytestmark = [
     pytest.mark.long,
@@ -23,9 +29,17 @@ def test_a_client(client, tmp_path):
     play(python, HERE / "programs" / f"{client}_program.py", tmp_path / "out")
 
 
+@pytest.mark.parametrize("client", LARGE)
+def test_a_large_client(client, tmp_path):
+    python = os.environ.get(variable := f"{client.upper()}_PYTHON")
+    if python is None:
+        pytest.skip(f"{LARGE[client]}; set {variable} to a Python that has it")
+    play(Path(python), HERE / "programs" / f"{client}_program.py", tmp_path / "out")
+
+
 def test_every_program_is_run():
     assert {path.name for path in (HERE / "programs").glob("*_program.py")} == {
-        f"{client}_program.py" for client in CLIENTS
+        f"{client}_program.py" for client in (*CLIENTS, *LARGE)
     }
 
 
