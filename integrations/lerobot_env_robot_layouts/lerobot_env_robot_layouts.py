@@ -4,6 +4,8 @@ Observations and actions are those of exported datasets, so a policy that was tr
 evaluated as it is:
 
     lerobot-eval --policy.path=outputs/… --env.type=robot_layouts --env.task=PickCube-v1
+
+A policy that was trained on an export with video needs ``--env.video=true``.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ NAMES = {
     "velocity": "observation.velocity",
     "environment_state": OBS_ENV_STATE,
 }
+PICTURE, PICTURES = "pixels/overview", "observation.images.overview"
 KINDS = {"environment_state": FeatureType.ENV}
 
 
@@ -40,7 +43,13 @@ class LeRobotNames(gym.ObservationWrapper):
 
     def observation(self, observation: Any) -> dict[str, Any]:
         """Return an observation, or its space, under LeRobot's names."""
-        return {key: observation[name] for key, name in NAMES.items() if name in observation.keys()}
+        known = observation.keys()
+        renamed = {key: observation[name] for key, name in NAMES.items() if name in known}
+        if PICTURES in known:
+            pixels = {"overview": observation[PICTURES]}
+            is_space = isinstance(observation, gym.spaces.Dict)
+            renamed["pixels"] = gym.spaces.Dict(pixels) if is_space else pixels
+        return renamed
 
 
 @EnvConfig.register_subclass("robot_layouts")
@@ -53,23 +62,30 @@ class RobotLayoutsEnv(EnvConfig):
         fps: Its control steps per second.
         robots: Other robots for some places: place → robot.
         control_mode: What actions mean; see `tasks.Scenario`.
-        render_mode: ``"rgb_array"`` to film episodes, which needs a Vulkan driver.
+        video: Whether policies see the pictures of exports with video, which needs a Vulkan driver.
+        render_mode: ``"rgb_array"``, as LeRobot films episodes, which needs one, too, or None.
     """
 
     task: str = "PickCube-v1"
     fps: int = 20
     robots: dict[str, str] = field(default_factory=dict)
     control_mode: str = "pd_joint_delta_pos"
-    render_mode: str | None = None
+    video: bool = False
+    render_mode: str | None = "rgb_array"
 
     def __post_init__(self) -> None:
         """Read off the task what policies are given and give."""
         env = self._make()
         self.features = {ACTION: PolicyFeature(FeatureType.ACTION, env.action_space.shape)}
         self.features_map = {ACTION: ACTION}
-        for key, space in env.observation_space.items():
-            self.features[key] = PolicyFeature(KINDS.get(key, FeatureType.STATE), space.shape)
-            self.features_map[key] = NAMES[key]
+        for key, name in NAMES.items():
+            if key in env.observation_space.spaces:
+                kind, shape = KINDS.get(key, FeatureType.STATE), env.observation_space[key].shape
+                self.features[key], self.features_map[key] = PolicyFeature(kind, shape), name
+        if self.video:
+            shape = env.observation_space["pixels"]["overview"].shape
+            self.features[PICTURE] = PolicyFeature(FeatureType.VISUAL, shape)
+            self.features_map[PICTURE] = PICTURES
         env.close()
 
     @property
@@ -86,7 +102,7 @@ class RobotLayoutsEnv(EnvConfig):
     def gym_kwargs(self) -> dict[str, Any]:
         """Arguments of ``gym.make``."""
         return {
-            "obs_mode": "lerobot",
+            "obs_mode": "lerobot+video" if self.video else "lerobot",
             "robots": self.robots or None,
             "control_mode": self.control_mode,
             "control_frequency": self.fps,

@@ -22,10 +22,9 @@ from rollouts.export.statistics import (
     flatten,
 )
 from rollouts.export.writer import DatasetWriter
-from tasks.engine.columns import lerobot_columns
+from tasks.engine.columns import CAMERA, lerobot_columns
 
 VERSION = "v3.0"
-CAMERA = "observation.images.overview"
 FILE = "chunk-{chunk_index:03d}/file-{file_index:03d}"
 DATA_PATH = f"data/{FILE}.parquet"
 EPISODES_PATH = f"meta/episodes/{FILE}.parquet"

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from layouts import Layout
+from robots.descriptor import Vector3
 from simulation import Simulation, State, World
 from simulation.maths import Floats, all_finite
 from tasks.engine.finite import NotFinite
 
-LEROBOT, ROBOMIMIC = FORMATS = ("lerobot", "robomimic")
+LEROBOT, FILMED, ROBOMIMIC = COLUMN_MODES = ("lerobot", "lerobot+video", "robomimic")
+CAMERA = "observation.images.overview"  # LeRobot's feature of an exported video
+Viewpoint = tuple[Vector3, Vector3]
+"""Where a camera is, and the point in the middle of its picture (m, world)."""
 
 
 def placed_bodies(world: World) -> list[str]:
@@ -60,21 +65,42 @@ def robomimic_columns(
     return columns | ({"object": bodies} if bodies.shape[1] else {})
 
 
+def overview(layout: Layout) -> Viewpoint | None:
+    """Return camera and target (m, world) that show robots from the side, the first on the left.
+
+    None for a single robot, which has no side.
+    """
+    if len(layout) == 1:
+        return None
+    bases = np.array([placement.base_position for placement in layout.values()])
+    along = bases[-1] - bases[0]
+    span = float(np.linalg.norm(along[:2]))
+    if span == 0:
+        return None
+    aside = np.array([along[1], -along[0], 0.0]) / span
+    middle = bases.mean(0)
+    eye = middle + span * aside + [0.0, 0.0, 0.42 * span]
+    target = middle + [0.0, 0.0, 0.16 * span]
+    return tuple(eye.tolist()), tuple(target.tolist())
+
+
 class ColumnObserver:
     """Observes what an export of the same moment would hold, bit for bit."""
 
-    def __init__(self, layout: Layout, form: str) -> None:
+    def __init__(self, layout: Layout, mode: str, viewpoint: Viewpoint) -> None:
         """Remember how to observe.
 
         Args:
             layout: The robots.
-            form: One of `FORMATS`.
+            mode: One of `COLUMN_MODES`.
+            viewpoint: The task's own, for a robot that is alone.
         """
-        self._layout, self._form = layout, form
+        self._layout, self._mode = layout, mode
+        self._view = overview(layout) or viewpoint
         self._copies: Simulation | None = None
 
-    def observe(self, simulation: Simulation, state: State) -> dict[str, Floats]:
-        """Return the columns of all environments, (N, k) each.
+    def observe(self, simulation: Simulation, state: State) -> dict[str, Any]:
+        """Return the columns of all environments, (N, k) each, and pictures, (N, 512, 512, 3).
 
         Raises:
             NotFinite: If a number is not finite.
@@ -84,13 +110,18 @@ class ColumnObserver:
         none = np.empty((simulation.num_envs, 0), np.float32)
         poses = [state.pose(name) for name in placed_bodies(simulation.worlds[0])]
         bodies = np.concatenate([none, *poses], 1)
-        if self._form == LEROBOT:
-            columns = lerobot_columns(qpos, qvel, bodies)
-        else:
+        if self._mode == ROBOMIMIC:
             columns = robomimic_columns(qpos, qvel, self._tcp_poses(state), bodies)
+        else:
+            columns = lerobot_columns(qpos, qvel, bodies)
         if not all(map(all_finite, columns.values())):
             raise NotFinite
-        return {name: column.copy() for name, column in columns.items()}
+        observed: dict[str, Any] = {name: column.copy() for name, column in columns.items()}
+        if self._mode == FILMED:
+            from simulation.rendering.pictures import Cameras  # loaded with the first picture
+
+            observed[CAMERA] = Cameras(simulation, *self._view).take()
+        return observed
 
     def close(self) -> None:
         """Let the copies of the robots go."""

@@ -17,14 +17,14 @@ from simulation import Camera, Simulation, State
 from simulation.cameras import TEXTURES, RobotCamera
 from simulation.maths import Array, Floats, all_finite
 from simulation.readout import ReadoutIndex
-from tasks.engine.columns import FORMATS, ColumnObserver
+from tasks.engine.columns import COLUMN_MODES, FILMED, ColumnObserver, Viewpoint
 from tasks.engine.finite import NotFinite
 from tasks.native.format import native_joints, observation_keys
 
 if TYPE_CHECKING:
     from simulation.rendering.pictures import Observers, View
 
-PLAIN_MODES = ("state", "state_dict", "none", *FORMATS)
+PLAIN_MODES = ("state", "state_dict", "none", *COLUMN_MODES)
 SHORT_MODES = {"rgbd": "rgb+depth"}
 STATE_FORMS = ("state", "state_dict")  # what may be joined to images
 OBS_MODES = (*PLAIN_MODES, "rgb", "rgbd", "rgb+depth+state", "depth", "rgb+segmentation")
@@ -42,7 +42,7 @@ class ObservationMode:
         flat: Whether everything but images is one flat part.
         privileged: Whether it includes what only a simulation knows.
         nothing: Whether nothing is observed.
-        columns: The format of exported datasets whose columns are observed; None if it is no such.
+        columns: The mode, if it is the columns of exported datasets that are observed.
     """
 
     textures: tuple[str, ...] = ()
@@ -50,6 +50,11 @@ class ObservationMode:
     privileged: bool = True
     nothing: bool = False
     columns: str | None = None
+
+    @property
+    def draws(self) -> bool:
+        """Whether pictures are observed."""
+        return bool(self.textures) or self.columns == FILMED
 
 
 def read_mode(name: str) -> ObservationMode:
@@ -61,7 +66,7 @@ def read_mode(name: str) -> ObservationMode:
     if not isinstance(name, str):
         raise TaskError(unknown_name_message("obs_mode", name, OBS_MODES))
     if name in PLAIN_MODES:
-        columns = name if name in FORMATS else None
+        columns = name if name in COLUMN_MODES else None
         return ObservationMode(flat=name == "state", nothing=name == "none", columns=columns)
     parts = SHORT_MODES.get(name, name).split("+")
     for part in parts:
@@ -118,6 +123,7 @@ class Observer:
         mode: ObservationMode,
         cameras: Iterable[Camera],
         sensed: Sequence[str],
+        viewpoint: Viewpoint,
     ) -> None:
         """Remember how to observe.
 
@@ -126,6 +132,7 @@ class Observer:
             mode: What to observe.
             cameras: The task's own cameras.
             sensed: See `tasks.MultiRobotTask`.
+            viewpoint: From where people see the task.
 
         Raises:
             TaskError: If images are asked for and there is no camera, or two have the same name.
@@ -136,7 +143,7 @@ class Observer:
             raise TaskError("there is no camera: the task declares none, nor do its robots")
         self._keys, self._robots, self._sensed = observation_keys(layout), tuple(layout), sensed
         self._rig: _CameraRig | None = None
-        self._columns = ColumnObserver(layout, mode.columns) if mode.columns else None
+        self._columns = ColumnObserver(layout, mode.columns, viewpoint) if mode.columns else None
 
     def observe(self, simulation: Simulation, state: State, parts: Mapping[str, Array]) -> Any:
         """Return an observation of all environments.

@@ -101,7 +101,7 @@ class MultiRobotTask(Declaration, Remade):
         self._reader = ActionReader(self.layout, self.num_envs)
         mode = read_mode(scenario.obs_mode)
         cameras = scenario.cameras or self.cameras if mode.textures else ()
-        self.observer = Observer(self.layout, mode, cameras, self.sensed)
+        self.observer = Observer(self.layout, mode, cameras, self.sensed, self.viewpoint)
         first = self.first_seed if first_seed is None else first_seed
         self._rngs = [EpisodeRandom(first + i) for i in range(self.num_envs)]
         self._max_reward = np.array(self.max_reward, np.float32)
@@ -276,9 +276,8 @@ class MultiRobotTask(Declaration, Remade):
         """Return what ``obs_mode="state"`` observes, (N, D), whatever the task's own mode is."""
         state = self._state
         parts = self.observe(state, self._info(state))
-        return Observer(self.layout, read_mode("state"), (), ()).observe(
-            self.simulation, state, parts
-        )
+        observer = Observer(self.layout, read_mode("state"), (), (), self.viewpoint)
+        return observer.observe(self.simulation, state, parts)
 
     def render(self) -> np.ndarray:
         """Return a picture of every environment, (N, 512, 512, 3) uint8.

@@ -15,7 +15,7 @@ from pettingzoo import ParallelEnv
 from robots import TaskError, UnknownNameError
 from robots.common.bounds import shown
 from tasks.engine.arguments import checked_seeds, own_options
-from tasks.engine.columns import FORMATS
+from tasks.engine.columns import COLUMN_MODES
 from tasks.engine.observation import space_of
 from tasks.engine.remade import Remade
 from tasks.fronts.numbers import info_row, row, stepper
@@ -66,7 +66,7 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         """Make the task; see `tasks.parallel_env`."""
         if "num_envs" in fields:
             raise TaskError("parallel_env takes no num_envs: it is one environment")
-        if (mode := fields.get("obs_mode")) in ("none", *FORMATS):
+        if (mode := fields.get("obs_mode")) in ("none", *COLUMN_MODES):
             raise TaskError(f"parallel_env takes no obs_mode={mode!r}; choices: 'state', 'rgb', …")
         self.task = make(task_id, render_mode=render_mode, **fields)
         self.render_mode = render_mode

@@ -9,7 +9,11 @@ import pytest
 import tasks
 from robots import TaskError
 from rollouts import evaluate
+from rollouts.export.columns import ColumnReader, make_task
 from rollouts.export.dataset import Export, export
+from rollouts.export.pictures import draw
+from rollouts.reading.trajectory import TrajectoryFile
+from simulation.rendering.pictures import vulkan_problem
 from tests.rollouts.recordings import SECOND, TWO_ROBOTS, record
 
 LENGTHS = [12, 5]
@@ -71,6 +75,24 @@ def test_the_columns_of_an_export_step_by_step(recording, exported, tmp_path):
             for name, rows in columns.items():
                 assert obs[name].tobytes() == rows[t].tobytes(), (i, t, name)
             obs, *_ = env.step(action)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("task_id", ["PushCube-v1", TWO_ROBOTS])
+def test_the_pictures_that_an_export_films(task_id, tmp_path):
+    if problem := vulkan_problem():
+        pytest.skip(problem)
+    task = tasks.make(task_id, obs_mode="lerobot+video")
+    task.reset(seed=99)  # as another world it draws the same
+    with TrajectoryFile(record(tmp_path / "one.h5", task_id, [4, 3])) as file:
+        drawn = make_task(file, pictures=True)
+        for trajectory in file:
+            columns = ColumnReader(drawn).read(trajectory)
+            obs, _ = task.reset(seed=trajectory.seed, options=REBUILT)
+            for picture, action in zip(draw(drawn, columns), trajectory.actions, strict=True):
+                assert picture.std() > 10
+                np.testing.assert_array_equal(obs["observation.images.overview"][0], picture)
+                obs, *_ = task.step(action[None])
 
 
 @pytest.mark.parametrize("obs_mode", ["lerobot", "robomimic"])

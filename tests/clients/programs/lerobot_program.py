@@ -51,9 +51,12 @@ def main(folder: Path) -> None:
         action = finish(policy.select_action(prepare({k: torch.tensor(x) for k, x in obs.items()})))
         obs, *_ = env.step(action[0].numpy())
 
+    for part in (policy, prepare, finish):
+        part.save_pretrained(folder / "policy")
+
     # By LeRobot's own evaluation, which finds our plugin.
     register_third_party_plugins()
-    wanted = EnvConfig.get_choice_class("robot_layouts")(task=TASK)
+    wanted = EnvConfig.get_choice_class("robot_layouts")(task=TASK, render_mode=None)
     (suite,) = make_env(wanted, n_envs=2).values()
     before, after = make_env_pre_post_processors(wanted, config)
     played = rollout(suite[0], policy, before, after, prepare, finish, seeds=[5, 6])
