@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from os import PathLike
+from typing import TYPE_CHECKING
 
 from kinematics.quaternions import inverted, multiplied, normalised
 from layouts.frames import ORIGIN, Pose, check_pose, declared_quaternion
@@ -45,6 +46,21 @@ class Placement:
     rpy: Vector3 | None = field(default=None, kw_only=True)
     on: str | None = field(default=None, kw_only=True)
     _world: Pose | None = field(default=None, init=False, repr=False, compare=False)
+
+    if TYPE_CHECKING:  # a robot may be named; what is kept is its descriptor
+
+        def __init__(
+            self,
+            robot: RobotLike,
+            position: Vector3 | None = None,
+            quaternion: Quaternion | None = None,
+            keyframe: str | None = None,
+            qpos_noise: float = 0.02,
+            *,
+            rpy: Vector3 | None = None,
+            on: str | None = None,
+        ) -> None:
+            """Take a place."""
 
     def __post_init__(self) -> None:
         """Look a robot's name up, and refuse poses that are no poses."""

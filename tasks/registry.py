@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields as fields_of
 from dataclasses import replace
 from importlib import import_module
 from os import PathLike
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from layouts import Layout, Placement
 from layouts.placement import RobotLike, load_robot
-from robots import RobotDescriptor, TaskError
+from robots import RobotDescriptor, RobotLayoutsError, TaskError, UnknownNameError, closest_match
 from robots.common.bounds import shown
 from robots.common.catalogue import Catalogue, reason
 
@@ -243,10 +244,15 @@ def make_scenario(
     """Return the scenario that `make` makes a task of, for the same arguments.
 
     Raises:
-        UnknownNameError: If a place, a robot or a field is unknown.
+        UnknownNameError: If a place, a robot or a field is unknown; of a field, it is a
+            ``TypeError`` as well.
         TaskError: If the robots do not say which places they take.
     """
     scenario = cls.scenario
+    known = [*(field.name for field in fields_of(scenario)), "robots"]
+    for name in fields:
+        if name not in known:
+            raise UnexpectedArgumentError.of(cls.task_id, name, known)
     if layout is not None:
         if not isinstance(layout, Layout):
             raise TaskError(f"layout is {shown(layout)}; a layouts.Layout is needed")
@@ -257,6 +263,35 @@ def make_scenario(
     for name, value in chosen.items():
         setattr(scenario, name, value)
     return scenario
+
+
+class UnexpectedArgumentError(UnknownNameError, TypeError):
+    """An argument that tasks are not made with (also a ``TypeError``, as Python's own error is).
+
+    Other packages try arguments, and go by that type and Python's words.
+    """
+
+    def __init__(self, message: str, name: object = "", choices: Iterable[str] = ()) -> None:
+        """Take the whole message: Gymnasium raises errors anew, with a longer one alone."""
+        self.kind, self.name, self.choices = "argument", name, tuple(choices)
+        RobotLayoutsError.__init__(self, message)
+
+    @classmethod
+    def of(cls, task_id: str, name: str, choices: Iterable[str]) -> UnexpectedArgumentError:
+        """Return the error of a name, with the closest match and all choices."""
+        choices = tuple(choices)
+        match = closest_match(name, choices)
+        suggestion = f" Did you mean {match!r}?" if match else ""
+        return cls(
+            f"{task_id} got an unexpected keyword argument {shown(name)}.{suggestion} Choices:"
+            f" {', '.join(choices)}.",
+            name,
+            choices,
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle by message, so that worker processes can send the error home."""
+        return type(self), (self.args[0], self.name, self.choices)
 
 
 def _replace_robots(layout: Layout, robots: RobotLike | Mapping[str, RobotLike]) -> Layout:

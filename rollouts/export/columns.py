@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from robots import RobotDescriptor
 from rollouts.reading.trajectory import Trajectory, TrajectoryError
 from tasks import MultiRobotTask
+from tasks.engine.columns import placed_bodies
 from tasks.episode import States
 from tasks.native.format import articulation_keys, declared_joints
 
@@ -68,7 +69,6 @@ class ColumnReader:
     def __init__(self, task: MultiRobotTask) -> None:
         """Take the names from a task and its robots."""
         self.task = task
-        world = task.simulation.worlds[0]
         placements = task.layout.items()
         self.action_names = [
             f"{place}.{name}" for place, p in placements for name in action_names(p.robot)
@@ -76,11 +76,7 @@ class ColumnReader:
         self.joint_names = [
             f"{place}.{joint}" for place, p in placements for joint in p.robot.joints
         ]
-        self.bodies = [
-            name
-            for name, body in world.bodies.items()
-            if body.kind != "static" and not body.anchored
-        ]
+        self.bodies = placed_bodies(task.simulation.worlds[0])
         self.body_names = [f"{body}.{number}" for body in self.bodies for number in POSE]
         self._keys = articulation_keys(task.layout)
         self._dof = {place: p.robot.dof for place, p in placements}

@@ -35,6 +35,9 @@ class Scenario:
             see (needs a Vulkan driver): ``"rgb"``, ``"rgbd"``, or any of ``rgb``, ``depth``,
             ``segmentation`` and ``position`` joined by ``+``, and to them ``state`` or
             ``state_dict``, without which images come only with what a real robot senses.
+            ``"lerobot"`` and ``"robomimic"`` give the columns that exports in these formats hold,
+            under their names, so that a policy trained on one plays here as it is;
+            ``"lerobot+video"`` gives the pictures of exports with video, too.
         reward_mode: One of the task's modes; None takes its first.
         control_mode: ``"pd_joint_delta_pos"``, or ``"pd_joint_pos"`` for actions that are joint
             positions.
@@ -85,7 +88,7 @@ class Scenario:
     @property
     def draws(self) -> bool:
         """Whether anything is drawn: for people, or for cameras that observe."""
-        return self.render_mode is not None or bool(read_mode(self.obs_mode).textures)
+        return self.render_mode is not None or read_mode(self.obs_mode).draws
 
     def check(self, reward_modes: Sequence[str]) -> None:
         """Refuse values that no task can be made with.

@@ -107,7 +107,7 @@ class MultiRobotTask(Declaration, Remade):
         self._reader = ActionReader(self.layout, self.num_envs)
         mode = read_mode(scenario.obs_mode)
         cameras = scenario.cameras or self.cameras if mode.textures else ()
-        self.observer = Observer(self.layout, mode, cameras, self.sensed)
+        self.observer = Observer(self.layout, mode, cameras, self.sensed, self.viewpoint)
         first = self.first_seed if first_seed is None else first_seed
         self._rngs = [EpisodeRandom(first + i) for i in range(self.num_envs)]
         self._max_reward = np.array(self.max_reward, np.float32)
@@ -302,6 +302,13 @@ class MultiRobotTask(Declaration, Remade):
         self.observer.changed(ids)
         self._read()
 
+    def flat_state(self) -> Floats:
+        """Return what ``obs_mode="state"`` observes, (N, D), whatever the task's own mode is."""
+        state = self._state
+        parts = self.observe(state, self._info(state))
+        observer = Observer(self.layout, read_mode("state"), (), (), self.viewpoint)
+        return observer.observe(self.simulation, state, parts)
+
     def render(self) -> np.ndarray:
         """Return a picture of every environment, (N, 512, 512, 3) uint8.
 
@@ -377,9 +384,10 @@ class MultiRobotTask(Declaration, Remade):
         return {ELAPSED: self._elapsed.copy(), **judged}
 
     def _observation(self, state: State, info: Info) -> Any:
-        if self.observer.mode.nothing:
+        mode = self.observer.mode
+        if mode.nothing:
             return {}
-        parts = self._observed.checked(self.observe(state, info))
+        parts = {} if mode.columns else self._observed.checked(self.observe(state, info))
         try:
             return self.observer.observe(self.simulation, state, parts)
         except NotFinite:

@@ -14,7 +14,8 @@ import rollouts.demo as demo
 from robots import AssetError, UrdfLocator
 from rollouts.__main__ import main
 from rollouts.demo import DemoOptions, run_demo
-from rollouts.video import film, overview, video_problem
+from rollouts.video import film, video_problem
+from tasks.engine.columns import overview
 from tests.rollouts.hand_overs import TASK, plan, task
 
 

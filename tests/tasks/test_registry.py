@@ -78,7 +78,7 @@ def test_an_unknown_field_raises():
     scenario = tasks.get_task_class("PickCube-v1").scenario
     with pytest.raises(AttributeError, match="Did you mean 'num_envs'"):
         scenario.num_env = 3
-    with pytest.raises(KeyError, match="scenario field 'num_environments'"):
+    with pytest.raises(KeyError, match="unexpected keyword argument 'num_environments'"):
         tasks.make("PickCube-v1", num_environments=3)
 
 
