@@ -39,6 +39,8 @@ from tests.robots.hub_server import (
 )
 from tests.robots.processes import is_alive, wait_until
 
+pytestmark = pytest.mark.usefixtures("store")
+
 CHECKOUT = Path(__file__).parents[2]
 HAND = "franka_description/meshes/collision/hand.stl"
 
