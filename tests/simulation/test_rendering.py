@@ -19,7 +19,7 @@ NO_DRIVER = {"VK_DRIVER_FILES": "/nowhere.json", "VK_ICD_FILENAMES": "/nowhere.j
 
 
 @pytest.fixture(scope="module")
-def drawn() -> tasks.MultiRobotTask:
+def drawn(renderer) -> tasks.MultiRobotTask:
     if problem := vulkan_problem():
         pytest.skip(problem)
     return tasks.make(TASK, num_envs=2, render_mode="rgb_array")
