@@ -10,8 +10,8 @@ from tests.native import NATIVE, TASKS, complaints, pair
 
 pytestmark = NATIVE
 
-# The second begins in a world that has a past, or that is rebuilt; the first in a rebuilt one.
-SEEDS = {"reused": (1, 2), "fresh": (2,)}
+# The second begins in a world that has a past; the others in one that is rebuilt.
+SEEDS = {"reused": (1, 2), "fresh": (0,)}
 
 
 def other_modes():
@@ -54,7 +54,8 @@ def test_scripted_contact(task_id, history):
     results = pair(task_id).play(episodes, history)
     assert complaints(results) == []
     if has_movable_bodies(task_id):
-        assert sum(result.contact_steps for result in results) >= 10, "hardly anything was touched"
+        touched = sum(result.contact_steps for result in results)
+        assert touched >= 5 * len(results), "hardly anything was touched"
 
 
 @pytest.mark.long
