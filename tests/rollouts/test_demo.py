@@ -118,7 +118,7 @@ def test_a_number_of_seeds_is_one_or_more(count, capsys):
     assert "--seeds" in capsys.readouterr().err
 
 
-def test_a_video_shows_the_episodes(tmp_path):
+def test_a_video_shows_the_episodes(tmp_path, renderer):
     if problem := video_problem():
         pytest.skip(problem)
     import imageio.v3 as imageio

@@ -259,7 +259,7 @@ CAMERA = "observation.images.overview"
 
 
 @pytest.fixture(scope="module")
-def filmed(tmp_path_factory) -> Path:
+def filmed(tmp_path_factory, renderer) -> Path:
     """Return a folder with a recording, and a dataset with video that was made of it."""
     if problem := video_problem():
         pytest.skip(problem)

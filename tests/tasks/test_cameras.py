@@ -21,7 +21,7 @@ SMALL = [Camera((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1), width=48, height=32)]
 
 
 @pytest.fixture
-def drawn() -> None:
+def drawn(renderer) -> None:
     """Skip where nothing can be drawn."""
     if problem := vulkan_problem():
         pytest.skip(problem)
