@@ -148,17 +148,20 @@ class PostureSearch:
         posture = self._stance.middle
         for choices in hands:
             made = [self._stance.with_joints(choice, posture) for choice in choices]
-            moved = {self._stance.tree.link(joint) for joint in self._moved(choices[0])}
+            hand = self._links(choices[0])
             inside = np.array(
-                [[self._hulls[i].link in moved for i in pair] for pair in self._pairs], bool
+                [[self._hulls[i].link in hand for i in pair] for pair in self._pairs], bool
             ).reshape(-1, 2)
-            pairs = self._pairs[inside.any(axis=1)]
+            pairs = self._pairs[inside.all(axis=1)]
             counts = [int(self._overlaps(tried, pairs).sum()) for tried in made]
             posture = made[counts.index(min(counts))]
         return posture
 
-    def _moved(self, joints: Mapping[str, float]) -> list[str]:
-        return [joint.child for joint in self._stance.model.moving if joint.name in joints]
+    def _links(self, joints: Mapping[str, float]) -> frozenset[int]:
+        """Return the links that some joints join, and what is rigid with them."""
+        model, tree = self._stance.model, self._stance.tree
+        ends = [end for j in model.moving if j.name in joints for end in (j.parent, j.child)]
+        return frozenset(tree.link(link) for end in ends for link in model.rigid_with(end))
 
     def _lowest(self) -> float:
         """Return the height of the ground: of the lowest point of the root's body (m)."""
