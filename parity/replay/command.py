@@ -92,7 +92,8 @@ def _run(cls: type[MultiRobotTask], path: Path, count: int) -> Run:
     episodes = load_episodes(path, cls.task_id, cls.layout.action_dim)[:count]
     if path.suffix == ".h5":
         with TrajectoryFile(path) as file:
-            task_for(file).close()  # refuses a file of another layout, which native does not have
+            # Native has the layout of the task alone; a file of another one is refused.
+            task_for(file, layout=cls.layout).close()
     return Run(
         cls.task_id,
         path.name,

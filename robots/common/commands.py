@@ -7,8 +7,8 @@ import io
 import os
 import signal
 import sys
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from typing import Any, NoReturn, TextIO
 
 from robots.common.errors import RobotLayoutsError, UnknownNameError
@@ -49,9 +49,16 @@ def program(module: str) -> str:
     return _spelt.get(module, f"python -m {module}")
 
 
-def spell_commands(spelt: Mapping[str, str]) -> None:
-    """Let `program` call commands otherwise, by their modules."""
+@contextmanager
+def commands_spelt(spelt: Mapping[str, str]) -> Iterator[None]:
+    """Let `program` call commands otherwise, by their modules, as long as one of them runs."""
+    before = dict(_spelt)
     _spelt.update(spelt)
+    try:
+        yield
+    finally:
+        _spelt.clear()
+        _spelt.update(before)
 
 
 def print_error(error: RobotLayoutsError) -> None:

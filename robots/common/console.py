@@ -13,7 +13,7 @@ from contextlib import suppress
 from importlib import import_module, metadata
 from typing import Any, NamedTuple, NoReturn
 
-from robots.common.commands import MEANINGLESS, print_error, spell_commands, start
+from robots.common.commands import MEANINGLESS, commands_spelt, print_error, start
 from robots.common.errors import UnknownNameError
 
 NAME = "robot-layouts"
@@ -96,19 +96,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(command: Command, words: Sequence[str]) -> int:
-    spell_commands(
-        {
-            about.module.removesuffix(".__main__"): f"{NAME} {name}".removesuffix(
-                f" {' '.join(about.words)}"
-            )
-            for name, about in COMMANDS.items()
-        }
-    )
+    spelt = {
+        about.module.removesuffix(".__main__"): f"{NAME} {name}".removesuffix(
+            f" {' '.join(about.words)}"
+        )
+        for name, about in COMMANDS.items()
+    }
     with suppress(OSError):  # it may have been deleted
         if (folder := os.getcwd()) not in sys.path:
             sys.path.append(folder)
     module: Any = import_module(command.module)
-    return module.main([*command.words, *words])
+    with commands_spelt(spelt):
+        return module.main([*command.words, *words])
 
 
 def _usage(commands: Mapping[str, Command]) -> str:

@@ -9,9 +9,10 @@ import pytest
 import tasks
 from robots import TaskError
 from rollouts import evaluate
-from rollouts.export.columns import ColumnReader, make_task
+from rollouts.export.columns import ColumnReader
 from rollouts.export.dataset import Export, export
 from rollouts.export.pictures import draw
+from rollouts.reading.recorded_task import task_for
 from rollouts.reading.trajectory import TrajectoryFile
 from simulation.rendering.pictures import vulkan_problem
 from tests.rollouts.recordings import SECOND, TWO_ROBOTS, record
@@ -85,7 +86,7 @@ def test_the_pictures_that_an_export_films(task_id, tmp_path):
     task = tasks.make(task_id, obs_mode="lerobot+video")
     task.reset(seed=99)  # as another world it draws the same
     with TrajectoryFile(record(tmp_path / "one.h5", task_id, [4, 3])) as file:
-        drawn = make_task(file, pictures=True)
+        drawn = task_for(file, pictures=True)
         for trajectory in file:
             columns = ColumnReader(drawn).read(trajectory)
             obs, _ = task.reset(seed=trajectory.seed, options=REBUILT)

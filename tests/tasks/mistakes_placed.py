@@ -259,8 +259,8 @@ MISTAKES = (
         {},
         (
             "unknown obs_mode 'states'. Did you mean 'state'? Choices: state, state_dict, none, "
-            "rgb, rgbd, rgb+depth+state, depth, rgb+segmentation. Besides, any of rgb, depth, "
-            "segmentation, position are joined by '+', and one of state, state_dict to them"
+            "lerobot, lerobot+video, robomimic, rgb, rgbd, rgb+depth+state, depth, rgb+segmentation."
+            " Besides, any of rgb, depth, segmentation, position are joined by '+', and one of state, state_dict to them"
         ),
         fields={"obs_mode": "states"},
     ),
