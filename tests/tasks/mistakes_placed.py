@@ -258,9 +258,10 @@ MISTAKES = (
         "an unknown obs_mode",
         {},
         (
-            "unknown obs_mode 'states'. Did you mean 'state'? Choices: state, state_dict, none, "
-            "lerobot, lerobot+video, robomimic, rgb, rgbd, rgb+depth+state, depth, rgb+segmentation."
-            " Besides, any of rgb, depth, segmentation, position are joined by '+', and one of state, state_dict to them"
+            "unknown obs_mode 'states'. Did you mean 'state'? Choices: state, state_dict, none,"
+            " lerobot, lerobot+video, robomimic, rgb, rgbd, rgb+depth+state, depth,"
+            " rgb+segmentation. Besides, any of rgb, depth, segmentation, position are joined by"
+            " '+', and one of state, state_dict to them"
         ),
         fields={"obs_mode": "states"},
     ),
