@@ -7,7 +7,7 @@ import io
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any, NoReturn, TextIO
 
@@ -50,7 +50,7 @@ def program(module: str) -> str:
 
 
 @contextmanager
-def commands_spelt(spelt: Mapping[str, str]) -> Iterator[None]:
+def commands_spelt(spelt: Mapping[str, str]) -> Generator[None]:
     """Let `program` call commands otherwise, by their modules, as long as one of them runs."""
     before = dict(_spelt)
     _spelt.update(spelt)
