@@ -186,14 +186,22 @@ class Arrangement(Mapping[str, Placement]):
             raise UnknownNameError("robot of this layout", name, [*known, *self.short_names])
         return known[full]
 
+    def arm_name(self, name: str) -> str:
+        """Return the full name of a robot or a limb.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        self.arm(name)
+        return self.short_names.get(name, name)
+
     def owner(self, name: str) -> str:
         """Return the robot that an arm belongs to: itself, unless it is a limb.
 
         Raises:
             UnknownNameError: If there is no arm of that name.
         """
-        self.arm(name)
-        return self.short_names.get(name, name).partition(".")[0]
+        return self.arm_name(name).partition(".")[0]
 
     @property
     def action_split(self) -> dict[str, slice]:
@@ -246,14 +254,35 @@ class Arrangement(Mapping[str, Placement]):
         """The least and the largest value of each number of the flat action."""
         return tuple(b for placement in self.values() for b in placement.robot.action_bounds)
 
-    def in_control_mode(self: _Self, mode: str) -> _Self:
+    def in_control_mode(self: _Self, mode: str | Mapping[str, str]) -> _Self:
         """Return the layout with robots that take the actions of a control mode.
 
+        Args:
+            mode: Name of a mode, or one by arm: a robot, or a limb by its full name or its short
+                one. Arms that are left out stay as they are.
+
         Raises:
-            UnknownNameError: If there is no such control mode.
-            DescriptorError: If a robot lacks the joint limits that the mode needs.
+            UnknownNameError: If there is no such control mode, or no such arm.
+            DescriptorError: If a robot lacks what the mode needs; see
+                `robots.RobotDescriptor.in_control_mode`.
         """
-        return self.replace_robots(**{n: p.robot.in_control_mode(mode) for n, p in self.items()})
+        if isinstance(mode, str):
+            chosen: dict[str, str | dict[str, str]] = dict.fromkeys(self, mode)
+        else:
+            chosen = self._modes_by_robot(mode)
+        robots = {name: self[name].robot.in_control_mode(own) for name, own in chosen.items()}
+        return self.replace_robots(**robots)
+
+    def _modes_by_robot(self, modes: Mapping[str, str]) -> dict[str, str | dict[str, str]]:
+        """Return the mode of each robot that some are named for, or those of its limbs."""
+        chosen: dict[str, str | dict[str, str]] = {}
+        for arm, mode in modes.items():
+            owner = self.owner(arm)
+            own = chosen.setdefault(owner, {} if self[owner].robot.parts else mode)
+            if isinstance(own, dict):
+                limb = self.arm_name(arm).partition(".")[2]
+                own.update(dict.fromkeys([limb] if limb else self[owner].robot.parts, mode))
+        return chosen
 
     def _with(self: _Self, changed: Mapping[str, Placement]) -> _Self:
         return type(self)({**self._placements, **changed}, self._frames)

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from robots.common.errors import DescriptorError, UnknownNameError
+from robots.commands import COMMANDS, FRAMES, Command
+from robots.common.errors import DescriptorError, UnknownNameError, unknown_name_message
 from robots.common.fields import settle, settle_fields
 
 
@@ -54,6 +55,12 @@ class JointGroup:
             control modes in which the action asks for positions.
         normalised: Whether action numbers lie in [-1, 1]; if not, they are in ``unit`` and lie
             in [lower, upper], but are not clipped.
+        command: What the action numbers ask for; see `robots.commands.COMMANDS`. Where they ask
+            for something else than joint positions, ``lower`` and ``upper`` are in its units.
+        target: Whether what is ``delta`` is relative to where the group was last driven to, and
+            not to where it is.
+        frame: In which frames a ``delta`` of a TCP pose is; see `robots.commands.FRAMES`.
+        root_link: Link whose frame TCP poses are in; the robot's root if None.
     """
 
     joints: tuple[str, ...]
@@ -73,6 +80,10 @@ class JointGroup:
     offsets: tuple[float, ...] = ()
     held: bool = False
     armature: float | tuple[float, ...] = 0.0
+    command: str = "position"
+    target: bool = False
+    frame: str = FRAMES[0]
+    root_link: str | None = None
 
     def __post_init__(self) -> None:
         """Refuse empty groups, repeated joints, inverted ranges and non-physical drives."""
@@ -83,8 +94,17 @@ class JointGroup:
             raise DescriptorError(f"a joint group names a joint twice: {self.joints}")
         if self.unit not in ("rad", "m"):
             raise DescriptorError(f"unit is {self.unit!r}; it must be 'rad' or 'm'")
+        for name, given, known in (
+            ("command", self.command, COMMANDS),
+            ("frame", self.frame, FRAMES),
+        ):
+            if given not in known:
+                raise DescriptorError(
+                    unknown_name_message(f"{name} of a joint group", given, known)
+                )
         self._refuse_bad_drives()
         self._refuse_bad_followers()
+        self._refuse_bad_commands()
         self._refuse_bad_ranges()
 
     @classmethod
@@ -135,6 +155,15 @@ class JointGroup:
                     f"{name} has {len(given)} numbers; the group has joints {self.joints}"
                 )
 
+    def _refuse_bad_commands(self) -> None:
+        if self.target and not self.delta:
+            raise DescriptorError(f"only a delta has a target; that of {self.joints} is none")
+        if self.command != "position" and (self.mimic or self.held):
+            raise DescriptorError(
+                f"{self.joints} take {self.command!r}; a group that is held or mimics takes"
+                " positions only"
+            )
+
     def _refuse_bad_ranges(self) -> None:
         for name, value in (("lower", self.lower), ("upper", self.upper)):
             if isinstance(value, tuple) and len(value) != self.size:
@@ -151,10 +180,23 @@ class JointGroup:
 
     @property
     def size(self) -> int:
-        """How many action numbers drive it: none if ``held``, one if ``mimic``, else one each."""
+        """How many action numbers drive it: none if ``held``, one if ``mimic``, else one each.
+
+        A TCP takes three or six, and joint positions with velocities two each.
+        """
         if self.held:
             return 0
-        return 1 if self.mimic else len(self.joints)
+        return 1 if self.mimic else len(self.numbers)
+
+    @property
+    def numbers(self) -> tuple[tuple[str, str], ...]:
+        """What each action number moves, and its unit; of a mimic group what each joint does."""
+        return COMMANDS[self.command].numbers(self.joints, self.unit)
+
+    @property
+    def asks(self) -> Command:
+        """What the action numbers ask for."""
+        return COMMANDS[self.command]
 
     @property
     def ranges(self) -> tuple[tuple[float, float], ...]:

@@ -13,6 +13,7 @@ from typing import Any, NoReturn, Protocol, runtime_checkable
 from robots.action_split import ActionNumber, ActionSplit, JointGroup, is_gripper, names
 from robots.common.errors import DescriptorError, UnknownNameError
 from robots.common.fields import settle_fields
+from robots.control_modes import CONTROL_MODES, MODES, driven_in
 from robots.limbs import share_out
 from robots.parts import (
     IDENTITY,
@@ -44,8 +45,6 @@ __all__ = [
     "Vector3",
     "names",
 ]
-
-CONTROL_MODES = ("pd_joint_delta_pos", "pd_joint_pos")  # ManiSkill's names
 
 
 @runtime_checkable
@@ -83,6 +82,8 @@ class RobotDescriptor:
         limbs: The arms of a robot that has several, by name, such as ``left`` and ``right``;
             ``tcp_link``, ``fingers`` and ``reach`` are then those of the first one. A robot without
             limbs is one arm.
+        control_modes: Joint groups, by their names, in control modes where they are not those that
+            `robots.control_modes` makes of ``action_split``; also modes of the robot's own.
     """
 
     name: str
@@ -100,6 +101,9 @@ class RobotDescriptor:
     allowed_collisions: tuple[tuple[str, str], ...] | None = None
     tcp_offset: Vector3 = (0.0, 0.0, 0.0)
     limbs: Mapping[str, Limb] = field(default_factory=dict[str, Limb])
+    control_modes: Mapping[str, Mapping[str, JointGroup]] = field(
+        default_factory=dict[str, Mapping[str, JointGroup]]
+    )
 
     def __post_init__(self) -> None:
         """Freeze the keyframes and refuse contradictions."""
@@ -128,6 +132,9 @@ class RobotDescriptor:
         self.keyframe(self.home.keyframe)
         object.__setattr__(self, "limbs", _Frozen(self.limbs))
         self._owners()
+        modes = {mode: _Frozen(groups) for mode, groups in self.control_modes.items()}
+        object.__setattr__(self, "control_modes", _Frozen(modes))
+        self._check_modes()
 
     @classmethod
     def from_urdf(
@@ -270,25 +277,56 @@ class RobotDescriptor:
             reach=limb.reach if limb else self.reach,
             cameras=tuple(c for c in self.cameras if part in c.name.split("_")),
             limbs={},
+            control_modes={},
         )
 
-    def in_control_mode(self, mode: str) -> RobotDescriptor:
+    def _check_modes(self) -> None:
+        """Refuse modes of the robot's own that drive groups which it does not have."""
+        for mode, groups in self.control_modes.items():
+            for name, group in groups.items():
+                own = self.action_split.groups.get(name)
+                if own is None or own.joints != group.joints:
+                    raise DescriptorError(
+                        f"{self.name}: control mode {mode!r} drives {name!r} with joints"
+                        f" {', '.join(group.joints)}; the action split has no such group"
+                    )
+
+    @property
+    def modes(self) -> tuple[str, ...]:
+        """The control modes that may be asked of it: ManiSkill's, then its own."""
+        return (*CONTROL_MODES, *(name for name in self.control_modes if name not in MODES))
+
+    def in_control_mode(self, mode: str | Mapping[str, str]) -> RobotDescriptor:
         """Return the robot with the actions of a control mode.
 
-        ``pd_joint_delta_pos`` is the action split as declared. In ``pd_joint_pos`` the numbers of
-        every group that was relative are joint positions, as in ManiSkill.
+        ``pd_joint_delta_pos`` is the action split as declared. The other modes of joint positions
+        change every group that is relative there, those of velocities all but grippers, and those
+        of the TCP (``pd_ee_…``) the arm alone, as in ManiSkill; see `robots.control_modes`.
+
+        Args:
+            mode: Name of a mode, or one by limb; limbs that are left out stay as they are.
 
         Raises:
-            UnknownNameError: If there is no such control mode.
-            DescriptorError: If the mode needs joint limits and a group has none.
+            UnknownNameError: If there is no such control mode, or no such limb.
+            DescriptorError: If the robot lacks what the mode needs: joint limits, or an arm.
         """
-        if mode not in CONTROL_MODES:
-            raise UnknownNameError("control mode", mode, CONTROL_MODES)
-        relative = {n: group for n, group in self.action_split.groups.items() if group.delta}
-        if mode == CONTROL_MODES[0] or not relative:
+        parts = self.parts or {self.name: self}
+        chosen = dict.fromkeys(parts, mode) if isinstance(mode, str) else mode
+        changed: dict[str, JointGroup] = {}
+        for part, name in chosen.items():
+            if part not in parts:
+                raise UnknownNameError(f"limb of {self.name}", part, parts)
+            if name not in self.modes:
+                raise UnknownNameError("control mode", name, self.modes)
+            split, own = parts[part].action_split, self.control_modes.get(name, {})
+            try:
+                has_tcp = not self.limbs or part in self.limbs
+                changed.update(driven_in(name, split, own, has_tcp=has_tcp))
+            except DescriptorError as error:
+                raise DescriptorError(f"{self.name}: {error}") from None
+        if all(self.action_split.groups[name] == group for name, group in changed.items()):
             return self
-        positions = {name: group.by_position() for name, group in relative.items()}
-        return replace(self, action_split=self.action_split.replace(**positions))
+        return replace(self, action_split=self.action_split.replace(**changed))
 
     def describe_action(self) -> tuple[ActionNumber, ...]:
         """Return name, unit and range of every action number, in order."""
@@ -296,18 +334,23 @@ class RobotDescriptor:
         for group_name, group in self.action_split.groups.items():
             if group.held:
                 continue
-            driven = [group.joints] if group.mimic else [(joint,) for joint in group.joints]
-            for joints, (lower, upper) in zip(driven, group.ranges, strict=True):
+            driven = [(joint,) for joint in group.joints] * 2  # by positions, and by velocities
+            for i, ((moved, unit), (lower, upper)) in enumerate(
+                zip(group.numbers, group.ranges, strict=not group.mimic)
+            ):
+                # A turn is scaled by its lower bound, as in ManiSkill.
+                turned = group.normalised and group.asks.tcp and unit == "rad"
+                relative = group.delta and not unit.endswith("/s")
                 numbers.append(
                     ActionNumber(
                         index=len(numbers),
-                        name=group_name if group.mimic else f"{group_name}.{joints[0]}",
+                        name=group_name if group.mimic else f"{group_name}.{moved}",
                         group=group_name,
-                        joints=joints,
-                        unit=f"{group.unit} per step" if group.delta else group.unit,
-                        lower=lower,
-                        upper=upper,
-                        relative=group.delta,
+                        joints=group.joints if group.mimic or group.asks.tcp else driven[i],
+                        unit=f"{unit} per step" if relative else unit,
+                        lower=-lower if turned else lower,
+                        upper=lower if turned else upper,
+                        relative=relative,
                         normalised=group.normalised,
                     )
                 )

@@ -14,6 +14,7 @@ from tasks.cell_options import add_cell_options, chosen_cell
 COMMANDS = {
     "record": "rollouts.recording.record_command",
     "evaluate": "rollouts.evaluate_command",
+    "convert": "rollouts.recording.convert_command",
     "replay": "rollouts.playing.replay_command",
     "export": "rollouts.export.command",
     "view": "rollouts.view_command",

@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--episodes", type=one_or_more, default=100, metavar="N", help="how many (%(default)s)")
     workers.add_arguments(parser)
     add("--seed", type=zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
-    add("--control-mode", choices=CONTROL_MODES, default=CONTROL_MODES[0], help="(%(default)s)")
+    workers.add_control_mode(parser, default=CONTROL_MODES[0])
     add_cell_options(parser)
 
 

@@ -168,6 +168,20 @@ class PoseSolver(Protocol):
         ...
 
 
+class PoseFollower(Protocol):
+    """Finds the joints of an arm that bring a link to a pose, from where they are."""
+
+    def follow(self, position: Floats, quaternion: Floats, qpos: Floats, /) -> Joints | None:
+        """Return the arm's joints, in the order asked for, or None if none were found.
+
+        Args:
+            position: Of the link in the root link's frame, (3,) (m).
+            quaternion: Likewise, wxyz.
+            qpos: All joints of the robot in its descriptor's order, (dof,) (rad, m).
+        """
+        ...
+
+
 class PointSolver(Protocol):
     """Solves for the arm joints, in the order of ``joints``, that bring a point of a TCP link."""
 
@@ -218,6 +232,10 @@ class Backend(Protocol):
 
     def drive(self, targets: Floats, env_ids: Sequence[int]) -> None:
         """Set every joint's drive target; ``targets`` has a row for each world, (N, dof)."""
+        ...
+
+    def drive_velocities(self, velocities: Floats, env_ids: Sequence[int]) -> None:
+        """Set every joint's target of velocity, likewise (rad/s, m/s); 0 until it is set."""
         ...
 
     def step(self, env_ids: Sequence[int], substeps: int) -> None:
@@ -272,6 +290,19 @@ class Backend(Protocol):
 
     def point_reach(self, robot: str) -> PointSolver:
         """Return a solver for points of a robot's TCP link, likewise."""
+        ...
+
+    def pose_follower(
+        self, robot: str, link: str, root_link: str | None, joints: Sequence[str]
+    ) -> PoseFollower:
+        """Return what follows poses of a robot's link with some of its joints, in any world.
+
+        Args:
+            robot: The robot's name in the layout.
+            link: The link.
+            root_link: Link whose frame poses are in, whatever holds it; the robot's root if None.
+            joints: Those that may move.
+        """
         ...
 
     def contact_counts(self) -> NDArray[np.int64]:

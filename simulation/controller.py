@@ -1,4 +1,7 @@
-"""Joint-position control, generated from the robots' action splits."""
+"""Joint-position control, generated from the robots' action splits.
+
+What control modes ask for besides is in `simulation.control`.
+"""
 
 from __future__ import annotations
 
@@ -86,6 +89,8 @@ def _drives(group: JointGroup, first: int, start: Sequence[float]) -> Iterator[_
     for i, (multiplier, offset) in enumerate(group.followers):
         if group.held:
             yield _Drive(first, 0.0, start[i], relative=False)
+        elif not group.asks.positions:
+            yield _Drive(first, 0.0, 0.0, relative=True)  # stays where it is
         else:
             source = first if group.mimic else first + i
             shift = 0.0 if group.delta else offset

@@ -14,6 +14,7 @@ from robots import RobotDescriptor, SimulationError
 from robots.descriptor import IDENTITY, Quaternion
 from simulation.backend import Backend, Overlap, PointSolver, PoseSolver, Rows
 from simulation.cameras import AnyCamera, View
+from simulation.control.modes import ModeController
 from simulation.controller import JointPositionController
 from simulation.maths import Array, Flags, Floats
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, substeps
@@ -34,6 +35,7 @@ class Simulation:
         index: Where each frame and joint stands in a read-out.
         drive_targets: What the joints were last driven to, robots in layout order, joints in the
             descriptors', (N, dof) (rad, m).
+        modes: What drives the robots, if their control modes ask for more than joint positions.
     """
 
     def __init__(
@@ -71,7 +73,11 @@ class Simulation:
         self._placements = Placements()
         self._controller = JointPositionController(layout)
         self.drive_targets: Floats = np.zeros((num_envs, self._controller.dof), np.float32)
+        self.modes: ModeController | None = None
+        if ModeController.needed(layout):
+            self.modes = ModeController(layout, self._controller)
         self.worlds: list[World] = []
+        self._fresh = set(self._everywhere)  # worlds that have not moved since their reset
         self._build(self._everywhere, build)
 
     def rebuild(self, env_ids: Sequence[int], build: Callable[[World, int], None]) -> None:
@@ -122,7 +128,14 @@ class Simulation:
     def clear(self, env_ids: Sequence[int]) -> None:
         """Begin a reset of some worlds: everything rests, and anchored bodies are put back."""
         self._change()
+        self._fresh.update(env_ids)
         self._backend.clear(env_ids)
+
+    def hold(self, state: State) -> None:
+        """End a reset: targets that control modes remember are where the robots are now."""
+        if self.modes is not None and self._fresh:
+            self.modes.begin(state, sorted(self._fresh))
+        self._fresh.clear()
 
     def place(
         self,
@@ -222,6 +235,8 @@ class Simulation:
         self, action: Floats, joint_positions: Floats, env_ids: Iterable[int] | None
     ) -> Sequence[int]:
         """Set the drive targets of worlds, and return which."""
+        if self.modes is not None:
+            return self._drive_modes(self.modes, action, env_ids)
         self._change()
         targets = self._controller.targets(action, joint_positions)
         if env_ids is None:
@@ -230,6 +245,21 @@ class Simulation:
             moving = list(env_ids)
             self.drive_targets[moving] = targets[moving]
         self._backend.drive(targets, moving)
+        return moving
+
+    def _drive_modes(
+        self, modes: ModeController, action: Floats, env_ids: Iterable[int] | None
+    ) -> Sequence[int]:
+        state = self.read()
+        moving = self._everywhere if env_ids is None else list(env_ids)
+        if self._fresh:
+            self.hold(state)
+        self._change()
+        targets, velocities = modes.command(action, state, moving)
+        self.drive_targets[moving] = targets[moving]
+        self._backend.drive(targets, moving)
+        if velocities is not None:
+            self._backend.drive_velocities(velocities, moving)
         return moving
 
     def _change(self) -> None:
@@ -259,6 +289,9 @@ class Simulation:
         built = self._backend.build(fresh)
         self.worlds = [fresh.get(i) or self.worlds[i] for i in self._everywhere]
         self.index = ReadoutIndex(self.layout, built)
+        self._fresh.update(env_ids)
+        if self.modes is not None:
+            self.modes.build(self._backend, self.index)
         self._change()
 
 

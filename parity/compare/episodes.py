@@ -91,12 +91,18 @@ def recorded_control_mode(path: Path) -> str | None:
     """Return the control mode that a file was recorded in, or None if it does not say.
 
     Raises:
-        TrajectoryError: If the file cannot be read.
+        TrajectoryError: If the file cannot be read, or its arms are in different modes.
     """
     if path.suffix != ".h5":
         return None
     with TrajectoryFile(path) as file:
-        return file.control_mode
+        mode = file.control_mode
+    if not isinstance(mode, str):
+        raise TrajectoryError(
+            f"{path} was recorded with a control mode for each arm, {dict(mode)}; native ManiSkill"
+            " has one for all"
+        )
+    return mode
 
 
 def find_demonstrations(folder: Path) -> dict[str, list[Path]]:

@@ -281,7 +281,7 @@ def _named(snapshot: Snapshot, robots: Mapping[str, str]) -> Arrays:
 def _play_native(
     env: MultiRobotTask, episode: Episode, film: Path | None, on_step: Callable[[str], None]
 ) -> Arrays:
-    mode, size = env.scenario.control_mode, PICTURE_SIZE if film else None
+    mode, size = str(env.scenario.control_mode), PICTURE_SIZE if film else None
     side = NativeSide(env.task_id, control_mode=mode, picture_size=size)
     native, keys = side.envs[0], articulation_keys(env.layout)
 

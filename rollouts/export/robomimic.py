@@ -10,6 +10,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from robots.control_modes import plain_mode
 from rollouts.export.columns import POSE, ColumnReader, Columns, Floats
 from rollouts.export.writer import DatasetWriter
 from tasks.engine.columns import robomimic_columns
@@ -89,7 +90,7 @@ class RobomimicWriter(DatasetWriter):
             "type": GYM,
             "env_kwargs": {
                 "robots": {place: p.robot.name for place, p in task.layout.items()},
-                "control_mode": task.scenario.control_mode,
+                "control_mode": plain_mode(task.scenario.control_mode),
                 "reward_mode": task.reward_mode,
                 "control_frequency": task.scenario.control_frequency,
             },

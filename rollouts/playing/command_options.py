@@ -6,9 +6,10 @@ import argparse
 import signal
 from collections.abc import Generator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from robots import TaskError
+from robots import CONTROL_MODES, DescriptorError, TaskError
+from robots.control_modes import read_mode
 from rollouts.playing.dispatch import EPISODE_SECONDS, check_timeout
 
 if TYPE_CHECKING:
@@ -100,3 +101,35 @@ def _at_least(least: int, text: str) -> int:
     if number < least:
         raise argparse.ArgumentTypeError(f"{number} is too few; it must be {least} or more")
     return number
+
+
+def add_control_mode(
+    parser: argparse.ArgumentParser, name: str = "--control-mode", **details: Any
+) -> None:
+    """Add the argument of a control mode, or of one for each arm.
+
+    Args:
+        parser: Takes it.
+        name: Its name.
+        details: Other arguments of ``add_argument``.
+    """
+    example = f"left={CONTROL_MODES[0]},right={CONTROL_MODES[1]}"
+    parser.add_argument(
+        name,
+        type=control_mode,
+        metavar="MODE",
+        help=f"one of {', '.join(CONTROL_MODES)}; or by arm: {example}",
+        **details,
+    )
+
+
+def control_mode(text: str) -> str | dict[str, str]:
+    """Return the control mode that a text names, or those by arm.
+
+    Raises:
+        argparse.ArgumentTypeError: If it is neither.
+    """
+    try:
+        return read_mode(text)
+    except DescriptorError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None

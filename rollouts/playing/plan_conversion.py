@@ -1,4 +1,4 @@
-"""Experts' plans in any control mode: the drive targets of each step, as joint positions."""
+"""Experts' plans in any control mode: what they drive joints to, as actions of that mode."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from experts.registry import Expert
 from robots import CONTROL_MODES, RobotDescriptor, TaskError
+from rollouts.playing.mode_conversion import converted
 from tasks import MultiRobotTask
 from tasks.episode import follow, moments
 
-DELTAS = CONTROL_MODES[0]  # which all experts speak
+DELTAS, POSITIONS = CONTROL_MODES[:2]  # all experts plan in deltas
 
 
 class Planner:
@@ -25,16 +26,24 @@ class Planner:
 
     def __init__(self, task: MultiRobotTask, expert: Expert) -> None:
         """Make a task in deltas for the expert to plan for, if this one is in another mode."""
-        self._task, self._expert, self.reason = task, expert, ""
+        self._task, self._expert, self._played, self.reason = task, expert, task, ""
         self._converts = task.scenario.control_mode != DELTAS
         if self._converts:
             self._task = type(task)(replace(task.scenario, control_mode=DELTAS))
 
     def __call__(self, seed: int) -> NDArray[np.float32]:
-        """Return the actions (T, A) of the episode that ``seed`` begins."""
+        """Return the actions (T, A) of the episode that ``seed`` begins.
+
+        In positions they move everything as planned, to the last bit; in other modes nearly, and
+        the task is stepped to find them.
+        """
         actions = self._expert(self._task, seed)
         self.reason = getattr(actions, "reason", "")
-        return as_positions(self._task, seed, actions) if self._converts else actions
+        if not self._converts:
+            return actions
+        if self._played.scenario.control_mode == POSITIONS:
+            return as_positions(self._task, seed, actions)
+        return converted(self._task, seed, actions, self._played)
 
     def close(self) -> None:
         """Let the worlds of its own task go, if it made one."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
+from dataclasses import fields as fields_of
 from typing import Any
 
 from layouts import Layout
@@ -46,6 +47,9 @@ LAYOUT = maybe(
 )
 SIMULATION = maybe(fields({}, {"physics": maybe(OBJECT), "control_frequency": NUMBER}))
 
+# Fields that joint groups did not have when earlier recordings were made.
+_LATER = ("armature", "command", "target", "frame", "root_link")
+
 _SHOWN = 4  # differences that a message names
 _ABSENT = "nothing"
 
@@ -82,11 +86,9 @@ def describe_layout(layout: Layout) -> dict[str, dict[str, Any]]:
 
 
 def _describe_group(group: JointGroup) -> dict[str, Any]:
-    """Return the fields of a joint group; recordings of old know no armature, so 0 is left out."""
-    described = asdict(group)
-    if not any(group.armatures):
-        del described["armature"]
-    return described
+    """Return a joint group's fields, without those for control modes where they say nothing."""
+    quiet = {field.name: field.default for field in fields_of(group) if field.name in _LATER}
+    return {k: v for k, v in asdict(group).items() if k not in quiet or v != quiet[k]}
 
 
 def describe_simulation(task: MultiRobotTask) -> dict[str, Any]:

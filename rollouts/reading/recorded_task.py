@@ -12,6 +12,7 @@ from rollouts.reading.guessed_robots import guess_again
 from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
 from tasks import MultiRobotTask, get_task_class, make
 from tasks.language.needs import ACT, HOLD
+from tasks.native.format import mode_by_arm
 
 MOST_ROBOTS = 64  # each takes memory, whoever wrote the file
 
@@ -80,7 +81,7 @@ def task_for(
     task = make(
         file.task_id,
         obs_mode="none",
-        control_mode=file.control_mode,
+        control_mode=mode_by_arm(file.control_mode, making["layout"] or cls.layout),
         render_mode="rgb_array" if pictures else None,
         **making,
     )

@@ -97,7 +97,8 @@ class Summary:
         task_id: Id of the task that was recorded.
         module: Module of a user's own that registers it, or None.
         env_kwargs: What native's environment was made with.
-        control_mode: Control mode of every episode.
+        control_mode: Control mode of every episode, or those of arms: by their names in the
+            layout, or by native's of robots.
         max_episode_steps: Control steps until an episode was truncated, or None.
         source_type: Where the actions come from, in ManiSkill's words, or None.
         episodes: Its episodes, in order.
@@ -106,7 +107,7 @@ class Summary:
     task_id: str
     module: str | None
     env_kwargs: dict[str, Any]
-    control_mode: str
+    control_mode: str | dict[str, str]
     max_episode_steps: int | None
     source_type: str | None
     episodes: tuple[Entry, ...]
@@ -126,7 +127,9 @@ def read_summary(path: Path) -> Summary:
         task_id=info["env_id"],
         module=info.get("module"),
         env_kwargs=env_kwargs,
-        control_mode=_common_mode(path, episodes, env_kwargs.get("control_mode")),
+        control_mode=_common_mode(
+            path, episodes, env_kwargs.get("control_mode"), own="layout" in found
+        ),
         max_episode_steps=info.get("max_episode_steps"),
         source_type=found.get("source_type"),
         episodes=tuple(_entry(episode) for episode in episodes),
@@ -183,15 +186,29 @@ def _only(seed: int | list[int] | None) -> int | None:
     return seed
 
 
-def _common_mode(path: Path, episodes: list[Mapping[str, Any]], default: Any) -> str:
-    named = {mode for episode in episodes for mode in _modes(episode.get("control_mode", default))}
-    modes = sorted(named or _modes(default))
-    if len(modes) == 1 and modes[0] in CONTROL_MODES:
-        return modes[0]
+def _common_mode(
+    path: Path, episodes: list[Mapping[str, Any]], default: Any, *, own: bool
+) -> str | dict[str, str]:
+    """Return the control mode of all episodes.
+
+    Args:
+        path: The recording.
+        episodes: Their json.
+        default: What the environment was made with.
+        own: Whether this library recorded it, perhaps in a mode of a robot's own.
+    """
+    given = [episode.get("control_mode", default) for episode in episodes] or [default]
+    mixed = default if isinstance(default, Mapping) else given[0]
+    modes = sorted({mode for each in given for mode in _modes(each)} or _modes(default))
+    if modes and (own or set(modes) <= set(CONTROL_MODES)):
+        if len(modes) == 1 and not isinstance(default, Mapping):
+            return modes[0]
+        if isinstance(mixed, Mapping) and all(each == given[0] for each in given):
+            return dict(mixed)
     listing = " and ".join(modes[:4]) or "no control mode that it names"
     raise TrajectoryError(
         f"{path} was recorded in {listing}; an episode can be played in one of"
-        f" {', '.join(CONTROL_MODES)}"
+        f" {', '.join(CONTROL_MODES)}, or each arm in one of its own"
     )
 
 

@@ -32,6 +32,7 @@ from rollouts.reading.provenance import (
 from rollouts.reading.summary import MAX_STEPS, OWN_EPISODE, Entry, TrajectoryError, read_summary
 from tasks import MultiRobotTask
 from tasks.episode import States
+from tasks.native.controllers import CONTROLLER
 
 __all__ = ["Trajectory", "TrajectoryError", "TrajectoryFile", "expect_file"]
 
@@ -48,7 +49,7 @@ class Trajectory:
     Attributes:
         episode_id: Its number in the file.
         seed: Seed of its reset; None if the file names none, or several.
-        control_mode: ``"pd_joint_delta_pos"`` or ``"pd_joint_pos"``.
+        control_mode: See `rollouts.reading.summary.Summary`.
         actions: Flat actions, (T, A).
         states: State dict of `MultiRobotTask.get_state_dict`, each entry (T + 1, k), the first
             row being the state after the reset; None if the file holds none.
@@ -62,7 +63,7 @@ class Trajectory:
 
     episode_id: int
     seed: int | None
-    control_mode: str
+    control_mode: str | dict[str, str]
     actions: NDArray[np.float32]
     states: States | None = None
     rewards: NDArray[np.float32] | None = None
@@ -271,7 +272,8 @@ class TrajectoryFile(Sequence[Trajectory]):
                 self._refuse(entry, f"{name} has shape {shape}, not ({steps},)")
             if not f"{name}/".startswith(STATES):
                 continue
-            if name.count("/") != 2:
+            kind = name.split("/")[1] if "/" in name else ""
+            if name.count("/") != 2 and (kind != CONTROLLER or name.count("/") < 2):
                 self._refuse(entry, f"its states are not by kind and name ({name})")
             if len(shape) != 2 or shape[0] != steps + 1:
                 what = f"its states of {name.rpartition('/')[2]} have shape {shape}"
@@ -322,7 +324,7 @@ def _states(arrays: Mapping[str, NDArray[Any]]) -> States | None:
     states: States = {}
     for name, rows in arrays.items():
         if name.startswith(STATES):
-            _, kind, entry = name.split("/")
+            _, kind, entry = name.split("/", 2)
             states.setdefault(kind, {})[entry] = np.asarray(rows, np.float32)
     return states or None
 

@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--seed", type=zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
     add("--out", type=Path, required=True, metavar="DIR", help="folder of trajectory.h5 and .json")
     add_cell_options(parser)
-    add("--control-mode", choices=CONTROL_MODES, default=CONTROL_MODES[0], help="(%(default)s)")
+    workers.add_control_mode(parser, default=CONTROL_MODES[0])
 
 
 def run(options: argparse.Namespace) -> int:

@@ -12,9 +12,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
 
-from robots import RecordingError, UnreadableFileError
+from robots import CONTROL_MODES, RecordingError, UnreadableFileError
 from robots.common.files import open_regular, read_text
 from robots.common.writing import PARTIAL, write_whole
+from robots.control_modes import plain_mode
 from rollouts.reading.guessed_robots import describe_guessed
 from rollouts.reading.provenance import describe_layout, describe_simulation, differences, listing
 from rollouts.reading.summary import MAX_JSON
@@ -271,7 +272,7 @@ def _header(task: MultiRobotTask, source: str, source_desc: str | None) -> dict[
             "env_kwargs": {
                 "obs_mode": "none",
                 "reward_mode": task.reward_mode,
-                "control_mode": task.scenario.control_mode,
+                "control_mode": plain_mode(task.scenario.control_mode),
                 "sim_backend": "physx_cpu",
             },
             "max_episode_steps": task.max_episode_steps,
@@ -301,7 +302,18 @@ def _expect_file_or_nothing(path: Path) -> None:
 
 
 def _control_mode(task: MultiRobotTask) -> str | dict[str, str]:
-    """Return the control mode as native writes it: by robot where there are several."""
-    mode = task.scenario.control_mode
-    keys = [key for key in observation_keys(task.layout).values() if key is not None]
-    return dict.fromkeys(keys, mode) if keys else mode
+    """Return the control mode as native writes it: by robot where there are several.
+
+    Where the arms of a robot have modes of their own, it is the mode by arm.
+    """
+    mode, keys = task.scenario.control_mode, observation_keys(task.layout)
+    if isinstance(mode, str):
+        return mode if None in keys.values() else {str(key): mode for key in keys.values()}
+    modes = {task.layout.arm_name(arm): own for arm, own in mode.items()}
+    by_arm = {
+        arm: modes.get(arm, modes.get(task.layout.owner(arm), CONTROL_MODES[0]))
+        for arm in task.layout.arms
+    }
+    if None in keys.values() or set(by_arm) != set(task.layout):
+        return by_arm
+    return {str(keys[robot]): own for robot, own in by_arm.items()}

@@ -16,6 +16,7 @@ from simulation.sapien3.collision import described_shapes
 from simulation.sapien3.contacts import PairForces, overlaps_in, presses_on_object
 from simulation.sapien3.inverse_kinematics import InverseKinematics
 from simulation.sapien3.point_reach import PointReach
+from simulation.sapien3.pose_follower import PoseFollower
 from simulation.sapien3.world import BuiltWorld, build_world
 from simulation.world import Placements, World
 
@@ -46,6 +47,14 @@ class SapienBackend:
             [joint.set_drive_target for robot in world.robots.values() for joint in robot.driven]
             for world in self.worlds
         ]
+        self._velocity_setters: list[list[Callable[[float], None]]] = [
+            [
+                joint.set_drive_velocity_target
+                for robot in world.robots.values()
+                for joint in robot.driven
+            ]
+            for world in self.worlds
+        ]
         self._packers = [world.scene.pack_poses for world in self.worlds]
         self._steps = [world.system.step for world in self.worlds]
         self._places = _pose_places(len(self.worlds), len(self.worlds[0].scene.entities))
@@ -73,6 +82,13 @@ class SapienBackend:
         for i in env_ids:
             for set_target, target in zip(self._setters[i], targets[i].tolist(), strict=True):
                 set_target(target)
+
+    def drive_velocities(self, velocities: Floats, env_ids: Sequence[int]) -> None:
+        """Set targets of velocity; see `Backend`."""
+        for i in env_ids:
+            setters = self._velocity_setters[i]
+            for set_target, velocity in zip(setters, velocities[i].tolist(), strict=True):
+                set_target(velocity)
 
     def step(self, env_ids: Sequence[int], substeps: int) -> None:
         """Advance worlds; see `Backend`."""
@@ -139,6 +155,13 @@ class SapienBackend:
     def point_reach(self, robot: str) -> PointReach:
         """Return a solver for points; see `Backend`."""
         return PointReach(self.worlds[0], robot)
+
+    def pose_follower(
+        self, robot: str, link: str, root_link: str | None, joints: Sequence[str]
+    ) -> PoseFollower:
+        """Return what follows poses of a link; see `Backend`."""
+        urdf = self._blueprints[robot].text
+        return PoseFollower(self.worlds[0].robots[robot], urdf, link, root_link, joints)
 
     def contact_counts(self) -> NDArray[np.int64]:
         """Return how many pairs of bodies touch; see `Backend`."""

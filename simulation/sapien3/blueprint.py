@@ -45,6 +45,7 @@ class Blueprint:
     Attributes:
         urdf: Its URDF.
         model: What that describes.
+        text: Its XML, as far as SAPIEN takes it.
         builder: SAPIEN's builder of an articulation.
         overlaps: Word 2 of the collision groups of links that may overlap others; None where
             SAPIEN's loader has set them.
@@ -53,6 +54,7 @@ class Blueprint:
 
     urdf: Path
     model: UrdfModel
+    text: str
     builder: Any
     overlaps: dict[str, int] | None = None
     checked: bool = False
@@ -119,7 +121,7 @@ def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
         ) from error
     tendons = builder.mimic_joint_records
     builder.mimic_joint_records = [t for t in tendons if _needs_tendon(t, descriptor, model)]
-    return Blueprint(urdf, model, builder, overlaps)
+    return Blueprint(urdf, model, text, builder, overlaps)
 
 
 class _Loader(URDFLoader):

@@ -16,9 +16,9 @@ from robots import TaskError, unknown_name_message
 from simulation import Camera, Simulation, State
 from simulation.cameras import TEXTURES, RobotCamera
 from simulation.maths import Array, Floats, all_finite
-from simulation.readout import ReadoutIndex
 from tasks.engine.columns import COLUMN_MODES, FILMED, ColumnObserver, Viewpoint
 from tasks.engine.finite import NotFinite
+from tasks.native import controllers
 from tasks.native.format import native_joints, observation_keys
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ SHORT_MODES = {"rgbd": "rgb+depth"}
 STATE_FORMS = ("state", "state_dict")  # what may be joined to images
 OBS_MODES = (*PLAIN_MODES, "rgb", "rgbd", "rgb+depth+state", "depth", "rgb+segmentation")
 """Examples of observation modes; images and a form of state are joined in any order."""
+
+JOINTS = "qpos", "qvel"  # that every robot observes of itself
 
 _IMAGE_DTYPES = ("uint8", "int16")
 
@@ -164,11 +166,11 @@ class Observer:
         if not self.mode.privileged:
             parts = self._sensible(parts)
         if not self.mode.textures:
-            return self._state(simulation.index, state, parts)
+            return self._state(simulation, state, parts)
         if self._rig is None:
             self._rig = _CameraRig(simulation, self.cameras, self.mode.textures)
         images = self._rig.look()
-        seen = self._state(simulation.index, state, parts)
+        seen = self._state(simulation, state, parts)
         return {**images, "state": seen} if self.mode.flat else {**seen, **images}
 
     def senses(self, part: str) -> bool:
@@ -194,13 +196,20 @@ class Observer:
         if self._columns:
             self._columns.close()
 
-    def slices(self, state: State, parts: Mapping[str, Array]) -> dict[str, slice]:
+    def slices(
+        self, simulation: Simulation, state: State, parts: Mapping[str, Array]
+    ) -> dict[str, slice]:
         """Return where each named part stands in the flat observation; nothing if there is none."""
         if not self.mode.flat:
             return {}
         sizes: dict[str, int] = {}
+        kept = controllers.entries(simulation)
         for name in self._robots:
             sizes[f"{name}.qpos"] = sizes[f"{name}.qvel"] = state.qpos(name).shape[1]
+            for entry in kept:
+                if entry.robot == name:
+                    key = f"{name}.{controllers.CONTROLLER}.{entry.key.replace('/', '.')}"
+                    sizes[key] = sum(entry.sizes)
         sizes.update({key: x.shape[1] if x.ndim == 2 else 1 for key, x in parts.items()})
         slices, start = dict[str, slice](), 0
         for name, size in sizes.items():
@@ -210,27 +219,37 @@ class Observer:
 
     # -- inside ------------------------------------------------------------------------------
 
-    def _state(self, index: ReadoutIndex, state: State, parts: Mapping[str, Array]) -> Any:
-        joints: list[Floats] = []
+    def _state(self, simulation: Simulation, state: State, parts: Mapping[str, Array]) -> Any:
+        index = simulation.index
+        kept = controllers.entries(simulation) if simulation.modes is not None else ()
+        rows = controllers.recall(simulation, kept)
+        robots: list[dict[str, Floats]] = []
         for name in self._robots:
-            joints.append(native_joints(index, name, state.qpos(name)))
-            joints.append(native_joints(index, name, state.qvel(name)))
-        return self._flat(joints, parts) if self.mode.flat else self._named(joints, parts)
+            own = {key: native_joints(index, name, getattr(state, key)(name)) for key in JOINTS}
+            for entry, row in zip(kept, rows, strict=True):
+                if entry.robot == name:
+                    own[f"{controllers.CONTROLLER}/{entry.key}"] = row
+            robots.append(own)
+        return self._flat(robots, parts) if self.mode.flat else self._named(robots, parts)
 
-    def _flat(self, joined: list[Floats], parts: Mapping[str, Array]) -> Floats:
+    def _flat(self, robots: Sequence[Mapping[str, Floats]], parts: Mapping[str, Array]) -> Floats:
+        joined = [row for own in robots for row in own.values()]
         joined.extend(part if part.ndim == 2 else part[:, None] for part in parts.values())
         flat = np.concatenate(joined, 1, dtype=np.float32)
         if not all_finite(flat):
             raise NotFinite
         return flat
 
-    def _named(self, joints: list[Floats], parts: Mapping[str, Array]) -> dict[str, Any]:
+    def _named(
+        self, robots: Sequence[Mapping[str, Floats]], parts: Mapping[str, Array]
+    ) -> dict[str, Any]:
+        joints = [row for own in robots for row in own.values()]
         if not all(map(all_finite, (*joints, *parts.values()))):
             raise NotFinite
         agent: dict[str, Any] = {}
-        for key, qpos, qvel in zip(self._keys.values(), joints[::2], joints[1::2], strict=True):
-            own = {"qpos": qpos.copy(), "qvel": qvel.copy()}
-            agent.update(own if key is None else {key: own})
+        for key, own in zip(self._keys.values(), robots, strict=True):
+            tree = controllers.nested({name: row.copy() for name, row in own.items()})
+            agent.update(tree if key is None else {key: tree})
         return {"agent": agent, "extra": {key: x.copy() for key, x in parts.items()}}
 
     def _sensible(self, parts: Mapping[str, Array]) -> dict[str, Array]:

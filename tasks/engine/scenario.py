@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -39,8 +39,9 @@ class Scenario:
             under their names, so that a policy trained on one plays here as it is;
             ``"lerobot+video"`` gives the pictures of exports with video, too.
         reward_mode: One of the task's modes; None takes its first.
-        control_mode: ``"pd_joint_delta_pos"``, or ``"pd_joint_pos"`` for actions that are joint
-            positions.
+        control_mode: One of `robots.CONTROL_MODES`, or of the robots' own; or a mapping from arms
+            to modes, in which arms that are left out stay in ``"pd_joint_delta_pos"``. An arm is a
+            robot, or a limb of one.
         control_frequency: Control steps per second (Hz); a whole number of physics steps each.
         max_episode_steps: Control steps until an episode is truncated; None takes the task's.
         render_mode: ``"rgb_array"`` to draw pictures (needs a Vulkan driver), or None.
@@ -60,7 +61,7 @@ class Scenario:
     physics: PhysicsSettings | None = None
     obs_mode: str = "state"
     reward_mode: str | None = None
-    control_mode: str = CONTROL_MODES[0]
+    control_mode: str | Mapping[str, str] = CONTROL_MODES[0]
     control_frequency: float = 20.0
     max_episode_steps: int | None = None
     render_mode: str | None = None
@@ -109,12 +110,12 @@ class Scenario:
             )
         for name, choices in (
             ("simulator", SIMULATORS),
-            ("control_mode", CONTROL_MODES),
             ("render_mode", RENDER_MODES),
             ("bystanders", BYSTANDERS),
             ("reward_mode", (None, *reward_modes)),
         ):
             checked_choice(name, getattr(self, name), choices, TaskError)
+        check_control_mode(self.layout, self.control_mode)
         read_mode(self.obs_mode)
         for name in ("check_layout", "headless"):
             checked_flag(name, getattr(self, name), TaskError)
@@ -125,6 +126,24 @@ class Scenario:
             checked_whole("max_episode_steps", self.max_episode_steps, 1, most, TaskError)
         substeps(self.physics or SAPIEN_DEFAULTS, self.control_frequency)
         _check_cameras(self.cameras)
+
+
+def check_control_mode(layout: Layout, mode: object) -> None:
+    """Refuse what is no control mode of a layout's robots.
+
+    Raises:
+        TaskError: If it is none, or names an arm that there is not.
+    """
+    if not isinstance(mode, Mapping):
+        known = dict.fromkeys(m for p in layout.values() for m in p.robot.modes)
+        checked_choice("control_mode", mode, tuple(known), TaskError)
+        return
+    for arm, own in mode.items():
+        try:
+            robot = layout[layout.owner(arm)].robot
+        except UnknownNameError as error:
+            raise TaskError(f"control_mode: {error}") from None
+        checked_choice(f"control_mode of {arm!r}", own, robot.modes, TaskError)
 
 
 def _check_count(num_envs: object) -> None:

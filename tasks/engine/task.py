@@ -350,6 +350,7 @@ class MultiRobotTask(Declaration, Remade):
         self._elapsed[ids] = 0
         self._speeds.begin(ids)
         state = self._read()
+        self.simulation.hold(state)
         self.memory.renew(self._remembered.checked(self.remember(state)), ids)
         expect_nothing(self, "begin_episodes", self.begin_episodes(state, ids))
         info = self._info(state)
@@ -365,7 +366,7 @@ class MultiRobotTask(Declaration, Remade):
             info = self._info(state)
         with unchanged(state, f"{name}.observe()"):
             parts = {} if mode.nothing else self._observed.checked(self.observe(state, info))
-        self.observation_slices = self.observer.slices(state, parts)
+        self.observation_slices = self.observer.slices(self.simulation, state, parts)
         if not mode.nothing:
             self.single_observation_space = space_of(self.start[0], batched=True)
             self.observation_space = batch_space(self.single_observation_space, self.num_envs)

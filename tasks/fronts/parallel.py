@@ -20,6 +20,7 @@ from tasks.engine.observation import space_of
 from tasks.engine.remade import Remade
 from tasks.fronts.numbers import info_row, row, stepper
 from tasks.language.randomness import FirstSeeds
+from tasks.native.controllers import CONTROLLER
 from tasks.native.format import native_places, observation_keys
 from tasks.registry import make
 
@@ -192,10 +193,21 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
     def _observed(self) -> dict[str, NDArray[np.intp]]:
         slices = self.task.observation_slices
         joints = {f"{robot}.{kind}" for robot in self.task.layout for kind in JOINTS}
-        shared = [np.arange(part.start, part.stop) for k, part in slices.items() if k not in joints]
+        robots = tuple(f"{robot}.{CONTROLLER}." for robot in self.task.layout)
+
+        def places(robot: str) -> list[NDArray[np.intp]]:
+            """Return what a robot's targets and everybody's parts are in the observation."""
+            return [
+                np.arange(part.start, part.stop)
+                for key, part in slices.items()
+                if key.startswith(f"{robot}.{CONTROLLER}.")
+                or not (key in joints or key.startswith(robots))
+            ]
+
         return {
             name: np.concatenate(
-                [slices[f"{self._robots[name]}.{kind}"].start + own for kind in JOINTS] + shared
+                [slices[f"{self._robots[name]}.{kind}"].start + own for kind in JOINTS]
+                + places(self._robots[name])
             )
             for name, own in self._joints.items()
         }
@@ -214,7 +226,8 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         if "agent" in whole:
             key = observation_keys(self.task.layout)[self._robots[agent]]
             joints = whole["agent"] if key is None else whole["agent"][key]
-            own["agent"] = {kind: rows[self._joints[agent]] for kind, rows in joints.items()}
+            own["agent"] = dict(joints)
+            own["agent"].update({kind: joints[kind][self._joints[agent]] for kind in JOINTS})
         cameras = self.task.observer.seen_by(self._robots[agent])
         for kind in ("sensor_param", "sensor_data"):
             if kind in whole:

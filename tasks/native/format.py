@@ -18,8 +18,11 @@ from simulation import Simulation, State
 from simulation.maths import Floats
 from simulation.readout import ReadoutIndex
 from tasks.arrays import array_of
+from tasks.native import controllers
+from tasks.native.controllers import CONTROLLER
 
-StateDict = dict[str, dict[str, Tensor]]
+StateDict = dict[str, dict[str, Any]]
+"""Tensors by group and entry; those of what control modes remember are nested as in native."""
 
 _UNIT_TOLERANCE = 0.01  # of quaternions: of two digits, say
 _BEYOND_LIMITS = 2 * math.pi  # rad, or m
@@ -41,6 +44,14 @@ def observation_keys(layout: Layout) -> dict[str, str | None]:
     if len(layout) == 1:
         return dict.fromkeys(layout)
     return {name: f"{p.robot.name}-{i}" for i, (name, p) in enumerate(layout.items())}
+
+
+def mode_by_arm(mode: str | Mapping[str, str], layout: Layout) -> str | dict[str, str]:
+    """Return a recorded control mode with the layout's names of arms for native's of robots."""
+    if isinstance(mode, str):
+        return mode
+    places = {key: place for place, key in observation_keys(layout).items() if key is not None}
+    return {places.get(name, name): own for name, own in mode.items()}
 
 
 def articulation_keys(layout: Layout) -> dict[str, str]:
@@ -91,7 +102,8 @@ def read_state_dict(simulation: Simulation, state: State) -> StateDict:
     """Return every pose and velocity as rows in native's format.
 
     Bodies that can move are rows of 13: position (m), quaternion (wxyz), linear (m/s) and angular
-    velocity (rad/s). Robots are the same of their root, then qpos and qvel.
+    velocity (rad/s). Robots are the same of their root, then qpos and qvel. Where a control mode
+    has targets, they are there as ``controller``.
     """
     index = simulation.index
     moving = _moving(simulation)
@@ -109,7 +121,17 @@ def read_state_dict(simulation: Simulation, state: State) -> StateDict:
         )
         for (name, key), root in zip(keys.items(), roots, strict=True)
     }
-    return {"actors": actors, "articulations": articulations}
+    found: StateDict = {"actors": actors, "articulations": articulations}
+    if kept := _remembered(simulation):
+        found[CONTROLLER] = controllers.nested({k: torch.from_numpy(x) for k, x in kept.items()})
+    return found
+
+
+def _remembered(simulation: Simulation) -> dict[str, Floats]:
+    """Return what control modes remember by native's names, each (N, k)."""
+    entries = controllers.entries(simulation)
+    rows = controllers.recall(simulation, entries)
+    return controllers.by_robot(entries, rows, observation_keys(simulation.layout))
 
 
 def _joined(*parts: Floats) -> Tensor:
@@ -145,6 +167,8 @@ class StateTape:
         width = self._ends[-1] + velocities * len(self._keys)
         self._rows: Floats = np.zeros((_MOMENTS, width), np.float32)
         self._length = 0
+        self._simulation = simulation
+        self._kept: list[dict[str, Floats]] = []
 
     def write(self, state: State) -> None:
         """Add the present moment; ``state`` must be the read-out of it."""
@@ -160,6 +184,8 @@ class StateTape:
         np.concatenate(parts, axis=None, out=row[: self._ends[-1]])
         if not self._length:  # roots are fixed: after a step they have no velocity
             row[self._ends[-1] :] = state.root_velocities().ravel()
+        if self._simulation.modes is not None:
+            self._kept.append(_remembered(self._simulation))
         self._length += 1
 
     def read(self) -> dict[str, dict[str, NDArray[np.float32]]]:
@@ -174,6 +200,8 @@ class StateTape:
         velocity = dict(zip(self._dynamic, moved, strict=True))
         still = np.zeros((moments, count, 6), np.float32)
         bases = zip(self._keys.items(), frames[len(self._bodies) :], fixed, strict=True)
+        names = self._kept[0] if self._kept else ()
+        kept = {name: np.stack([rows[name] for rows in self._kept]) for name in names}
         return {
             "actors": {
                 name: np.concatenate([pose, velocity.get(name, still)], 2)
@@ -183,6 +211,7 @@ class StateTape:
                 key: np.concatenate([pose, root, self._own(qpos, name), self._own(qvel, name)], 2)
                 for (name, key), pose, root in bases
             },
+            **({CONTROLLER: kept} if kept else {}),
         }
 
     def _own(self, joints: Floats, robot: str) -> Floats:
@@ -198,7 +227,7 @@ def write_state_dict(
 
     Numbers must be finite and at most `robots.common.bounds.FAR`, quaternions within 1 % of unit
     length, and joints within a full turn (rad; or 2π m) of their limits: joint noise and contacts
-    push them a little beyond.
+    push them a little beyond. Targets of control modes that are left out stay as they are.
 
     Args:
         simulation: The worlds.
@@ -218,6 +247,17 @@ def write_state_dict(
             joints = (declared_joints(simulation.index, name, part) for part in (qpos, qvel))
             robots[name] = np.concatenate([pose, *joints], 1)
     simulation.write(env_ids, rows["actors"], robots)
+    if rows.get(CONTROLLER):
+        controllers.restore(simulation, rows[CONTROLLER], env_ids, _targets(simulation))
+
+
+def _targets(simulation: Simulation) -> dict[str, controllers.Entry]:
+    """Return what control modes remember by native's names."""
+    keys = observation_keys(simulation.layout)
+    return {
+        entry.key if keys[entry.robot] is None else f"{keys[entry.robot]}/{entry.key}": entry
+        for entry in controllers.entries(simulation)
+    }
 
 
 class _Entry(NamedTuple):
@@ -236,12 +276,14 @@ def _checked_rows(
     for group, values in _items(state, "the state"):
         if group not in known:
             raise TaskError(unknown_name_message("state group", group, known))
+        if group == CONTROLLER and isinstance(values, Mapping):
+            values = controllers.flattened(values)
         for key, value in _items(values, group):
             if key not in known[group]:
                 raise TaskError(unknown_name_message(f"entry of {group}", key, known[group]))
             what, entry = f"{group}/{key}", known[group][key]
             array = _checked_array(value, what, (len(env_ids), len(entry.names)))
-            _check_numbers(array, what, entry, env_ids)
+            _check_numbers(array, what, entry, env_ids, quaternion=_quaternion(group, key))
             rows[group][key] = array
     return rows
 
@@ -260,10 +302,20 @@ def _entries(simulation: Simulation) -> dict[str, dict[str, _Entry]]:
             np.concatenate([pose.lowest, np.maximum(low - _BEYOND_LIMITS, -FAR), -fastest]),
             np.concatenate([pose.highest, np.minimum(high + _BEYOND_LIMITS, FAR), fastest]),
         )
+    targets = {
+        key: _Entry(tuple(f"number {i}" for i in range(k)), np.full(k, -FAR), np.full(k, FAR))
+        for key, k in ((key, sum(e.sizes)) for key, e in _targets(simulation).items())
+    }
     return {
         "actors": dict.fromkeys(_moving(simulation), pose),
         "articulations": articulations,
+        **({CONTROLLER: targets} if targets else {}),
     }
+
+
+def _quaternion(group: str, key: str) -> bool:
+    """Return whether numbers 3 to 6 of an entry are a quaternion."""
+    return group != CONTROLLER or key.endswith("target_pose")
 
 
 def _items(entries: Any, what: str) -> Iterable[tuple[Any, Any]]:
@@ -285,7 +337,9 @@ def _checked_array(value: Any, what: str, shape: tuple[int, int]) -> Floats:
         return array.astype(np.float32)
 
 
-def _check_numbers(array: Floats, what: str, entry: _Entry, env_ids: Sequence[int]) -> None:
+def _check_numbers(
+    array: Floats, what: str, entry: _Entry, env_ids: Sequence[int], *, quaternion: bool
+) -> None:
     wrong = np.argwhere(~((entry.lowest <= array) & (array <= entry.highest)))
     if len(wrong):
         row, place = (int(i) for i in wrong[0])
@@ -294,6 +348,8 @@ def _check_numbers(array: Floats, what: str, entry: _Entry, env_ids: Sequence[in
             f"{what}: {entry.names[place]} is {array[row, place]:g} for environment {env_ids[row]};"
             f" a number from {low:g} to {high:g} is needed"
         )
+    if not quaternion:
+        return
     lengths = np.linalg.norm(array[:, 3:7], axis=1)
     for env, length in zip(env_ids, lengths, strict=True):
         if abs(length - 1) > _UNIT_TOLERANCE:

@@ -200,13 +200,14 @@ class TestOfficialFiles:
         summary = json.loads(beside.read_text())
         summary["env_info"]["env_kwargs"].update(env_kwargs)
         if mode := env_kwargs.get("control_mode"):
+            del summary["layout"]  # as in a file of ManiSkill's
             for episode in summary["episodes"]:
                 episode["control_mode"] = mode
         beside.write_text(json.dumps(summary))
         return folder / recording.name
 
     def test_one_of_the_task_is_found(self, capsys, recording, demos):
-        self.put(recording, demos / "a", control_mode="pd_ee_delta_pose")
+        self.put(recording, demos / "a", control_mode="pd_ee_dance")
         self.put(recording, demos / "b", sim_backend="physx_cuda")
         chosen = self.put(recording, demos / "c")
         assert find_official(TASK) == chosen
@@ -219,8 +220,8 @@ class TestOfficialFiles:
         assert code == 1
         assert f"there is no recording of PushT-v1 in {demos} that can be played" in said
         assert "python -m rollouts record" in said
-        self.put(recording, demos / "a", control_mode="pd_ee_delta_pose")
-        with pytest.raises(TrajectoryError, match=r"\n  .*was recorded in pd_ee_delta_pose"):
+        self.put(recording, demos / "a", control_mode="pd_ee_dance")
+        with pytest.raises(TrajectoryError, match=r"\n  .*was recorded in pd_ee_dance"):
             open_recording(None, TASK)
 
     def test_neither_file_nor_task(self, capsys):

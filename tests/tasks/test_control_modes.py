@@ -133,5 +133,5 @@ def test_a_robot_without_limits_says_so():
 def test_an_unknown_control_mode():
     with pytest.raises(UnknownNameError, match="Did you mean 'pd_joint_pos'"):
         RobotRegistry.load("panda").in_control_mode("pd_joint_pose")
-    with pytest.raises(TaskError, match=r"'pd_ee_pose' is not offered; choices: 'pd_joint_delta"):
-        tasks.make("PickCube-v1", control_mode="pd_ee_pose")
+    with pytest.raises(TaskError, match=r"'pd_ee_dance' is not offered; choices: 'pd_joint_delta"):
+        tasks.make("PickCube-v1", control_mode="pd_ee_dance")

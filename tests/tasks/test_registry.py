@@ -93,7 +93,7 @@ def test_an_unknown_field_raises():
         ({"obs_mode": "state+state_dict"}, "makes no sense: at least one of rgb, depth"),
         ({"obs_mode": "rgb+rgb"}, "each once"),
         ({"reward_mode": "dens"}, "reward_mode 'dens' is not offered.*'dense'"),
-        ({"control_mode": "pd_ee_pose"}, "control_mode 'pd_ee_pose' is not offered"),
+        ({"control_mode": "pd_ee_dance"}, "control_mode 'pd_ee_dance' is not offered"),
         ({"simulator": "mujoco"}, "simulator 'mujoco' is not offered; choices: 'sapien3'"),
         ({"headless": False}, "headless=False is not offered"),
         ({"cameras": ["base"]}, "cameras has a str; simulation.Camera is needed"),

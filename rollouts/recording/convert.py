@@ -1,0 +1,100 @@
+"""Records the episodes of a recording in another control mode."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from rollouts.playing.mode_conversion import converted
+from rollouts.playing.replay import FILE, task_for
+from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.recording.recorder import Recorder
+from tasks.episode import play
+
+
+@dataclass
+class Conversion:
+    """What came of converting a recording.
+
+    Attributes:
+        path: Where it is.
+        kept: Seeds of the episodes that succeed in the other mode, too.
+        lost: Seeds of those that do not.
+        left_out: Numbers of the episodes that have no seed, or did not succeed in their own mode.
+    """
+
+    path: Path
+    kept: list[int] = field(default_factory=list[int])
+    lost: list[int] = field(default_factory=list[int])
+    left_out: list[int] = field(default_factory=list[int])
+
+    @property
+    def complete(self) -> bool:
+        """Whether every episode that could be converted was kept."""
+        return bool(self.kept) and not self.lost
+
+    def __str__(self) -> str:
+        """Say it in words."""
+        tried = len(self.kept) + len(self.lost)
+        lines = [f"{len(self.kept)} of {tried} successful episodes succeed in the other mode, too"]
+        if self.lost:
+            lines.append(f"not kept: the seeds {', '.join(map(str, self.lost))}")
+        if self.left_out:
+            numbers = ", ".join(map(str, self.left_out))
+            lines.append(f"left out, as they have no seed or no success: the episodes {numbers}")
+        return "; ".join(lines) + f": {self.path}"
+
+
+def convert(
+    file: TrajectoryFile,
+    mode: str | Mapping[str, str],
+    folder: Path,
+    count: int | None = None,
+    on_episode: Callable[[], None] = lambda: None,
+) -> Conversion:
+    """Record the successful episodes of a recording in another control mode.
+
+    Args:
+        file: The recording.
+        mode: The other mode, or one by arm.
+        folder: Where ``trajectory.h5`` and ``trajectory.json`` are written; episodes that are
+            there already are kept.
+        count: How many of the first episodes; None: all.
+        on_episode: Called after each.
+
+    Raises:
+        TrajectoryError: If the recording cannot be played here.
+        TaskError: If the mode is none.
+        RecordingError: If the folder cannot be written or holds a recording of something else.
+    """
+    with closing(task_for(file)) as source:
+        task = type(source)(replace(source.scenario, control_mode=mode))
+        text = f"converted from {file.control_mode}"
+        with (
+            closing(task),
+            Recorder(
+                folder / FILE,
+                task,
+                resume=True,
+                source=file.source_type or "scripted",
+                source_desc=text,
+            ) as recorder,
+        ):
+            found = Conversion(recorder.path)
+            there = recorder.seeds
+            for number in range(len(file) if count is None else count):
+                episode = file[number]
+                if episode.seed is None or episode.solved is False:
+                    found.left_out.append(episode.episode_id)
+                elif episode.seed in there:
+                    found.kept.append(episode.seed)
+                else:
+                    actions = converted(source, episode.seed, episode.actions, task)
+                    played = play(task, episode.seed, actions)
+                    if played.solved:
+                        recorder.add(played)
+                    (found.kept if played.solved else found.lost).append(episode.seed)
+                on_episode()
+    return found

@@ -1,0 +1,1 @@
+"""Control modes other than joint positions: velocities, targets that are remembered, TCP poses."""

@@ -1,0 +1,145 @@
+"""What control modes remember, under native's names: a part of observations and state dicts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from layouts import Layout
+from simulation import Simulation
+from simulation.control.modes import Remembered
+from simulation.maths import Floats
+from simulation.readout import ReadoutIndex
+
+CONTROLLER = "controller"  # native's group of a state dict, and of what a robot observes of itself
+_JOINTS = "target_qpos"
+
+
+class Entry(NamedTuple):
+    """What a robot remembers under one name of native's.
+
+    Attributes:
+        robot: Name of the robot in the layout.
+        key: Native's names below the robot, joined by ``/``: ``arm/target_qpos``.
+        parts: Which of `ModeController.remembered` it joins.
+        sizes: How many numbers each has.
+        joints: Whether it is the joints of a whole robot, which native has in another order.
+    """
+
+    robot: str
+    key: str
+    parts: tuple[int, ...]
+    sizes: tuple[int, ...]
+    joints: bool = False
+
+
+def entries(simulation: Simulation) -> tuple[Entry, ...]:
+    """Return what robots remember, robot by robot.
+
+    Where all that drives a robot of several joint groups remembers joints, native has one
+    controller without a name; else each is called like its joint group.
+    """
+    if simulation.modes is None:
+        return ()
+    kept = simulation.modes.remembered
+    listed: list[Entry] = []
+    for robot in simulation.layout:
+        own = [i for i, part in enumerate(kept) if part.robot == robot]
+        sizes = tuple(kept[i].size for i in own)
+        if len(own) > 1 and _whole(simulation.layout, robot, [kept[i] for i in own]):
+            every = sum(sizes) == simulation.layout[robot].robot.dof
+            listed.append(Entry(robot, _JOINTS, tuple(own), sizes, joints=every))
+        else:
+            listed += [
+                Entry(robot, f"{kept[i].group}/{kept[i].kind}", (i,), (size,))
+                for i, size in zip(own, sizes, strict=True)
+            ]
+    return tuple(listed)
+
+
+def recall(simulation: Simulation, entries: Sequence[Entry]) -> list[Floats]:
+    """Return copies of the numbers of entries, each (N, k) (rad, m, wxyz)."""
+    if not entries or simulation.modes is None:
+        return []
+    kept = simulation.modes.recall()
+    rows = [np.concatenate([kept[i] for i in entry.parts], 1) for entry in entries]
+    return [_ordered(simulation.index, *pair) for pair in zip(entries, rows, strict=True)]
+
+
+def restore(
+    simulation: Simulation,
+    given: Mapping[str, Floats],
+    env_ids: Sequence[int],
+    keys: Mapping[str, Entry],
+) -> None:
+    """Let robots of some worlds remember numbers.
+
+    Args:
+        simulation: The worlds.
+        given: Rows by native's name, each (worlds, k).
+        env_ids: Which worlds.
+        keys: Entry by native's name.
+    """
+    if simulation.modes is None:
+        return
+    for name, rows in given.items():
+        entry = keys[name]
+        order = simulation.index.loaded_order[entry.robot] if entry.joints else None
+        rows = rows if order is None else rows[:, np.argsort(order)]
+        ends = np.cumsum(entry.sizes)[:-1]
+        for part, own in zip(entry.parts, np.split(rows, ends, 1), strict=True):
+            simulation.modes.restore(part, own, env_ids)
+
+
+def by_robot(
+    entries: Sequence[Entry], rows: Sequence[NDArray[Any]], robots: Mapping[str, str | None]
+) -> dict[str, NDArray[Any]]:
+    """Return rows by native's names, which begin with the robot's key where it has one.
+
+    Args:
+        entries: What robots remember.
+        rows: Their numbers.
+        robots: Native's key of each robot, or None where native has one robot.
+    """
+    found: dict[str, NDArray[Any]] = {}
+    for entry, own in zip(entries, rows, strict=True):
+        key = robots[entry.robot]
+        found[entry.key if key is None else f"{key}/{entry.key}"] = own
+    return found
+
+
+def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a mapping by ``a/b/c`` as mappings of mappings."""
+    tree: dict[str, Any] = {}
+    for name, value in flat.items():
+        *above, last = name.split("/")
+        branch = tree
+        for step in above:
+            branch = branch.setdefault(step, {})
+        branch[last] = value
+    return tree
+
+
+def flattened(tree: Mapping[str, Any], above: str = "") -> dict[str, Any]:
+    """Return mappings of mappings as one mapping by ``a/b/c``."""
+    flat: dict[str, Any] = {}
+    for name, value in tree.items():
+        if isinstance(value, Mapping):
+            flat.update(flattened(value, f"{above}{name}/"))
+        else:
+            flat[f"{above}{name}"] = value
+    return flat
+
+
+def _whole(layout: Layout, robot: str, own: Sequence[Remembered]) -> bool:
+    groups = layout[robot].robot.action_split.groups
+    driven = {name for name, group in groups.items() if group.size}
+    return {part.group for part in own} == driven and all(part.kind == _JOINTS for part in own)
+
+
+def _ordered(index: ReadoutIndex, entry: Entry, rows: Floats) -> Floats:
+    order = index.loaded_order[entry.robot] if entry.joints else None
+    return rows if order is None else rows[:, order]
