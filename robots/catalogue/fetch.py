@@ -5,6 +5,7 @@ from math import pi
 
 from robots.assets.locator import UrdfLocator
 from robots.catalogue import panda
+from robots.control_modes import CONTROL_MODES
 from robots.descriptor import ActionSplit, CameraMount, Fingers, GripperMaterial, Home, JointGroup
 
 FINGERS = ("l_gripper_finger_link", "r_gripper_finger_link")
@@ -17,15 +18,16 @@ ARM = replace(
             "forearm_roll_joint", "wrist_flex_joint", "wrist_roll_joint"),
     limits=((-1.6056, 1.6056), (-1.221, 1.518), TURNS, (-2.251, 2.251), TURNS, (-2.16, 2.16),
             TURNS),
-    reset_noise=False,
+    reset_noise=False, root_link="torso_lift_link",
 )
+GRIPPER = replace(panda.PANDA.action_split.groups["gripper"], upper=0.05,
+                  joints=("l_gripper_finger_joint", "r_gripper_finger_joint"))
 # fmt: on
-GRIPPER = replace(
-    panda.PANDA.action_split.groups["gripper"],
-    joints=("l_gripper_finger_joint", "r_gripper_finger_joint"),
-    upper=0.05,
-)
-HEAD = ("head_pan_joint", "head_tilt_joint")
+HEADS = ("head_pan_joint", "head_tilt_joint")
+BODY = {  # moves by steps in every control mode
+    "head": replace(ARM, joints=HEADS, limits=((-1.57, 1.57), (-0.76, 1.45))),
+    "torso": replace(ARM, joints=("torso_lift_joint",), unit="m", limits=((0.0, 0.38615),)),
+}
 # ManiSkill drives the base by its speed; here it brakes, with the same damping and force.
 BASE = JointGroup.hold(("root_z_rotation_joint",), stiffness=0.0, damping=1e3, force_limit=500.0)
 SLIDES = ("root_x_axis_joint", "root_y_axis_joint")
@@ -37,8 +39,7 @@ FETCH = replace(
     action_split=ActionSplit(
         arm=ARM,
         gripper=GRIPPER,
-        head=replace(ARM, joints=HEAD, limits=((-1.57, 1.57), (-0.76, 1.45))),
-        torso=replace(ARM, joints=("torso_lift_joint",), unit="m", limits=((0.0, 0.38615),)),
+        **BODY,
         base_slide=replace(BASE, joints=SLIDES, unit="m"),
         base_turn=BASE,
     ),
@@ -54,6 +55,7 @@ FETCH = replace(
         "tabletop": (0, -pi / 4, 0, pi / 4, 0, pi / 3, 0, *OPEN, 0, 0, 0.386, 0, 0, 0),
     },
     home=Home(position=(-1.05, 0.0, -0.9196429), keyframe="tabletop"),  # on the floor
+    control_modes=dict.fromkeys(CONTROL_MODES, BODY),
     reach=1.13,  # of the TCP, from the URDF
     source="mani_skill 3.0.1, agents/robots/fetch/fetch.py and scene_builder/table",
 )

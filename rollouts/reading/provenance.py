@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
-from dataclasses import fields as fields_of
 from typing import Any
 
 from layouts import Layout
@@ -47,9 +46,6 @@ LAYOUT = maybe(
 )
 SIMULATION = maybe(fields({}, {"physics": maybe(OBJECT), "control_frequency": NUMBER}))
 
-# Fields that joint groups did not have when earlier recordings were made.
-_LATER = ("armature", "command", "target", "frame", "root_link")
-
 _SHOWN = 4  # differences that a message names
 _ABSENT = "nothing"
 
@@ -86,9 +82,12 @@ def describe_layout(layout: Layout) -> dict[str, dict[str, Any]]:
 
 
 def _describe_group(group: JointGroup) -> dict[str, Any]:
-    """Return a joint group's fields, without those for control modes where they say nothing."""
-    quiet = {field.name: field.default for field in fields_of(group) if field.name in _LATER}
-    return {k: v for k, v in asdict(group).items() if k not in quiet or v != quiet[k]}
+    """Return a joint group's fields; those that recordings of old lack only where they count."""
+    silent = set[str]() if group.asks.tcp else {"frame", "root_link"}
+    silent |= set() if any(group.armatures) else {"armature"}
+    silent |= {"command"} if group.command == "position" else set()
+    silent |= set() if group.target else {"target"}
+    return {name: value for name, value in asdict(group).items() if name not in silent}
 
 
 def describe_simulation(task: MultiRobotTask) -> dict[str, Any]:

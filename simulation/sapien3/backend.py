@@ -16,7 +16,7 @@ from simulation.sapien3.collision import described_shapes
 from simulation.sapien3.contacts import PairForces, overlaps_in, presses_on_object
 from simulation.sapien3.inverse_kinematics import InverseKinematics
 from simulation.sapien3.point_reach import PointReach
-from simulation.sapien3.pose_follower import PoseFollower
+from simulation.sapien3.pose_follower import JOINTS_OF_A_POSE, NearestFollower, PoseFollower
 from simulation.sapien3.world import BuiltWorld, build_world
 from simulation.world import Placements, World
 
@@ -161,7 +161,8 @@ class SapienBackend:
     ) -> PoseFollower:
         """Return what follows poses of a link; see `Backend`."""
         urdf = self._blueprints[robot].text
-        return PoseFollower(self.worlds[0].robots[robot], urdf, link, root_link, joints)
+        follower = PoseFollower if len(joints) >= JOINTS_OF_A_POSE else NearestFollower
+        return follower(self.worlds[0].robots[robot], urdf, link, root_link, joints)
 
     def contact_counts(self) -> NDArray[np.int64]:
         """Return how many pairs of bodies touch; see `Backend`."""
