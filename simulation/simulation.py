@@ -70,6 +70,7 @@ class Simulation:
         self._physics, self._visuals = physics, visuals
         self._backend = backend()
         self._moment = Moment(self._backend)
+        self._latest: State | None = None  # of this moment, if control modes look at it
         self._placements = Placements()
         self._controller = JointPositionController(layout)
         self.drive_targets: Floats = np.zeros((num_envs, self._controller.dof), np.float32)
@@ -178,7 +179,10 @@ class Simulation:
         """Return what all worlds look like now."""
         if self._placements:
             self._change()
-        return State(self._backend.read(), self.index, self._moment)
+        state = State(self._backend.read(), self.index, self._moment)
+        if self.modes is not None:
+            self._latest = state
+        return state
 
     def touched(self) -> None:
         """Note that a world was changed by hand, so that earlier states count as past."""
@@ -250,13 +254,18 @@ class Simulation:
     def _drive_modes(
         self, modes: ModeController, action: Floats, env_ids: Iterable[int] | None
     ) -> Sequence[int]:
-        state = self.read()
+        state = self._latest
+        if state is None or self._placements:
+            state = self.read()
         moving = self._everywhere if env_ids is None else list(env_ids)
         if self._fresh:
             self.hold(state)
         self._change()
         targets, velocities = modes.command(action, state, moving)
-        self.drive_targets[moving] = targets[moving]
+        if env_ids is None:
+            self.drive_targets = targets
+        else:
+            self.drive_targets[moving] = targets[moving]
         self._backend.drive(targets, moving)
         if velocities is not None:
             self._backend.drive_velocities(velocities, moving)
@@ -270,6 +279,7 @@ class Simulation:
             self._placements.robots.clear()
         self._moment.past = True
         self._moment = Moment(self._backend)
+        self._latest = None
 
     def _describe(self, index: int, build: Callable[[World, int], None]) -> World:
         world = World(

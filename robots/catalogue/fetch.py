@@ -23,26 +23,20 @@ ARM = replace(
 GRIPPER = replace(panda.PANDA.action_split.groups["gripper"], upper=0.05,
                   joints=("l_gripper_finger_joint", "r_gripper_finger_joint"))
 # fmt: on
-HEADS = ("head_pan_joint", "head_tilt_joint")
+HEAD, TORSO = ("head_pan_joint", "head_tilt_joint"), ("torso_lift_joint",)
 BODY = {  # moves by steps in every control mode
-    "head": replace(ARM, joints=HEADS, limits=((-1.57, 1.57), (-0.76, 1.45))),
-    "torso": replace(ARM, joints=("torso_lift_joint",), unit="m", limits=((0.0, 0.38615),)),
+    "head": replace(ARM, joints=HEAD, limits=((-1.57, 1.57), (-0.76, 1.45))),
+    "torso": replace(ARM, joints=TORSO, unit="m", limits=((0.0, 0.38615),)),
 }
 # ManiSkill drives the base by its speed; here it brakes, with the same damping and force.
 BASE = JointGroup.hold(("root_z_rotation_joint",), stiffness=0.0, damping=1e3, force_limit=500.0)
-SLIDES = ("root_x_axis_joint", "root_y_axis_joint")
+SLIDE = replace(BASE, joints=("root_x_axis_joint", "root_y_axis_joint"), unit="m")
 
 FETCH = replace(
     panda.PANDA,
     name="fetch",
     urdf=UrdfLocator("maniskill_fetch", "fetch.urdf"),
-    action_split=ActionSplit(
-        arm=ARM,
-        gripper=GRIPPER,
-        **BODY,
-        base_slide=replace(BASE, joints=SLIDES, unit="m"),
-        base_turn=BASE,
-    ),
+    action_split=ActionSplit(arm=ARM, gripper=GRIPPER, **BODY, base_slide=SLIDE, base_turn=BASE),
     tcp_link="gripper_link",
     gripper_material=GripperMaterial(FINGERS, 2.0, 2.0, 0.0, patch_radius=0.1),
     fingers=Fingers(FINGERS, opening_signs=(-1, 1)),

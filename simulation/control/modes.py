@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -72,24 +71,10 @@ class ModeController:
         self._any_target = bool(self._from_target.any())
         self._scale = _scale(driven)
         owners = _arm_of(layout)
-        tools = [
-            Tool(
-                part.robot,
-                owners[part.robot, part.name],
-                part.group,
-                layout.arm(owners[part.robot, part.name]).robot.tcp_link,
-                part.numbers,
-                tuple(part.joints),
-                part.own,
-            )
+        self._tools = {
+            (part.robot, part.name): ToolControl(_tool(part, layout, owners[part.robot, part.name]))
             for part in driven
             if part.group.asks.tcp
-        ]
-        self._controls = [ToolControl(list(g)) for _, g in groupby(tools, _alike)]
-        self._tools = {
-            tool.numbers.start: (control, place)
-            for control in self._controls
-            for place, tool in enumerate(control.tools)
         }
         self.targets: Floats = np.zeros((0, positions.dof), np.float32)
         self._kept = [part for part in driven if part.group.target]
@@ -111,7 +96,7 @@ class ModeController:
 
     def build(self, backend: Backend, index: ReadoutIndex) -> None:
         """Find frames and solvers in worlds that were built."""
-        for control in self._controls:
+        for control in self._tools.values():
             control.build(backend, index)
 
     def begin(self, state: State, env_ids: Sequence[int]) -> None:
@@ -119,8 +104,8 @@ class ModeController:
         if len(self.targets) != state.num_envs:
             self.targets = state.joint_positions.copy()
         self.targets[env_ids] = state.joint_positions[env_ids]
-        for control in self._controls:
-            if control.target:
+        for control in self._tools.values():
+            if control.tool.group.target:
                 control.begin(state, env_ids)
 
     def command(
@@ -141,12 +126,11 @@ class ModeController:
         base = np.where(self._from_target, self.targets, present) if self._any_target else present
         targets = self._positions.targets(action, base)
         scaled = self._scaled(action)
-        for control in self._controls:
-            wanted = control.ask(action, scaled, state)
-            control.follow(wanted, state, env_ids, targets)
-            if control.target:
-                control.keep(wanted, env_ids)
-        self.targets[env_ids] = targets[env_ids]
+        for control in self._tools.values():
+            for env in env_ids:
+                control.drive(action[env], scaled[env], state, env, targets[env])
+        if self._any_target:
+            self.targets[env_ids] = targets[env_ids]
         if not self.moves:
             return targets, None
         velocities = np.zeros_like(targets)
@@ -177,8 +161,7 @@ class ModeController:
         """Return a view of what is remembered of a joint group."""
         if not part.group.asks.tcp:
             return self.targets[:, part.joints.start : part.joints.stop]
-        control, place = self._tools[part.numbers.start]
-        return control.poses[place :: len(control.tools)]
+        return self._tools[part.robot, part.name].targets
 
 
 def _driven(layout: Layout) -> Iterable[_Driven]:
@@ -226,6 +209,7 @@ def _arm_of(layout: Layout) -> dict[tuple[str, str], str]:
     }
 
 
-def _alike(tool: Tool) -> tuple[object, ...]:
-    group = tool.group
-    return group.command, group.delta, group.target, group.frame, group.normalised
+def _tool(part: _Driven, layout: Layout, arm: str) -> Tool:
+    link = layout.arm(arm).robot.tcp_link
+    joints = slice(part.joints.start, part.joints.stop)
+    return Tool(part.robot, arm, part.group, link, part.numbers, joints, part.own)

@@ -1,25 +1,22 @@
-"""TCP control: from action numbers to poses of tool centre points, and on to joint targets."""
+"""TCP control: from action numbers to the pose of a tool centre point, and on to joint targets."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
 from robots import JointGroup
 from simulation.backend import Backend, PoseFollower
 from simulation.control import poses
+from simulation.control.poses import Row
 from simulation.maths import Floats
 from simulation.readout import ReadoutIndex
 from simulation.state import State
 
-_ROOT = "root_translation"
-_ROOT_TURN = "root_aligned"
 
-
-@dataclass(frozen=True)
-class Tool:
+class Tool(NamedTuple):
     """A joint group whose action numbers ask for a TCP.
 
     Attributes:
@@ -37,139 +34,108 @@ class Tool:
     group: JointGroup
     tcp_link: str
     numbers: slice
-    joints: tuple[int, ...]
+    joints: slice
     own: slice
 
 
 class ToolControl:
-    """Drives joint groups that take the same command, in all worlds at once."""
+    """Drives a joint group by the pose of its TCP, in every world.
 
-    def __init__(self, tools: Sequence[Tool]) -> None:
-        """Take what is driven alike."""
-        self.tools = tuple(tools)
-        group = tools[0].group
-        self.delta, self.target = group.delta, group.target
-        self._turns = group.asks.turn
+    Attributes:
+        tool: The joint group.
+        targets: Where the TCP was last asked to be in its root link's frame, (N, 7).
+    """
+
+    def __init__(self, tool: Tool) -> None:
+        """Take what is driven."""
+        self.tool, group = tool, tool.group
+        start = tool.numbers.start
+        self._place, self._angles = slice(start, start + 3), slice(start + 3, start + 6)
         moves, turns = group.frame.split(":")
-        self._by_root, self._turn_by_root = moves == _ROOT, turns.startswith(_ROOT_TURN)
-        self._normalised = group.normalised
-        starts = [tool.numbers.start for tool in tools]
-        self._places = np.array([range(start, start + 3) for start in starts])
-        self._angles = np.array([range(start + 3, start + 6) for start in starts])
+        self._by_root, self._turns_by_root = moves.startswith("root"), turns.startswith("root")
         # Native scales a turn by its lower bound, so that 1 turns backwards.
-        lows = [tool.group.ranges[-1][0] for tool in tools]
-        self._turn_scale = np.array(lows, np.float32)[:, None]
-        self._followers: list[PoseFollower] = []
-        self._roots: Floats = np.zeros((0, 7), np.float32)
-        self._to_roots = self._roots
-        self.poses: Floats = self._roots
-        """Where the TCPs were last asked to be in their root frames, (N · tools, 7)."""
+        self._turn_scale = np.float32(group.ranges[-1][0])
+        self._follower: PoseFollower | None = None
+        self._tcp_frame = self._link_frame = self._root_frame = 0
+        self._roots: dict[bytes, Row] = {}
+        self.targets: Floats = np.zeros((0, 7), np.float32)
 
     def build(self, backend: Backend, index: ReadoutIndex) -> None:
         """Find the frames, and what solves for joints."""
-        links = [(index.links[tool.robot], tool) for tool in self.tools]
-        self._tcp_frames = [index.tcps[tool.arm] for tool in self.tools]
-        self._link_frames = [link[tool.tcp_link] for link, tool in links]
-        self._root_frames = [
-            index.bases[tool.robot] if tool.group.root_link is None else link[tool.group.root_link]
-            for link, tool in links
-        ]
-        self._followers = [
-            backend.pose_follower(
-                tool.robot, tool.tcp_link, tool.group.root_link, tool.group.joints
-            )
-            for tool in self.tools
-        ]
+        tool, links = self.tool, index.links[self.tool.robot]
+        root_link = tool.group.root_link
+        self._tcp_frame, self._link_frame = index.tcps[tool.arm], links[tool.tcp_link]
+        self._root_frame = index.bases[tool.robot] if root_link is None else links[root_link]
+        self._follower = backend.pose_follower(
+            tool.robot, tool.tcp_link, root_link, tool.group.joints
+        )
 
     def begin(self, state: State, env_ids: Iterable[int]) -> None:
         """Let the targets of some worlds be where the TCPs are."""
-        now = self.now(state)
-        if len(self.poses) != len(now):
-            self.poses = now
-        for i in env_ids:
-            rows = self._rows(i)
-            self.poses[rows] = now[rows]
+        if len(self.targets) != state.num_envs:
+            self.targets = np.zeros((state.num_envs, 7), np.float32)
+        for env in env_ids:
+            self.targets[env] = self._now(state, env)
 
-    def now(self, state: State) -> Floats:
-        """Return where the TCPs are in their root frames, (N · tools, 7)."""
-        return poses.combined(self._from_roots(state), _rows(state, self._tcp_frames))
+    def drive(self, action: Floats, scaled: Floats, state: State, env: int, joints: Floats) -> None:
+        """Write the joint targets that bring the TCP where an action asks it to be.
 
-    def ask(self, action: Floats, scaled: Floats, state: State) -> Floats:
-        """Return where the TCPs are to be, (N · tools, 7).
+        They are left as they are if there are none.
 
         Args:
-            action: Actions, (N, A).
-            scaled: The same, clipped, and scaled to metres.
+            action: Of one world, (A,).
+            scaled: The same, clipped and scaled to metres.
             state: The worlds before the step.
+            env: Which world.
+            joints: Joint targets of that world, (dof,) (rad, m), which hold the present joints.
         """
-        places = scaled[:, self._places].reshape(-1, 3)
-        turns = self._turned(action) if self._turns else None
-        if not self.delta:
-            assert turns is not None
-            return np.concatenate([places, turns], 1)
-        before = self.poses if self.target else self.now(state)
-        spots, ways = before[:, :3], before[:, 3:]
-        moved = places if self._by_root else poses.turned(ways, places)
-        if turns is not None:
-            pair = (turns, ways) if self._turn_by_root else (ways, turns)
-            ways = poses.product(*pair)
-        return np.concatenate([spots + moved, poses.upright(ways)], 1)
-
-    def follow(self, wanted: Floats, state: State, env_ids: Iterable[int], targets: Floats) -> None:
-        """Write the joint targets that bring TCPs where they are wanted; they stay where they fail.
-
-        Args:
-            wanted: Poses of the TCPs, (N · tools, 7).
-            state: The worlds before the step.
-            env_ids: Which worlds.
-            targets: Joint targets, (N, dof) (rad, m), which hold the present joints.
-        """
-        if self._tcp_frames != self._link_frames:
-            wanted = self._of_links(wanted, state)
-        qpos = state.joint_positions
-        for i in env_ids:
-            for tool, follower, row in zip(
-                self.tools, self._followers, range(self._rows(i).start, len(wanted)), strict=False
-            ):
-                pose = wanted[row]
-                found = follower.follow(pose[:3], pose[3:], qpos[i, tool.own])
-                if found is not None:
-                    targets[i, tool.joints] = found
-
-    def keep(self, wanted: Floats, env_ids: Iterable[int]) -> None:
-        """Let the targets of some worlds be poses, (N · tools, 7)."""
-        for i in env_ids:
-            rows = self._rows(i)
-            self.poses[rows] = wanted[rows]
+        assert self._follower is not None
+        wanted = self._wanted(action, scaled, state, env)
+        if self.tool.group.target:
+            self.targets[env] = wanted
+        pose: Floats = np.array(self._of_link(wanted, state, env), np.float32)
+        qpos = state.joint_positions[env, self.tool.own]
+        found = self._follower.follow(pose[:3], pose[3:], qpos)
+        if found is not None:
+            joints[self.tool.joints] = found
 
     # -- inside ------------------------------------------------------------------------------
 
-    def _rows(self, env: int) -> slice:
-        count = len(self.tools)
-        return slice(env * count, (env + 1) * count)
+    def _wanted(self, action: Floats, scaled: Floats, state: State, env: int) -> Row:
+        """Return where the TCP is to be, in its root link's frame."""
+        group, place = self.tool.group, poses.row(scaled[self._place])
+        turn = self._turn(action) if group.asks.turn else None
+        if not group.delta:
+            assert turn is not None
+            return *place, *turn
+        before = poses.row(self.targets[env]) if group.target else self._now(state, env)
+        spot, way = before[:3], before[3:]
+        moved = place if self._by_root else poses.turned(way, place)
+        if turn is not None:
+            way = poses.product(turn, way) if self._turns_by_root else poses.product(way, turn)
+        return *poses.added(spot, moved), *poses.upright(way)
 
-    def _turned(self, action: Floats) -> Floats:
-        angles = action[:, self._angles].reshape(-1, 3)
-        if self._normalised:
-            angles = poses.clipped_turn(angles).reshape(-1, len(self.tools), 3)
-            angles = (angles * self._turn_scale).reshape(-1, 3)
+    def _turn(self, action: Floats) -> Row:
+        angles = action[self._angles]
+        if self.tool.group.normalised:
+            angles = poses.clipped_turn(angles) * self._turn_scale
         return poses.rotation(angles)
 
-    def _from_roots(self, state: State) -> Floats:
-        """Return the inverses of the root links' poses, which seldom move."""
-        roots = _rows(state, self._root_frames)
-        if not np.array_equal(roots, self._roots):
-            self._roots, self._to_roots = roots, poses.inverse(roots)
-        return self._to_roots
+    def _now(self, state: State, env: int) -> Row:
+        """Return where the TCP is, in its root link's frame."""
+        root = state.all_poses[self._root_frame, env]
+        key = root.tobytes()
+        if key not in self._roots:  # roots seldom move
+            if len(self._roots) > state.num_envs:
+                self._roots.clear()
+            self._roots[key] = poses.inverse(poses.row(root))
+        return poses.combined(self._roots[key], poses.row(state.all_poses[self._tcp_frame, env]))
 
-    def _of_links(self, wanted: Floats, state: State) -> Floats:
-        """Return poses of the links that orient TCPs, of poses of the TCPs, which hang on them."""
-        tcps, links = (_rows(state, frames) for frames in (self._tcp_frames, self._link_frames))
-        return poses.combined(wanted, poses.combined(poses.inverse(tcps), links))
-
-
-def _rows(state: State, frames: list[int]) -> Floats:
-    """Return the poses of frames, those of a world after one another, (N · frames, 7)."""
-    if len(frames) == 1:
-        return state.all_poses[frames[0]]
-    return state.all_poses[frames].swapaxes(0, 1).reshape(-1, 7)
+    def _of_link(self, wanted: Row, state: State, env: int) -> Row:
+        """Return where the link that orients the TCP is, if the TCP is where it is wanted."""
+        if self._tcp_frame == self._link_frame:
+            return wanted
+        tcp, link = (
+            poses.row(state.all_poses[frame, env]) for frame in (self._tcp_frame, self._link_frame)
+        )
+        return poses.combined(wanted, poses.combined(poses.inverse(tcp), link))

@@ -190,9 +190,8 @@ def _end(joint: ElementTree.Element, which: str) -> str:
 def _complete_limits(joints: Iterable[ElementTree.Element]) -> None:
     """Give limits what Pinocchio's parser insists on, and the search makes no use of."""
     for joint in joints:
-        limit = joint.find("limit")
-        if limit is None and joint.get("type") in ("revolute", "prismatic"):
-            limit = ElementTree.SubElement(joint, "limit", {"lower": "0", "upper": "0"})
-        if limit is not None:
-            for key in ("effort", "velocity"):
+        if joint.find("limit") is None and joint.get("type") in ("revolute", "prismatic"):
+            ElementTree.SubElement(joint, "limit")
+        for limit in joint.iterfind("limit"):
+            for key in ("lower", "upper", "effort", "velocity"):
                 limit.set(key, limit.get(key, "0"))

@@ -221,7 +221,7 @@ class Observer:
 
     def _state(self, simulation: Simulation, state: State, parts: Mapping[str, Array]) -> Any:
         index = simulation.index
-        kept = controllers.entries(simulation) if simulation.modes is not None else ()
+        kept = controllers.entries(simulation)
         rows = controllers.recall(simulation, kept)
         robots: list[dict[str, Floats]] = []
         for name in self._robots:

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from layouts import Layout
 from simulation import Simulation
-from simulation.control.modes import Remembered
+from simulation.control.modes import ModeController, Remembered
 from simulation.maths import Floats
 from simulation.readout import ReadoutIndex
 
 CONTROLLER = "controller"  # native's group of a state dict, and of what a robot observes of itself
 _JOINTS = "target_qpos"
+
+_known: WeakKeyDictionary[ModeController, tuple[Entry, ...]] = WeakKeyDictionary()
 
 
 class Entry(NamedTuple):
@@ -42,15 +45,21 @@ def entries(simulation: Simulation) -> tuple[Entry, ...]:
     Where all that drives a robot of several joint groups remembers joints, native has one
     controller without a name; else each is called like its joint group.
     """
-    if simulation.modes is None:
+    modes = simulation.modes
+    if modes is None or not modes.remembered:
         return ()
-    kept = simulation.modes.remembered
+    if modes not in _known:
+        _known[modes] = _entries(simulation.layout, modes.remembered)
+    return _known[modes]
+
+
+def _entries(layout: Layout, kept: Sequence[Remembered]) -> tuple[Entry, ...]:
     listed: list[Entry] = []
-    for robot in simulation.layout:
+    for robot in layout:
         own = [i for i, part in enumerate(kept) if part.robot == robot]
         sizes = tuple(kept[i].size for i in own)
-        if len(own) > 1 and _whole(simulation.layout, robot, [kept[i] for i in own]):
-            every = sum(sizes) == simulation.layout[robot].robot.dof
+        if len(own) > 1 and _whole(layout, robot, [kept[i] for i in own]):
+            every = sum(sizes) == layout[robot].robot.dof
             listed.append(Entry(robot, _JOINTS, tuple(own), sizes, joints=every))
         else:
             listed += [
