@@ -43,6 +43,7 @@ COMMANDS: Mapping[str, Command] = {
         record="let an expert play episodes in worker processes, and record them",
         replay="play a recording again, and compare what happens",
         evaluate="let a policy or an expert play, and tell how well it does",
+        convert="record a recording again in another control mode",
         export="write a recording as a dataset for LeRobot or robomimic",
         view="look at an episode of a recording in a browser",
         bench="measure what steps, resets, workers and recordings cost",
