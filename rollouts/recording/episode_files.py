@@ -45,7 +45,10 @@ _OPENING = b"robot-layouts episode 1\n"
 _CHECKSUM = 4  # bytes
 _MAX_PART = MAX_BYTES + 2**24  # bytes
 
-_ARRAY_NAME = re.compile(r"(actions|rewards|success|terminated|truncated|env_states(/[^/\0]+){2})")
+_ARRAY_NAME = re.compile(
+    r"(actions|rewards|success|terminated|truncated"
+    r"|env_states(/[^/\0]+){2}|env_states/controller(/[^/\0]+){1,3})"
+)
 _CONTENT = fields(
     {
         "attributes": fields({"episode": TEXT}, {"action_split": TEXT}),

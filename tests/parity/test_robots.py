@@ -9,7 +9,7 @@ import pytest
 import sapien
 
 from layouts import Layout, Placement
-from robots import RobotDescriptor, RobotRegistry
+from robots import CONTROL_MODES, RobotDescriptor, RobotRegistry
 from simulation import PhysicsSettings, Simulation
 from simulation.sapien3.backend import worlds_below
 from tests.native import NATIVE
@@ -34,7 +34,27 @@ AGENTS = {
 BASE_NUMBERS = {"fetch": 2}  # of native's action, at its end; here the base stands still
 
 
-def native_motion(name: str, actions: np.ndarray) -> np.ndarray:
+DELTAS = CONTROL_MODES[0]
+# One of each kind that a robot has in its own way: a root link that moves, drives of its own, nine
+# joints without an arm. The long tests try every mode that native's agent has.
+MODES = (
+    ("fetch", "pd_ee_delta_pose"),
+    ("fetch", "pd_joint_pos"),
+    ("koch", "pd_joint_pos"),
+    ("trifingerpro", "pd_joint_delta_pos_vel"),
+)
+HANDS = dict.fromkeys(("allegro_hand_left", "dclaw", "koch", "so100"), CONTROL_MODES[1:3])
+OFFERED = {
+    **HANDS,
+    "fetch": [m for m in CONTROL_MODES if m not in ("pd_ee_pose", "pd_joint_pos_vel")],  # NaN there
+    "panda": CONTROL_MODES,
+    "panda_stick": CONTROL_MODES,
+    "panda_wristcam": CONTROL_MODES,
+    "trifingerpro": CONTROL_MODES[:6],
+}
+
+
+def native_motion(name: str, actions: np.ndarray, mode: str = DELTAS) -> np.ndarray:
     """Return qpos and qvel after every step, (steps, 2, dof), SAPIEN's order."""
     import gymnasium
     import mani_skill.envs  # noqa: F401
@@ -43,7 +63,7 @@ def native_motion(name: str, actions: np.ndarray) -> np.ndarray:
     env = gymnasium.make(
         "Empty-v1",
         robot_uids=AGENTS[name],
-        control_mode="pd_joint_delta_pos",
+        control_mode=mode,
         sim_backend="physx_cpu",
         reconfiguration_freq=0,
     )
@@ -52,6 +72,7 @@ def native_motion(name: str, actions: np.ndarray) -> np.ndarray:
     agent = native.agent
     agent.reset(torch.from_numpy(start(name)[None]))
     agent.robot.set_pose(sapien.Pose([0.0, 0.0, HEIGHT]))
+    agent.controller.reset()
     assert [joint.name for joint in agent.robot.active_joints] == active(name)
     rows = []
     for action in actions:
@@ -61,8 +82,8 @@ def native_motion(name: str, actions: np.ndarray) -> np.ndarray:
     return np.array(rows)
 
 
-def ours(robot: str | RobotDescriptor) -> Simulation:
-    layout = Layout({"arm": Placement(robot)})
+def ours(robot: str | RobotDescriptor, mode: str = DELTAS) -> Simulation:
+    layout = Layout({"arm": Placement(robot)}).in_control_mode(mode)
     return Simulation(layout, lambda world, _: None, 1, PhysicsSettings())
 
 
@@ -77,8 +98,8 @@ def start(name: str) -> np.ndarray:
     return np.array([qpos[joint] for joint in active(name)], np.float32)
 
 
-def our_motion(robot: str | RobotDescriptor, actions: np.ndarray) -> np.ndarray:
-    simulation = ours(robot)
+def our_motion(robot: str | RobotDescriptor, actions: np.ndarray, mode: str = DELTAS) -> np.ndarray:
+    simulation = ours(robot, mode)
     arm = worlds_below(simulation)[0].robots["arm"]
     arm.reset(next(iter(arm.descriptor.keyframes.values())))
     arm.articulation.set_root_pose(sapien.Pose([0.0, 0.0, HEIGHT]))  # built elsewhere, as native
@@ -90,9 +111,14 @@ def our_motion(robot: str | RobotDescriptor, actions: np.ndarray) -> np.ndarray:
     return np.array(rows)
 
 
-def random_actions(name: str) -> np.ndarray:
-    size = RobotRegistry.load(name).action_dim
-    return np.random.default_rng(0).uniform(-1.2, 1.2, (STEPS, size)).astype(np.float32)
+def random_actions(name: str, mode: str = DELTAS) -> np.ndarray:
+    """Return actions a little beyond their bounds; those for poses ask for places in reach."""
+    robot = RobotRegistry.load(name).in_control_mode(mode)
+    low, high = np.array(robot.action_bounds).T
+    actions = np.random.default_rng(0).uniform(1.2 * low, 1.2 * high, (STEPS, robot.action_dim))
+    if mode == "pd_ee_pose":
+        actions[:, :6] = (0.5, 0.0, 0.4, np.pi, 0.0, 0.0) + actions[:, :6] / 30
+    return actions.astype(np.float32)
 
 
 @pytest.mark.parametrize("name", AGENTS)
@@ -101,6 +127,26 @@ def test_a_robot_moves_as_its_native_agent(name):
     expected = native_motion(name, actions)
     assert np.abs(expected[-1, 0] - expected[0, 0]).max() > 0.1
     np.testing.assert_array_equal(our_motion(name, actions), expected)
+
+
+def expect_native(name: str, mode: str) -> None:
+    actions = random_actions(name, mode)
+    expected = native_motion(name, actions, mode)
+    assert np.abs(expected[-1, 0] - expected[0, 0]).max() > 0.1
+    np.testing.assert_array_equal(our_motion(name, actions, mode), expected)
+
+
+@pytest.mark.parametrize(("name", "mode"), MODES)
+def test_a_robot_moves_as_its_native_agent_in_a_mode(name, mode):
+    expect_native(name, mode)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("name", "mode"), [(n, mode) for n, own in OFFERED.items() for mode in own]
+)
+def test_a_robot_moves_as_its_native_agent_in_every_mode(name, mode):
+    expect_native(name, mode)
 
 
 @pytest.mark.parametrize(

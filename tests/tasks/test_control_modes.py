@@ -112,6 +112,8 @@ def test_a_robot_in_another_control_mode(robot):
     assert list(positions.action_split) == list(deltas.action_split)
     for before, after in zip(deltas.describe_action(), positions.describe_action(), strict=True):
         assert after.name == before.name
+        if before.group in deltas.control_modes.get(MODE, {}):
+            continue  # the robot's own
         assert not after.relative
         if before.relative:
             assert (after.unit, after.normalised) == (before.unit.split()[0], False)

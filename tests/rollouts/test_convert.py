@@ -1,0 +1,96 @@
+"""Recordings in other control modes: converted, replayed, recorded by experts."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from rollouts.__main__ import main
+from rollouts.playing.replay import open_recording, replay, task_for
+from rollouts.recording.record import record
+
+TASK = "PickCube-v1"
+SEEDS = (0, 1)
+MODE = "pd_ee_target_delta_pose"
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recording")
+    record(TASK, SEEDS, folder, workers=0)
+    return folder
+
+
+def replays(folder):
+    with open_recording(folder, None) as file:
+        task = task_for(file)
+        return [replay(task, episode) for episode in file]
+
+
+def test_there_and_back(recording, tmp_path, capsys):
+    assert main(["convert", str(recording), "--to", MODE, "--out", str(tmp_path / "poses")]) == 0
+    assert "2 of 2 successful episodes succeed" in capsys.readouterr().out
+    found = replays(tmp_path / "poses")
+    assert [episode.seed for episode in found] == list(SEEDS)
+    assert all(episode.success and episode.difference is None for episode in found)
+    with open_recording(tmp_path / "poses", None) as file:
+        assert file.control_mode == MODE
+        assert file[0].states["controller"]["arm/target_pose"].shape[1] == 7
+    words = ["convert", str(tmp_path / "poses"), "--to", "pd_joint_delta_pos"]
+    assert main([*words, "--out", str(tmp_path / "deltas")]) == 0
+    assert all(episode.success for episode in replays(tmp_path / "deltas"))
+
+
+def test_a_conversion_goes_on_where_it_stopped(recording, tmp_path, capsys):
+    words = ["convert", str(recording), "--to", "pd_joint_vel", "--out", str(tmp_path)]
+    assert main([*words, "--episodes", "1"]) == 0
+    first = (tmp_path / "trajectory.h5").read_bytes()
+    assert main(words) == 0
+    capsys.readouterr()
+    written = json.loads((tmp_path / "trajectory.json").read_text())
+    assert [episode["episode_seed"] for episode in written["episodes"]] == list(SEEDS)
+    assert len((tmp_path / "trajectory.h5").read_bytes()) > len(first)
+
+
+def test_episodes_that_failed_are_left_out(recording, tmp_path, capsys):
+    import shutil
+
+    shutil.copytree(recording, tmp_path / "failed")
+    beside = tmp_path / "failed" / "trajectory.json"
+    with open_recording(tmp_path / "failed", None) as file:
+        assert all(episode.solved for episode in file)
+    about = json.loads(beside.read_text())
+    del about["episodes"][0]
+    beside.write_text(json.dumps(about))
+    words = ["convert", str(tmp_path / "failed"), "--to", "pd_ee_pose"]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 0
+    assert "1 of 1" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("mode", "complaint"),
+    [
+        ("pd_ee_dance", "control_mode 'pd_ee_dance' is not offered"),
+        ("leg=pd_ee_pose", "unknown robot of this layout 'leg'"),
+    ],
+)
+def test_what_is_no_mode(recording, tmp_path, capsys, mode, complaint):
+    assert main(["convert", str(recording), "--to", mode, "--out", str(tmp_path / "x")]) == 1
+    assert complaint in capsys.readouterr().err
+    assert not (tmp_path / "x").exists()
+
+
+def test_experts_record_with_a_mode_for_each_arm(tmp_path):
+    mode = {"left": "pd_ee_delta_pose", "right": "pd_joint_pos"}
+    summary = record("TwoRobotPickCube-v1", [0], tmp_path, workers=0, control_mode=mode)
+    assert summary.played[0].success
+    with open_recording(tmp_path, None) as file:
+        assert file.control_mode == mode
+    found = replays(tmp_path)
+    assert [(episode.success, episode.difference) for episode in found] == [(True, None)]
+    about = json.loads((tmp_path / "trajectory.json").read_text())
+    assert about["episodes"][0]["control_mode"] == {
+        "panda_wristcam-0": "pd_ee_delta_pose",
+        "panda_wristcam-1": "pd_joint_pos",
+    }
