@@ -266,10 +266,10 @@ class Arrangement(Mapping[str, Placement]):
             DescriptorError: If a robot lacks what the mode needs; see
                 `robots.RobotDescriptor.in_control_mode`.
         """
-        if isinstance(mode, str):
-            chosen: dict[str, str | dict[str, str]] = dict.fromkeys(self, mode)
+        if not isinstance(mode, Mapping):
+            chosen: dict[str, str | Mapping[str, str]] = dict.fromkeys(self, mode)
         else:
-            chosen = self._modes_by_robot(mode)
+            chosen = {**self._modes_by_robot(mode)}
         robots = {name: self[name].robot.in_control_mode(own) for name, own in chosen.items()}
         return self.replace_robots(**robots)
 

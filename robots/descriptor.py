@@ -311,7 +311,7 @@ class RobotDescriptor:
             DescriptorError: If the robot lacks what the mode needs: joint limits, or an arm.
         """
         parts = self.parts or {self.name: self}
-        chosen = dict.fromkeys(parts, mode) if isinstance(mode, str) else mode
+        chosen = mode if isinstance(mode, Mapping) else dict.fromkeys(parts, mode)
         changed: dict[str, JointGroup] = {}
         for part, name in chosen.items():
             if part not in parts:

@@ -39,7 +39,7 @@ FIELDS: dict[tuple[str | int, ...], tuple[Any, ...]] = {
     ("episodes", 1): ("text", 3, [], None, {}),
     ("episodes", 1, "episode_id"): (*NOT_NUMBERS, None, 0, 99),
     ("episodes", 1, "episode_seed"): ("seven", 3.5, -1, True, {}, 10**30, ["a"], [-1], 13),
-    ("episodes", 1, "control_mode"): (*NOT_TEXTS, "", {"arm": 3}, "pd_ee_pose", "pd_joint_pos"),
+    ("episodes", 1, "control_mode"): (*NOT_TEXTS, "", {"arm": 3}, "pd_ee_dance", "pd_joint_pos"),
     ("episodes", 1, "elapsed_steps"): (*NOT_NUMBERS, 0, 3, 5, 10**6, 10**6 + 1),
     ("episodes", 1, "reset_kwargs"): NOT_OBJECTS,
     ("episodes", 1, "reset_kwargs", "seed"): ("seven", 3.5, -1, True, {}, 10**30, 2**32, ["a"]),

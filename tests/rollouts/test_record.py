@@ -189,7 +189,8 @@ def test_another_recording_is_not_gone_on_with(tmp_path, capsys):
         (["--ray="], 1, "'' is no address of a Ray cluster; it must be"),
         (["--ray=auto", "--workers=0"], 1, "workers on a Ray cluster is 0; it must be a whole nu"),
         (["--seed=-1"], 2, "-1 is too few; it must be 0 or more"),
-        (["--control-mode=pd_ee_pose"], 2, "invalid choice: 'pd_ee_pose'"),
+        (["--control-mode=pd_ee_dance"], 1, "control_mode 'pd_ee_dance' is not offered"),
+        (["--control-mode=left=,right="], 2, "makes no sense; a name such as"),
     ],
 )
 def test_bad_usage(tmp_path, capsys, words, code, complaint):
