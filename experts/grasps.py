@@ -77,6 +77,7 @@ def pick(
     ready: float = 0.1,
     around: float = 0.03,
     most: int | None = None,
+    opening: float = OPEN,
 ) -> tuple[Waypoint, ...]:
     """Return the waypoints after which a gripper holds a body: above, around, grasp.
 
@@ -90,6 +91,8 @@ def pick(
         ready: How near it must come to that place before it goes on (rad).
         around: How near it must come to the grip before it closes (rad).
         most: How many steps each waypoint may take.
+        opening: Action number of the gripper on the way; 0 leaves one as it stands that moves by
+            so much per step, such as an SO-100's.
     """
 
     def before(scene: Scene) -> list[Pose]:
@@ -97,8 +100,8 @@ def pick(
 
     held = partial(Scene.grasps, robot=robot, body=body)
     return (
-        Waypoint(f"above {body}", before, OPEN, near=ready, most=most),
-        Waypoint(f"around {body}", grips, OPEN, near=around, most=most),
+        Waypoint(f"above {body}", before, opening, near=ready, most=most),
+        Waypoint(f"around {body}", grips, opening, near=around, most=most),
         Waypoint(f"grasp {body}", None, CLOSED, steps=2, until=held, most=most),
     )
 

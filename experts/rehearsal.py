@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import pi, remainder
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from experts.driver import ArmDriver
 from experts.geometry import heading
 from experts.script import OPEN, Pose, Scene, Script, Waypoint
+from experts.tips import pose_solver
 from kinematics.rotations import Floats, inverse, rotate
 from kinematics.solve import by_way
 from layouts import Layout
@@ -37,6 +39,23 @@ class Attempt:
     actions: NDArray[np.float32]
     success: bool
     reason: str = ""
+
+
+class Plan(NDArray[np.float32] if TYPE_CHECKING else np.ndarray):
+    """Actions, (T, A) float32, and why they do not solve their episode.
+
+    Attributes:
+        reason: In words; empty if they do.
+    """
+
+    reason: str = ""
+
+    @classmethod
+    def of(cls, attempt: Attempt) -> Plan:
+        """Return what came of an attempt."""
+        plan = attempt.actions.view(cls)
+        plan.reason = attempt.reason
+        return plan
 
 
 class Rehearsal:
@@ -112,7 +131,7 @@ class _Player:
         self._robot, self._waypoints = robot, list(waypoints)
         self._driver = ArmDriver(task.layout.arm(robot).robot)
         if any(waypoint.to is not None for waypoint in waypoints):
-            self._kinematics = task.simulation.inverse_kinematics(robot)
+            self._kinematics = pose_solver(task, robot)
             self._posture = _Posture(alone, task.layout, robot)
         if any(waypoint.at is not None for waypoint in waypoints):
             self._reach = task.simulation.point_reach(robot)
@@ -243,7 +262,7 @@ def _players(
 
 def first_success(
     task: MultiRobotTask, seed: int, scripts: Callable[[Scene], Sequence[Script]]
-) -> NDArray[np.float32]:
+) -> Plan:
     """Try scripts one after the other and return the actions of the first that succeeds.
 
     Args:
@@ -269,7 +288,7 @@ def first_success(
 
 def search(
     task: MultiRobotTask, seed: int, attempts: Callable[[Rehearsal], Iterable[Attempt]]
-) -> NDArray[np.float32]:
+) -> Plan:
     """Make attempts until one succeeds and return its actions.
 
     If none does, the actions of the longest attempt are returned: they fail as honestly.
@@ -280,7 +299,7 @@ def search(
         attempts: Makes them one by one, each in an episode begun anew.
 
     Returns:
-        Actions (T, A) with T at most the task's ``max_episode_steps``.
+        Actions (T, A) with T at most the task's ``max_episode_steps``, and the reason if they fail.
 
     Raises:
         TaskError: If no attempt could even be begun.
@@ -295,7 +314,7 @@ def search(
     best = max(made, key=lambda attempt: (attempt.success, len(attempt.actions)))
     if not len(best.actions):
         raise TaskError(f"{task.task_id}, seed {seed}: no plan: {best.reason}")
-    return best.actions
+    return Plan.of(best)
 
 
 def _stack(actions: list[NDArray[np.float32]], task: MultiRobotTask) -> NDArray[np.float32]:

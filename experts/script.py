@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinematics.rotations import Floats
+from experts.tips import gripper_turn
+from kinematics.rotations import Floats, multiply
 from simulation import State
 from tasks import MultiRobotTask
 
@@ -28,6 +29,7 @@ class Scene:
     def __init__(self, task: MultiRobotTask) -> None:
         """Look at the first world of a task as it is now."""
         self._state: State = task.simulation.read()
+        self._layout = task.layout
         self.design: Any = task.simulation.worlds[0].design
 
     def body(self, name: str) -> Pose:
@@ -35,8 +37,14 @@ class Scene:
         return _split(self._state.pose(name)[0])
 
     def tcp(self, robot: str) -> Pose:
-        """Return the pose of a robot's tool centre point."""
-        return _split(self._state.tcp_pose(robot)[0])
+        """Return the pose of a robot's tool centre point.
+
+        Its z axis is the gripper's approach and its y axis the way the fingers open, if the robot's
+        TCP link has them so, as a Panda's; where the TCP is the mean of several links, always.
+        """
+        position, quaternion = _split(self._state.tcp_pose(robot)[0])
+        turned = gripper_turn(self._layout.arm(robot).robot)
+        return position, quaternion if turned is None else multiply(quaternion, turned)
 
     def qpos(self, robot: str) -> Floats:
         """Return all joints of a robot in its descriptor's order, shape (dof,) (rad, m)."""

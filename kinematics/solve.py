@@ -6,7 +6,7 @@ Every search is deterministic: random starts come from a fixed seed.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,15 +36,18 @@ class Goal:
 
     Attributes:
         position: Of the point, (3,) (m).
-        links: Indices of the links whose mean origin is the point.
+        links: Indices of the links whose mean origin is the point, or lies beside it.
         rotation: Of the link ``turned``, (3, 3); None if any will do.
         turned: Index of the link that has the orientation.
+        offset: From the mean origin to the point, in the frame of ``turned``, (3,) (m); None if
+            that is the point.
     """
 
     position: Floats
     links: Sequence[int]
     rotation: Floats | None = None
     turned: int = 0
+    offset: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +90,8 @@ def solve(tree: Tree, goal: Goal, starts: Floats, free: Sequence[int]) -> Soluti
     """
     needed = tree.towards([*goal.links, goal.turned])
     links = [needed.link(tree.links[link]) for link in goal.links]
-    goal = Goal(goal.position, links, goal.rotation, needed.link(tree.links[goal.turned]))
+    turned = needed.link(tree.links[goal.turned])
+    goal = replace(goal, links=links, turned=turned)
     qpos = _descend(needed, goal, starts.copy(), free)
     errors, _ = _errors(needed, goal, qpos, free)
     missing = np.linalg.norm(errors[:, :3], axis=1)
@@ -124,6 +128,10 @@ def _errors(tree: Tree, goal: Goal, qpos: Floats, free: Sequence[int]) -> tuple[
     slopes = np.zeros((len(qpos), 3, len(free)))
     for link in goal.links:
         slopes += tree.jacobian(poses, link, free)[:, :3] / len(goal.links)
+    if goal.offset is not None:
+        beside = poses[:, goal.turned, :3, :3] @ goal.offset
+        turning = tree.jacobian(poses, goal.turned, free)[:, 3:]
+        place, slopes = place + beside, slopes + np.cross(turning, beside[..., None], axis=1)
     if goal.rotation is None:
         return goal.position - place, slopes
     turn = rotation_vector(goal.rotation @ poses[:, goal.turned, :3, :3].transpose(0, 2, 1))

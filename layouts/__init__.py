@@ -1,5 +1,9 @@
 """Which robots stand where: placements, presets, checks and pictures."""
 
+from kinematics.own_rooms import expect_own
+
+expect_own("robots")
+
 from kinematics.quaternions import rpy_quaternion, yaw_quaternion
 from layouts.frames import Frame, Pose, ceiling, table, wall
 from layouts.layout import Layout

@@ -16,7 +16,7 @@ from layouts.validate_command import add_check_options
 from layouts.view_command import add_view_options
 from robots import LayoutError, RobotRegistry, UnknownNameError
 from robots.common.bounds import shown
-from robots.common.commands import FAILED, exit_code, start
+from robots.common.commands import FAILED, exit_code, program, start
 
 # What presets take besides the robots.
 OPTIONS = ("spacing", "radius", "facing", "columns", "edges", "table", "inset", "keyframe")
@@ -157,7 +157,7 @@ def _words(word: str) -> list[str]:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m layouts", description="Say which robots stand where, and look at it."
+        prog=program("layouts"), description="Say which robots stand where, and look at it."
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     show = commands.add_parser("show", help="print a layout as a table, and draw it if asked")

@@ -168,6 +168,12 @@ class Arrangement(Mapping[str, Placement]):
         names = [*self, *(limb for limb, _ in limbs)]
         return {limb: part for limb, part in limbs if names.count(limb) == 1}
 
+    @property
+    def places(self) -> dict[str, str]:
+        """The `arms` by the names that they go by in a task: the short one, where there is one."""
+        short = {full: name for name, full in self.short_names.items()}
+        return {short.get(arm, arm): arm for arm in self.arms}
+
     def arm(self, name: str) -> Placement:
         """Return a robot, or a limb by its full name or its short one, described like a robot.
 

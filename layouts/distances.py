@@ -2,7 +2,9 @@
 
 Neighbours stand `HAND_OVER` of the sum of their reaches apart: the last eighth of that sum is where
 both can work, so one can hand an object to the other. They never stand so near that one can reach
-the other's base. Robots of the catalogue, however mixed, keep clear of each other so.
+the other's base; where one reaches less than half as far as the other, hardly farther than that, as
+the reach of a tall robot shrinks towards the height at which a small one works. Robots of the
+catalogue, however mixed, keep clear of each other so.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ HAND_OVER = 7 / 8
 # The same where robots also stand round a corner of a table: at 7/8 their hands would meet over its
 # middle. Pandas need 0.93 to start 5 cm apart there, with joint noise.
 ROUND_CORNERS = 15 / 16
+UNEQUAL = 1 / 2  # of the larger reach; what counts as much less
 OPPOSITE = (("north", "south"), ("east", "west"))  # edges of a table
 
 Rows = Mapping[str, Sequence[RobotDescriptor]]  # the robots of each edge of a table, in order
@@ -26,7 +29,8 @@ Rows = Mapping[str, Sequence[RobotDescriptor]]  # the robots of each edge of a t
 
 def apart(one: RobotDescriptor, other: RobotDescriptor) -> float:
     """Return the hand-over distance (m) of two bases, from which neither reaches the other one."""
-    return max(HAND_OVER * (one.reach + other.reach), one.reach, other.reach)
+    smaller, larger = sorted((one.reach, other.reach))
+    return larger if smaller < UNEQUAL * larger else max(HAND_OVER * (smaller + larger), larger)
 
 
 def gaps(row: Iterable[RobotDescriptor]) -> list[float]:

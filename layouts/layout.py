@@ -28,6 +28,12 @@ class Layout(Arrangement):
         """Show a table: name, robot, action numbers, base pose, keyframe and reach of each."""
         return describe(self)
 
+    def _repr_html_(self) -> str:
+        """Show a notebook the picture from above."""
+        from layouts.display import layout_html
+
+        return layout_html(self)
+
     def to_yaml(self) -> str:
         """Return the layout as YAML text, as it was declared; robots by their registered names.
 

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from os import PathLike
+from typing import TYPE_CHECKING
 
 from kinematics.quaternions import inverted, multiplied, normalised
 from layouts.frames import ORIGIN, Pose, check_pose, declared_quaternion
-from robots import LayoutError, RobotDescriptor, RobotRegistry
+from robots import LayoutError, RobotDescriptor
 from robots.common.bounds import as_float, shown
 from robots.descriptor import IDENTITY, Quaternion, Vector3
+from robots.named import named_robot
 
-RobotLike = str | RobotDescriptor
+RobotLike = str | PathLike[str] | RobotDescriptor
 
 LARGEST_NOISE = 1.0  # rad; of twice that, a joint starts anywhere
 
@@ -43,6 +46,21 @@ class Placement:
     rpy: Vector3 | None = field(default=None, kw_only=True)
     on: str | None = field(default=None, kw_only=True)
     _world: Pose | None = field(default=None, init=False, repr=False, compare=False)
+
+    if TYPE_CHECKING:  # a robot may be named; what is kept is its descriptor
+
+        def __init__(
+            self,
+            robot: RobotLike,
+            position: Vector3 | None = None,
+            quaternion: Quaternion | None = None,
+            keyframe: str | None = None,
+            qpos_noise: float = 0.02,
+            *,
+            rpy: Vector3 | None = None,
+            on: str | None = None,
+        ) -> None:
+            """Take a place."""
 
     def __post_init__(self) -> None:
         """Look a robot's name up, and refuse poses that are no poses."""
@@ -153,17 +171,18 @@ def faced(robot: RobotDescriptor, turn: Quaternion) -> Quaternion:
 
 
 def load_robot(robot: RobotLike) -> RobotDescriptor:
-    """Return a descriptor as it is, or look a name up in the registry.
+    """Return a descriptor as it is, look a name up, or guess the robot of a URDF by its path.
 
     Raises:
-        LayoutError: If it is neither.
+        LayoutError: If it is none of these.
         UnknownNameError: If no robot has that name.
+        AssetError: If it is the path of no usable URDF.
     """
     if isinstance(robot, RobotDescriptor):
         return robot
-    if not isinstance(robot, str):
+    if not isinstance(robot, (str, PathLike)):
         raise LayoutError(f"robot is {shown(robot)}; it takes a robot's name or a RobotDescriptor")
-    return RobotRegistry.load(robot)
+    return named_robot(robot)
 
 
 def check_robots(robots: object) -> None:

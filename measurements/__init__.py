@@ -1,1 +1,5 @@
 """What everything costs, and whether anything grows; no other room needs it."""
+
+from kinematics.own_rooms import expect_own
+
+expect_own("robots", "layouts", "simulation", "tasks", "experts", "rollouts")

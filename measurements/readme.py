@@ -12,6 +12,7 @@ from measurements.bench import readme_table as bench_table
 from parity.compare.results import RESULTS, ResultsError, read
 from parity.compare.task_summary import REWARD_MODES, number_text, reward_text, success_text
 from robots import RobotLayoutsError
+from robots.common.commands import program
 from tasks import list_clones
 
 README = Path(__file__).parents[1] / "README.md"
@@ -27,7 +28,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         of parity does not hold exactly the tasks there are, 2 if a file cannot be read.
     """
     parser = argparse.ArgumentParser(
-        prog="python -m parity readme",
+        prog=f"{program('parity')} readme",
         description="Write what `python -m parity compare --all --record` and `python -m parity"
         " bench --record` found into README.md.",
     )

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from robots import UnknownNameError
-from robots.common.commands import MEANINGLESS, exit_code, print_error, start
+from robots.common.commands import MEANINGLESS, exit_code, print_error, program, start
 
 # Command -> the module whose ``main(argv)`` runs it, and what it does.
 COMMANDS = {
@@ -39,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns its exit code, 2 if there is no such command or it makes no sense."""
     command, *rest = list(sys.argv[1:] if argv is None else argv) or ["--help"]
     if command in ("-h", "--help"):
-        print(f"usage: python -m parity {{{','.join(COMMANDS)}}} ...\n")
+        print(f"usage: {program('parity')} {{{','.join(COMMANDS)}}} ...\n")
         for name, (_, description) in COMMANDS.items():
             print(f"  {name:<10} {description}")
         return 0

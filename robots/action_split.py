@@ -45,6 +45,9 @@ class JointGroup:
             (``unit``); 0 if empty.
         held: Whether no action number drives the group: its joints are held where the layout
             starts them. ``lower`` and ``upper`` then mean nothing.
+        armature: Inertia of motor and gear as the joint feels it (kg·m² or kg), one number for all
+            joints or one per joint; a URDF has none. It keeps apart joints whose links push each
+            other.
         unit: ``"rad"`` or ``"m"``.
         friction: Joint friction coefficient (dimensionless).
         reset_noise: Whether a reset adds joint noise to this group.
@@ -76,6 +79,7 @@ class JointGroup:
     multipliers: tuple[float, ...] = ()
     offsets: tuple[float, ...] = ()
     held: bool = False
+    armature: float | tuple[float, ...] = 0.0
     command: str = "position"
     target: bool = False
     frame: str = FRAMES[0]
@@ -112,6 +116,7 @@ class JointGroup:
         damping: float = 1e5,
         force_limit: float = 1e5,
         unit: str = "rad",
+        armature: float | tuple[float, ...] = 0.0,
     ) -> JointGroup:
         """Return a group that is held where the layout starts it, and takes no action number.
 
@@ -121,20 +126,21 @@ class JointGroup:
             damping: See `JointGroup`.
             force_limit: See `JointGroup`.
             unit: ``"rad"`` or ``"m"``.
+            armature: See `JointGroup`.
         """
         return cls(
             joints, -1.0, 1.0, stiffness, damping, force_limit, unit=unit, held=True,
-            reset_noise=False,
+            reset_noise=False, armature=armature,
         )  # fmt: skip
 
     def _refuse_bad_drives(self) -> None:
-        for name in ("stiffness", "damping", "force_limit"):
+        for name in ("stiffness", "damping", "force_limit", "armature"):
             given = getattr(self, name)
             if isinstance(given, tuple) and len(given) != len(self.joints):
                 raise DescriptorError(
                     f"{name} has {len(given)} numbers; the group has joints {self.joints}"
                 )
-        for name in ("stiffness", "damping", "force_limit", "friction"):
+        for name in ("stiffness", "damping", "force_limit", "friction", "armature"):
             for value in _spread(getattr(self, name), 1):
                 if value < 0:
                     raise DescriptorError(f"{name} is {value}; it must not be negative")
@@ -212,6 +218,11 @@ class JointGroup:
         return tuple(zip(*(_spread(value, len(self.joints)) for value in numbers), strict=True))
 
     @property
+    def armatures(self) -> tuple[float, ...]:
+        """Armature of each joint (kg·m² or kg)."""
+        return _spread(self.armature, len(self.joints))
+
+    @property
     def followers(self) -> tuple[tuple[float, float], ...]:
         """Multiplier and offset (``unit``) of each joint; (1, 0) unless a mimic group has some."""
         ones, zeros = (1.0,) * len(self.joints), (0.0,) * len(self.joints)
@@ -267,6 +278,9 @@ class ActionSplit(Mapping[str, slice]):
         settle(groups, Mapping[str, JointGroup], "ActionSplit", DescriptorError)
         if not any(group.size for group in groups.values()):
             raise DescriptorError("an action split needs at least one joint group to drive")
+        self._lay_out(groups)
+
+    def _lay_out(self, groups: Mapping[str, JointGroup]) -> None:
         joints = [joint for group in groups.values() for joint in group.joints]
         twice = sorted({joint for joint in joints if joints.count(joint) > 1})
         if twice:
@@ -325,9 +339,30 @@ class ActionSplit(Mapping[str, slice]):
         """Return a split with some groups exchanged (new names go to the end)."""
         return ActionSplit(**{**self.groups, **groups})
 
+    def held(self, *groups: str) -> ActionSplit:
+        """Return a split in which groups take no number and are held where they start.
+
+        Args:
+            groups: Their names; all if none is given.
+        """
+        still = groups or self.groups
+        return _split_from_groups(
+            {name: _held(g) if name in still else g for name, g in self.groups.items()}
+        )
+
+
+def _held(group: JointGroup) -> JointGroup:
+    still = JointGroup.hold(
+        group.joints, stiffness=0.0, damping=0.0, force_limit=0.0, unit=group.unit
+    )
+    drives = ("stiffness", "damping", "force_limit", "friction", "limits")
+    return replace(still, **{name: getattr(group, name) for name in drives})
+
 
 def _split_from_groups(groups: dict[str, JointGroup]) -> ActionSplit:
-    return ActionSplit(**groups)
+    split = ActionSplit.__new__(ActionSplit)  # one that nobody drives is no mistake here
+    split._lay_out(groups)  # pyright: ignore[reportPrivateUsage]
+    return split
 
 
 @dataclass(frozen=True)

@@ -75,6 +75,7 @@ class RobotDescriptor:
         fingers: The links that grasp, if it has any.
         cameras: Cameras on its links.
         home: Default standing place and keyframe.
+        tcp_offset: From there to the TCP, in the frame of ``tcp_link`` (m).
         allowed_collisions: Pairs of links that may overlap, besides those that a joint joins and
             those that are rigid with each other; checks and physics let them. None takes what
             ManiSkill's loader takes: of the SRDF beside the URDF the pairs of reason ``Default``.
@@ -98,6 +99,7 @@ class RobotDescriptor:
     cameras: tuple[CameraMount, ...] = ()
     home: Home = field(default_factory=Home)
     allowed_collisions: tuple[tuple[str, str], ...] | None = None
+    tcp_offset: Vector3 = (0.0, 0.0, 0.0)
     limbs: Mapping[str, Limb] = field(default_factory=dict[str, Limb])
     control_modes: Mapping[str, Mapping[str, JointGroup]] = field(
         default_factory=dict[str, Mapping[str, JointGroup]]
@@ -223,6 +225,17 @@ class RobotDescriptor:
         counts = {"joint": self.dof, "action number": self.action_dim}
         return ", ".join(f"{count} {what}{'s' * (count != 1)}" for what, count in counts.items())
 
+    def __repr__(self) -> str:
+        """Show name, sizes and reach; the fields are many."""
+        return f"RobotDescriptor({self.name!r}: {self.summary}, reach {self.reach:g} m)"
+
+    def _repr_html_(self) -> str:
+        """Show a notebook the table of action numbers."""
+        from robots.display import robot_html
+
+        text = f"{self.summary}, reach {self.reach:g} m"
+        return robot_html(self.name, text, self.describe_action())
+
     def keyframe(self, name: str) -> tuple[float, ...]:
         """Return the joint positions of a keyframe (rad, m), in the order of ``joints``.
 
@@ -259,6 +272,7 @@ class RobotDescriptor:
             keyframes={key: [qpos[i] for i in places] for key, qpos in self.keyframes.items()},
             tcp_link=limb.tcp_link if limb else self.tcp_link,
             tcp_position_links=limb.tcp_position_links if limb else self.tcp_position_links,
+            tcp_offset=limb.tcp_offset if limb else self.tcp_offset,
             fingers=limb and limb.fingers,
             reach=limb.reach if limb else self.reach,
             cameras=tuple(c for c in self.cameras if part in c.name.split("_")),

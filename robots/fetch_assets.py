@@ -15,7 +15,7 @@ from robots.assets.progress import size
 from robots.assets.sources import AssetSource, InstalledPackage, LocalCopy
 from robots.assets.store import AssetStore, FileState, default_root
 from robots.assets.wheel_source import PackageWheel
-from robots.common.commands import exit_code, print_error, printable, start
+from robots.common.commands import exit_code, print_error, printable, program, start
 from robots.common.errors import RobotLayoutsError
 from robots.common.paths import absolute
 from robots.descriptor import RobotDescriptor
@@ -90,7 +90,7 @@ def describe_file(file: AssetFile, store: AssetStore) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m robots.fetch_assets", description=__doc__)
+    parser = argparse.ArgumentParser(prog=program("robots.fetch_assets"), description=__doc__)
     add = parser.add_argument
     which = "robots to fetch; if none is named, all, or all that --source has"
     add("robots", nargs="*", metavar="ROBOT", help=which)

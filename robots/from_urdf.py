@@ -17,7 +17,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from robots.common.commands import exit_code, start
+from robots.common.commands import exit_code, program, start
 from robots.common.errors import AssetError, MissingPackageError, UnknownNameError
 from robots.common.paths import absolute
 from robots.guess import Guess, guess
@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0, or 1 if the URDF is unusable, or 2 if there is no robot of that name.
     """
-    parser = argparse.ArgumentParser(prog="python -m robots.from_urdf", description=__doc__)
+    parser = argparse.ArgumentParser(prog=program("robots.from_urdf"), description=__doc__)
     parser.add_argument("urdf", metavar="PATH", help="URDF, or name in robot_descriptions")
     parser.add_argument("--name", help="registry name of the robot")
     parser.add_argument("--module", action="store_true", help="print the data module to paste")

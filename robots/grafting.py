@@ -38,6 +38,7 @@ from robots.registry import RobotRegistry
 from robots.urdf.model import UrdfModel
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
+from robots.urdf.tcp import find_tcp
 from robots.urdf.tree import kinematic_tree
 
 RobotLike = RobotDescriptor | str | os.PathLike[str]
@@ -150,8 +151,14 @@ def with_tool(
         urdf=urdf,
         tcp_link=part.prefix + tcp_link,
         tcp_position_links=(),
+        tcp_offset=(0.0, 0.0, 0.0),
         limbs={
-            key: replace(limb, tcp_link=part.prefix + tcp_link, tcp_position_links=())
+            key: replace(
+                limb,
+                tcp_link=part.prefix + tcp_link,
+                tcp_position_links=(),
+                tcp_offset=(0.0, 0.0, 0.0),
+            )
             if limb.tcp_link == part.link
             else limb
             for key, limb in robot.limbs.items()
@@ -222,6 +229,7 @@ def on_body(
         action_split=ActionSplit(**groups),
         tcp_link=first.tcp_link,
         tcp_position_links=first.tcp_position_links,
+        tcp_offset=first.tcp_offset,
         gripper_material=_material(named),
         fingers=first.fingers,
         cameras=tuple(camera for robot in named for camera in robot.cameras),
@@ -257,6 +265,7 @@ def _limbs(
             (x, y, z),
             robot.fingers,
             robot.tcp_position_links,
+            robot.tcp_offset,
             tuple(f"{key}_{group}" for group in robot.action_split.groups),
         )
     return limbs
@@ -307,6 +316,7 @@ def _gripper_of(robot: RobotDescriptor) -> tuple[RobotDescriptor, Floats, str]:
             robot,
             action_split=ActionSplit(**groups),
             tcp_link=robot.tcp_link if robot.tcp_link in links else root,
+            tcp_offset=robot.tcp_offset if robot.tcp_link in links else (0.0, 0.0, 0.0),
             cameras=tuple(camera for camera in robot.cameras if camera.link in links),
             keyframes=keyframes,
         ),
@@ -363,6 +373,7 @@ def _with_part(
         action_split=ActionSplit(**kept, **new),
         tcp_link=added.tcp_link,
         tcp_position_links=added.tcp_position_links,
+        tcp_offset=added.tcp_offset,
         gripper_material=added.gripper_material,
         fingers=added.fingers,
         cameras=(*(c for c in robot.cameras if c.link in model.links), *added.cameras),
@@ -458,11 +469,10 @@ def _length(robot: RobotDescriptor, joint: str) -> float:
     """Return the distance from a joint to the tool centre point at the first keyframe (m)."""
     model = _model(robot.urdf)
     tree = kinematic_tree(model, robot.joints)
-    poses = tree.forward(np.array([robot.keyframe(robot.home.keyframe)], float))[0]
+    poses = tree.forward(np.array([robot.keyframe(robot.home.keyframe)], float))
     carried = next(one.child for one in model.joints if one.name == joint)
-    tips = [tree.link(link) for link in robot.tcp_position_links or (robot.tcp_link,)]
-    centre = poses[tips, :3, 3].mean(axis=0)
-    return float(np.linalg.norm(transform(inverse_pose(poses[tree.link(carried)]), centre)))
+    centre = find_tcp(robot, tree).places(poses)[0]
+    return float(np.linalg.norm(transform(inverse_pose(poses[0, tree.link(carried)]), centre)))
 
 
 def _vector(pose: Floats) -> Vector3:

@@ -103,6 +103,7 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
         "action_split": split,
         "tcp_link": parts.tools[main.name].link,
         "tcp_position_links": parts.tools[main.name].links,
+        "tcp_offset": parts.tools[main.name].offset,
         "gripper_material": find_material(parts.anatomy.limbs),
         "fingers": fingers,
         "keyframes": {"rest": tuple(rest[joint] for joint in split.joints)},
@@ -174,6 +175,7 @@ def _limbs(parts: _Parts, rest: Mapping[str, float]) -> dict[str, LimbDescriptio
             base,
             _fingers(parts, limb)[0],
             tool.links,
+            tool.offset,
         )
     return limbs
 

@@ -7,7 +7,6 @@ robots are stood, stepped and moved in physics instead, and the report is what w
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Iterable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -20,14 +19,16 @@ from robots.assets.manifest import AssetFile, AssetPackage, load_manifest
 from robots.assets.packages import SourceError, find_package
 from robots.assets.progress import size
 from robots.assets.store import AssetStore, FileState, default_root
-from robots.common.commands import exit_code, print_error, start
+from robots.common.commands import exit_code, print_error, program, start
 from robots.descriptor import JointGroup, RobotDescriptor
 from robots.fetch_assets import describe_file
+from robots.named import named_robot
 from robots.registry import RobotRegistry
 from robots.urdf.model import ModelJoint
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_cleaned, read_urdf
-from robots.urdf.tree import kinematic_tree, link_index
+from robots.urdf.tcp import find_tcp
+from robots.urdf.tree import kinematic_tree
 
 TRY_COMMAND = "simulation.try_command"  # with run(robots)
 
@@ -39,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0, or 1 if files are unreadable or a robot that is tried does not work, or 2 if a robot
         does not exist.
     """
-    parser = argparse.ArgumentParser(prog="python -m robots.inspect", description=__doc__)
+    parser = argparse.ArgumentParser(prog=program("robots.inspect"), description=__doc__)
     parser.add_argument("robots", nargs="*", metavar="ROBOT", help="robots to report on")
     parser.add_argument(
         "--try", action="store_true", dest="tries", help="stand, step and move them in physics"
@@ -50,21 +51,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return exit_code(lambda: (_try if options.tries else _print)(options.robots))
 
 
-def load(name_or_path: str) -> RobotDescriptor:
-    """Return a robot of the catalogue, or the guess of a URDF, by its path."""
-    if name_or_path.endswith(".urdf") or os.path.isfile(name_or_path):
-        return RobotDescriptor.from_urdf(name_or_path, quiet=True)
-    return RobotRegistry.load(name_or_path)
-
-
 def _try(names: Sequence[str]) -> int:
     command: Any = import_module(TRY_COMMAND)
-    return command.run([load(name) for name in names])
+    return command.run([named_robot(name) for name in names])
 
 
 def _print(names: Sequence[str]) -> int:
     for name in names:
-        print(report(load(name), AssetStore(default_root())))
+        print(report(named_robot(name), AssetStore(default_root())))
     if names:
         return 0
     robots, failures = RobotRegistry.load_all()
@@ -86,7 +80,7 @@ def report(robot: RobotDescriptor, store: AssetStore) -> str:
         f"{robot.name}: {robot.summary}": [
             f"numbers from  {robot.source}",
             f"reach         {robot.reach:g} m from the base axis",
-            f"TCP link      {robot.tcp_link}",
+            f"TCP           {_tcp(robot)}",
             *(
                 f"limb          {name}: TCP {limb.tcp_link}, reach {limb.reach:g} m from"
                 f" ({_row(limb.base)}) m"
@@ -141,7 +135,7 @@ def find_urdf(robot: RobotDescriptor, store: AssetStore) -> tuple[Path | None, s
 
 
 def _fetch_hint(robot: RobotDescriptor) -> str:
-    return f"`python -m robots.fetch_assets {robot.name}` fetches it"
+    return f"`{program('robots.fetch_assets')} {robot.name}` fetches it"
 
 
 def _catalogue(robots: Iterable[RobotDescriptor]) -> Iterator[str]:
@@ -179,7 +173,7 @@ def _bounds(joint: ModelJoint) -> tuple[str, str]:
 
 
 def _drives(robot: RobotDescriptor) -> Iterator[str]:
-    rows = [("group", "joints", "stiffness", "damping", "force limit", "friction")]
+    rows = [("group", "joints", "stiffness", "damping", "force limit", "friction", "armature")]
     for name, group in robot.action_split.groups.items():
         force, per = ("N", "N/m") if group.unit == "m" else ("N·m", "N·m/rad")
         rows.append(
@@ -190,6 +184,7 @@ def _drives(robot: RobotDescriptor) -> Iterator[str]:
                 f"{_numbers(group.damping)} {per.replace('/', '·s/')}",
                 f"{_numbers(group.force_limit)} {force}",
                 f"{group.friction:g}",
+                f"{_numbers(group.armature)} {'kg' if group.unit == 'm' else 'kg·m²'}",
             )
         )
     return _table(rows)
@@ -213,14 +208,21 @@ def _keyframes(robot: RobotDescriptor, urdf: Path | None) -> Iterator[str]:
 
 
 def _tcp_places(robot: RobotDescriptor, urdf: Path) -> dict[str, Sequence[float]]:
-    """Return the TCP link's position at each keyframe, in the base frame (m)."""
+    """Return where the TCP is at each keyframe, in the base frame (m)."""
     model = read_model(read_urdf(urdf), urdf.name)
     others = [joint.name for joint in model.moving if joint.name not in robot.joints]
     tree = kinematic_tree(model, [*robot.joints, *others])
     qpos = np.zeros((len(robot.keyframes), len(tree.coordinates)))
     qpos[:, : robot.dof] = list(robot.keyframes.values())
-    places = tree.forward(qpos)[:, link_index(tree, robot.tcp_link), :3, 3]
+    places = find_tcp(robot, tree).places(tree.forward(qpos))
     return dict(zip(robot.keyframes, places.tolist(), strict=True))
+
+
+def _tcp(robot: RobotDescriptor) -> str:
+    links = robot.tcp_position_links
+    text = f"the middle of {', '.join(links)}, turned as {robot.tcp_link}" if links else ""
+    offset = f", {_row(robot.tcp_offset)} m from it" if any(robot.tcp_offset) else ""
+    return f"{text or robot.tcp_link}{offset}"
 
 
 def _gripper(robot: RobotDescriptor) -> Iterator[str]:

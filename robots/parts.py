@@ -161,6 +161,7 @@ class Limb:
         base: Where its first joint is at home, in the robot's frame (m).
         fingers: The links that grasp, if it has any.
         tcp_position_links: Links whose mean origin is the TCP position; ``tcp_link`` if empty.
+        tcp_offset: From there to the TCP, in ``tcp_link``'s frame (m).
         groups: Its joint groups, which follow one another in the action. Empty takes those that
             have the limb's name among their words: of ``left``, ``left_arm`` and ``left_gripper``.
     """
@@ -170,6 +171,7 @@ class Limb:
     base: Vector3 = (0.0, 0.0, 0.0)
     fingers: Fingers | None = None
     tcp_position_links: tuple[str, ...] = ()
+    tcp_offset: Vector3 = (0.0, 0.0, 0.0)
     groups: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:

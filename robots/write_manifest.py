@@ -29,7 +29,7 @@ from robots.assets.packages import (
     SourceError,
     find_package,
 )
-from robots.common.commands import exit_code, start
+from robots.common.commands import exit_code, program, start
 from robots.common.errors import AssetError
 from robots.common.files import read_regular, read_text
 from robots.common.writing import write_whole
@@ -53,7 +53,7 @@ TERMS = {
 
 def main(arguments: list[str] | None = None) -> int:
     """Write the manifest, or with ``--check`` tell whether it is up to date."""
-    parser = argparse.ArgumentParser(prog="python -m robots.write_manifest", description=__doc__)
+    parser = argparse.ArgumentParser(prog=program("robots.write_manifest"), description=__doc__)
     parser.add_argument("--check", action="store_true", help="only compare; exit code 1 if stale")
     check = parser.parse_args(arguments).check
     return exit_code(lambda: _write(check=check))

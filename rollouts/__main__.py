@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 
-from robots.common.commands import exit_code, start
+from robots.common.commands import exit_code, program, start
+from tasks.cell_options import add_cell_options, chosen_cell
 
 # Command -> its module, with DESCRIPTION, add_arguments(parser) and run(options).
 COMMANDS = {
@@ -40,12 +41,18 @@ def _demo(options: argparse.Namespace) -> int:
 
     from rollouts.demo import DemoOptions, run_demo
 
-    chosen = DemoOptions(options.task, options.seeds, options.out, video=not options.no_video)
+    chosen = DemoOptions(
+        options.task,
+        options.seeds,
+        options.out,
+        video=not options.no_video,
+        making=chosen_cell(options),
+    )
     return 0 if run_demo(chosen, Console()) else 1
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m rollouts", description=__doc__)
+    parser = argparse.ArgumentParser(prog=program("rollouts"), description=__doc__)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     demo = commands.add_parser("demo", help="let an expert play a task, ten seeds by default")
     add = demo.add_argument
@@ -53,6 +60,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--seeds", type=_count, default=10, metavar="N", help="play seeds 0 to N - 1 (default 10)")
     add("--out", type=Path, default=Path("runs/demo"), metavar="DIR", help="default %(default)s")
     add("--no-video", action="store_true", help="make no video")
+    add_cell_options(demo)
     demo.set_defaults(run=_demo)
     for name, path in COMMANDS.items():
         module = import_module(path)

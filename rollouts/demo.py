@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import mean
+from typing import Any
 
 import torch
 from rich.console import Console
@@ -20,6 +21,7 @@ from rollouts.recording.recorder import Recorder
 from rollouts.video import film, video_problem
 from tasks import MultiRobotTask
 from tasks.episode import PlayedEpisode, play
+from tasks.registry import make_scenario
 
 ENOUGH = 0.9  # share of episodes that must succeed
 FILMED_EPISODES, FILMING_SECONDS = 4, 60.0
@@ -34,12 +36,14 @@ class DemoOptions:
         seeds: How many seeds to play, from 0.
         out: Folder for the recording, the picture and the video.
         video: Whether to make a video.
+        making: Arguments of `tasks.make`: ``layout``, ``robots`` and ``bystanders``.
     """
 
     task: str = "TwoRobotPickCube-v1"
     seeds: int = 10
     out: Path = Path("runs/demo")
     video: bool = True
+    making: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
 
 def run_demo(options: DemoOptions, console: Console) -> bool:
@@ -60,11 +64,12 @@ def run_demo(options: DemoOptions, console: Console) -> bool:
     """
     torch.set_num_threads(1)  # the tensors are small: threads would only wait for each other
     expert = find_expert(options.task)
-    layout = tasks.get_task_class(options.task).layout
+    cls = tasks.get_task_class(options.task)
+    layout = make_scenario(cls, **options.making).layout
     console.print(f"[bold]{options.task}[/], {options.seeds} seeds", highlight=False)
     film_why_not = _pictures_problem(layout) if options.video else "not asked for"
     _find_files(layout, console)
-    task = tasks.make(options.task, obs_mode="state")
+    task = tasks.make(options.task, obs_mode="state", **options.making)
     _show_layout(layout, options.out, console)
 
     episodes: list[PlayedEpisode] = []
@@ -153,7 +158,7 @@ def _report(episodes: Sequence[PlayedEpisode], console: Console) -> None:
 
 def _film(options: DemoOptions, episodes: Sequence[PlayedEpisode], console: Console) -> None:
     path = options.out / "video.mp4"
-    task: MultiRobotTask = tasks.make(options.task, render_mode="rgb_array")
+    task: MultiRobotTask = tasks.make(options.task, render_mode="rgb_array", **options.making)
     with _live(console) as live:
         line = live.add_task("video")
         shown = film(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from robots import CONTROL_MODES, TaskError
 from rollouts.playing import command_options as workers
 from rollouts.playing.command_options import INTERRUPTED, one_or_more, stop_signals, zero_or_more
+from tasks.cell_options import add_cell_options, chosen_cell
 
 if TYPE_CHECKING:
     from rollouts.playing.executor import Event
@@ -26,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.epilog = EPILOG
     add = parser.add_argument
-    add("--task", required=True, help="task id")
+    add("--task", required=True, help="task id; MODULE:ID for one of your own")
     add(
         "--policy",
         default="expert",
@@ -37,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     workers.add_arguments(parser)
     add("--seed", type=zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
     workers.add_control_mode(parser, default=CONTROL_MODES[0])
+    add_cell_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -58,6 +60,7 @@ def run(options: argparse.Namespace) -> int:
                 executor=executor,
                 on_event=_Status(line).show,
                 control_mode=options.control_mode,
+                **chosen_cell(options),
             )
     except KeyboardInterrupt:
         print("stopped", file=sys.stderr)

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import random
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from copy import deepcopy
-from dataclasses import dataclass
-from math import fsum
+from dataclasses import dataclass, field, replace
 from statistics import mean
-from typing import Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
-import numpy as np
 import torch
 
 from experts import find_expert
 from experts.registry import Expert
 from robots import TaskError
+from robots.common.bounds import checked_whole
 from rollouts.playing.executor import (
     EPISODE_SECONDS,
     Event,
@@ -26,10 +24,17 @@ from rollouts.playing.executor import (
     play_all,
 )
 from rollouts.playing.plan_conversion import Planner
+from rollouts.playing.randomness import random_states, seed_all
 from rollouts.playing.seeds import checked_seeds
+from rollouts.playing.together import Player, is_batched, play_together
 from tasks import MultiRobotTask, Scenario, get_task_class
-from tasks.episode import Policy, Score, follow, moments
+from tasks.episode import Policy, Score, follow
 from tasks.registry import make_scenario
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from tasks.engine.making import MakingFields
 
 EXPERT = "expert"
 
@@ -66,12 +71,17 @@ class Evaluation:
         return {seed: score.total for seed, score in self.scores.items()}
 
     @property
+    def reasons(self) -> dict[int, str]:
+        """Seed → why the episode failed, for those of which that is known: an expert's."""
+        return {seed: score.reason for seed, score in self.scores.items() if score.reason}
+
+    @property
     def lengths(self) -> dict[int, int]:
         """Seed → control steps."""
         return {seed: score.steps for seed, score in self.scores.items()}
 
-    def __str__(self) -> str:
-        """Return it as a few lines."""
+    def __repr__(self) -> str:
+        """Show it as a few lines."""
         failed = [seed for seed, success in self.successes.items() if not success]
         lines = [
             f"{self.task}, {self.policy}: {len(self.scores) - len(failed)} of {len(self.scores)}"
@@ -82,6 +92,8 @@ class Evaluation:
         if failed:
             more = f" and {len(failed) - _SHOWN} more" if len(failed) > _SHOWN else ""
             lines.append(f"no success: seeds {', '.join(map(str, failed[:_SHOWN]))}{more}")
+        reasons = list(self.reasons.items())
+        lines += [f"seed {seed}: {reason}" for seed, reason in reasons[:_SHOWN]]
         return "\n".join(lines)
 
 
@@ -90,11 +102,12 @@ def evaluate(
     task: str,
     seeds: Sequence[int],
     *,
+    num_envs: int = 1,
     workers: int | None = None,
     executor: Executor | None = None,
     episode_timeout: float | None = EPISODE_SECONDS,
     on_event: Callable[[Event], None] = lambda event: None,
-    **making: Any,
+    **making: Unpack[MakingFields],
 ) -> Evaluation:
     """Let a policy play the episodes of some seeds, and tell how they went.
 
@@ -108,14 +121,20 @@ def evaluate(
             (A,) or (1, A). It can be pickled, unless ``workers`` is 0; what `copy.deepcopy` does
             not copy, such as a function, is not copied for each episode. Or ``"expert"``, which
             makes a plan for each seed and carries it out; where it finds none, the episode is a
-            failure of 0 steps.
+            failure of 0 steps, whose reason is given.
         task: Id of the task.
         seeds: Which episodes, each once.
+        num_envs: How many episodes each process plays at once, in environments of one task. The
+            policy is called, and copied, for each as if that were alone, so that the scores are
+            those of 1. A policy whose attribute ``batched`` is True is called once for all that
+            are running, observations (n, D) → actions (n, A), which is faster; it is neither
+            copied nor are its random numbers those of each seed.
         workers: How many processes play; None: one for each core that this process may use; 0:
             none, but this one.
         executor: Who plays instead, such as `rollouts.playing.ray_executor.RayExecutor`.
-        episode_timeout: Seconds that an episode may take in a worker until that is ended and the
-            episode played again, three times in all; None if it may take for ever.
+        episode_timeout: Seconds that an episode, or those played at once, may take in a worker
+            until that is ended and they are played again, three times in all; None if they may
+            take for ever.
         on_event: Called with each event of the executor, to show progress.
         making: Arguments of `tasks.make`, such as ``robots`` and ``obs_mode``.
 
@@ -130,24 +149,41 @@ def evaluate(
     cls, seeds = get_task_class(task), checked_seeds(seeds)
     if not seeds:
         raise TaskError("no seeds were given; an evaluation plays one or more")
-    name, scenario = _name(policy), make_scenario(cls, **making)
-    if scenario.num_envs != 1:
-        raise TaskError(f"num_envs is {scenario.num_envs}; an evaluation plays 1 in each worker")
+    checked_whole("num_envs", num_envs, 1, None, TaskError)
+    num_envs = min(num_envs, len(seeds))
+    name, scenario = _name(policy), make_scenario(cls, num_envs, **making)
     scenario.check(cls.reward_modes)
+    together = {seeds[i]: tuple(seeds[i : i + num_envs]) for i in range(0, len(seeds), num_envs)}
     if callable(policy):
-        job = EvaluationJob(cls, scenario, policy)
+        job = EvaluationJob(cls, scenario, policy, together=together)
     else:
-        job = EvaluationJob(cls, scenario, expert=find_expert(cls.task_id))
+        job = EvaluationJob(cls, scenario, expert=find_expert(cls.task_id), together=together)
     scores: dict[int, Score] = {}
-    with closing(play_all(executor, job, seeds)) as events:
+    with closing(play_all(executor, job, list(together))) as events:
         for event in events:
-            on_event(event)
+            for single in _one_by_one(event):
+                on_event(single)
+                if single.seed is not None and isinstance(single.result, Score):
+                    scores[single.seed] = single.result
             if event.error is not None:
-                event.error.args = (f"seed {event.seed}: {event.error}", *event.error.args[1:])
-                raise event.error
-            if event.seed is not None and isinstance(event.result, Score):
-                scores[event.seed] = event.result
+                _raise(event.error, [event.seed] if event.seed is None else together[event.seed])
     return Evaluation(cls.task_id, name, {seed: scores[seed] for seed in seeds})
+
+
+def _one_by_one(event: Event) -> list[Event]:
+    """Return an event for each episode if it is of episodes that were played at once."""
+    if not isinstance(event.result, dict):
+        return [event]
+    return [replace(event, seed=seed, result=score) for seed, score in event.result.items()]
+
+
+def _raise(error: Exception, seeds: Sequence[int | None]) -> NoReturn:
+    """Raise an error that says at which seeds it happened."""
+    which = (
+        f"seed {seeds[0]}" if len(seeds) == 1 else f"one of the seeds {', '.join(map(str, seeds))}"
+    )
+    error.args = (f"{which}: {error}", *error.args[1:])
+    raise error
 
 
 @dataclass(frozen=True)
@@ -159,63 +195,63 @@ class EvaluationJob:
         scenario: How to make it.
         policy: Who plays, a `Policy`; None if the expert does.
         expert: An expert, or None.
+        together: Seeds that are played at once, by the first of them.
     """
 
     task: type[MultiRobotTask]
     scenario: Scenario
     policy: Any = None
     expert: Expert | None = None
+    together: Mapping[int, tuple[int, ...]] = field(default_factory=dict[int, tuple[int, ...]])
 
     @property
     def modules(self) -> tuple[str, ...]:
         """What other machines may need to play it."""
         return modules_of(self.task, self.policy, self.expert)
 
-    def __call__(self) -> Callable[[int], Score]:
-        """Make the task in a worker, and return what plays the episode of a seed."""
+    def __call__(self) -> Callable[[int], dict[int, Score]]:
+        """Make the task in a worker, and return what plays the episodes of a seed and others."""
         torch.set_num_threads(1)  # as many everywhere, so that sums are the same
-        return _Player(self)
+        return _Play(self)
 
 
-class _Player:
-    """Plays episodes in one world, which is built anew for each."""
+class _Play:
+    """Plays episodes in the worlds of one task, which are built anew for each."""
 
     def __init__(self, job: EvaluationJob) -> None:
-        self._env, self._policy = job.task(job.scenario), job.policy
-        self._planner = None if job.expert is None else Planner(self._env, job.expert)
+        self._job = job
+        self._env = self._planning = job.task(job.scenario)
+        self._planner: Planner | None = None
+        if job.expert is not None:
+            if self._env.num_envs > 1:
+                self._planning = job.task(replace(job.scenario, num_envs=1))
+            self._planner = Planner(self._planning, job.expert)
 
-    def __call__(self, seed: int) -> Score:
-        """Play the episode of a seed."""
-        random.seed(seed)
-        np.random.seed(seed)
-        torch.manual_seed(seed)
-        if self._planner is None:
-            return _play(self._env, seed, deepcopy(self._policy), self._env.max_episode_steps)
-        try:
-            plan = self._planner(seed)
-        except TaskError:
-            return Score(False, 0.0, 0)
-        return _play(self._env, seed, follow(plan), len(plan))
+    def __call__(self, seed: int) -> dict[int, Score]:
+        """Play the episodes of a seed and of those that are played together with it."""
+        players = [self._player(seed) for seed in self._job.together[seed]]
+        with torch.no_grad():
+            play_together(self._env, players)
+        return {player.seed: player.score for player in players}
 
     def close(self) -> None:
         """Let the worlds go."""
-        self._env.close()
-        if self._planner is not None:
-            self._planner.close()
+        for own in (self._env, self._planning, self._planner):
+            if own is not None:
+                own.close()
 
-
-def _play(env: MultiRobotTask, seed: int, policy: Policy, most: int) -> Score:
-    """Play an episode of at most so many steps."""
-    rewards: list[float] = []
-    success = False
-    with torch.no_grad(), closing(moments(env, seed, policy, most)) as happening:
-        next(happening)
-        for moment in happening:
-            rewards.append(moment.reward)
-            success = moment.success
-            if moment.terminated or moment.truncated:
-                break
-    return Score(success, fsum(rewards), len(rewards))
+    def _player(self, seed: int) -> Player:
+        """Return who plays the episode of a seed; the random generators begin with it."""
+        seed_all(seed)
+        if self._planner is None:
+            policy = self._job.policy
+            policy = policy if is_batched(policy) else deepcopy(policy)
+            return Player(seed, policy, self._env.max_episode_steps, random_states())
+        try:
+            plan = self._planner(seed)
+        except TaskError as error:
+            return Player(seed, follow(()), 0, random_states(), str(error))
+        return Player(seed, follow(plan), len(plan), random_states(), self._planner.reason)
 
 
 def _name(policy: Policy | str) -> str:

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from layouts import Layout
 from robots import MissingPackageError, RecordingError
 from robots.common.writing import PARTIAL, written_whole
 from robots.descriptor import Vector3
 from simulation.rendering.pictures import Cameras, vulkan_problem
 from tasks import MultiRobotTask
+from tasks.engine.columns import overview
 from tasks.episode import Episode, play
 
 Picture = NDArray[np.uint8]  # (H, W, 3)
@@ -94,25 +94,6 @@ def open_video(path: Path, frames_per_second: float) -> Generator[Callable[[Pict
         _writer(partial, frames_per_second) as writer,
     ):
         yield writer.append_data
-
-
-def overview(layout: Layout) -> tuple[Vector3, Vector3] | None:
-    """Return camera and target (m, world) that show robots from the side, the first on the left.
-
-    None for a single robot, which has no side.
-    """
-    if len(layout) == 1:
-        return None
-    bases = np.array([placement.base_position for placement in layout.values()])
-    along = bases[-1] - bases[0]
-    span = float(np.linalg.norm(along[:2]))
-    if span == 0:
-        return None
-    aside = np.array([along[1], -along[0], 0.0]) / span
-    middle = bases.mean(0)
-    eye = middle + span * aside + [0.0, 0.0, 0.42 * span]
-    target = middle + [0.0, 0.0, 0.16 * span]
-    return tuple(eye.tolist()), tuple(target.tolist())
 
 
 def _film_one(

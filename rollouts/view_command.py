@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from layouts.view_command import add_page_options, show
 from layouts.viewer import Cell, Motion
 from rollouts.playing.replay_command import add_recording
+from tasks.cell_options import chosen_cell
 
 if TYPE_CHECKING:
     from rollouts.reading.trajectory import Trajectory, TrajectoryFile
@@ -38,15 +39,18 @@ def run(options: argparse.Namespace) -> int:
     from rollouts.playing.replay import open_recording
 
     with open_recording(options.file, options.task) as file:
-        return show(lambda: episode_cell(file, options.episode), options)
+        cell = chosen_cell(options)
+        return show(lambda: episode_cell(file, options.episode, **cell), options)
 
 
-def episode_cell(file: TrajectoryFile, number: int) -> Cell:
+def episode_cell(file: TrajectoryFile, number: int, **cell: Any) -> Cell:
     """Return what a page shows of an episode.
 
     Args:
         file: The recording.
         number: Its place in the file.
+        **cell: Which robots stood where, where the file cannot say it; see
+            `rollouts.reading.recorded_task.task_for`.
 
     Raises:
         TrajectoryError: If there is no such episode, or it cannot be shown.
@@ -59,7 +63,7 @@ def episode_cell(file: TrajectoryFile, number: int) -> Cell:
         raise TrajectoryError(
             f"{file.path} has no episode {number}; it has {len(file)}, from 0 to {len(file) - 1}"
         )
-    task, trajectory = task_for(file), file[number]
+    task, trajectory = task_for(file, **cell), file[number]
     try:
         motion = _motion(task, trajectory)
         title = f"{task.task_id}, episode {trajectory.episode_id} of {file.path.name}"

@@ -4,6 +4,10 @@ The only room that imports sapien, which lives in `simulation.sapien3`, below th
 `simulation.backend` describes.
 """
 
+from kinematics.own_rooms import expect_own
+
+expect_own("robots", "layouts")
+
 from simulation.cameras import Camera
 from simulation.physics import SAPIEN_DEFAULTS, Friction, PhysicsSettings
 from simulation.scene import build_scene

@@ -10,11 +10,13 @@ import numpy as np
 
 from layouts import Layout
 from robots import Fingers, RobotDescriptor, SimulationError, UnknownNameError
+from robots.descriptor import Vector3
 from simulation.backend import Backend, Built, BuiltRobot, Pair, Velocity
 from simulation.maths import Floats
 
 Place = TypeVar("Place")
 Key = TypeVar("Key", bound=Hashable)
+MeanFrame = tuple[int, list[int], Vector3]
 
 
 class Lost(NamedTuple):
@@ -132,8 +134,9 @@ class ReadoutIndex:
         grippers: Places of each robot's gripper joints, and the sum of their upper limits (m).
         bases: Frame of each robot's root link.
         loaded_order: For each robot `BuiltRobot.loaded_order`, or None if it is the descriptor's.
-        mean_frames: For each frame that lies between links: the frame that orients it, and the
-            frames whose mean is its origin.
+        mean_frames: For each frame that lies between or beside links: the frame that orients it,
+            the frames whose mean is its origin, and what lies between that and it, in the frame
+            that orients it (m).
         pairs: Pairs of frames whose distance was asked for.
         velocities: Velocities of bodies that were asked for.
         forces: Pairs whose contact force was asked for.
@@ -154,7 +157,7 @@ class ReadoutIndex:
         self.grippers: Places[tuple[list[int], np.float32]] = Places(_ROBOT)
         self.bases: Places[int] = Places(_ROBOT)
         self.loaded_order: Places[list[int] | None] = Places(_ROBOT)
-        self.mean_frames: list[tuple[int, list[int]]] = []
+        self.mean_frames: list[MeanFrame] = []
         self.pairs = FramePairs()
         self.velocities: Declared[Velocity] = Declared()
         self.forces: Declared[Pair] = Declared()
@@ -245,9 +248,10 @@ class ReadoutIndex:
 
     def _tcp_frame(self, links: Places[int], descriptor: RobotDescriptor) -> int:
         orientation = links[descriptor.tcp_link]
-        if not descriptor.tcp_position_links:
+        if not descriptor.tcp_position_links and not any(descriptor.tcp_offset):
             return orientation
-        between = orientation, [links[x] for x in descriptor.tcp_position_links]
+        origins = [links[x] for x in descriptor.tcp_position_links] or [orientation]
+        between = orientation, origins, descriptor.tcp_offset
         if between not in self.mean_frames:
             self.mean_frames.append(between)
             self.frames += 1

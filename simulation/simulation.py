@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from layouts import Layout
-from robots import RobotDescriptor
+from robots import RobotDescriptor, SimulationError
 from robots.descriptor import IDENTITY, Quaternion
 from simulation.backend import Backend, Overlap, PointSolver, PoseSolver, Rows
 from simulation.cameras import AnyCamera, View
@@ -156,8 +156,15 @@ class Simulation:
 
         Raises:
             UnknownNameError: If there is no such body.
+            SimulationError: If there are more rows than worlds, or fewer, or a pose is none.
         """
-        names = [bodies] * self.num_envs if isinstance(bodies, str) else bodies
+        count, given = self.num_envs, (np.shape(positions), np.shape(where))
+        if given != ((count, 3), (count,)):
+            raise SimulationError(
+                f"place takes positions of shape {(count, 3)} and where of shape {(count,)}, a row"
+                f" for each environment; given: {given[0]} and {given[1]}"
+            )
+        names = [bodies] * count if isinstance(bodies, str) else bodies
         rows = zip(self.worlds, names, positions.tolist(), where.tolist(), strict=True)
         for world, name, position, moved in rows:
             if moved:
@@ -288,6 +295,7 @@ class Simulation:
     def _build(self, env_ids: Sequence[int], build: Callable[[World, int], None]) -> None:
         fresh = {i: self._describe(i, build) for i in env_ids}
         self._placements.forget(env_ids)
+        _expect_alike({**dict(enumerate(self.worlds)), **fresh})
         built = self._backend.build(fresh)
         self.worlds = [fresh.get(i) or self.worlds[i] for i in self._everywhere]
         self.index = ReadoutIndex(self.layout, built)
@@ -295,3 +303,14 @@ class Simulation:
         if self.modes is not None:
             self.modes.build(self._backend, self.index)
         self._change()
+
+
+def _expect_alike(worlds: Mapping[int, World]) -> None:
+    """Refuse worlds with other bodies than the first, since all are read as one array."""
+    bodies = list(worlds[min(worlds)].bodies)
+    for number, world in worlds.items():
+        if list(world.bodies) != bodies:
+            raise SimulationError(
+                f"environment {number} has the bodies {list(world.bodies)}, environment"
+                f" {min(worlds)} {bodies}; all have the same ones, added in the same order"
+            )

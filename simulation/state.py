@@ -6,15 +6,17 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cache, wraps
 from typing import Any, Concatenate, Literal, ParamSpec, TypeVar
+from warnings import warn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots import Fingers, SimulationError
+from robots.descriptor import Vector3
 from simulation.backend import Readout, Velocity
 from simulation.grasps import grasped
-from simulation.maths import Array, Flags, Floats, concatenate, counted, full, like, norm
-from simulation.readout import Lost, Moment, ReadoutIndex
+from simulation.maths import Array, Flags, Floats, concatenate, counted, full, like, norm, stack
+from simulation.readout import Lost, MeanFrame, Moment, ReadoutIndex
 from simulation.rotations import last_euler_angle, rotation_matrix
 
 _NOTHING = np.empty(0, np.float32)
@@ -301,6 +303,12 @@ class State:
         """
         fingers = self._index.fingers[robot]
         if fingers is None:
+            warn(
+                f"{robot!r} has no fingers, so that is_grasping({robot!r}, {body!r}) is false for"
+                " ever; a task that needs them says so in `needs`",
+                RuntimeWarning,
+                stacklevel=3,
+            )
             return np.zeros(self.num_envs, bool)
         pairs = self._index.grasp(robot, body)
         forces = self._all_forces(pairs[-1])
@@ -384,17 +392,28 @@ class State:
         return forces
 
 
-def with_means(poses: Floats, means: Sequence[tuple[int, list[int]]]) -> Floats:
-    """Return poses, (F, N, 7), and after them those of frames that lie between others.
+def with_means(poses: Floats, means: Sequence[MeanFrame]) -> Floats:
+    """Return poses, (F, N, 7), and after them those of frames that lie between or beside others.
 
     Args:
-        poses: Of the frames between which they lie.
-        means: For each, the frame that orients it, and the frames whose mean is its origin.
+        poses: Of those others.
+        means: See `ReadoutIndex`.
     """
-    between = poses[[orientation for orientation, _ in means]]
-    for row, (_, points) in zip(between, means, strict=True):
+    between = poses[[orientation for orientation, _, _ in means]]
+    for row, (_, points, offset) in zip(between, means, strict=True):
         row[:, :3] = sum(poses[point, :, :3] for point in points) / len(points)
+        if any(offset):
+            row[:, :3] += _turned(row[:, 3:], offset)
     return concatenate((poses, between))
+
+
+def _turned(quaternion: Floats, vector: Vector3) -> Floats:
+    """Return a vector turned by quaternions, wxyz, (N, 4); shape (N, 3)."""
+    (w, x, y, z), (a, b, c) = quaternion.T, vector
+    p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+    return stack(
+        (a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p), 1
+    )
 
 
 @cache  # asked for with every state that is recorded

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from math import hypot, isfinite
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from layouts import Layout
 from robots import SimulationError, UnknownNameError
+from robots.common.bounds import checked_choice, shown
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
 from simulation.shapes import Shape
 
 BodyKind = Literal["dynamic", "kinematic", "static"]
+_KINDS = get_args(BodyKind)
+
+_UNIT_TOLERANCE = 0.01  # of a quaternion's length: of two digits, say
 
 
 @dataclass(frozen=True)
@@ -128,10 +133,12 @@ class World:
             marker: Whether it is there for people only: cameras that observe do not see it.
 
         Raises:
-            SimulationError: If the name is taken.
+            SimulationError: If the name is taken, or something is not what it must be.
         """
+        self._check_body(name, shapes, kind)
         if name in self.bodies:
             raise SimulationError(f"this world already has a body called {name!r}")
+        self._pose(name, position, quaternion)
         body = Body(name, shapes, kind, position, quaternion, anchored, marker)
         self.bodies[name] = body
         return body
@@ -156,13 +163,17 @@ class World:
 
         Raises:
             UnknownNameError: If the world has no such body.
-            SimulationError: If there are more numbers than that, or fewer.
+            SimulationError: If there are more numbers than that, or fewer, or they are not finite,
+                or the quaternion is no rotation.
         """
         self.set_poses((name,), position, quaternion)
 
     def set_poses(self, names: Iterable[str], position: Any, quaternion: Any = IDENTITY) -> None:
         """Move several bodies to the same pose; see `set_pose`."""
-        pose = [*_floats(position, 3, "position"), *_floats(quaternion, 4, "quaternion")]
+        if isinstance(names, str):
+            raise SimulationError(f"set_poses takes several names; set_pose takes one, {names!r}")
+        names = list(names)
+        pose = self._pose(", ".join(map(str, names)), position, quaternion)
         rows = self._placements.bodies
         for name in names:
             rows.setdefault(self.body(name).name, {})[self._number] = pose
@@ -176,16 +187,44 @@ class World:
 
         Raises:
             UnknownNameError: If the layout has no such robot.
-            SimulationError: If there are more numbers than joints, or fewer.
+            SimulationError: If there are more numbers than joints, or fewer, or they are not
+                finite.
         """
-        joints, dof = np.array(qpos, float), self.layout[robot].robot.dof
-        if joints.shape != (dof,):
-            raise SimulationError(f"qpos of {robot} is {qpos!r}; it must be {dof} numbers")
-        self._placements.robots.setdefault(robot, {})[self._number] = joints
+        joints = self.layout[robot].robot.joints
+        numbers = self._floats(qpos, len(joints), f"qpos of robot {robot!r}", "rad, m")
+        self._placements.robots.setdefault(robot, {})[self._number] = np.array(numbers, float)
 
+    def _check_body(self, name: object, shapes: tuple[object, ...], kind: object) -> None:
+        if not isinstance(name, str) or not name:
+            raise SimulationError(f"a body's name is {shown(name)}; it must be a text")
+        for shape in shapes:
+            if not isinstance(shape, Shape):
+                raise SimulationError(
+                    f"body {name!r}: {shown(shape)} is no shape; shapes are Box, Sphere, Cylinder,"
+                    " Capsule, Mesh and Plane"
+                )
+        checked_choice(f"body {name!r}: kind", kind, _KINDS, SimulationError)
 
-def _floats(values: Any, count: int, what: str) -> list[float]:
-    floats = values.tolist() if hasattr(values, "tolist") else [float(x) for x in values]
-    if not isinstance(floats, list) or len(floats) != count:
-        raise SimulationError(f"{what} is {values!r}; it must be {count} numbers")
-    return floats
+    def _pose(self, body: str, position: Any, quaternion: Any) -> list[float]:
+        place = self._floats(position, 3, f"position of body {body!r}", "m")
+        if quaternion is IDENTITY:
+            return [*place, *IDENTITY]
+        turn = self._floats(quaternion, 4, f"quaternion of body {body!r}", "w, x, y, z")
+        if abs(hypot(*turn) - 1) > _UNIT_TOLERANCE:
+            raise SimulationError(
+                f"quaternion of body {body!r} in environment {self._number} is {shown(quaternion)},"
+                f" of length {hypot(*turn):.3g}; a rotation has length 1 (order w, x, y, z)"
+            )
+        return [*place, *turn]
+
+    def _floats(self, values: Any, count: int, what: str, unit: str) -> list[float]:
+        try:
+            floats = values.tolist() if hasattr(values, "tolist") else [float(x) for x in values]
+            if isfinite(sum(floats)) and len(floats) == count:
+                return floats
+        except (TypeError, ValueError):  # no numbers, or several rows of them
+            pass
+        raise SimulationError(
+            f"{what} in environment {self._number} is {shown(values)}; it must be {count} finite"
+            f" numbers ({unit})"
+        )

@@ -14,12 +14,17 @@ Making an environment of it for other programs (each loads its package when it i
 Writing a task (`tasks.vocabulary` lists every name; functions of arrays are in `tasks.maths`):
     MultiRobotTask: What a task's class subclasses.
     register_task: Gives it its names.
+    Needs: What a place needs of the robot that stands there.
     Cube, Goal, Table, Area, …: Bodies that it declares, and where they begin.
     State, World, EpisodeRandom: What its methods are given.
     closeness, stillness, lies_on, …: Terms of rewards and of success.
 
 ``python -m tasks list`` prints a table of all tasks. Importing this loads neither torch nor sapien.
 """
+
+from kinematics.own_rooms import expect_own
+
+expect_own("robots", "layouts", "simulation")
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any

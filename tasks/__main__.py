@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 import argparse
-import os
-import sys
 from collections.abc import Sequence
+from importlib import import_module
+from typing import Any
 
 from rich.console import Console
 
 from layouts.view_command import add_page_options, page_words, show
-from robots.common.commands import exit_code, start
+from robots import RobotLayoutsError, TaskError
+from robots.common.commands import exit_code, print_error, program, start
+from tasks.cell_options import add_cell_options, chosen_cell
 from tasks.description import (
+    TaskFacts,
     declared_facts,
     describe,
     list_table,
     parity_verdicts,
     recorded_sizes,
 )
-from tasks.registry import list_tasks, make
+from tasks.registry import list_tasks, load_tasks, make
 from tasks.view import task_cell
 
-MIN_WIDTH = 120  # columns that a table may take; a narrower terminal wraps it
+RECORDINGS = "rollouts.__main__"  # with main(words)
+MIN_WIDTH = 140  # columns that a table may take; a narrower terminal wraps it
+TASK_HELP = "task id or another of its names; MODULE:ID for one of your own"
 LEGEND = (
     "norm is normalized_dense; the first reward mode is the default. parity: the last recorded"
     " comparison with native ManiSkill, where there was one; obs is the size recorded there."
@@ -42,16 +47,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return exit_code(lambda: options.run(options))
 
 
-def _list(options: argparse.Namespace) -> None:
+def _list(options: argparse.Namespace) -> int:
     verdicts, sizes = parity_verdicts(), recorded_sizes()
-    rows = [declared_facts(task_id, sizes.get(task_id)) for task_id in list_tasks()]
+    for name in options.modules:
+        load_tasks(name)
+    rows: list[TaskFacts] = []
+    failures: list[RobotLayoutsError] = []
+    for task_id in list_tasks():
+        try:
+            rows.append(declared_facts(task_id, sizes.get(task_id)))
+        except TaskError as error:  # of another package
+            failures.append(error)
     console = _console()
     console.print(list_table(rows, verdicts))
     console.print(LEGEND)
+    for failure in failures:
+        print_error(failure)
+    return 1 if failures else 0
 
 
 def _describe(options: argparse.Namespace) -> None:
-    env = make(options.task)
+    env = make(options.task, **chosen_cell(options))
     console = _console()
     for part in describe(env):
         console.print(part, soft_wrap=isinstance(part, str))
@@ -61,9 +77,14 @@ def _describe(options: argparse.Namespace) -> None:
 def _view(options: argparse.Namespace) -> int:
     """Show a task as it is reset, or hand a recording over to the room that reads recordings."""
     if options.demo is not None:
+        if cell := chosen_cell(options):
+            raise TaskError(
+                f"--demo takes no --{' and no --'.join(cell)}: the recording says who stands where"
+            )
         words = ["view", options.demo, "--task", options.task, "--episode", str(options.episode)]
-        os.execv(sys.executable, [sys.executable, "-m", "rollouts", *words, *page_words(options)])
-    env = make(options.task, obs_mode="none")
+        command: Any = import_module(RECORDINGS)
+        return command.main([*words, *page_words(options)])
+    env = make(options.task, obs_mode="none", **chosen_cell(options))
     env.reset(options.seed)
     status = show(lambda: task_cell(env, f"{env.task_id}, seed {options.seed}"), options)
     env.close()
@@ -78,23 +99,31 @@ def _console() -> Console:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m tasks", description="See which tasks there are, and what each is."
+        prog=program("tasks"), description="See which tasks there are, and what each is."
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     every = commands.add_parser("list", help="print every task as a row of a table")
+    every.add_argument(
+        "modules",
+        nargs="*",
+        metavar="MODULE",
+        help="modules of your own whose tasks to list, too, such as mylab.tray",
+    )
     every.set_defaults(run=_list)
     one = commands.add_parser("describe", help="print everything about a task")
-    one.add_argument("task", metavar="TASK", help="task id or another of its names")
+    one.add_argument("task", metavar="TASK", help=TASK_HELP)
+    add_cell_options(one)
     one.set_defaults(run=_describe)
     view = commands.add_parser(
         "view",
         help="look at a task, or at a demonstration of it, in a browser",
-        epilog="--demo hands over to `python -m rollouts view`.",
+        epilog=f"--demo hands over to `{program('rollouts')} view`.",
     )
-    view.add_argument("task", metavar="TASK", help="task id or another of its names")
+    view.add_argument("task", metavar="TASK", help=TASK_HELP)
     view.add_argument("--seed", type=int, default=0, metavar="N", help="of the reset (0)")
     view.add_argument("--demo", metavar="FILE", help="an h5 file of recorded episodes")
     view.add_argument("--episode", type=int, default=0, metavar="N", help="the Nth of them (0)")
+    add_cell_options(view)
     add_page_options(view)
     view.set_defaults(run=_view)
     return parser

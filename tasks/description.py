@@ -21,11 +21,12 @@ from simulation import Camera
 from simulation.cameras import RobotCamera
 from tasks.engine.observation import cameras_of
 from tasks.engine.task import MultiRobotTask
-from tasks.registry import get_task_class, make, other_names
+from tasks.registry import full_name, get_task_class, make, origin, other_names
 
 # Written by ``python -m parity compare --all --record``; a checkout and the wheel both carry it.
 PARITY_RESULTS = Path(__file__).parents[1] / "parity" / "results.json"
 UNKNOWN = "–"
+OURS = "robot-layouts"  # where built-in tasks come from
 
 _SUCCESS = "Success:"
 _SECTIONS = ("Attributes:", "Args:", "Note:", "Example:", "Examples:")  # of Google docstrings
@@ -42,6 +43,7 @@ class TaskFacts:
         observation_size: Numbers of one flat observation; None if that is not known.
         max_episode_steps: Control steps until an episode is truncated.
         reward_modes: Its reward modes, the default first.
+        origin: The package or module that it comes from.
     """
 
     task_id: str
@@ -50,6 +52,7 @@ class TaskFacts:
     observation_size: int | None
     max_episode_steps: int
     reward_modes: tuple[str, ...]
+    origin: str = OURS
 
 
 @dataclass(frozen=True)
@@ -99,6 +102,7 @@ def declared_facts(task_id: str, observation_size: int | None = None) -> TaskFac
         observation_size,
         cls.max_episode_steps,
         cls.reward_modes,
+        origin(cls.task_id) or OURS,
     )
 
 
@@ -144,9 +148,8 @@ def list_table(tasks: Iterable[TaskFacts], verdicts: dict[str, str]) -> Table:
         tasks: Their facts.
         verdicts: Task id → verdict of the comparison with native.
     """
-    rows = _table(
-        "task", "robots", "action", "obs", "steps", "rewards", "parity", numbers=(2, 3, 4)
-    )
+    columns = ("task", "robots", "action", "obs", "steps", "rewards", "parity", "from")
+    rows = _table(*columns, numbers=(2, 3, 4))
     for task in tasks:
         rows.add_row(
             task.task_id,
@@ -156,6 +159,7 @@ def list_table(tasks: Iterable[TaskFacts], verdicts: dict[str, str]) -> Table:
             str(task.max_episode_steps),
             short_modes(task.reward_modes),
             verdicts.get(task.task_id, UNKNOWN),
+            task.origin,
         )
     return rows
 
@@ -195,7 +199,8 @@ def describe(env: MultiRobotTask) -> Iterator[RenderableType]:
         ("episode", f"{env.max_episode_steps} steps, {env.scenario.control_frequency:g} per s"),
         ("reward modes", ", ".join([f"{cls.reward_modes[0]} (default)", *cls.reward_modes[1:]])),
         ("source", cls.source),
-        ("other names", ", ".join(other_names(cls))),
+        ("other names", ", ".join([*_full_name(cls), *other_names(cls)])),
+        ("from", origin(cls.task_id) or OURS),
         ("parity", parity_verdicts().get(cls.task_id, "")),
     ):
         rows.add_row(name, value or UNKNOWN)
@@ -207,6 +212,11 @@ def describe(env: MultiRobotTask) -> Iterator[RenderableType]:
     yield observation_table(env.observation_slices, env.observer.senses)
     yield "Cameras, with obs_mode='rgb' or 'rgbd'; with images, only sensed parts are observed"
     yield camera_table(cameras_of(env.layout, cls.cameras))
+
+
+def _full_name(cls: type[MultiRobotTask]) -> list[str]:
+    name = full_name(cls)
+    return [] if name == cls.task_id else [name]
 
 
 def observation_size(env: MultiRobotTask) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import fsum
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -43,11 +43,13 @@ class Score:
         success: Whether its last step was a success.
         total: Sum of its rewards.
         steps: Its control steps.
+        reason: Why it failed, in words, if that is known; of an expert, it is.
     """
 
     success: bool
     total: float
     steps: int
+    reason: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True)

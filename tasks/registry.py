@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields as fields_of
 from dataclasses import replace
 from importlib import import_module
+from os import PathLike
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from layouts import Layout, Placement
 from layouts.placement import RobotLike, load_robot
-from robots import RobotDescriptor, TaskError
+from robots import RobotDescriptor, RobotLayoutsError, TaskError, UnknownNameError, closest_match
 from robots.common.bounds import shown
 from robots.common.catalogue import Catalogue, reason
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from tasks.engine.making import ScenarioFields
     from tasks.engine.scenario import Scenario
     from tasks.engine.task import MultiRobotTask
 
@@ -79,7 +84,8 @@ TASKS = Catalogue(
         if target.startswith(CLONES)
     },
     ignore_case=True,
-    hint="A task of your own goes by 'module:Id', and is registered there by @register_task('Id').",
+    hint="A task of your own goes by 'module:Id', as in 'mylab.tray:TwoArmTray-v1', and is"
+    " registered there by @register_task('Id').",
 )
 
 
@@ -98,6 +104,15 @@ def register_task(*names: str) -> Callable[[TaskClass], TaskClass]:
         )
 
     def register(cls: TaskClass) -> TaskClass:
+        from tasks.engine.declared import check_declaration  # it loads torch, as the class has
+        from tasks.engine.task import MultiRobotTask
+
+        if not (isinstance(cls, type) and issubclass(cls, MultiRobotTask)):
+            raise TaskError(
+                f"@register_task({names[0]!r}) is above {shown(cls)}; it takes a subclass of"
+                " tasks.MultiRobotTask"
+            )
+        check_declaration(cls)
         for name in names:
             if (owner := TASKS.home(name)) not in (None, f"{cls.__module__}:{cls.__qualname__}"):
                 raise TaskError(f"the name {name!r} is already taken by {owner}")
@@ -122,6 +137,11 @@ def list_tasks() -> tuple[str, ...]:
     return tuple(TASKS)
 
 
+def list_own() -> tuple[str, ...]:
+    """Return the id of every task that was registered in this process and is not built in."""
+    return tuple(sorted(set(TASKS.registered) - set(CATALOGUE)))
+
+
 def list_clones() -> tuple[str, ...]:
     """Return the id of every task that clones one of ManiSkill's, sorted.
 
@@ -144,12 +164,32 @@ def get_task_class(name: str) -> type[MultiRobotTask]:
     name = str(name)
     module, colon, task_id = name.rpartition(":")
     if colon:
-        _import(module, name)
+        _import(module, f"of the task {name!r}")
         name = task_id
     for spelling in (name, _native_name(name)):
         if spelling in TASKS:
             return TASKS[spelling]
     raise TASKS.unknown(name, f"Importing {module!r} registered no such task." if colon else None)
+
+
+def origin(task_id: str) -> str | None:
+    """Return the module or the package that a task comes from; None if this library's own."""
+    return TASKS.origin(task_id)
+
+
+def full_name(cls: type[MultiRobotTask]) -> str:
+    """Return what finds a class in every process: its id, or ``module:Id`` if it is in no list."""
+    outside = TASKS.origin(cls.task_id) == cls.__module__
+    return f"{cls.__module__}:{cls.task_id}" if outside else cls.task_id
+
+
+def load_tasks(module: str) -> None:
+    """Import a module of the user's own, which registers the tasks in it.
+
+    Raises:
+        TaskError: If it cannot be imported.
+    """
+    _import(module.partition(":")[0], "of tasks")
 
 
 def other_names(cls: type[MultiRobotTask]) -> tuple[str, ...]:
@@ -164,7 +204,7 @@ def make(
     layout: Layout | None = None,
     obs_mode: str = "state",
     reward_mode: str | None = None,
-    **fields: Any,
+    **fields: Unpack[ScenarioFields],
 ) -> MultiRobotTask:
     """Make a task.
 
@@ -172,9 +212,11 @@ def make(
         task_id: Its id or another of its names.
         num_envs: Number of environments in this process.
         robots: Other robots for some places: a mapping place → robot, or one robot for a task
-            with one place. A robot that lacks its place's keyframe starts from its home's.
+            with one place; by name, descriptor, or the path of a URDF to guess it from. One that
+            lacks its place's keyframe starts from its home's.
         layout: Another layout with the task's places, in any order; for a task over any number of
-            robots, with places of any names.
+            robots, with places of any names. ``bystanders="hold"`` or ``"act"`` lets more robots
+            stand there.
         obs_mode: ``"state"``, ``"state_dict"``, ``"none"``, or what cameras see: ``"rgb"``,
             ``"rgbd"`` and others; see `tasks.Scenario`.
         reward_mode: One of the task's reward modes; None takes native's default.
@@ -197,15 +239,20 @@ def make_scenario(
     layout: Layout | None = None,
     obs_mode: str = "state",
     reward_mode: str | None = None,
-    **fields: Any,
+    **fields: Unpack[ScenarioFields],
 ) -> Scenario:
     """Return the scenario that `make` makes a task of, for the same arguments.
 
     Raises:
-        UnknownNameError: If a place, a robot or a field is unknown.
+        UnknownNameError: If a place, a robot or a field is unknown; of a field, it is a
+            ``TypeError`` as well.
         TaskError: If the robots do not say which places they take.
     """
     scenario = cls.scenario
+    known = [*(field.name for field in fields_of(scenario)), "robots"]
+    for name in fields:
+        if name not in known:
+            raise UnexpectedArgumentError.of(cls.task_id, name, known)
     if layout is not None:
         if not isinstance(layout, Layout):
             raise TaskError(f"layout is {shown(layout)}; a layouts.Layout is needed")
@@ -218,11 +265,40 @@ def make_scenario(
     return scenario
 
 
+class UnexpectedArgumentError(UnknownNameError, TypeError):
+    """An argument that tasks are not made with (also a ``TypeError``, as Python's own error is).
+
+    Other packages try arguments, and go by that type and Python's words.
+    """
+
+    def __init__(self, message: str, name: object = "", choices: Iterable[str] = ()) -> None:
+        """Take the whole message: Gymnasium raises errors anew, with a longer one alone."""
+        self.kind, self.name, self.choices = "argument", name, tuple(choices)
+        RobotLayoutsError.__init__(self, message)
+
+    @classmethod
+    def of(cls, task_id: str, name: str, choices: Iterable[str]) -> UnexpectedArgumentError:
+        """Return the error of a name, with the closest match and all choices."""
+        choices = tuple(choices)
+        match = closest_match(name, choices)
+        suggestion = f" Did you mean {match!r}?" if match else ""
+        return cls(
+            f"{task_id} got an unexpected keyword argument {shown(name)}.{suggestion} Choices:"
+            f" {', '.join(choices)}.",
+            name,
+            choices,
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle by message, so that worker processes can send the error home."""
+        return type(self), (self.args[0], self.name, self.choices)
+
+
 def _replace_robots(layout: Layout, robots: RobotLike | Mapping[str, RobotLike]) -> Layout:
     if isinstance(robots, Mapping):
         changed = {place: _stand(layout[place], robot) for place, robot in robots.items()}
         return Layout({**layout, **changed}, layout.frames)
-    if len(layout) == 1 and isinstance(robots, (str, RobotDescriptor)):
+    if len(layout) == 1 and isinstance(robots, (str, PathLike, RobotDescriptor)):
         return _replace_robots(layout, {next(iter(layout)): robots})
     given = [robots] if isinstance(robots, (str, RobotDescriptor)) else robots
     names = [name for name in given if isinstance(name, str)] if isinstance(given, list) else []
@@ -245,8 +321,8 @@ def _is_native_name(name: str) -> bool:
     return name.lower().startswith("maniskill.")
 
 
-def _import(module: str, name: str) -> None:
-    """Import the module of a user that registers a task.
+def _import(module: str, whose: str) -> None:
+    """Import the module of a user that registers tasks.
 
     Raises:
         TaskError: If that fails.
@@ -254,6 +330,5 @@ def _import(module: str, name: str) -> None:
     try:
         import_module(module)
     except (Exception, SystemExit) as error:  # whatever the code of another package does
-        raise TaskError(
-            f"the module {module!r} of the task {name!r} cannot be imported: {reason(error)}"
-        ) from error
+        words = f"the module {module!r} {whose} cannot be imported: {reason(error)}"
+        raise TaskError(words) from error

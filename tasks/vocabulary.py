@@ -36,6 +36,7 @@ from tasks.language.bodies import (
     Target,
     WideTable,
 )
+from tasks.language.needs import Needs
 from tasks.language.poses import angle_between, compose, inverse, transform
 from tasks.language.props import (
     BLUE,
@@ -78,6 +79,7 @@ __all__ = [
     "Info",
     "Mesh",
     "MultiRobotTask",
+    "Needs",
     "POLISHED",
     "Peg",
     "PhysicsSettings",

@@ -68,8 +68,8 @@ def optional_problem() -> str | None:
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """One process more than there are cores, because tests also wait: for deadlines, say."""
-    return len(os.sched_getaffinity(0)) + 1
+    """Two processes more than there are cores, because tests also wait: for deadlines, say."""
+    return len(os.sched_getaffinity(0)) + 2
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
@@ -78,13 +78,55 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
             pytest.skip(problem)
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Give all comparisons of a task to one process, which makes its native environment once."""
+@pytest.fixture(scope="session")
+def renderer() -> object:
+    """Keep alive what all pictures of a process share, or None where nothing can be drawn.
+
+    It goes with the last scene that can be drawn, and the next one would compute how light is
+    reflected anew: 6 s of processor time.
+    """
+    from simulation.rendering.pictures import vulkan_problem
+
+    if vulkan_problem():
+        return None
+    from sapien import Device
+    from sapien.render import RenderSystem
+
+    from simulation.sapien3.device import outlive_forks
+
+    system = RenderSystem(Device("cpu"))  # native's; a process can draw on no more than one
+    outlive_forks(system)
+    return system
+
+
+@pytest.hookimpl(tryfirst=True)  # before xdist looks at the groups
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Give what shares something costly to one process, which makes it once.
+
+    That are all comparisons of a task, for its native environment, and all that is drawn.
+    """
     for item in items:
-        parameters = getattr(item, "callspec", None)
-        task_id = parameters.params.get("task_id") if parameters is not None else None
-        if task_id is not None and item.get_closest_marker("native"):
-            item.add_marker(pytest.mark.xdist_group(task_id))
+        if name := _group(item):
+            item.add_marker(pytest.mark.xdist_group(name))
+    if getattr(config.option, "loadgroup", False):
+        _put_groups_into_ids(items)
+
+
+def _put_groups_into_ids(items: list[pytest.Item]) -> None:
+    """Do what xdist 3.8 does in vain since pytest 9.2 keeps an item's id in another attribute."""
+    for item in items:
+        group = item.get_closest_marker("xdist_group")
+        if group is not None and hasattr(item, "_id"):
+            item._id = type(item._id).parse(f"{item.nodeid}@{group.args[0]}")
+
+
+def _group(item: pytest.Item) -> str | None:
+    if "renderer" in getattr(item, "fixturenames", ()):
+        return "pictures"
+    parameters = getattr(item, "callspec", None)
+    if parameters is None or not item.get_closest_marker("native"):
+        return None
+    return parameters.params.get("task_id")
 
 
 @pytest.hookimpl(wrapper=True)

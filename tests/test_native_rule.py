@@ -1,4 +1,4 @@
-"""The rule of ``conftest.py``: where native cannot run, its tests skip, or fail if required."""
+"""The rules of ``conftest.py``: which tests skip, or fail if required, and which go together."""
 
 from pathlib import Path
 
@@ -79,3 +79,11 @@ def test_a_native_test_that_passes_is_counted(run):
     result = run(NATIVE_TEST.format("pass"), required=True)
     assert result.ret == pytest.ExitCode.OK
     result.stdout.fnmatch_lines(["native comparison: 1 passed, 0 skipped"])
+
+
+@pytest.mark.xdist_group("together")
+def test_xdist_learns_of_groups(request):
+    """Else each of their tests goes to any process, and each process makes what they share."""
+    if not hasattr(request.config, "workerinput"):
+        pytest.skip("there is one process")
+    assert request.node.nodeid.endswith("@together")

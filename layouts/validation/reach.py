@@ -13,7 +13,7 @@ from layouts.placement import Placement
 from robots import RobotDescriptor
 from robots.bodies.hulls import RobotModel
 from robots.descriptor import IDENTITY
-from robots.urdf.tree import link_index
+from robots.urdf.tcp import find_tcp
 
 STARTS = 24  # places that inverse kinematics starts from, besides the keyframes
 
@@ -63,8 +63,7 @@ class Reach:
         self._base = pose_matrix(placement.base_position, placement.base_quaternion)
         self._start = np.array(placement.start_qpos)
         self._arm = [robot.joints.index(joint) for joint in arm.arm_joints]
-        self._tcp = link_index(model.kinematics, arm.tcp_link)
-        self._points = tcp_links(arm, model)
+        self._tcp = find_tcp(arm, model.kinematics)
         self._starts = _starts(robot, placement, model, self._arm)
 
     def solve(self, position: Floats, quaternion: Floats | None = None) -> list[Solution]:
@@ -79,7 +78,9 @@ class Reach:
         pose = pose_matrix(position, IDENTITY if quaternion is None else quaternion)
         target = np.linalg.inv(self._base) @ pose
         rotation = None if quaternion is None else target[:3, :3]
-        goal = Goal(target[:3, 3], self._points, rotation, self._tcp)
+        tcp = self._tcp
+        offset = tcp.offset if tcp.offset.any() else None
+        goal = Goal(target[:3, 3], tcp.links, rotation, tcp.turned, offset)
         found = solve(self._kinematics, goal, self._starts, self._arm)
         return [
             Solution(
@@ -90,16 +91,6 @@ class Reach:
             )
             for i in found.ranked(self._start)
         ]
-
-
-def tcp_links(robot: RobotDescriptor, model: RobotModel) -> list[int]:
-    """Return the links whose mean origin is the tool centre point.
-
-    Raises:
-        UnknownNameError: If the robot lacks one of them.
-    """
-    names = robot.tcp_position_links or (robot.tcp_link,)
-    return [link_index(model.kinematics, name) for name in names]
 
 
 class Workspace:
@@ -137,10 +128,8 @@ def _workspace_points(robot: RobotDescriptor, model: RobotModel, own: RobotDescr
     start = np.array(robot.keyframe(robot.home.keyframe))
     qpos = np.tile(start, (WORKSPACE_SAMPLES, 1))
     qpos[:, arm] = scattered(model.kinematics.limits[arm], WORKSPACE_SAMPLES)
-    points = tcp_links(own, model)
-    tree = model.kinematics.towards(points)
-    at = [tree.link(model.kinematics.links[point]) for point in points]
-    return tree.forward(qpos)[:, at][..., :3, 3].mean(axis=1)
+    tree = model.kinematics.towards(find_tcp(own, model.kinematics).needed)
+    return find_tcp(own, tree).places(tree.forward(qpos))
 
 
 def _starts(

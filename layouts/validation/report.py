@@ -96,6 +96,8 @@ def _spaces(report: Report) -> Iterator[str]:
             f"{one} and {other} share {shared.volume:.2f} m³:"
             f" {share:.0%} of {one}'s, {other_share:.0%} of {other}'s"
         )
+    if not ordered and len(report.workspaces) > 1:
+        yield "no two of them share a point"
     if len(ordered) > SPOKEN_PAIRS:
         yield f"and {len(ordered) - SPOKEN_PAIRS} pairs that share less"
 

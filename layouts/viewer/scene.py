@@ -142,6 +142,14 @@ class Scene:
             )
             self._moving[name].append((link, handle))
 
+        if any(robot.tcp_offset):
+            self._api.add_frame(
+                node(name, "frames", robot.tcp_link) + "/tcp",
+                axes_length=robot.reach * FRAME_LENGTH,
+                axes_radius=robot.reach * FRAME_LENGTH / 25,
+                position=robot.tcp_offset,
+            )
+
     def _draw_hulls(self, name: str, colour: tuple[int, int, int]) -> None:
         model = self._cell.models[name]
         touching = self._api.add_frame(f"/{name}/touching", show_axes=False)

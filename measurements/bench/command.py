@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from robots import MissingPackageError
 from rollouts.playing.command_options import INTERRUPTED, one_or_more, stop_signals, zero_or_more
+from tasks.cell_options import add_cell_options, chosen_cell
 
 if TYPE_CHECKING:
     from measurements.bench.report import Report
@@ -32,10 +33,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--task", nargs="+", metavar="TASK", help="task ids; what takes one takes the first")
     add("--rounds", type=one_or_more, metavar="N", help="samples of each (12)")
     add("--processor-time", action="store_true", help="for a machine that does other things too")
+    add_cell_options(parser, robots=False)
+    add(
+        "--robots",
+        type=_number_or_robot,
+        nargs="+",
+        metavar="N",
+        help="numbers of robots, up to 8 (1 2 4 8); PLACE=ROBOT: other robots in places of --task",
+    )
     for name, values, about in (
         ("environments", "1 4 16 64", "numbers of environments in one process"),
         ("workers", "0 1 2 4", "numbers of worker processes, as many as there are cores"),
-        ("robots", "1 2 4 8", "numbers of robots, up to 8"),
         ("cubes", "0 8 16 32 64", "numbers of cubes that touch"),
     ):
         help_text = f"{about} ({values})"
@@ -93,6 +101,10 @@ def run_benchmarks(
     return 0, report
 
 
+def _number_or_robot(text: str) -> int | str:
+    return text if "=" in text else zero_or_more(text)
+
+
 def settings_of(options: argparse.Namespace) -> Settings:
     """Return the settings that a command line asks for.
 
@@ -105,16 +117,23 @@ def settings_of(options: argparse.Namespace) -> Settings:
     from measurements.bench.worlds import MOST_ROBOTS
     from robots import RobotRegistry
     from tasks import get_task_class
+    from tasks.registry import full_name
 
     for kind in options.kinds or ():
         RobotRegistry.load(kind)
+    words = [word for word in options.robots or () if isinstance(word, str)]
+    options.robots = [word for word in options.robots or () if not isinstance(word, str)]
+    making = chosen_cell(argparse.Namespace(**{**vars(options), "robots": words}))
+    if making and not options.task:
+        raise BenchmarkError(f"--{' and --'.join(making)}: of which task? Name it with --task")
     for name, least in (("environments", 1), ("robots", 1)):
         if wrong := [n for n in getattr(options, name) or () if n < least]:
             raise BenchmarkError(f"--{name} {wrong[0]}: it takes numbers of {least} or more")
     if wrong := [n for n in options.robots or () if n > MOST_ROBOTS]:
         raise BenchmarkError(f"--robots {wrong[0]}: it takes numbers from 1 to {MOST_ROBOTS}")
     given = {
-        "tasks": tuple(get_task_class(task).task_id for task in options.task or ()),
+        "tasks": tuple(full_name(get_task_class(task)) for task in options.task or ()),
+        "making": making,
         "rounds": options.rounds,
         **{
             name: tuple(sorted(getattr(options, name) or ()))

@@ -30,7 +30,7 @@ def reset(settings: Settings) -> Measurement:
     """Time resets of one environment, as they are and with the world built anew."""
     variants: dict[tuple[str, str], Sample] = {}
     for task_id in settings.tasks:
-        env = tasks.make(task_id)
+        env = tasks.make(task_id, **settings.making)
         variants["reset", task_id] = timed_resets(env.reset, settings.clock)
         again = timed_resets(lambda seed, env=env: env.reset(seed, options=REBUILT), settings.clock)
         variants["world built anew", task_id] = again
@@ -60,7 +60,7 @@ def recording(settings: Settings) -> Measurement:
     """Time episodes of random actions that are recorded, and ones that are only stepped."""
     variants: dict[tuple[str, str], Sample] = {}
     for task_id in settings.tasks:
-        env = tasks.make(task_id)
+        env = tasks.make(task_id, **settings.making)
         variants[STEPPED, task_id] = _timed_episodes(env, settings, _step)
         variants[RECORDED, task_id] = _timed_episodes(env, settings, _record)
     return Measurement(

@@ -25,7 +25,7 @@ from measurements.bench.settings import Benchmark, Settings
 from measurements.bench.steps import PHYSICS, Played
 from parity.compare.native_env import make_native, make_native_front, native_action
 from robots import RobotLayoutsError, TaskError
-from robots.common.commands import start
+from robots.common.commands import program, start
 from robots.common.writing import write_whole
 from tasks import MultiRobotTask, get_task_class, list_clones
 
@@ -159,7 +159,7 @@ def _native_vector(task_id: str) -> Generator[AsyncVectorEnv | None]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit code."""
-    parser = argparse.ArgumentParser(prog="python -m parity bench", description=__doc__)
+    parser = argparse.ArgumentParser(prog=f"{program('parity')} bench", description=__doc__)
     add_arguments(parser)
     parser.epilog = f"Benchmarks: {', '.join(benchmarks(()))}. All of them take some minutes."
     parser.add_argument("--record", action="store_true", help=f"keep all of it in {RECORD.name}")
@@ -169,6 +169,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         if options.record and (options.only or options.task):
             raise BenchmarkError("a record holds every benchmark; leave out --only and --task")
         settings = settings_of(options)
+        if settings.making:
+            raise BenchmarkError("native takes no layout and no other robots; leave them out")
         task_ids = settings.tasks if options.task else list_clones()
         _expect_clones(task_ids)
         status, report = run_benchmarks(options, benchmarks(task_ids), settings)

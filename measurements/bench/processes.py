@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from measurements.bench.measurement import BenchmarkError, Measurement, by_series
 from measurements.bench.settings import CORES, Clock, Settings
 from measurements.bench.steps import PHYSICS, random_actions
+from tasks import get_task_class
 from tasks.processes import process as processes
 from tasks.processes.worker import Worker
 
@@ -27,9 +28,10 @@ def workers(settings: Settings) -> Measurement:
     """Measure the rate of vectors with some numbers of workers."""
     task_id, share = settings.tasks[0], settings.worker_envs
     samples: dict[tuple[str, int], list[float]] = {}
-    with PhysicsProcesses(task_id, max(1, *settings.workers), share) as floor:
+    making = settings.making
+    with PhysicsProcesses(task_id, max(1, *settings.workers), share, making) as floor:
         for count in settings.workers:
-            with vector(task_id, max(1, count) * share, count) as env:
+            with vector(task_id, max(1, count) * share, count, **making) as env:
                 timed = TimedVector(env, settings.clock, settings.batch_steps)
                 variants = {
                     (VECTOR, count): timed.rate,
@@ -56,7 +58,7 @@ def start(settings: Settings) -> Measurement:
     def seconds(count: int) -> Callable[[int], float]:
         def sample(number: int) -> float:
             begun = settings.clock.now()
-            with vector(task_id, count, min(count, CORES)) as env:
+            with vector(task_id, count, min(count, CORES), **settings.making) as env:
                 env.reset(seed=number)
                 return settings.clock.now(worker_ids()) - begun
 
@@ -77,7 +79,7 @@ def start(settings: Settings) -> Measurement:
 def memory(settings: Settings) -> Measurement:
     """Measure how much memory one more environment takes in a worker."""
     variants = {
-        ("one more environment", task_id): lambda number, task_id=task_id: _extra(task_id)
+        ("one more environment", task_id): lambda number, task_id=task_id: _extra(task_id, settings)
         for task_id in settings.tasks
     }
     return Measurement(
@@ -117,12 +119,15 @@ class TimedVector:
 class PhysicsProcesses:
     """Processes that all do nothing but physics: what any vector is measured against."""
 
-    def __init__(self, task_id: str, count: int, num_envs: int) -> None:
+    def __init__(
+        self, task_id: str, count: int, num_envs: int, making: Mapping[str, Any] | None = None
+    ) -> None:
         """Start ``count`` processes, with ``num_envs`` environments each."""
         self._num_envs = num_envs
         self._workers: list[Worker[Connection]] = []
         for _ in range(count):
-            self._workers.append(Worker(processes.context.Pipe(), _work, task_id, num_envs))
+            arguments = task_id, num_envs, making or {}
+            self._workers.append(Worker(processes.context.Pipe(), _work, *arguments))
 
     def __enter__(self) -> PhysicsProcesses:
         """Wait until all are ready."""
@@ -160,7 +165,7 @@ class PhysicsProcesses:
             worker.end()
 
 
-def _work(connection: Connection, task_id: str, num_envs: int) -> None:
+def _work(connection: Connection, task_id: str, num_envs: int, making: Mapping[str, Any]) -> None:
     """Do the physics of actions that are sent, and answer with the seconds that it took."""
     import torch
 
@@ -168,7 +173,7 @@ def _work(connection: Connection, task_id: str, num_envs: int) -> None:
 
     processes.end_with_parent()
     torch.set_num_threads(1)
-    env = tasks.make(task_id, num_envs=num_envs)
+    env = tasks.make(task_id, num_envs=num_envs, **making)
     connection.send(0.0)
     while True:
         try:
@@ -187,9 +192,10 @@ def _answer(worker: Worker[Connection]) -> float:
 
 
 @contextmanager
-def vector(task_id: str, num_envs: int, num_workers: int) -> Generator[Any]:
+def vector(task_id: str, num_envs: int, num_workers: int, **making: Any) -> Generator[Any]:
     """Give a vector of a task, and close it in the end."""
-    env = gymnasium.make_vec(f"RobotLayouts/{task_id}", num_envs=num_envs, num_workers=num_workers)
+    name = f"RobotLayouts/{get_task_class(task_id).task_id}"
+    env = gymnasium.make_vec(name, num_envs=num_envs, num_workers=num_workers, **making)
     with closing(env):
         yield env
 
@@ -199,16 +205,16 @@ def worker_ids() -> Sequence[int]:
     return [child.pid for child in multiprocessing.active_children() if child.pid is not None]
 
 
-def _extra(task_id: str) -> float:
+def _extra(task_id: str, settings: Settings) -> float:
     """Return the memory of one more environment (MB)."""
-    few, many = (_private_memory(task_id, count) for count in (FEW, MANY))
+    few, many = (_private_memory(task_id, count, settings) for count in (FEW, MANY))
     return (many - few) / (MANY - FEW)
 
 
-def _private_memory(task_id: str, num_envs: int) -> float:
+def _private_memory(task_id: str, num_envs: int, settings: Settings) -> float:
     """Return the memory that a worker with some environments shares with no one (MB)."""
     before = set(worker_ids())
-    with vector(task_id, num_envs, 1) as env:
+    with vector(task_id, num_envs, 1, **settings.making) as env:
         env.reset(seed=0)
         for action in random_actions(0, 5, num_envs, env.single_action_space.shape[0]):
             env.step(action)

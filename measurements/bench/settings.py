@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 from measurements.bench.measurement import Key, Measurement, interleave
 
@@ -73,6 +74,7 @@ class Settings:
         started: Numbers of environments whose start is timed.
         episodes: Episodes of a recording.
         checked: Numbers of robots whose layout is validated.
+        making: Arguments of `tasks.make`, with which the tasks are made.
     """
 
     clock: Clock = Clock()
@@ -90,6 +92,7 @@ class Settings:
     started: tuple[int, ...] = (1, 64)
     episodes: int = 12
     checked: tuple[int, ...] = (1, 2, 4)
+    making: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def interleave(
         self,

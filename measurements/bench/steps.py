@@ -62,7 +62,7 @@ def random_actions(seed: int, steps: int, envs: int, numbers: int) -> NDArray[np
 
 def step(settings: Settings) -> Measurement:
     """Time one environment of each task."""
-    envs = {task_id: tasks.make(task_id) for task_id in settings.tasks}
+    envs = {task_id: tasks.make(task_id, **settings.making) for task_id in settings.tasks}
     return _beside_physics(
         settings, "step", "One step of one environment, by task", "task", {STEP: envs}
     )
@@ -71,7 +71,10 @@ def step(settings: Settings) -> Measurement:
 def environments(settings: Settings) -> Measurement:
     """Time a step with one environment, with some, and with many in this process."""
     task_id, settings = settings.tasks[0], replace(settings, steps=settings.batch_steps)
-    envs = {count: tasks.make(task_id, num_envs=count) for count in settings.environments}
+    envs = {
+        count: tasks.make(task_id, num_envs=count, **settings.making)
+        for count in settings.environments
+    }
     title = f"One step per environment of one process, {task_id}"
     return _beside_physics(settings, "environments", title, "environments", {STEP: envs})
 

@@ -18,7 +18,7 @@ from measurements.robots.sources import PACKAGES, Robot, find_robots, named_fold
 from measurements.robots.survey import Seen, survey
 from measurements.robots.table import markdown
 from robots import MissingPackageError
-from robots.common.commands import exit_code, notice, start
+from robots.common.commands import exit_code, notice, program, start
 from robots.common.writing import write_whole
 from rollouts.progress import LiveLine
 
@@ -32,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 if every robot was tried, 1 if something cannot be read or written, 2 if a source does
         not exist.
     """
-    parser = argparse.ArgumentParser(prog="python -m measurements.robots", description=__doc__)
+    parser = argparse.ArgumentParser(prog=program("measurements.robots"), description=__doc__)
     add = parser.add_argument
     add("folders", nargs="*", metavar="[NAME=]FOLDER", help="folders with URDFs")
     add(

@@ -15,7 +15,11 @@ REACH_SHARES = 0.9, 1.35
 TCP_ERROR = 0.002  # m
 WITH_TCP = ("manipulator", "humanoid", "unknown")  # kinds of robots that bring it somewhere
 
-STAGES = ("loads", "alone", "facing", "beside", "trial", "tcp_move", "to_urdf", "to_drake")
+MISSED = 0.03  # of the overlaps that checks see; what physics may not see
+
+STAGES = (
+    "loads", "alone", "facing", "beside", "trial", "tcp_move", "agreement", "to_urdf", "to_drake",
+)  # fmt: skip
 
 QUESTIONS: Mapping[str, str] = {
     "loads": "loads",
@@ -31,6 +35,7 @@ QUESTIONS: Mapping[str, str] = {
     "steps_500": "500 steps",
     "numbers": "its own joints",
     "tcp_move": "TCP move",
+    "agreement": "checks as physics",
     "to_urdf": "URDF",
     "to_drake": "Drake",
     "no_raw": "no raw exception",
@@ -78,6 +83,7 @@ def judge(seen: Seen, expected: Expected) -> dict[str, Answer]:
     error = seen.get("tcp_move", {}).get("error")
     came = _yes(error is not None and error < TCP_ERROR, _length(error))
     answers["tcp_move"] = came if expected.kind in WITH_TCP else NOT_ASKED
+    answers["agreement"] = _agreement(seen.get("agreement", {}))
     return {question: answers[question] for question in QUESTIONS}
 
 
@@ -181,6 +187,15 @@ def _steps(trial: Seen, steps: int) -> Answer:
     if exploded is not None and exploded <= steps:
         return Answer(False, f"step {exploded}")
     return YES
+
+
+def _agreement(seen: Seen) -> Answer:
+    if "both" not in seen:
+        return _yes(False)
+    if seen["physics"]:
+        return Answer(False, f"{seen['physics']} unseen")
+    alone, checked = seen["checks"], seen["both"] + seen["checks"]
+    return _yes(alone <= MISSED * checked + 1, f"{alone} of {checked} missed")
 
 
 def _no_raw(seen: Seen) -> Answer:

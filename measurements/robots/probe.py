@@ -17,6 +17,7 @@ from typing import Any
 import yaml
 
 from layouts import Layout, face_to_face, side_by_side, single
+from measurements.robots.agreement import compare
 from robots import RobotDescriptor, RobotLayoutsError
 from robots.from_urdf import guess_descriptor
 from robots.urdf.reading import read_model
@@ -62,6 +63,7 @@ def loads(urdf: Path, robots: list[RobotDescriptor]) -> Seen:
         },
         "tcp": robot.tcp_link,
         "tips": list(robot.tcp_position_links),
+        "tcp_offset": list(robot.tcp_offset),
         "reach": round(robot.reach, 4),
     }
 
@@ -104,6 +106,11 @@ def trial(robot: RobotDescriptor) -> Seen:
     }
 
 
+def agreement(robot: RobotDescriptor) -> Seen:
+    """Return in how many cases checks and physics see links inside each other, or one alone."""
+    return compare(robot)._asdict()
+
+
 def exported_urdf(robot: RobotDescriptor) -> Seen:
     """Save a robot as a URDF, read that again, and look for its meshes."""
     with tempfile.TemporaryDirectory() as folder:
@@ -134,6 +141,7 @@ LOOKS: Mapping[str, Callable[[RobotDescriptor], Seen]] = {
     "beside": beside,
     "trial": trial,
     "tcp_move": tcp_move,
+    "agreement": agreement,
     "to_urdf": exported_urdf,
     "to_drake": exported_drake,
 }

@@ -70,6 +70,8 @@ def _about(record: Record, judged: Sequence[Judged]) -> Iterator[str]:
     yield "  others by less than a tenth of what was asked for until then"
     yield "- TCP move: 5 cm by inverse kinematics, less than 2 mm off; URDF, Drake: saved, and read"
     yield "  again"
+    yield "- checks as physics: in 200 random postures, links that are inside each other by 1 mm in"
+    yield "  physics are so in checks (else: how many are unseen), and the reverse but for 3 %"
     yield ""
 
 

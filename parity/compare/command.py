@@ -27,6 +27,7 @@ from parity.compare.results import RESULTS, record
 from parity.compare.runs import Run, play
 from parity.compare.task_summary import summarise, summary_table
 from robots import CONTROL_MODES, RecordingError, TaskError, closest_match
+from robots.common.commands import program
 from robots.common.writing import write_whole
 from rollouts.progress import LiveLine
 from tasks import MultiRobotTask
@@ -43,7 +44,7 @@ class _Source(NamedTuple):
 def parser() -> argparse.ArgumentParser:
     """Return the command's argument parser."""
     arguments = argparse.ArgumentParser(
-        prog="python -m parity compare",
+        prog=f"{program('parity')} compare",
         description="Step tasks beside the native ManiSkill environments that they clone, with the"
         " same seeds and actions, and compare observations, states, rewards and info exactly.",
         epilog="Exit code: 0 if every difference is exactly zero, 1 if not, 2 for bad usage.",

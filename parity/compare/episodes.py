@@ -91,18 +91,18 @@ def recorded_control_mode(path: Path) -> str | None:
     """Return the control mode that a file was recorded in, or None if it does not say.
 
     Raises:
-        TrajectoryError: If the file cannot be read, or each arm has a mode of its own: native makes
-            all robots of a task in one.
+        TrajectoryError: If the file cannot be read, or its arms are in different modes.
     """
     if path.suffix != ".h5":
         return None
     with TrajectoryFile(path) as file:
         mode = file.control_mode
-    if isinstance(mode, str):
-        return mode
-    raise TrajectoryError(
-        f"{path} was recorded in a control mode for each arm; native's tasks have one for all"
-    )
+    if not isinstance(mode, str):
+        raise TrajectoryError(
+            f"{path} was recorded with a control mode for each arm, {dict(mode)}; native ManiSkill"
+            " has one for all"
+        )
+    return mode
 
 
 def find_demonstrations(folder: Path) -> dict[str, list[Path]]:

@@ -17,6 +17,7 @@ from experts import list_experts
 from parity.compare.native_env import native_tasks
 from parity.compare.results import RESULTS, read
 from robots import MissingPackageError, RobotRegistry
+from robots.common.commands import program
 from rollouts.reading.summary import recorded_task
 from rollouts.reading.trajectory import TrajectoryError
 from tasks import get_task_class, list_clones, list_tasks
@@ -104,7 +105,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         RobotLayoutsError: If something that it needs cannot be read.
     """
     parser = argparse.ArgumentParser(
-        prog="python -m parity inventory",
+        prog=f"{program('parity')} inventory",
         description="List every task: sizes, expert, the recorded comparison with native,"
         " demonstrations; and the tasks of native's that have no clone here.",
     )

@@ -17,6 +17,7 @@ from parity.compare.episodes import load_episodes, recorded_control_mode
 from parity.compare.lockstep import EpisodeResult
 from parity.compare.runs import Run, RunResult, play
 from robots import CONTROL_MODES, TaskError
+from robots.common.commands import program
 from rollouts.playing.executor import ProcessExecutor
 from rollouts.playing.replay import find_official, task_for
 from rollouts.progress import LiveLine
@@ -28,7 +29,7 @@ from tasks import MultiRobotTask
 def parser() -> argparse.ArgumentParser:
     """Return the command's argument parser."""
     arguments = argparse.ArgumentParser(
-        prog="python -m parity replay",
+        prog=f"{program('parity')} replay",
         description="Play recorded actions in native ManiSkill and here, both from a reset with"
         " the recorded seed that rebuilds the world, and compare everything exactly.",
         epilog="Exit code: 0 if every episode agrees to the last bit, 1 if not, 2 for bad usage.",
@@ -91,7 +92,8 @@ def _run(cls: type[MultiRobotTask], path: Path, count: int) -> Run:
     episodes = load_episodes(path, cls.task_id, cls.layout.action_dim)[:count]
     if path.suffix == ".h5":
         with TrajectoryFile(path) as file:
-            task_for(file).close()  # refuses a file of another layout, which native does not have
+            # Native has the layout of the task alone; a file of another one is refused.
+            task_for(file, layout=cls.layout).close()
     return Run(
         cls.task_id,
         path.name,

@@ -28,6 +28,7 @@ from parity.compare.snapshot import Snapshot, largest_difference
 from parity.compare.task_summary import number_text
 from parity.show.native_pictures import NativeScene
 from robots import CONTROL_MODES, RecordingError, RobotLayoutsError
+from robots.common.commands import program
 from robots.common.writing import written_whole
 from rollouts.progress import LiveLine
 from rollouts.reading.trajectory import TrajectoryError
@@ -102,7 +103,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         RobotLayoutsError: If they could not be played.
     """
     parser = argparse.ArgumentParser(
-        prog="python -m parity rollout",
+        prog=f"{program('parity')} rollout",
         description="Play one episode in native ManiSkill and here, keep every array of both in"
         f" DIR/TASK/{NATIVE_FILE} and {OUR_FILE}, film native, and compare the two.",
         epilog="Exit code: 0 if every difference is exactly zero, 1 if not, 2 for bad usage.",
@@ -280,8 +281,7 @@ def _named(snapshot: Snapshot, robots: Mapping[str, str]) -> Arrays:
 def _play_native(
     env: MultiRobotTask, episode: Episode, film: Path | None, on_step: Callable[[str], None]
 ) -> Arrays:
-    mode, size = env.scenario.control_mode, PICTURE_SIZE if film else None
-    assert isinstance(mode, str)  # a recording with a mode for each arm was refused
+    mode, size = str(env.scenario.control_mode), PICTURE_SIZE if film else None
     side = NativeSide(env.task_id, control_mode=mode, picture_size=size)
     native, keys = side.envs[0], articulation_keys(env.layout)
 

@@ -12,6 +12,7 @@ from parity.report.html import render
 from parity.show import embedding
 from parity.sweep.entries import SUMMARY, read_summary
 from robots import RecordingError, TaskError
+from robots.common.commands import program
 from robots.common.writing import write_whole
 
 LIMIT = 25.0  # MB
@@ -28,7 +29,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         RobotLayoutsError: If the page could not be written.
     """
     parser = argparse.ArgumentParser(
-        prog="python -m parity report",
+        prog=f"{program('parity')} report",
         description="Make one self-contained HTML page of what `python -m parity sweep` and the"
         " recorded comparison found, clips included.",
     )

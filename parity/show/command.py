@@ -18,6 +18,7 @@ from parity.compare.both_sides import NativeSide, OurSide
 from parity.compare.episodes import load_episodes, recorded_control_mode
 from parity.show.clip import Candidate, Clip, ClipOptions, SideBySide, choose
 from robots import CONTROL_MODES, MissingPackageError, RecordingError, TaskError
+from robots.common.commands import program
 from rollouts.progress import LiveLine
 from rollouts.video import package_problem
 from tasks import MultiRobotTask
@@ -30,7 +31,7 @@ EXPERT_EPISODES = 5  # to choose from
 def parser() -> argparse.ArgumentParser:
     """Return the command's argument parser."""
     arguments = argparse.ArgumentParser(
-        prog="python -m parity render",
+        prog=f"{program('parity')} render",
         description="Play recorded actions on native ManiSkill and here, in lock-step, and show"
         " native | ours | their amplified difference, all drawn in native's own scene, so that only"
         " the physics state differs.",

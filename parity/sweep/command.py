@@ -16,6 +16,7 @@ from parity.sweep.entries import SUMMARY, Entry, is_done, line, read_summary, wr
 from parity.sweep.plan import Plan, plan
 from parity.sweep.processes import STAGE_SECONDS, Progressed, sweep
 from parity.sweep.stages import STAGES
+from robots.common.commands import program
 from rollouts.playing.executor import Executor
 
 
@@ -29,7 +30,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         RobotLayoutsError: If the arguments make no sense.
     """
     parser = argparse.ArgumentParser(
-        prog="python -m parity sweep",
+        prog=f"{program('parity')} sweep",
         description="For each task: compare episodes with native, keep a rollout of both sides,"
         f" make a side-by-side clip, and write everything into DIR/{SUMMARY}. A sweep that was"
         " stopped goes on where it was.",

@@ -13,6 +13,7 @@ from robots.assets.progress import listing, say, size
 from robots.assets.sources import AssetSource, InstalledPackage
 from robots.assets.store import AssetStore, FileState, default_root
 from robots.assets.wheel_source import PackageWheel
+from robots.common.commands import program
 from robots.common.errors import AssetError
 from robots.urdf.summary import read_references
 
@@ -204,6 +205,6 @@ def _failure_text(wanted: list[AssetFile], store: AssetStore, failures: list[str
         f"{len(wanted)} robot files cannot be used in {store.root}\n"
         f"  sources tried:{tried}\n"
         f"  files:\n    {states}\n"
-        f"  what to do: connect to the network and run `python -m robots.fetch_assets`, or"
+        f"  what to do: connect to the network and run `{program('robots.fetch_assets')}`, or"
         f" `pip install {wheels}`, or copy the files into {store.root} from another machine"
     )

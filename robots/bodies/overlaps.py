@@ -106,11 +106,12 @@ def overlapping(
     """
     import fcl
 
-    bodies = [
-        fcl.CollisionObject(hull.geometry, fcl.Transform(pose[:3, :3], pose[:3, 3]))
-        for hull in hulls
-        for pose in (poses[hull.link],)
-    ]
+    pairs = [tuple(pair) for pair in pairs]
+    bodies = {
+        i: fcl.CollisionObject(hulls[i].geometry, fcl.Transform(pose[:3, :3], pose[:3, 3]))
+        for i in {i for pair in pairs for i in pair}
+        for pose in (poses[hulls[i].link],)
+    }
     request = fcl.CollisionRequest()
     return np.array(
         [fcl.collide(bodies[a], bodies[b], request, fcl.CollisionResult()) > 0 for a, b in pairs],

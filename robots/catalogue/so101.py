@@ -25,7 +25,7 @@ SO101 = RobotDescriptor(
         ("gripper_link", "moving_jaw_so101_v1_link"), 2.0, 2.0, 0.0, patch_radius=0.1,
     ),
     keyframes={
-        "rest": (0.0, 0.0, 0.0, 0.0, 0.0, 1.74533),
+        "rest": (0.0, -0.4, 0.4, 1.2, 0.0, 1.0),
     },
     reach=0.48,  # of the TCP, from the URDF
     source="example-robot-data 6.0.0, so_arm_description; drives from each joint's inertia",

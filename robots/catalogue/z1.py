@@ -25,14 +25,14 @@ Z1 = RobotDescriptor(
     urdf=UrdfLocator("example_z1_description", "urdf/z1.urdf"),
     action_split=ActionSplit(arm=ARM, gripper=GRIPPER),
     tcp_link="gripperStator",
-    tcp_position_links=("gripperMover", "gripperStator"),
+    tcp_offset=(0.1425, 0.0, -0.0089),  # where the jaws' tips meet
     gripper_material=GripperMaterial(
         ("gripperStator", "gripperMover"), 2.0, 2.0, 0.0, patch_radius=0.1,
     ),
     keyframes={
         "rest": (0.0, 1.4, -0.75, 0.0, 0.0, 0.0, -1.5707),
     },
-    reach=0.77,  # of the TCP, from the URDF; data sheet 0.74
+    reach=0.888,  # of the TCP, from the URDF; data sheet 0.74
     source="example-robot-data 6.0.0, z1_description; drives from each joint's inertia",
     allowed_collisions=among(  # neighbours, and what overlaps however the joints stand
         ("gripperMover", "link06"),

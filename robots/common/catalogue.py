@@ -118,6 +118,21 @@ class Catalogue(Mapping[str, Value]):
                 failures.append(error)
         return values, failures
 
+    def origin(self, name: str) -> str | None:
+        """Return where something comes from that is not built in.
+
+        Returns:
+            The package and version that bring it by an entry point, or the module of what was
+            registered in this process; None for what is built in, or says nothing of itself.
+        """
+        home, known = self.home(name), self._known(name)
+        if known is not None and home == self.lines.get(known):
+            return None
+        for point in self._points(name):
+            if point.dist is not None:
+                return f"{point.dist.name} {point.dist.version}"
+        return None if home is None else home.partition(":")[0]
+
     def unknown(self, name: object, hint: str | None = None) -> UnknownNameError:
         """Return the error that says that a name is unknown, with the closest match."""
         hint = self._hint if hint is None else hint

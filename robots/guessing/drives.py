@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,11 +21,16 @@ SHORTEST_STEP = 0.04  # rad, m; what ManiSkill's Panda truly goes in one control
 # physics advances by 0.01 s; with a force that is `JUST_ENOUGH`, 94 %.
 FREQUENCY = 150.0  # rad/s
 JUST_ENOUGH = 6.0  # of inertia · step / CONTROL_STEP²; 4 is the least there is
-SETTLING = 0.1  # s; of a finger that goes to a place
-# Physics in single precision shakes light fingers that are driven more stiffly.
-STIFFEST = 1e3  # rad/s, of a joint's frequency
+SETTLING = {"m": 0.1, "rad": 0.2}  # s; of a finger that goes to a place
+# Of a joint's frequency (rad/s). Physics in single precision shakes light links that are driven
+# more stiffly; and fingers, which touch each other, fly off.
+STIFFEST, STIFFEST_FINGER = 1e3, 2 * FREQUENCY
 MOST_DAMPED = 7e3  # 1/s, of a finger's damping by its inertia, as a Panda's has
 LIGHTEST = 1e-6  # kg·m², kg; of what hangs on a joint, if a URDF gives nothing that weighs
+# Links push each other: where two axes line up, one joint's motion turns the other by as much, and
+# PhysX parts light joints from heavy ones only roughly. Motors and gears have inertia of their own;
+# a gear that is chosen well makes the joint feel as much of it as of its load. Half is enough.
+ARMATURE = 0.5  # of the inertia that hangs on the joint
 HOLDING = 10.0  # times the force that an arm's joint would have
 POSTURES = 16  # in which the inertia is looked at
 
@@ -38,12 +43,14 @@ class Drive:
         stiffness: N·m/rad or N/m.
         damping: N·m·s/rad or N·s/m.
         force_limit: N·m or N.
+        armature: kg·m² or kg.
         step: How far it goes in one control step (rad or m).
     """
 
     stiffness: float
     damping: float
     force_limit: float
+    armature: float
     step: float
 
 
@@ -59,8 +66,9 @@ class Drives:
         moving = stance.model.moving
         links = [stance.tree.link(joint.child) for joint in moving]
         inertia = hanging_inertia(stance.tree, masses, stance.poses(postures), links)
-        self._inertia: Mapping[str, float] = {
-            joint.name: float(value) for joint, value in zip(moving, inertia, strict=True)
+        self._hanging: Mapping[str, float] = {
+            joint.name: max(float(value), LIGHTEST)
+            for joint, value in zip(moving, inertia, strict=True)
         }
         self._raised: list[str] = []  # names of joints
 
@@ -70,6 +78,7 @@ class Drives:
             "drives: stiffness from the inertia that hangs on each joint, critically damped, so"
             f" that a control step of {CONTROL_STEP:g} s covers what the action asks for; forces"
             " from the URDF's efforts",
+            "armature: motors and gears add half of the inertia that hangs on each joint",
             f"action: arm joints move per control step by up to {LONGEST_STEP:g} rad or m, or as"
             " far as their force brings them",
         ]
@@ -82,14 +91,21 @@ class Drives:
 
     def of(self, joint: ModelJoint) -> Drive:
         """Return the drive of a joint that an action moves."""
-        drive, raised = self._drive(joint)
+        return self._noted(joint, STIFFEST)
+
+    def finger(self, joint: ModelJoint) -> Drive:
+        """Return the drive of a finger's joint that an action moves by steps."""
+        return self._noted(joint, STIFFEST_FINGER)
+
+    def _noted(self, joint: ModelJoint, stiffest: float) -> Drive:
+        drive, raised = self._drive(joint, stiffest)
         if raised and joint.name not in self._raised:
             self._raised.append(joint.name)
         return drive
 
-    def _drive(self, joint: ModelJoint) -> tuple[Drive, bool]:
+    def _drive(self, joint: ModelJoint, stiffest: float) -> tuple[Drive, bool]:
         """Return a drive, and whether its force is more than the URDF's effort."""
-        inertia = max(self._inertia[joint.name], LIGHTEST)
+        inertia = self._inertia(joint)
         needed = JUST_ENOUGH * inertia / CONTROL_STEP**2  # N·m, N; per rad or m of a step
         force = joint.effort or max(FORCE, needed * SHORTEST_STEP)
         step = min(LONGEST_STEP, force / needed)
@@ -97,36 +113,45 @@ class Drives:
         if raised:
             force, step = needed * SHORTEST_STEP, SHORTEST_STEP
         # What only just has the force to stop in time must begin to brake in time.
-        stiffest = STIFFEST if step == LONGEST_STEP else 2 * FREQUENCY
+        stiffest = stiffest if step == LONGEST_STEP else 2 * FREQUENCY
         stiffness = max(STIFFNESS, inertia * FREQUENCY**2)
         stiffness = min(stiffness, inertia * stiffest**2)
         damping = 2 * (stiffness * inertia) ** 0.5
-        return Drive(*map(_rounded, (stiffness, damping, force)), step=_down(step)), raised
+        armature = ARMATURE * self._hanging[joint.name]
+        numbers = map(_rounded, (stiffness, damping, force, armature))
+        return Drive(*numbers, step=_down(step)), raised
+
+    def _inertia(self, joint: ModelJoint) -> float:
+        """Return what a joint's drive moves: what hangs on it, and its motor and gear."""
+        return (1 + ARMATURE) * self._hanging[joint.name]
 
     def gripping(self, joint: ModelJoint) -> Drive:
         """Return the drive of a joint whose targets are places, far away at times: it takes time.
 
-        ManiSkill's Panda drives its fingers with a damping of a tenth of the stiffness.
+        ManiSkill's Panda drives its fingers, which slide, with a damping of a tenth of the
+        stiffness. Fingers that turn go a longer way, and hit harder.
         """
-        drive = self.of(joint)
-        inertia = max(self._inertia[joint.name], LIGHTEST)
-        damping = min(max(drive.damping, drive.stiffness * SETTLING), inertia * MOST_DAMPED)
-        stiffness = min(drive.stiffness, damping / SETTLING)
+        drive, settling = self.of(joint), SETTLING[joint.unit]
+        inertia = self._inertia(joint)
+        damping = min(max(drive.damping, drive.stiffness * settling), inertia * MOST_DAMPED)
+        stiffness = min(drive.stiffness, damping / settling)
         force = min(drive.force_limit, FORCE)
-        return Drive(_rounded(stiffness), _rounded(damping), force, drive.step)
+        return replace(
+            drive, stiffness=_rounded(stiffness), damping=_rounded(damping), force_limit=force
+        )
 
     def holding(self, joint: ModelJoint) -> Drive:
         """Return the drive of a joint that stays where it starts."""
-        drive, _ = self._drive(joint)
+        drive, _ = self._drive(joint, STIFFEST)
         force = max(drive.force_limit, FORCE) * HOLDING
-        return Drive(drive.stiffness, drive.damping, _rounded(force), drive.step)
+        return replace(drive, force_limit=_rounded(force))
 
 
 def drive_fields(drives: Sequence[Drive]) -> dict[str, Any]:
     """Return the fields of a JointGroup that drive its joints."""
     return {
         name: alike([getattr(drive, name) for drive in drives])
-        for name in ("stiffness", "damping", "force_limit")
+        for name in ("stiffness", "damping", "force_limit", "armature")
     }
 
 

@@ -26,6 +26,7 @@ class Fingertips:
         stance: The robot.
         limb: The limb that ends in the hand.
         ends: The last link of each finger.
+        solid: Whether shapes tell where the tips are, not frames alone.
     """
 
     def __init__(self, stance: Stance, limb: Limb, hulls: Sequence[Hull]) -> None:
@@ -33,7 +34,7 @@ class Fingertips:
         self.stance, self.limb = stance, limb
         self._poses = stance.poses(stance.middle)[0]
         self._palm = self._poses[stance.tree.link(limb.palm)]
-        self._hulls = hulls
+        self._hulls, self.solid = hulls, bool(hulls)
         leaves = [joint for joint in limb.fingers if not stance.model.moving_on(joint.child)]
         tips = {joint.child: self._tip(joint.child) for joint in leaves}
         far = {link: float(np.linalg.norm(tip - self._palm[:3, 3])) for link, tip in tips.items()}

@@ -24,6 +24,8 @@ SQUEEZE = 0.01  # how far beyond closed a parallel gripper's target is (m)
 SAME = 0.02  # of a range; how much two fingers' ranges may differ
 OPENINGS = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the way, in which a hand may stand
 MOST_JOINTS = 20  # of a hand whose fingers collide with each other
+USUALLY = 0.5  # of `POSTURES`; links of a hand that overlap so often are one mechanism
+POSTURES = 32  # random ones of a hand
 NOTICEABLE = 1e-4  # m; how much opening changes the distance of the tips
 
 
@@ -89,8 +91,8 @@ def entangled(
 
     In a hand that one number drives, those that overlap while it is more open than closed, and of
     what does not grasp those that ever do: parts of one mechanism. In others, those that overlap
-    in each of the hand's postures; in hands of very many joints all,
-    as physics tells only so many sets of links apart.
+    in each of the hand's postures, or in half of its random ones; in hands of very many joints
+    all, as physics tells only so many sets of links apart.
 
     Args:
         stance: The robot.
@@ -117,7 +119,22 @@ def entangled(
         ends = {stance.tree.link(link) for end in grasping for link in stance.model.rigid_with(end)}
         inner = np.array([not {hulls[i].link for i in pair} <= ends for pair in mine], bool)
         always = open_enough | (overlaps.any(axis=0) & inner)
+    else:
+        always |= _usually(stance, limb, hulls, mine)
     return _names(stance, hulls, mine[always])
+
+
+def _usually(
+    stance: Stance, limb: Limb, hulls: Sequence[Hull], pairs: NDArray[np.intp]
+) -> NDArray[np.bool_]:
+    """Tell which pairs of a hand's hulls overlap in half of its random postures, (pairs,)."""
+    leaders = [joint for joint in limb.fingers if joint.name in stance.index]
+    places = [stance.index[joint.name] for joint in leaders]
+    low, high = np.array([joint.span for joint in leaders]).T
+    drawn = np.tile(stance.middle, (POSTURES, 1))
+    drawn[:, places] = np.random.default_rng(0).uniform(low, high, (POSTURES, len(places)))
+    counts = sum(overlapping(hulls, poses, pairs).astype(int) for poses in stance.poses(drawn))
+    return np.asarray(counts > USUALLY * POSTURES, bool)
 
 
 def _names(stance: Stance, hulls: Sequence[Hull], pairs: NDArray[np.intp]) -> list[tuple[str, str]]:
@@ -242,7 +259,8 @@ def _many(
     for unit, suffix in (("rad", ""), ("m", "_slide")):
         joints = [joint for joint in alone if joint.unit == unit]
         if joints:
-            groups[name + suffix] = by_steps(joints, drives, reset_noise=False)
+            made = [drives.finger(joint) for joint in joints]
+            groups[name + suffix] = by_steps(joints, made, reset_noise=False)
     for leader in leaders:
         if len(followers[leader.name]) > 1:
             groups[_free(f"{name}_{_identifier(leader.name)}", groups)] = _led(

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from robots.descriptor import JointGroup
 from robots.guessing.anatomy import PARTS, Anatomy, Limb
-from robots.guessing.drives import Drives, alike, drive_fields
+from robots.guessing.drives import Drive, Drives, alike, drive_fields
 from robots.urdf.model import ModelJoint
 
 
@@ -18,7 +18,8 @@ def arm_groups(limb: Limb, drives: Drives) -> dict[str, JointGroup]:
         drives: The drives of its joints.
     """
     return {
-        name_of(limb, name): by_steps(joints, drives) for name, joints in _by_unit("arm", limb.arm)
+        name_of(limb, name): by_steps(joints, [drives.of(joint) for joint in joints])
+        for name, joints in _by_unit("arm", limb.arm)
     }
 
 
@@ -42,7 +43,7 @@ def held_groups(anatomy: Anatomy, drives: Drives) -> dict[str, JointGroup]:
 
 
 def by_steps(
-    joints: Sequence[ModelJoint], drives: Drives, *, reset_noise: bool = True
+    joints: Sequence[ModelJoint], drives: Sequence[Drive], *, reset_noise: bool = True
 ) -> JointGroup:
     """Return a group whose numbers move its joints by steps.
 
@@ -51,8 +52,7 @@ def by_steps(
         drives: Their drives.
         reset_noise: Whether a reset adds joint noise.
     """
-    made = [drives.of(joint) for joint in joints]
-    steps = [drive.step for drive in made]
+    steps = [drive.step for drive in drives]
     return JointGroup(
         _names(joints),
         lower=alike([-step for step in steps]),
@@ -61,7 +61,7 @@ def by_steps(
         unit=joints[0].unit,
         reset_noise=reset_noise,
         limits=tuple(joint.span for joint in joints),
-        **drive_fields(made),
+        **drive_fields(drives),
     )
 
 

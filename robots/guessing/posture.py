@@ -22,7 +22,7 @@ BEST = 16  # of them, refined and then looked at for overlaps
 TRIES = 3  # rounds of that, each without the overlaps met before
 ROUNDS = 4  # of refinement, each with half the spread
 ROOM = 0.15  # rad, of each joint, in which nothing may overlap either
-ROOM_TRIES = 6  # random motions by so much
+ROOM_TRIES = 6  # random motions of all joints by so much, besides those of one alone
 OUT = 0.55  # of the reach; where the TCP is best, ahead of the limb's first joint
 NEAR, FAR = 0.35, 0.85  # of the reach; where it may be
 HEIGHT = 0.35  # of the reach, above the ground; best for an arm that stands on it
@@ -148,17 +148,20 @@ class PostureSearch:
         posture = self._stance.middle
         for choices in hands:
             made = [self._stance.with_joints(choice, posture) for choice in choices]
-            moved = {self._stance.tree.link(joint) for joint in self._moved(choices[0])}
+            hand = self._links(choices[0])
             inside = np.array(
-                [[self._hulls[i].link in moved for i in pair] for pair in self._pairs], bool
+                [[self._hulls[i].link in hand for i in pair] for pair in self._pairs], bool
             ).reshape(-1, 2)
-            pairs = self._pairs[inside.any(axis=1)]
+            pairs = self._pairs[inside.all(axis=1)]
             counts = [int(self._overlaps(tried, pairs).sum()) for tried in made]
             posture = made[counts.index(min(counts))]
         return posture
 
-    def _moved(self, joints: Mapping[str, float]) -> list[str]:
-        return [joint.child for joint in self._stance.model.moving if joint.name in joints]
+    def _links(self, joints: Mapping[str, float]) -> frozenset[int]:
+        """Return the links that some joints join, and what is rigid with them."""
+        model, tree = self._stance.model, self._stance.tree
+        ends = [end for j in model.moving if j.name in joints for end in (j.parent, j.child)]
+        return frozenset(tree.link(link) for end in ends for link in model.rigid_with(end))
 
     def _lowest(self) -> float:
         """Return the height of the ground: of the lowest point of the root's body (m)."""
@@ -242,36 +245,35 @@ class PostureSearch:
         drawn[:near, view.free] = np.clip(pulled, *view.room)
         fixed = np.delete(np.arange(len(posture)), view.free)
         drawn[:, fixed] = posture[fixed]
-        counts: list[tuple[int, int, Floats]] = []
+        counts: list[tuple[int, int, int, Floats]] = []
         met = np.zeros(len(pairs), bool)
         for _ in range(TRIES):
             pool = self._refined(view, self._without(pairs[met], drawn, view))
             for tried in pool:
                 overlaps = self._overlaps(tried, pairs)
-                near = overlaps.any() or self._near(view, tried, pairs)
-                if not near:
+                near = 0 if overlaps.any() else self._near(view, tried, pairs)
+                if not (overlaps.any() or near):
                     return tried
                 met |= overlaps
-                counts.append((int(overlaps.sum()), len(counts), tried))
-        return min(counts)[2]
+                counts.append((int(overlaps.sum()), near, len(counts), tried))
+        return min(counts)[3]
 
-    def _near(self, view: View, posture: Floats, pairs: NDArray[np.intp]) -> bool:
-        """Tell whether a small motion of a limb from a posture makes something overlap."""
-        shape = (ROOM_TRIES, len(view.free))
-        moves = np.random.default_rng(0).choice([-ROOM, ROOM], shape)
-        for move in moves:
-            moved = posture.copy()
-            moved[view.free] += np.where(view.slides, move * ROOM, move)
-            if self._overlaps(moved, pairs).any():
-                return True
-        return False
+    def _near(self, view: View, posture: Floats, pairs: NDArray[np.intp]) -> int:
+        """Return how many of some small motions of a limb make something overlap."""
+        count = len(view.free)
+        together = np.random.default_rng(0).choice([-ROOM, ROOM], (ROOM_TRIES, count))
+        moves = np.concatenate([together, ROOM * np.eye(count), -ROOM * np.eye(count)])
+        moved = np.tile(posture, (len(moves), 1))
+        moved[:, view.free] += np.where(view.slides, moves * ROOM, moves)
+        return sum(self._any(poses, pairs) for poses in self._stance.poses(moved))
 
     def _without(self, pairs: NDArray[np.intp], drawn: Floats, view: View) -> Floats:
         """Return the best of some postures in which some pairs do not overlap, or all if none."""
         order = np.argsort(self._cost(view, drawn), kind="stable")[: DRAWS // 4]
         if not len(pairs):
             return drawn
-        free = [i for i in order if not self._overlaps(drawn[i], pairs).any()]
+        poses = self._stance.poses(drawn[order])
+        free = [i for i, at in zip(order, poses, strict=True) if not self._any(at, pairs)]
         return drawn[free] if free else drawn
 
     def _refined(self, view: View, drawn: Floats) -> Floats:
@@ -288,6 +290,10 @@ class PostureSearch:
             pool = family[np.arange(len(pool)), cost.argmin(axis=1)]
             spread = spread / 2
         return pool[np.argsort(self._cost(view, pool), kind="stable")]
+
+    def _any(self, poses: Floats, pairs: NDArray[np.intp]) -> bool:
+        """Tell whether anything overlaps where the links have some poses, (links, 4, 4)."""
+        return len(pairs) > 0 and any(overlapping(self._hulls, poses, pairs))
 
     def _overlaps(self, posture: Floats, pairs: NDArray[np.intp]) -> NDArray[np.bool_]:
         if not len(pairs):

@@ -56,10 +56,9 @@ def find_reach(
     origins = tree.origins.copy()
     origins[tree.parents == 0, :2, 3] -= base[:2]
     tree = replace(tree, origins=origins)
-    poses = tree.forward(start[None])[0]
+    poses = tree.forward(start[None])
     palm = tree.link(limb.palm)
-    tips = [tree.link(link) for link in tool.origins]
-    point = transform(inverse_pose(poses[palm]), poses[tips, :3, 3]).mean(axis=0)
+    point = transform(inverse_pose(poses[0, palm]), tool.on(tree).places(poses)[0])
     moving = [joint for joint in limb.arm if not _flies(joint)]
     starts = _postures(tree, start, moving)
     free = [tree.coordinates.index(joint.name) for joint in moving]

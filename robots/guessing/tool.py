@@ -6,10 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinematics.rotations import Floats, inverse_pose, transform
+from kinematics.tree import Tree
+from robots.descriptor import Vector3
 from robots.guessing import words
 from robots.guessing.anatomy import Limb
 from robots.guessing.fingertips import Fingertips
 from robots.guessing.stance import Stance
+from robots.urdf.tcp import Tcp, place_tcp
 
 BETWEEN = 0.05  # m; a frame named like a tool counts if it is so near to the place between tips
 EXACT = 0.02  # m; farther away, the reason says so
@@ -25,16 +29,17 @@ class Tool:
         link: Link whose frame orients it.
         links: Links whose mean origin is its position; empty for ``link``.
         reason: Why, one sentence.
+        offset: From there to its position, in the frame of ``link`` (m).
     """
 
     link: str
     links: tuple[str, ...]
     reason: str
+    offset: Vector3 = (0.0, 0.0, 0.0)
 
-    @property
-    def origins(self) -> tuple[str, ...]:
-        """The links whose mean origin is its position."""
-        return self.links or (self.link,)
+    def on(self, tree: Tree) -> Tcp:
+        """Return it on a tree that has its links."""
+        return place_tcp(tree, self.link, self.links, self.offset)
 
 
 def find_tool(stance: Stance, limb: Limb, tips: Fingertips | None) -> Tool:
@@ -98,6 +103,11 @@ def _between(stance: Stance, limb: Limb, rigid: list[str], tips: Fingertips, whi
 
     ends = [link for link in rigid if words.is_tool(link) or words.has(link, words.HAND)]
     ends += [limb.palm] if words.has(limb.palm, words.HAND) else []
+    still = tuple(link for link in rigid if words.has(link, words.TIP))
+    if len(still) > 1:  # of fingers that are fixed
+        if off(still) <= BETWEEN:
+            return _mean(limb, still, which, off(still))
+        ends = [link for link in ends if link not in still]
     named = min(((off((link,)), link) for link in ends), default=(np.inf, ""))
     if named[0] <= BETWEEN:
         reason = f"{which}: the link {named[1]}, which lies between the finger tips"
@@ -105,6 +115,8 @@ def _between(stance: Stance, limb: Limb, rigid: list[str], tips: Fingertips, whi
     frames = _grasping(stance, tips)
     if off(frames) <= BETWEEN:
         return _mean(limb, frames, which, off(frames))
+    if tips.solid:
+        return _beside(stance, limb, which, off((limb.palm,)), middle)
     choices: list[tuple[str, ...]] = [(limb.palm,), *((link,) for link in rigid), frames]
     distance, best = min((off(links), links) for links in choices)
     if best == frames:
@@ -117,6 +129,17 @@ def _mean(limb: Limb, links: tuple[str, ...], which: str, distance: float) -> To
     listing = ", ".join(links[:-1]) + f" and {links[-1]}"
     reason = f"{which}: the middle of {listing}, turned as {limb.palm}"
     return Tool(limb.palm, links, reason + _apart(distance))
+
+
+def _beside(stance: Stance, limb: Limb, which: str, distance: float, middle: Floats) -> Tool:
+    """Return the place between the finger tips as seen from the palm."""
+    palm = stance.poses(stance.middle)[0, stance.tree.link(limb.palm)]
+    x, y, z = (round(value, 4) + 0.0 for value in transform(inverse_pose(palm), middle).tolist())
+    reason = (
+        f"{which}: {distance * 100:.0f} cm from the link {limb.palm}, where the finger tips meet"
+        " and no frame lies"
+    )
+    return Tool(limb.palm, (), reason, (x, y, z))
 
 
 def _grasping(stance: Stance, tips: Fingertips) -> tuple[str, ...]:

@@ -39,9 +39,9 @@ class View:
         self.slides = np.array([joint.unit == "m" for joint in joints])
         margin = 1.5 * MARGIN * half * 2
         self.room = self.limits + np.array([margin, -margin])
-        links = [stance.tree.link(name) for name in (*tool.origins, limb.palm)]
+        links = [*tool.on(stance.tree).needed, stance.tree.link(limb.palm)]
         self._tree = stance.tree.towards(links)
-        self._tcp = [self._tree.link(name) for name in tool.origins]
+        self._tcp = tool.on(self._tree)
         self._palm = self._tree.link(limb.palm)
         first = self._tree.link(joints[0].child)
         pose = stance.poses(stance.middle)[0, stance.tree.link(joints[0].child)]
@@ -59,7 +59,7 @@ class View:
     def look(self, postures: Floats) -> tuple[Floats, Floats]:
         """Return the poses of the limb's links, and the TCP from the shoulder (postures, 3)."""
         poses = self._tree.forward(postures)
-        return poses, poses[:, self._tcp][..., :3, 3].mean(axis=1) - self.shoulder
+        return poses, self._tcp.places(poses) - self.shoulder
 
     def places(self, postures: Floats) -> Floats:
         """Return the TCP from the shoulder, (postures, 3) (m)."""
@@ -67,6 +67,6 @@ class View:
 
     def pointing(self, poses: Floats) -> Floats:
         """Return which way the tool points, seen from the palm, (postures, 3); 0 if nowhere."""
-        way = poses[:, self._tcp][..., :3, 3].mean(axis=1) - poses[:, self._palm, :3, 3]
+        way = self._tcp.places(poses) - poses[:, self._palm, :3, 3]
         length = np.linalg.norm(way, axis=1, keepdims=True)
         return np.where(length > 0.01, way / np.maximum(length, 1e-9), 0.0)

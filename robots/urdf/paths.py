@@ -17,7 +17,7 @@ with ``colcon build --symlink-install`` do.
 from __future__ import annotations
 
 import posixpath
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from urllib.parse import unquote
 
 from robots.common.errors import AssetError
@@ -46,10 +46,11 @@ def resolve(reference: str, urdf: str, exists: Exists) -> str:
         AssetError: If it is no path, or leads out of the folders that the URDF may refer to.
     """
     folder = posixpath.dirname(urdf)
+    roots = _roots(folder, exists)
     allowed = [
         path
         for path, package in _candidates(reference, urdf, exists)
-        if is_allowed(path, folder, exists) or (package and _inside(path, package))
+        if _is_below(path, folder, roots) or (package and _inside(path, package))
     ]
     if not allowed:
         raise AssetError(
@@ -68,9 +69,13 @@ def is_allowed(path: str, folder: str, exists: Exists) -> bool:
         folder: Folder of the URDF, absolute or relative to its package.
         exists: Whether a path exists.
     """
+    return _is_below(path, folder, _roots(folder, exists))
+
+
+def _is_below(path: str, folder: str, roots: Iterable[str]) -> bool:
     if not posixpath.isabs(folder):
         return not (posixpath.isabs(path) or path == ".." or path.startswith("../"))
-    if any(_inside(path, root) for root in _roots(folder, exists)):
+    if any(_inside(path, root) for root in roots):
         return True
     around = posixpath.dirname(folder)
     return _inside(path, around) and _is_mesh_folder(posixpath.relpath(path, around))
@@ -106,16 +111,17 @@ def _local(path: str, reference: str, urdf: str) -> str:
     return path
 
 
-def _roots(folder: str, exists: Exists) -> Iterator[str]:
-    yield folder
-    around = posixpath.dirname(folder)
+def _roots(folder: str, exists: Exists) -> list[str]:
+    """Return the folders in which files may lie that a URDF refers to; none by a relative one."""
+    if not posixpath.isabs(folder):
+        return []
+    roots = [folder, _local_copy()]
     if posixpath.basename(folder).lower() in URDF_FOLDERS:
-        yield around
+        roots.append(posixpath.dirname(folder))
     for parent in (folder, *_parents(folder)):
         if any(exists(posixpath.join(parent, mark)) for mark in PACKAGE_MARKS):
-            yield parent
-            break
-    yield _local_copy()
+            return [*roots, parent]
+    return roots
 
 
 def _local_copy() -> str:

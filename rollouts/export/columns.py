@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-import tasks
-from layouts import Layout, Placement
 from robots import RobotDescriptor
-from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
+from rollouts.reading.trajectory import Trajectory, TrajectoryError
 from tasks import MultiRobotTask
+from tasks.engine.columns import placed_bodies
 from tasks.episode import States
-from tasks.native.format import articulation_keys, declared_joints, mode_by_arm
+from tasks.native.format import articulation_keys, declared_joints
 
 Floats = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -72,7 +69,6 @@ class ColumnReader:
     def __init__(self, task: MultiRobotTask) -> None:
         """Take the names from a task and its robots."""
         self.task = task
-        world = task.simulation.worlds[0]
         placements = task.layout.items()
         self.action_names = [
             f"{place}.{name}" for place, p in placements for name in action_names(p.robot)
@@ -80,11 +76,7 @@ class ColumnReader:
         self.joint_names = [
             f"{place}.{joint}" for place, p in placements for joint in p.robot.joints
         ]
-        self.bodies = [
-            name
-            for name, body in world.bodies.items()
-            if body.kind != "static" and not body.anchored
-        ]
+        self.bodies = placed_bodies(task.simulation.worlds[0])
         self.body_names = [f"{body}.{number}" for body in self.bodies for number in POSE]
         self._keys = articulation_keys(task.layout)
         self._dof = {place: p.robot.dof for place, p in placements}
@@ -188,51 +180,6 @@ def succeeded(trajectory: Trajectory) -> bool:
             " episodes, without only_successes"
         )
     return bool(trajectory.success[-1])
-
-
-def make_task(file: TrajectoryFile, *, pictures: bool = False) -> MultiRobotTask:
-    """Make the task of a recording, with its robots where they stood.
-
-    Args:
-        file: The recording.
-        pictures: Whether to draw its worlds.
-
-    Raises:
-        UnknownNameError: If there is no such task or robot.
-        TaskError: If the task cannot be made like that.
-        AssetError: If robot files cannot be found.
-        TrajectoryError: If it is not the world of the recording even so.
-    """
-    recorded = file.simulation or {}
-    layout = recorded_layout(file.layout) if file.layout else None
-    own = layout or tasks.get_task_class(file.task_id).scenario.layout
-    task = tasks.make(
-        file.task_id,
-        layout=layout,
-        obs_mode="none",
-        control_mode=mode_by_arm(file.control_mode, own),
-        render_mode="rgb_array" if pictures else None,
-        **{name: recorded[name] for name in ("control_frequency",) if name in recorded},
-    )
-    file.expect(task.task_id, task.layout.action_dim)
-    file.expect_world(task)
-    return task
-
-
-def recorded_layout(described: Mapping[str, Mapping[str, Any]]) -> Layout:
-    """Return the layout that `rollouts.reading.provenance.describe_layout` described."""
-    return Layout(
-        {
-            place: Placement(
-                robot["robot"],
-                tuple(robot["position"]),
-                tuple(robot["quaternion"]),
-                robot["keyframe"],
-                robot["qpos_noise"],
-            )
-            for place, robot in described.items()
-        }
-    )
 
 
 def _done(trajectory: Trajectory) -> Flags:

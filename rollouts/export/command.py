@@ -26,6 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--fps", type=int, metavar="N", help="steps per second to state (default: the task's, 20)")
     add("--video", action="store_true", help="draw every step, too (lerobot; needs Vulkan)")
     add("--only-successes", action="store_true", help="leave out episodes that end in failure")
+    add("--task", help="the recording's task; MODULE:ID for one of your own")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -47,6 +48,7 @@ def run(options: argparse.Namespace) -> int:
         fps=options.fps,
         video=options.video,
         only_successes=options.only_successes,
+        task=options.task,
     )
     with LiveLine(unit="episodes") as line:
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -10,9 +10,12 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from layouts import Layout
+from layouts.placement import RobotLike
 from robots import MissingPackageError, TaskError, UnknownNameError
-from rollouts.export.columns import ColumnReader, Columns, make_task, succeeded
+from rollouts.export.columns import ColumnReader, Columns, succeeded
 from rollouts.export.folder import new_folder, refuse_used
+from rollouts.reading.recorded_task import task_class, task_for
 from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
 from tasks.description import read_docstring
 
@@ -35,6 +38,9 @@ class Export:
             task if None.
         video: Whether pictures of the episodes are drawn (``"lerobot"`` only).
         only_successes: Whether episodes whose last step is no success are left out.
+        task: The recording's task; ``module:Id`` for one of a module that no package lists.
+        layout: Where its robots stood, where the recording cannot say it.
+        robots: Which robots these were, where the recording cannot say it.
     """
 
     recording: str | PathLike[str]
@@ -43,6 +49,9 @@ class Export:
     fps: int | None = None
     video: bool = False
     only_successes: bool = False
+    task: str | None = None
+    layout: Layout | None = None
+    robots: Mapping[str, RobotLike] | None = None
 
 
 @dataclass(frozen=True)
@@ -83,7 +92,8 @@ def export(wanted: Export, progress: Progress = lambda done, total: None) -> Exp
     with TrajectoryFile(wanted.recording) as file:
         if not len(file):
             raise TrajectoryError(f"{file.path} holds no episodes; there is nothing to export")
-        task = make_task(file, pictures=wanted.video)
+        task_class(file, wanted.task)
+        task = task_for(file, layout=wanted.layout, robots=wanted.robots, pictures=wanted.video)
         reader = ColumnReader(task)
         episodes = steps = 0
         with new_folder(out) as folder, _writer(wanted, folder, file, reader) as add:

@@ -22,9 +22,9 @@ from rollouts.export.statistics import (
     flatten,
 )
 from rollouts.export.writer import DatasetWriter
+from tasks.engine.columns import CAMERA, lerobot_columns
 
 VERSION = "v3.0"
-CAMERA = "observation.images.overview"
 FILE = "chunk-{chunk_index:03d}/file-{file_index:03d}"
 DATA_PATH = f"data/{FILE}.parquet"
 EPISODES_PATH = f"meta/episodes/{FILE}.parquet"
@@ -153,11 +153,10 @@ class LeRobotWriter(DatasetWriter):
         steps = len(columns)
         frames = np.arange(steps)
         reader, whole = self._reader, np.full(steps, 0)
+        observed = lerobot_columns(columns.qpos, columns.qvel, columns.bodies)
         vectors: list[tuple[str, Sequence[str], Number]] = [
             ("action", reader.action_names, columns.actions),
-            ("observation.state", reader.joint_names, _joined(columns.qpos)[:-1]),
-            ("observation.velocity", reader.joint_names, _joined(columns.qvel)[:-1]),
-            ("observation.environment_state", reader.body_names, columns.bodies[:-1]),
+            *((key, self._names(key), rows[:-1]) for key, rows in observed.items()),
         ]
         scalars: list[tuple[str, Number | None]] = [
             ("next.reward", columns.rewards),
@@ -172,12 +171,16 @@ class LeRobotWriter(DatasetWriter):
         features = {
             key: (_feature("float32", len(names), list(names)), values)
             for key, names, values in vectors
-            if names
         }
         for key, values in scalars:
             if values is not None:
                 features[key] = (_feature(values.dtype.name, 1, None), values[:, None])
         return features
+
+    def _names(self, observed: str) -> Sequence[str]:
+        """Return what each number of a feature that is observed is called."""
+        is_bodies = observed == "observation.environment_state"
+        return self._reader.body_names if is_bodies else self._reader.joint_names
 
     def _film(
         self, pictures: Iterable[NDArray[np.uint8]], watch: Callable[[int], None]
@@ -322,10 +325,6 @@ def _array(values: Number) -> Any:
 
 def _keys(prefix: str, place: Place) -> dict[str, Any]:
     return {f"{prefix}/{name}": index for name, index in vars(place).items()}
-
-
-def _joined(parts: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
-    return np.concatenate(list(parts.values()), 1)
 
 
 def _write_json(path: Path, content: Mapping[str, Any]) -> None:

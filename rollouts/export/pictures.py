@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from robots import MissingPackageError, SimulationError
 from rollouts.export.columns import Columns, state_row
 from rollouts.reading.trajectory import TrajectoryError
-from rollouts.video import INSTALL, overview
+from rollouts.video import INSTALL
 from simulation.rendering.pictures import SIZE, Cameras, vulkan_problem
 from tasks import MultiRobotTask
+from tasks.engine.columns import overview
 from tasks.episode import States, follow, moments
 
 SHAPE = (SIZE, SIZE, 3)

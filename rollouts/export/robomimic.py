@@ -13,6 +13,7 @@ import numpy as np
 from robots.control_modes import plain_mode
 from rollouts.export.columns import POSE, ColumnReader, Columns, Floats
 from rollouts.export.writer import DatasetWriter
+from tasks.engine.columns import robomimic_columns
 from tasks.episode import States
 
 FILE_NAME = "low_dim.hdf5"  # what robomimic calls observations without pictures
@@ -50,7 +51,9 @@ class RobomimicWriter(DatasetWriter):
         demo["dones"] = columns.done.astype(np.int64)
         if columns.rewards is not None:
             demo["rewards"] = columns.rewards
-        for key, rows in self._observations(columns).items():
+        tcp_poses = self._reader.tcp_poses(columns)
+        observed = robomimic_columns(columns.qpos, columns.qvel, tcp_poses, columns.bodies)
+        for key, rows in observed.items():
             demo[f"obs/{key}"] = rows[:-1]
             demo[f"next_obs/{key}"] = rows[1:]
         if "state_layout" not in self._data.attrs:
@@ -58,18 +61,6 @@ class RobomimicWriter(DatasetWriter):
         if columns.success is not None and columns.success[-1]:
             self._solved.append(name)
         self._total += steps
-
-    def _observations(self, columns: Columns) -> dict[str, Floats]:
-        """Return what is observed after the reset and after each step, each (T + 1, k)."""
-        parts: dict[str, Floats] = {}
-        tcp_poses = self._reader.tcp_poses(columns)
-        for place in columns.qpos:
-            parts[f"{place}_qpos"] = columns.qpos[place]
-            parts[f"{place}_qvel"] = columns.qvel[place]
-            parts[f"{place}_tcp_pose"] = tcp_poses[place]
-        if self._reader.bodies:
-            parts["object"] = columns.bodies
-        return parts
 
     def _let_go(self) -> None:
         self._file.close()

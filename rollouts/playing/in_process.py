@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import random
 from collections.abc import Callable, Generator, Iterable
 from typing import Any
 
-import numpy as np
 import torch
 
 from rollouts.playing.events import Event, Play
+from rollouts.playing.randomness import random_states, set_random_states
 from rollouts.playing.transport import as_ours
 
 
@@ -61,11 +60,9 @@ class _Inside:
 
 
 def _settings() -> tuple[Any, ...]:
-    return torch.get_num_threads(), random.getstate(), np.random.get_state(), torch.get_rng_state()
+    return torch.get_num_threads(), random_states()
 
 
-def _set(threads: int, python: Any, numpy: Any, of_torch: torch.Tensor) -> None:
+def _set(threads: int, states: tuple[Any, ...]) -> None:
     torch.set_num_threads(threads)
-    random.setstate(python)
-    np.random.set_state(numpy)
-    torch.set_rng_state(of_torch)
+    set_random_states(states)

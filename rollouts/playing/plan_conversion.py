@@ -18,11 +18,15 @@ DELTAS, POSITIONS = CONTROL_MODES[:2]  # all experts plan in deltas
 
 
 class Planner:
-    """What an expert does in the episodes of a task, in the task's control mode."""
+    """What an expert does in the episodes of a task, in the task's control mode.
+
+    Attributes:
+        reason: Why its last plan does not solve the episode, in words, if the expert says so.
+    """
 
     def __init__(self, task: MultiRobotTask, expert: Expert) -> None:
         """Make a task in deltas for the expert to plan for, if this one is in another mode."""
-        self._task, self._expert, self._played = task, expert, task
+        self._task, self._expert, self._played, self.reason = task, expert, task, ""
         self._converts = task.scenario.control_mode != DELTAS
         if self._converts:
             self._task = type(task)(replace(task.scenario, control_mode=DELTAS))
@@ -34,6 +38,7 @@ class Planner:
         the task is stepped to find them.
         """
         actions = self._expert(self._task, seed)
+        self.reason = getattr(actions, "reason", "")
         if not self._converts:
             return actions
         if self._played.scenario.control_mode == POSITIONS:

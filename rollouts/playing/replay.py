@@ -10,15 +10,28 @@ from typing import Literal
 import numpy as np
 
 from robots import TaskError
+from robots.common.commands import program
+from rollouts.reading.recorded_task import task_class, task_for
 from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
-from tasks import MultiRobotTask, get_task_class, make
+from tasks import MultiRobotTask, get_task_class
 from tasks.episode import States, play
-from tasks.native.format import mode_by_arm
 
 Start = Literal["seed", "state"]
 STARTS: tuple[Start, ...] = ("seed", "state")
 
 FILE = "trajectory.h5"
+
+__all__ = [
+    "STARTS",
+    "Replayed",
+    "Start",
+    "StateDifference",
+    "find_official",
+    "first_difference",
+    "open_recording",
+    "replay",
+    "task_for",
+]
 
 
 @dataclass(frozen=True)
@@ -88,10 +101,11 @@ def open_recording(path: Path | None, task_id: str | None) -> TrajectoryFile:
             raise TaskError("neither a file nor a task is given to replay")
         path = find_official(get_task_class(task_id).task_id)
     file = TrajectoryFile(path / FILE if path.is_dir() else path)
-    recorded = get_task_class(file.task_id)
-    if task_id is not None and recorded is not get_task_class(task_id):
-        wanted = get_task_class(task_id).task_id
-        raise TrajectoryError(f"{file.path} was recorded in {file.task_id}, not in {wanted}")
+    try:
+        task_class(file, task_id)
+    except BaseException:
+        file.close()
+        raise
     return file
 
 
@@ -121,24 +135,9 @@ def find_official(task_id: str) -> Path:
     if not playable:
         raise TrajectoryError(
             f"there is no recording of {task_id} in {folder} that can be played; give a file, or"
-            f" record one with `python -m rollouts record`{''.join(reasons)}"
+            f" record one with `{program('rollouts')} record`{''.join(reasons)}"
         )
     return min(playable)[1]
-
-
-def task_for(file: TrajectoryFile) -> MultiRobotTask:
-    """Make the task that a file was recorded in, in the file's control mode.
-
-    Raises:
-        TrajectoryError: If the file's layout, robot files, physics or actions are not those of
-            the task here.
-    """
-    layout = get_task_class(file.task_id).scenario.layout
-    mode = mode_by_arm(file.control_mode, layout)
-    task = make(file.task_id, obs_mode="none", control_mode=mode)
-    file.expect(task.task_id, task.layout.action_dim)
-    file.expect_world(task)
-    return task
 
 
 def replay(task: MultiRobotTask, trajectory: Trajectory, start: Start = "seed") -> Replayed:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robots.common.commands import printable
+from tasks.cell_options import add_cell_options, chosen_cell
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -47,7 +48,12 @@ def add_recording(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="the h5 file, or the folder of a recording",
     )
-    add("--task", help="its task; without FILE, find its official one in $MS_ASSET_DIR/demos")
+    add(
+        "--task",
+        help="its task, MODULE:ID for one of your own; without FILE, find its official one in"
+        " $MS_ASSET_DIR/demos",
+    )
+    add_cell_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -64,7 +70,7 @@ def run(options: argparse.Namespace) -> int:
 
     torch.set_num_threads(1)
     with open_recording(options.file, options.task) as file:
-        task = task_for(file)
+        task = task_for(file, **chosen_cell(options))
         count = len(file) if options.episodes is None else max(0, min(options.episodes, len(file)))
         found: list[Replayed] = []
         with LiveLine(count, "episodes") as line:

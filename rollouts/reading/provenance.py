@@ -82,8 +82,9 @@ def describe_layout(layout: Layout) -> dict[str, dict[str, Any]]:
 
 
 def _describe_group(group: JointGroup) -> dict[str, Any]:
-    """Return a joint group's fields; those for control modes only where they say something."""
+    """Return a joint group's fields; those that recordings of old lack only where they count."""
     silent = set[str]() if group.asks.tcp else {"frame", "root_link"}
+    silent |= set() if any(group.armatures) else {"armature"}
     silent |= {"command"} if group.command == "position" else set()
     silent |= set() if group.target else {"target"}
     return {name: value for name, value in asdict(group).items() if name not in silent}

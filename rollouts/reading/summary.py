@@ -52,6 +52,7 @@ _SUMMARY = fields(
                     fields({}, {"control_mode": maybe(_MODE), "sim_backend": maybe(NAME)})
                 ),
                 "max_episode_steps": maybe(_STEPS),
+                "module": maybe(NAME),
             },
         ),
         "episodes": items(fields({"episode_id": whole(0, 2**31 - 1)}, _EPISODE)),
@@ -94,6 +95,7 @@ class Summary:
 
     Attributes:
         task_id: Id of the task that was recorded.
+        module: Module of a user's own that registers it, or None.
         env_kwargs: What native's environment was made with.
         control_mode: Control mode of every episode, or those of arms: by their names in the
             layout, or by native's of robots.
@@ -103,6 +105,7 @@ class Summary:
     """
 
     task_id: str
+    module: str | None
     env_kwargs: dict[str, Any]
     control_mode: str | dict[str, str]
     max_episode_steps: int | None
@@ -122,6 +125,7 @@ def read_summary(path: Path) -> Summary:
     env_kwargs = info.get("env_kwargs") or {}
     return Summary(
         task_id=info["env_id"],
+        module=info.get("module"),
         env_kwargs=env_kwargs,
         control_mode=_common_mode(
             path, episodes, env_kwargs.get("control_mode"), own="layout" in found

@@ -17,6 +17,7 @@ from robots import UnreadableFileError, closest_match
 from robots.common.files import open_regular
 from rollouts.reading.damage import damage_errors
 from rollouts.reading.episode_checksum import ARRAYS, CHECKSUM, STATES, TEXTS, checksum
+from rollouts.reading.guessed_robots import GUESSED
 from rollouts.reading.hdf5_file import Hdf5File, Shapes
 from rollouts.reading.provenance import (
     LAYOUT,
@@ -83,11 +84,13 @@ class TrajectoryFile(Sequence[Trajectory]):
     Attributes:
         path: The h5 file.
         task_id: Id of the task that was recorded.
+        module: Module of a user's own that registers the task; None if every process knows it.
         control_mode: Control mode of every episode.
         max_episode_steps: Control steps until an episode was truncated, or None.
         env_kwargs: What native's environment was made with.
         source_type: Where the actions come from, in ManiSkill's words, or None.
         layout: What `rollouts.reading.provenance.describe_layout` wrote; None in native's files.
+        guessed: What `rollouts.reading.guessed_robots.describe_guessed` wrote, or None.
         simulation: What `rollouts.reading.provenance.describe_simulation` wrote; None in native's
             files.
         action_split: Robot name → slice of the flat action; None in native's files.
@@ -107,14 +110,19 @@ class TrajectoryFile(Sequence[Trajectory]):
         self.path = Path(path)
         expect_file(self.path, (".h5",))
         summary = read_summary(self.path)
-        self.task_id, self.env_kwargs = summary.task_id, summary.env_kwargs
+        self.task_id, self.module, self.env_kwargs = (
+            summary.task_id,
+            summary.module,
+            summary.env_kwargs,
+        )
         self.control_mode = summary.control_mode
         self.max_episode_steps, self.source_type = summary.max_episode_steps, summary.source_type
         self._entries = summary.episodes
         self.seeds = tuple(entry.seed for entry in self._entries)
         with self._damage("this h5 file"):
             self._file = Hdf5File(self.path)
-            described = self._file.texts(names=("layout", "simulation")) or {}
+            described = self._file.texts(names=("layout", "simulation", "guessed")) or {}
+            self.guessed = read_described(described, "guessed", GUESSED)
             self.layout = read_described(described, "layout", LAYOUT)
             self.simulation = read_described(described, "simulation", SIMULATION)
             self.action_split = action_split(self.layout) if self.layout else None

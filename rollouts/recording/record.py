@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import torch
 
 import tasks
 from experts import find_expert
 from experts.registry import Expert
+from layouts import Layout
+from layouts.placement import RobotLike
 from robots import CONTROL_MODES, RecordingError
 from rollouts.playing.executor import (
     EPISODE_SECONDS,
@@ -29,6 +32,7 @@ from rollouts.recording.episode_files import PartWriter
 from rollouts.recording.recorder import Recorder
 from tasks import MultiRobotTask, Scenario
 from tasks.episode import Score, play
+from tasks.registry import make_scenario
 
 FILE = "trajectory.h5"
 
@@ -75,7 +79,8 @@ class _Player:
     def __call__(self, seed: int) -> tuple[Score, bytes]:
         """Play and encode the episode of a seed."""
         episode = play(self._env, seed, self._plan(seed))
-        return episode.score, self._writer.encode(episode)
+        reason = "" if episode.solved else self._plan.reason
+        return replace(episode.score, reason=reason), self._writer.encode(episode)
 
     def close(self) -> None:
         """Let the worlds go."""
@@ -122,6 +127,9 @@ def record(
     workers: int | None = None,
     episode_timeout: float | None = EPISODE_SECONDS,
     control_mode: str | Mapping[str, str] = CONTROL_MODES[0],
+    layout: Layout | None = None,
+    robots: RobotLike | Mapping[str, RobotLike] | None = None,
+    bystanders: str | None = None,
     on_event: Callable[[Summary, Event | None], None] = lambda summary, event: None,
 ) -> Summary:
     """Record the episodes of some seeds; those that are in the folder already are kept.
@@ -137,6 +145,9 @@ def record(
         episode_timeout: Seconds that an episode may take in a worker until that is ended and the
             episode played again, three times in all; None if it may take for ever.
         control_mode: Control mode of the recorded actions, or those by arm.
+        layout: Where robots stand, if not where the task's own do; see `tasks.make`.
+        robots: Other robots for some places; see `tasks.make`.
+        bystanders: What robots do that have no place in the task; see `tasks.Scenario`.
         on_event: Called once at the start without an event, and after every event.
 
     Raises:
@@ -151,8 +162,8 @@ def record(
     executor = choose_executor(workers, executor, episode_timeout)
     cls, expert = tasks.get_task_class(task_id), find_expert(task_id)
     seeds = checked_seeds(seeds)
-    scenario = cls.scenario
-    scenario.control_mode = control_mode
+    cell: dict[str, Any] = {"layout": layout, "robots": robots, "bystanders": bystanders}
+    scenario = make_scenario(cls, control_mode=control_mode, **cell)
     description = f"{getattr(expert, '__module__', '')}:{getattr(expert, '__qualname__', expert)}"
     env = cls(scenario)
     summary = Summary()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from robots import CONTROL_MODES, RecordingError
 from rollouts.playing import command_options as workers
 from rollouts.playing.command_options import INTERRUPTED, one_or_more, stop_signals, zero_or_more
+from tasks.cell_options import add_cell_options, chosen_cell
 
 if TYPE_CHECKING:
     from rollouts.playing.executor import Event
@@ -27,11 +28,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.epilog = EPILOG
     add = parser.add_argument
-    add("--task", required=True, help="task id")
+    add("--task", required=True, help="task id; MODULE:ID for one of your own")
     add("--episodes", type=one_or_more, required=True, metavar="N", help="how many episodes")
     workers.add_arguments(parser)
     add("--seed", type=zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
     add("--out", type=Path, required=True, metavar="DIR", help="folder of trajectory.h5 and .json")
+    add_cell_options(parser)
     workers.add_control_mode(parser, default=CONTROL_MODES[0])
 
 
@@ -56,6 +58,7 @@ def run(options: argparse.Namespace) -> int:
                 options.out,
                 executor,
                 control_mode=options.control_mode,
+                **chosen_cell(options),
                 on_event=status.show,
             )
     except KeyboardInterrupt:

@@ -16,6 +16,7 @@ from robots import CONTROL_MODES, RecordingError, UnreadableFileError
 from robots.common.files import open_regular, read_text
 from robots.common.writing import PARTIAL, write_whole
 from robots.control_modes import plain_mode
+from rollouts.reading.guessed_robots import describe_guessed
 from rollouts.reading.provenance import describe_layout, describe_simulation, differences, listing
 from rollouts.reading.summary import MAX_JSON
 from rollouts.recording.disk import claim, disk_errors
@@ -32,10 +33,12 @@ from rollouts.recording.trajectory_writer import join, read_joined
 from tasks import MultiRobotTask
 from tasks.episode import PlayedEpisode
 from tasks.native.format import observation_keys
+from tasks.registry import full_name
 
 __all__ = ["Recorder", "describe_layout"]
 
-SOURCE = ("source_type", "source_desc")  # may change from one resumption to the next
+# What may change from one resumption to the next, and what earlier versions did not write.
+NOT_COMPARED = ("source_type", "source_desc", "guessed")
 
 
 class _Entry(NamedTuple):
@@ -224,11 +227,7 @@ class Recorder:
             part.unlink()
 
     def _expect_same(self, path: Path, header: Mapping[str, Any]) -> None:
-        before, now = (
-            {name: value for name, value in about.items() if name not in SOURCE}
-            for about in (header, self._header)
-        )
-        found = differences(before, now)
+        found = differences(_compared(header), _compared(self._header))
         if found:
             raise RecordingError(
                 f"{path} was recorded with something else, so this recording cannot go on there"
@@ -265,9 +264,11 @@ class Recorder:
 
 def _header(task: MultiRobotTask, source: str, source_desc: str | None) -> dict[str, Any]:
     """Return what the json and the attributes of every file say about all episodes."""
+    name, guessed = full_name(type(task)), describe_guessed(task.scenario.layout)
     return {
         "env_info": {
             "env_id": task.task_id,
+            **({"module": name.rpartition(":")[0]} if ":" in name else {}),
             "env_kwargs": {
                 "obs_mode": "none",
                 "reward_mode": task.reward_mode,
@@ -280,7 +281,15 @@ def _header(task: MultiRobotTask, source: str, source_desc: str | None) -> dict[
         "source_desc": source_desc,
         "layout": describe_layout(task.layout),
         "simulation": describe_simulation(task),
+        **({"guessed": guessed} if guessed else {}),
     }
+
+
+def _compared(header: Mapping[str, Any]) -> dict[str, Any]:
+    about = {name: value for name, value in header.items() if name not in NOT_COMPARED}
+    if isinstance(info := about.get("env_info"), dict):
+        about["env_info"] = {name: value for name, value in info.items() if name != "module"}
+    return about
 
 
 def _expect_file_or_nothing(path: Path) -> None:

@@ -50,6 +50,8 @@ class InverseKinematics:
             )
         self._arm = arm = ArmModel(world, robot)
         self.joints = arm.joints
+        x, y, z = descriptor.tcp_offset
+        self._offset = sapien.Pose([x, y, z]) if x or y or z else None
         self._keyframes = np.array([*descriptor.keyframes.values()], float)
 
     def solve(self, position: Numbers, quaternion: Numbers, start_qpos: Numbers) -> Floats | None:
@@ -74,6 +76,8 @@ class InverseKinematics:
             Positions in the order of ``joints``, each (arm joints,) (rad).
         """
         target = self._arm.base.inv() * sapien.Pose(list(position), list(quaternion))
+        if self._offset is not None:
+            target = target * self._offset.inv()
         all_joints = np.asarray(start_qpos, float)
         found: list[Floats] = []
         for start in self._starts(all_joints):
@@ -97,7 +101,10 @@ class InverseKinematics:
         Args:
             arm_qpos: Positions in the order of ``joints``, shape (arm joints,) (rad).
         """
-        return self._arm.forward(arm_qpos)
+        if self._offset is None:
+            return self._arm.forward(arm_qpos)
+        pose = self._arm.tcp_pose(arm_qpos) * self._offset
+        return np.array(pose.p, float), np.array(pose.q, float)
 
     def _starts(self, qpos: Floats) -> Iterator[Floats]:
         yield qpos

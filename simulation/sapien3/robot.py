@@ -126,10 +126,12 @@ class SimulatedRobot:
     def _set_drives(self) -> None:
         joints = iter(self.driven)
         for group in self.descriptor.action_split.groups.values():
-            for drive in group.drives:
+            for drive, armature in zip(group.drives, group.armatures, strict=True):
                 joint = next(joints)
                 joint.set_drive_properties(*drive, "force")
                 joint.set_friction(group.friction)
+                if armature:
+                    joint.set_armature(np.array([armature], np.float32))
 
 
 def _speeds(descriptor: RobotDescriptor, model: UrdfModel) -> NDArray[np.float32]:

@@ -50,7 +50,8 @@ class ActionReader:
         for name in action:
             if name not in self._split:
                 raise UnknownNameError("robot of this layout", name, self._split)
-        missing = [name for name in self._split if name not in action]
+        needed = [name for name, part in self._split.items() if part.stop > part.start]
+        missing = [name for name in needed if name not in action]
         if missing:
             raise ActionError(
                 f"the action has no numbers for {missing}; the robots are {list(self._split)}"
@@ -58,6 +59,7 @@ class ActionReader:
         parts = [
             self._array(action[name], part.stop - part.start, f"the action of {name!r}")
             for name, part in self._split.items()
+            if name in action
         ]
         return np.concatenate(parts, axis=1)
 

@@ -1,4 +1,4 @@
-"""Checks of what a task is asked for: which environments, which seeds, which places."""
+"""Checks of what a task is asked for: which environments, which seeds."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-from layouts import Layout
 from robots import TaskError, unknown_name_message
 from robots.common.bounds import checked_flag, shown
 
 RECONFIGURE = "reconfigure"  # option of a reset, and in its info: whether worlds are rebuilt
+ELAPSED = "elapsed_steps"  # in info: control steps since the reset
 SEED = "seed"  # in the info of fronts: what the random streams began with
+SUCCESS = "is_success"  # there, too: what other packages call success
 
 
 def checked_ids(env_ids: Sequence[int] | None, num_envs: int) -> list[int]:
@@ -60,15 +61,13 @@ def checked_seeds(seed: int | Sequence[int | None] | None, ids: Sequence[int]) -
     return seeds
 
 
-def checked_options(options: Mapping[str, Any] | None, known: Collection[str]) -> Mapping[str, Any]:
+def checked_options(options: Mapping[str, Any] | None) -> Mapping[str, Any]:
     """Return the options of a reset; none if None.
 
-    Args:
-        options: What was given.
-        known: The options that there are.
+    Options that are not ours pass: fronts are given those of other packages, and ignore them.
 
     Raises:
-        TaskError: If they are no mapping, one does not exist, or ``reconfigure`` is no truth value.
+        TaskError: If they are no mapping, or ``reconfigure`` is no truth value.
     """
     if options is None:
         return {}
@@ -76,9 +75,6 @@ def checked_options(options: Mapping[str, Any] | None, known: Collection[str]) -
         raise TaskError(
             f"options is {shown(options)}; it takes a mapping: {{{RECONFIGURE!r}: True}}"
         )
-    for key in options:
-        if key not in known:
-            raise TaskError(unknown_name_message("reset option", key, known))
     checked_flag(f"the option {RECONFIGURE!r}", options.get(RECONFIGURE, False), TaskError)
     return options
 
@@ -87,42 +83,22 @@ def wants_rebuild(options: Mapping[str, Any] | None) -> bool:
     """Return whether the options of a reset ask for new worlds.
 
     Raises:
-        TaskError: If they make no sense.
+        TaskError: If they make no sense, or one does not exist.
     """
-    return bool(checked_options(options, (RECONFIGURE,)).get(RECONFIGURE, False))
+    known = own_options(options)
+    for key in options or ():
+        if key not in known:
+            raise TaskError(unknown_name_message("reset option", key, known))
+    return known[RECONFIGURE]
 
 
-def check_places(task: str, layout: Layout, own: Layout, robot_counts: range | None) -> None:
-    """Refuse a layout whose places are not the task's; their order is the layout's own.
-
-    A limb takes the place that it is called like.
-
-    Args:
-        task: The task's name.
-        layout: The layout.
-        own: The task's own layout.
-        robot_counts: How many robots it may have, under any names; None for the places of ``own``.
+def own_options(options: Mapping[str, Any] | None) -> dict[str, bool]:
+    """Return those options of a reset that tasks know; the others are left out.
 
     Raises:
-        TaskError: If the places are wrong.
+        TaskError: See `checked_options`.
     """
-    if robot_counts is not None:
-        if len(layout.arms) not in robot_counts:
-            raise TaskError(
-                f"{task} takes {robot_counts[0]} to {robot_counts[-1]} robots;"
-                f" the layout has {len(layout.arms)}: {list(layout.arms)}"
-            )
-    elif not _fill(layout, own):
-        raise TaskError(
-            f"{task} has the places {list(own)}; the layout has {list(layout.arms)}."
-            " Give the layout's robots the names of the places"
-        )
-
-
-def _fill(layout: Layout, places: Collection[str]) -> bool:
-    """Whether the arms of a layout take just these places, one each."""
-    short = {full: name for name, full in layout.short_names.items()}
-    return {short.get(arm, arm) for arm in layout.arms} == set(places)
+    return {RECONFIGURE: bool(checked_options(options).get(RECONFIGURE, False))}
 
 
 def check_info(task: str, info: Collection[str]) -> None:
@@ -131,7 +107,7 @@ def check_info(task: str, info: Collection[str]) -> None:
     Raises:
         TaskError: If there is one.
     """
-    taken = [key for key in (RECONFIGURE, SEED) if key in info]
+    taken = [key for key in (RECONFIGURE, SEED, SUCCESS) if key in info]
     if taken:
         raise TaskError(
             f"{task}.evaluate() returned {', '.join(taken)}, which info already has; call it"

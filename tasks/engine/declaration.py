@@ -12,6 +12,7 @@ from layouts import Layout
 from simulation import Camera, PhysicsSettings, State, World
 from simulation.maths import Array, Floats
 from tasks.language.bodies import Declared, Table, WideTable, declared_bodies
+from tasks.language.needs import Needs
 from tasks.language.randomness import EpisodeRandom
 
 Info = dict[str, Any]
@@ -38,6 +39,8 @@ class Declaration:
             `tasks.language.bodies`.
         robot_counts: How many robots a layout may have, in places of any names; None if it takes
             exactly the places of ``layout``.
+        needs: What places need of their robots, by place, ``"*"`` for all others; see
+            `tasks.Needs`.
         physics: Solver settings; None keeps SAPIEN's own defaults.
         max_episode_steps: Control steps until an episode is truncated.
         reward_modes: Reward modes, the default first.
@@ -57,6 +60,7 @@ class Declaration:
     table: ClassVar[Table | WideTable] = Table()
     bodies: ClassVar[Mapping[str, Declared]] = {}
     robot_counts: ClassVar[range | None] = None
+    needs: ClassVar[Mapping[str, Needs]] = {}
     physics: ClassVar[PhysicsSettings | None] = None
     max_episode_steps: int
     reward_modes: ClassVar[tuple[str, ...]] = ()

@@ -4,12 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
+from typing import Any
 
+from robots import UnknownNameError
 from simulation.maths import Array, copy
 
 
 class Memory(SimpleNamespace):
     """Arrays by name, (N, …) each, as attributes."""
+
+    def __getattr__(self, name: str) -> Any:
+        """Refuse what is not there.
+
+        Raises:
+            NotRememberedError: Always.
+        """
+        if name.startswith("__"):
+            raise AttributeError(name)
+        raise NotRememberedError("array that remember() returned", name, vars(self))
 
     def renew(self, fresh: Mapping[str, Array], env_ids: Sequence[int]) -> None:
         """Take the rows of environments that were reset; the others stay.
@@ -25,3 +37,7 @@ class Memory(SimpleNamespace):
                 kept = copy(getattr(self, name))  # somebody may hold the earlier one
                 kept[list(env_ids)] = rows[list(env_ids)]
                 setattr(self, name, kept)
+
+
+class NotRememberedError(UnknownNameError, AttributeError):
+    """An array that the task does not remember (also an ``AttributeError``)."""

@@ -16,6 +16,7 @@ from robots import TaskError, unknown_name_message
 from simulation import Camera, Simulation, State
 from simulation.cameras import TEXTURES, RobotCamera
 from simulation.maths import Array, Floats, all_finite
+from tasks.engine.columns import COLUMN_MODES, FILMED, ColumnObserver, Viewpoint
 from tasks.engine.finite import NotFinite
 from tasks.native import controllers
 from tasks.native.format import native_joints, observation_keys
@@ -23,7 +24,7 @@ from tasks.native.format import native_joints, observation_keys
 if TYPE_CHECKING:
     from simulation.rendering.pictures import Observers, View
 
-PLAIN_MODES = ("state", "state_dict", "none")
+PLAIN_MODES = ("state", "state_dict", "none", *COLUMN_MODES)
 SHORT_MODES = {"rgbd": "rgb+depth"}
 STATE_FORMS = ("state", "state_dict")  # what may be joined to images
 OBS_MODES = (*PLAIN_MODES, "rgb", "rgbd", "rgb+depth+state", "depth", "rgb+segmentation")
@@ -43,12 +44,19 @@ class ObservationMode:
         flat: Whether everything but images is one flat part.
         privileged: Whether it includes what only a simulation knows.
         nothing: Whether nothing is observed.
+        columns: The mode, if it is the columns of exported datasets that are observed.
     """
 
     textures: tuple[str, ...] = ()
     flat: bool = False
     privileged: bool = True
     nothing: bool = False
+    columns: str | None = None
+
+    @property
+    def draws(self) -> bool:
+        """Whether pictures are observed."""
+        return bool(self.textures) or self.columns == FILMED
 
 
 def read_mode(name: str) -> ObservationMode:
@@ -60,7 +68,8 @@ def read_mode(name: str) -> ObservationMode:
     if not isinstance(name, str):
         raise TaskError(unknown_name_message("obs_mode", name, OBS_MODES))
     if name in PLAIN_MODES:
-        return ObservationMode(flat=name == "state", nothing=name == "none")
+        columns = name if name in COLUMN_MODES else None
+        return ObservationMode(flat=name == "state", nothing=name == "none", columns=columns)
     parts = SHORT_MODES.get(name, name).split("+")
     for part in parts:
         if part not in (*TEXTURES, *STATE_FORMS):
@@ -116,6 +125,7 @@ class Observer:
         mode: ObservationMode,
         cameras: Iterable[Camera],
         sensed: Sequence[str],
+        viewpoint: Viewpoint,
     ) -> None:
         """Remember how to observe.
 
@@ -124,6 +134,7 @@ class Observer:
             mode: What to observe.
             cameras: The task's own cameras.
             sensed: See `tasks.MultiRobotTask`.
+            viewpoint: From where people see the task.
 
         Raises:
             TaskError: If images are asked for and there is no camera, or two have the same name.
@@ -134,6 +145,7 @@ class Observer:
             raise TaskError("there is no camera: the task declares none, nor do its robots")
         self._keys, self._robots, self._sensed = observation_keys(layout), tuple(layout), sensed
         self._rig: _CameraRig | None = None
+        self._columns = ColumnObserver(layout, mode.columns, viewpoint) if mode.columns else None
 
     def observe(self, simulation: Simulation, state: State, parts: Mapping[str, Array]) -> Any:
         """Return an observation of all environments.
@@ -149,6 +161,8 @@ class Observer:
         """
         if self.mode.nothing:
             return {}
+        if self._columns:
+            return self._columns.observe(simulation, state)
         if not self.mode.privileged:
             parts = self._sensible(parts)
         if not self.mode.textures:
@@ -177,8 +191,10 @@ class Observer:
             self._rig.stale.update(env_ids)
 
     def close(self) -> None:
-        """Let the cameras go."""
+        """Let the cameras go, and what else was made to observe."""
         self._rig = None
+        if self._columns:
+            self._columns.close()
 
     def slices(
         self, simulation: Simulation, state: State, parts: Mapping[str, Array]

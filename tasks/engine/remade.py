@@ -10,7 +10,8 @@ _Self = TypeVar("_Self", bound="Remade")
 class Remade:
     """Something whose copies, and what is unpickled, are made anew with the same arguments.
 
-    They begin their own episodes, and each is to be closed for itself.
+    They begin their own episodes, and each is to be closed for itself. What Gymnasium noted about
+    the environment, its ``spec``, is theirs as well.
     """
 
     _arguments: tuple[tuple[Any, ...], dict[str, Any]]
@@ -23,7 +24,8 @@ class Remade:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Say how to make another one."""
-        return _make, (type(self), *self._arguments)
+        spec = vars(self).get("spec")
+        return _make, (type(self), *self._arguments), None if spec is None else {"spec": spec}
 
 
 def _make(cls: type[Remade], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Remade:

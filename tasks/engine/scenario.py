@@ -14,6 +14,8 @@ from robots import CONTROL_MODES, TaskError, UnknownNameError
 from robots.common.bounds import checked_choice, checked_flag, checked_whole, shown
 from simulation import SAPIEN_DEFAULTS, Camera, PhysicsSettings
 from simulation.physics import substeps
+from tasks.engine.bystanders import BYSTANDERS
+from tasks.engine.display import scenario_html, scenario_text
 from tasks.engine.observation import read_mode
 
 SIMULATORS = ("sapien3",)
@@ -33,6 +35,9 @@ class Scenario:
             see (needs a Vulkan driver): ``"rgb"``, ``"rgbd"``, or any of ``rgb``, ``depth``,
             ``segmentation`` and ``position`` joined by ``+``, and to them ``state`` or
             ``state_dict``, without which images come only with what a real robot senses.
+            ``"lerobot"`` and ``"robomimic"`` give the columns that exports in these formats hold,
+            under their names, so that a policy trained on one plays here as it is;
+            ``"lerobot+video"`` gives the pictures of exports with video, too.
         reward_mode: One of the task's modes; None takes its first.
         control_mode: One of `robots.CONTROL_MODES`, or of the robots' own; or a mapping from arms
             to modes, in which arms that are left out stay in ``"pd_joint_delta_pos"``. An arm is a
@@ -44,6 +49,9 @@ class Scenario:
         cameras: Cameras to observe with, in the place of the task's own; empty takes those. Those
             of the robots come after.
         simulator: ``"sapien3"``.
+        bystanders: What the layout's robots do that have no place in the task: ``"hold"`` still and
+            take no action number, or ``"act"``, with action numbers of their own. None refuses
+            them.
         check_layout: Whether to refuse a layout whose robots collide; the task's own layout is
             never checked.
     """
@@ -60,6 +68,7 @@ class Scenario:
     headless: bool = True
     cameras: Sequence[Camera] = field(default_factory=list[Camera])
     simulator: str = "sapien3"
+    bystanders: str | None = None
     check_layout: bool = True
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -69,10 +78,18 @@ class Scenario:
             raise UnknownScenarioField("scenario field", name, known)
         object.__setattr__(self, name, value)
 
+    def __repr__(self) -> str:
+        """Show the fields that differ from their defaults."""
+        return scenario_text(self)
+
+    def _repr_html_(self) -> str:
+        """Show a notebook the same, with the layout's picture."""
+        return scenario_html(self)
+
     @property
     def draws(self) -> bool:
         """Whether anything is drawn: for people, or for cameras that observe."""
-        return self.render_mode is not None or bool(read_mode(self.obs_mode).textures)
+        return self.render_mode is not None or read_mode(self.obs_mode).draws
 
     def check(self, reward_modes: Sequence[str]) -> None:
         """Refuse values that no task can be made with.
@@ -94,6 +111,7 @@ class Scenario:
         for name, choices in (
             ("simulator", SIMULATORS),
             ("render_mode", RENDER_MODES),
+            ("bystanders", BYSTANDERS),
             ("reward_mode", (None, *reward_modes)),
         ):
             checked_choice(name, getattr(self, name), choices, TaskError)

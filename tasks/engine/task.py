@@ -12,23 +12,28 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 from torch import Tensor
 
+from layouts import Layout
 from robots import SimulationError, TaskError
 from simulation import Simulation, State, World
 from simulation.maths import Floats, all_finite
 from tasks.engine.actions import ActionReader
 from tasks.engine.arguments import (
+    ELAPSED,
     check_info,
-    check_places,
     checked_ids,
     checked_seeds,
     wants_rebuild,
 )
+from tasks.engine.bystanders import check_needs, check_places, settled
 from tasks.engine.declaration import Declaration, Info
+from tasks.engine.declared import check_declaration
+from tasks.engine.display import task_html, task_text
 from tasks.engine.finite import NotFinite, refuse_observation, refuse_reward, refuse_state
 from tasks.engine.layout_check import refuse_collisions
 from tasks.engine.memory import Memory
 from tasks.engine.observation import Observer, read_mode, space_of
 from tasks.engine.remade import Remade
+from tasks.engine.returned import ReturnedArrays, ReturnedReward, expect_nothing, unchanged
 from tasks.engine.scenario import Scenario
 from tasks.engine.speeds import SpeedWatch
 from tasks.language.randomness import EpisodeRandom
@@ -81,13 +86,14 @@ class MultiRobotTask(Declaration, Remade):
             LayoutError: If the robots of a layout other than the task's own collide.
             AssetError: If robot files cannot be found.
         """
-        scenario.check(self.reward_modes)
         own = type(self)
-        check_places(own.__name__, scenario.layout, own.layout, self.robot_counts)
+        check_declaration(own)
+        scenario.check(self.reward_modes)
+        layout = own.built_layout(scenario)
         if scenario.check_layout and scenario.layout != own.layout:
             refuse_collisions(scenario.layout, self.table.outline(scenario.layout))
         self.scenario = scenario
-        self.layout = scenario.layout.in_control_mode(scenario.control_mode)
+        self.layout = layout
         self.num_envs = scenario.num_envs
         self.obs_mode = scenario.obs_mode
         self.reward_mode = scenario.reward_mode or self.reward_modes[0]
@@ -101,7 +107,7 @@ class MultiRobotTask(Declaration, Remade):
         self._reader = ActionReader(self.layout, self.num_envs)
         mode = read_mode(scenario.obs_mode)
         cameras = scenario.cameras or self.cameras if mode.textures else ()
-        self.observer = Observer(self.layout, mode, cameras, self.sensed)
+        self.observer = Observer(self.layout, mode, cameras, self.sensed, self.viewpoint)
         first = self.first_seed if first_seed is None else first_seed
         self._rngs = [EpisodeRandom(first + i) for i in range(self.num_envs)]
         self._max_reward = np.array(self.max_reward, np.float32)
@@ -109,6 +115,7 @@ class MultiRobotTask(Declaration, Remade):
         self._everywhere: Sequence[int] = range(self.num_envs)
         self.moving = self._everywhere
         self.memory = Memory()
+        self._expect_returns(own.__name__)
         self._simulation: Simulation | None = Simulation(
             self.layout,
             self._build_world,
@@ -122,6 +129,29 @@ class MultiRobotTask(Declaration, Remade):
         self._responds = type(self).respond is not Declaration.respond
         self.start = self._begin(list(range(self.num_envs)), reconfigured=True)
         self._describe_observation()
+
+    @classmethod
+    def built_layout(cls, scenario: Scenario) -> Layout:
+        """Return the layout that a task of a scenario is built with, in its control mode.
+
+        Raises:
+            TaskError: If its places are not the task's, or a robot lacks what its place needs.
+            DescriptorError: If a robot lacks the joint limits that the control mode needs.
+        """
+        name, own, given = cls.__name__, cls.layout, scenario.layout
+        check_places(name, given, own, cls.robot_counts, scenario.bystanders)
+        check_needs(name, given, given if cls.robot_counts else own, cls.needs)
+        still = settled(given, own, cls.robot_counts, scenario.bystanders)
+        return still.in_control_mode(scenario.control_mode)
+
+    def __repr__(self) -> str:
+        """Show what it is and what was made of it, in a few lines."""
+        made = "observation_slices" in vars(self)
+        return task_text(self) if made else object.__repr__(self)
+
+    def _repr_html_(self) -> str:
+        """Show a notebook the same, with the layout's picture."""
+        return task_html(self)
 
     @property
     def seeds(self) -> list[int]:
@@ -228,7 +258,7 @@ class MultiRobotTask(Declaration, Remade):
         state = self._read()
         self._speeds.look(state, self.moving, self._elapsed)
         if self._responds:
-            self.respond(state)
+            expect_nothing(self, "respond", self.respond(state))
             self.simulation.touched()
             state = self._read()
         info = self._info(state)
@@ -272,6 +302,13 @@ class MultiRobotTask(Declaration, Remade):
         self.observer.changed(ids)
         self._read()
 
+    def flat_state(self) -> Floats:
+        """Return what ``obs_mode="state"`` observes, (N, D), whatever the task's own mode is."""
+        state = self._state
+        parts = self.observe(state, self._info(state))
+        observer = Observer(self.layout, read_mode("state"), (), (), self.viewpoint)
+        return observer.observe(self.simulation, state, parts)
+
     def render(self) -> np.ndarray:
         """Return a picture of every environment, (N, 512, 512, 3) uint8.
 
@@ -288,26 +325,34 @@ class MultiRobotTask(Declaration, Remade):
 
     # -- inside ------------------------------------------------------------------------------
 
+    def _expect_returns(self, name: str) -> None:
+        """Say what the methods of the class must return."""
+        count = self.num_envs
+        self._judged = ReturnedArrays(f"{name}.evaluate()", count, judges=True)
+        self._observed = ReturnedArrays(f"{name}.observe()", count, axes=2)
+        self._remembered = ReturnedArrays(f"{name}.remember()", count)
+        self._rewards = ReturnedReward(f"{name}.dense_reward()", count)
+
     def _build_world(self, world: World, index: int) -> None:
         rng = self._rngs[index]
         world.design = self.design(rng)
-        self.build(world)
+        expect_nothing(self, "build", self.build(world))
         rng.restart_numpy()
 
     def _begin(self, ids: list[int], *, reconfigured: bool) -> tuple[Any, Info]:
         self.simulation.clear(ids)
         for i in ids:  # all that is placed here reaches the simulator in one go
             world = self.simulation.worlds[i]
-            self.reset_robots(world, self._rngs[i])
-            self.sample(world, self._rngs[i])
+            expect_nothing(self, "reset_robots", self.reset_robots(world, self._rngs[i]))
+            expect_nothing(self, "sample", self.sample(world, self._rngs[i]))
         if reconfigured:
             self._camera = None
         self._elapsed[ids] = 0
         self._speeds.begin(ids)
         state = self._read()
         self.simulation.hold(state)
-        self.memory.renew(self.remember(state), ids)
-        self.begin_episodes(state, ids)
+        self.memory.renew(self._remembered.checked(self.remember(state)), ids)
+        expect_nothing(self, "begin_episodes", self.begin_episodes(state, ids))
         info = self._info(state)
         check_info(type(self).__name__, info)
         self.observer.changed(ids)
@@ -316,8 +361,11 @@ class MultiRobotTask(Declaration, Remade):
 
     def _describe_observation(self) -> None:
         """Read spaces and slices off the first observation."""
-        state, mode = self._state, self.observer.mode
-        parts = self.observe(state, self._info(state)) if mode.flat else {}
+        state, mode, name = self._read(), self.observer.mode, type(self).__name__
+        with unchanged(state, f"{name}.evaluate()"):
+            info = self._info(state)
+        with unchanged(state, f"{name}.observe()"):
+            parts = {} if mode.nothing else self._observed.checked(self.observe(state, info))
         self.observation_slices = self.observer.slices(self.simulation, state, parts)
         if not mode.nothing:
             self.single_observation_space = space_of(self.start[0], batched=True)
@@ -333,15 +381,14 @@ class MultiRobotTask(Declaration, Remade):
         return state
 
     def _info(self, state: State) -> Info:
-        info: Info = {"elapsed_steps": self._elapsed.copy()}
-        for key, value in self.evaluate(state).items():
-            info[key] = np.asarray(value)
-        return info
+        judged = self._judged.checked(self.evaluate(state))
+        return {ELAPSED: self._elapsed.copy(), **judged}
 
     def _observation(self, state: State, info: Info) -> Any:
-        if self.observer.mode.nothing:
+        mode = self.observer.mode
+        if mode.nothing:
             return {}
-        parts = self.observe(state, info)
+        parts = {} if mode.columns else self._observed.checked(self.observe(state, info))
         try:
             return self.observer.observe(self.simulation, state, parts)
         except NotFinite:
@@ -359,7 +406,11 @@ class MultiRobotTask(Declaration, Remade):
                 return np.zeros(self.num_envs, np.float32)
 
     def _dense(self, state: State, action: Floats, info: Info) -> Floats:
-        reward = np.asarray(self.dense_reward(state, action, info), np.float32)
+        if self._rewards.dtype is None:  # the first
+            with unchanged(state, f"{type(self).__name__}.dense_reward()"):
+                reward = self._rewards.checked(self.dense_reward(state, action, info))
+        else:
+            reward = self._rewards.checked(self.dense_reward(state, action, info))
         if not all_finite(reward):
             refuse_reward(reward, self, self._elapsed)
         return reward

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from robots import MissingPackageError
 from tasks.fronts.names import NAMESPACE
-from tasks.registry import list_tasks
+from tasks.registry import list_own, list_tasks
 
 if TYPE_CHECKING:
     from tasks.fronts.parallel import ParallelTask
@@ -26,14 +26,18 @@ def register() -> None:
     """Tell Gymnasium every task of `tasks.list_tasks` that it does not know yet.
 
     Importing `tasks` does this, and so does registering a task. Names that are no Gymnasium ids
-    (those end with ``-v`` and a number) stay unknown to it.
+    (those end with ``-v`` and a number) stay unknown to it. Tasks of a user's own module go by
+    their plain id, too, unless it is taken: so ``gymnasium.make("mylab.tray:TwoArmTray-v1")``,
+    which imports the module and looks the id up, finds them.
     """
     from gymnasium import registry
 
     from tasks.fronts.spec import TaskSpec
 
-    for task_id in filter(_GYMNASIUM_NAME.fullmatch, list_tasks()):
-        if (name := f"{NAMESPACE}/{task_id}") not in registry:
+    names = {f"{NAMESPACE}/{task_id}": task_id for task_id in list_tasks()}
+    names |= {task_id: task_id for task_id in list_own()}
+    for name, task_id in names.items():
+        if _GYMNASIUM_NAME.fullmatch(task_id) and name not in registry:
             registry[name] = TaskSpec(
                 name,
                 entry_point="tasks.fronts.gymnasium:GymnasiumTask",

@@ -6,10 +6,11 @@ from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
+from gymnasium import logger
 from numpy.typing import NDArray
 
 from robots import TaskError
-from tasks.engine.arguments import checked_seeds
+from tasks.engine.arguments import checked_seeds, own_options
 from tasks.engine.observation import space_of
 from tasks.engine.remade import Remade
 from tasks.fronts.numbers import info_row, row, stepper
@@ -69,7 +70,7 @@ class GymnasiumTask(Remade, gymnasium.Env[Any, NDArray[np.float32]]):
 
         Args:
             seed: Seed of the episode; None lets the random streams run on, from entropy.
-            options: ``{"reconfigure": True}`` rebuilds the world.
+            options: ``{"reconfigure": True}`` rebuilds the world; others are ignored.
 
         Returns:
             Observation and info.
@@ -77,8 +78,9 @@ class GymnasiumTask(Remade, gymnasium.Env[Any, NDArray[np.float32]]):
         Raises:
             TaskError: If an argument makes no sense; nothing is reset then.
         """
+        known = own_options(options)
         own = self._first.fill(checked_seeds(seed, (0,)), (0,))
-        obs, info = self.task.reset(own, options)
+        obs, info = self.task.reset(own, known)
         self._first.given((0,))
         self._seed = self.task.seeds[0]
         super().reset(seed=own[0])
@@ -97,12 +99,15 @@ class GymnasiumTask(Remade, gymnasium.Env[Any, NDArray[np.float32]]):
         ended = bool(terminated[0])
         return row(obs), reward[0].item(), ended, False, info_row(info, self._seed)
 
-    def render(self) -> NDArray[np.uint8]:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
         """Return a picture, (512, 512, 3) uint8.
 
-        Raises:
-            TaskError: If it was not made with ``render_mode="rgb_array"``.
+        Without ``render_mode="rgb_array"`` there is none, which a warning says: Gymnasium's
+        interface has it so, and trainers call this unasked.
         """
+        if self.render_mode is None:
+            logger.warn("this task draws no pictures; make it with render_mode='rgb_array'")
+            return None
         return self.task.render()[0]
 
     def close(self) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.engine.arguments import RECONFIGURE, SEED
+from tasks.engine.arguments import RECONFIGURE, SEED, SUCCESS
 from tasks.engine.observation import observed_dtype
 from tasks.engine.task import MultiRobotTask
 
@@ -50,5 +50,6 @@ def info_row(info: Mapping[str, Any], seed: int) -> dict[str, Any]:
         for key, value in info.items()
         if key != RECONFIGURE
     }
+    row_info[SUCCESS] = row_info["success"]
     row_info[SEED] = seed
     return row_info

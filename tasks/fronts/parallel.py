@@ -7,13 +7,15 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
+from gymnasium import logger
 from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from robots import TaskError, UnknownNameError
 from robots.common.bounds import shown
-from tasks.engine.arguments import RECONFIGURE, checked_options, checked_seeds
+from tasks.engine.arguments import checked_seeds, own_options
+from tasks.engine.columns import COLUMN_MODES
 from tasks.engine.observation import space_of
 from tasks.engine.remade import Remade
 from tasks.fronts.numbers import info_row, row, stepper
@@ -43,9 +45,13 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     Attributes:
         task: The task, with one environment.
-        possible_agents: The robots' places, or their limbs, as in the task's ``action_split``.
+        possible_agents: The places that take action numbers, or the limbs, as in the task's
+            ``action_split``.
         agents: The same during an episode, else nothing.
         observed: Robot → the numbers of the task's flat observation that it observes.
+        observation_spaces: Robot → what it observes.
+        action_spaces: Robot → what it may do.
+        state_space: Of what `state` returns.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -65,8 +71,8 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         """Make the task; see `tasks.parallel_env`."""
         if "num_envs" in fields:
             raise TaskError("parallel_env takes no num_envs: it is one environment")
-        if fields.get("obs_mode") == "none":
-            raise TaskError("parallel_env takes no obs_mode='none'; choices: 'state', 'rgb', …")
+        if (mode := fields.get("obs_mode")) in ("none", *COLUMN_MODES):
+            raise TaskError(f"parallel_env takes no obs_mode={mode!r}; choices: 'state', 'rgb', …")
         self.task = make(task_id, render_mode=render_mode, **fields)
         self.render_mode = render_mode
         frames = round(self.task.scenario.control_frequency)
@@ -77,27 +83,29 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         self._step = stepper(self.task)
         self._first = FirstSeeds(1)
         self._seed = self.task.seeds[0]
-        self.possible_agents = list(self.task.action_split)
+        split = self.task.action_split
+        self.possible_agents = [name for name, part in split.items() if part.stop > part.start]
         self.agents: list[str] = []
         layout, index = self.task.layout, self.task.simulation.index
         self._robots = {name: layout.owner(name) for name in self.possible_agents}
         self._joints = {name: native_places(index, layout, name) for name in self.possible_agents}
         self.observed = self._observed() if self.task.observation_slices else {}
         bounds = self.task.single_action_space
-        self._action_spaces = {
+        self.action_spaces = {
             name: Box(bounds.low[part], bounds.high[part], dtype=np.float32)
             for name, part in self.task.action_split.items()
         }
         start = self._observations(self.task.start[0])
-        self._observation_spaces = {name: space_of(own) for name, own in start.items()}
+        self.observation_spaces = {name: space_of(own) for name, own in start.items()}
+        self.state_space = space_of(self.state())
 
     def observation_space(self, agent: str) -> Space[Observation]:
         """Return what a robot observes; always the same object."""
-        return _look_up(self._observation_spaces, agent)
+        return _look_up(self.observation_spaces, agent)
 
     def action_space(self, agent: str) -> Space[NDArray[np.float32]]:
         """Return what a robot may do; always the same object."""
-        return _look_up(self._action_spaces, agent)
+        return _look_up(self.action_spaces, agent)
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -107,8 +115,7 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         Args:
             seed: Seed of the episode; None lets the random streams run on, the first time from one
                 that the system's entropy gives. ``info["seed"]`` is what they began with.
-            options: ``{"reconfigure": True}`` rebuilds the world; as PettingZoo's checks demand,
-                other options are ignored.
+            options: ``{"reconfigure": True}`` rebuilds the world; others are ignored.
 
         Returns:
             Observation and info of every robot.
@@ -116,10 +123,9 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         Raises:
             TaskError: If an argument makes no sense; nothing is reset then.
         """
-        known = checked_options(options, options or ())
-        rebuilt = {key: value for key, value in known.items() if key == RECONFIGURE}
+        known = own_options(options)
         own = self._first.fill(checked_seeds(seed, (0,)), (0,))
-        obs, info = self.task.reset(own, rebuilt)
+        obs, info = self.task.reset(own, known)
         self._first.given((0,))
         self._seed = self.task.seeds[0]
         self.agents = list(self.possible_agents)
@@ -163,12 +169,19 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
             self._infos(own_info),
         )
 
-    def render(self) -> NDArray[np.uint8]:
+    def state(self) -> NDArray[np.float32]:
+        """Return what all robots together would observe as ``"state"``, flat, for critics."""
+        return self.task.flat_state()[0]
+
+    def render(self) -> NDArray[np.uint8] | None:
         """Return a picture, (512, 512, 3) uint8.
 
-        Raises:
-            TaskError: If it was not made with ``render_mode="rgb_array"``.
+        Without ``render_mode="rgb_array"`` there is none, which a warning says: Gymnasium's
+        interface has it so, and trainers call this unasked.
         """
+        if self.render_mode is None:
+            logger.warn("this task draws no pictures; make it with render_mode='rgb_array'")
+            return None
         return self.task.render()[0]
 
     def close(self) -> None:

@@ -17,13 +17,11 @@ from stable_baselines3.common.vec_env.base_vec_env import (
 )
 
 from robots import TaskError, UnknownNameError
-from tasks.engine.arguments import RECONFIGURE, checked_options
+from tasks.engine.arguments import RECONFIGURE, own_options
 from tasks.engine.remade import Remade
 from tasks.fronts.names import NAMESPACE
-from tasks.fronts.vector import RESET_OPTIONS, VectorTask
+from tasks.fronts.vector import VectorTask
 from tasks.registry import get_task_class
-
-_OPTIONS = tuple(option for option in RESET_OPTIONS if option != "reset_mask")
 
 
 class SB3Task(Remade, VecEnv):
@@ -78,7 +76,7 @@ class SB3Task(Remade, VecEnv):
             TaskError: If a seed or an option makes no sense; nothing is reset then.
             WorkerError: If workers die, hang or fail.
         """
-        rebuilt = np.array([_rebuilds(options) for options in self._options])
+        rebuilt = np.array([own_options(options)[RECONFIGURE] for options in self._options])
         obs: Any = None
         for mask, rebuild in ((rebuilt, True), (~rebuilt, False)):
             if mask.any():
@@ -121,7 +119,6 @@ class SB3Task(Remade, VecEnv):
                 infos[i]["terminal_observation"] = _flat(info["final_obs"][i])
         for own, late in zip(infos, (truncated & ~terminated).tolist(), strict=True):
             own["TimeLimit.truncated"] = late
-            own["is_success"] = own["success"]
         return _flat(obs), reward, done, infos
 
     def close(self) -> None:
@@ -184,10 +181,6 @@ class SB3Task(Remade, VecEnv):
 
 class UnknownAttributeError(UnknownNameError, AttributeError):
     """An attribute that environments do not have (also an ``AttributeError``)."""
-
-
-def _rebuilds(options: Mapping[str, Any]) -> bool:
-    return bool(checked_options(options, _OPTIONS).get(RECONFIGURE, False))
 
 
 def _rows(info: Mapping[str, Any], num_envs: int) -> list[dict[str, Any]]:

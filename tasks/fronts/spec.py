@@ -16,7 +16,7 @@ class TaskSpec(EnvSpec):
     def _steps(self) -> int:
         """Return what was set, or given to `gymnasium.make_vec`, or the task's own."""
         known = self._set_steps or self.kwargs.get("max_episode_steps")
-        return known or get_task_class(self.id.partition("/")[2]).max_episode_steps
+        return known or get_task_class(self.id.rpartition("/")[2]).max_episode_steps
 
     def _set(self, steps: int | None) -> None:
         self._set_steps = steps

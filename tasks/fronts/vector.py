@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from robots import SimulationError, TaskError, unknown_name_message
 from tasks.engine.actions import ActionReader
-from tasks.engine.arguments import RECONFIGURE, checked_options, checked_seeds
+from tasks.engine.arguments import RECONFIGURE, SUCCESS, checked_options, checked_seeds
 from tasks.engine.observation import space_of
 from tasks.engine.remade import Remade
 from tasks.fronts.batch import FINAL, INFO, OBSERVATION, Beginning, Part
@@ -25,8 +25,6 @@ from tasks.fronts.gymnasium import RENDER_MODES
 from tasks.fronts.workers import Failure, InProcess, WorkerError, Workers, WorkersFailed
 from tasks.language.randomness import FirstSeeds
 from tasks.registry import get_task_class, make_scenario
-
-RESET_OPTIONS = (RECONFIGURE, "reset_mask")
 
 _Flags = NDArray[np.bool_]
 _Arguments = ParamSpec("_Arguments")
@@ -68,6 +66,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
     Attributes:
         num_envs: Number of environments N.
         num_workers: Number of worker processes; 0 if the environments are in this one.
+        autoreset_mode: What happens after an episode's last step.
         action_split: Robot name → slice of one environment's action.
         busy: Locked while a thread calls it.
     """
@@ -115,9 +114,10 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         scenario.check(cls.reward_modes)
         workers = _checked_workers(num_workers, num_envs)
         self.num_envs, self.num_workers, self.render_mode = num_envs, workers, render_mode
+        self.autoreset_mode = mode
         frames = round(scenario.control_frequency)
         self.metadata = {**self.metadata, "autoreset_mode": mode, "render_fps": frames}  # type: ignore[misc]
-        layout = scenario.layout.in_control_mode(scenario.control_mode)
+        layout = cls.built_layout(scenario)
         self.action_split = layout.action_split
         self._reader = ActionReader(layout, num_envs)
         self._seeds = [cls.first_seed + i for i in range(num_envs)]
@@ -154,7 +154,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             seed: ``k`` seeds environment i with k + i; a list gives each its own; None lets the
                 random streams run on, the first time from a seed that the system's entropy gives.
             options: ``{"reset_mask": mask}`` resets only where the mask, (N,) bool, is true;
-                ``{"reconfigure": True}`` rebuilds the worlds.
+                ``{"reconfigure": True}`` rebuilds the worlds. Others are ignored.
 
         Returns:
             Observation of all environments and info, which tells of those that were reset:
@@ -337,10 +337,11 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         for name, array in self._crew.arrays.items():
             first, _, key = name.partition("/")
             if first == prefix:
-                info[key] = array.copy()
-                if mask is not self._everywhere:
-                    info[key][~mask] = 0
-                info[f"_{key}"] = mask.copy()
+                for called in (key, SUCCESS) if key == "success" else (key,):
+                    info[called] = array.copy()
+                    if mask is not self._everywhere:
+                        info[called][~mask] = 0
+                    info[f"_{called}"] = mask.copy()
         return info
 
     def _final(self, ended: _Flags) -> dict[str, Any]:
@@ -358,7 +359,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
     # -- checks ------------------------------------------------------------------------------
 
     def _checked_options(self, options: Mapping[str, Any] | None) -> tuple[_Flags, bool]:
-        options = checked_options(options, RESET_OPTIONS)
+        options = checked_options(options)
         mask = options.get("reset_mask")
         if mask is None:
             mask = self._everywhere

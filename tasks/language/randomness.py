@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from layouts import Layout
+from robots import TaskError
 
 
 class FirstSeeds:
@@ -87,12 +88,31 @@ class EpisodeRandom:
         self.restart_numpy()
 
     def uniform(self, *shape: int) -> Tensor:
-        """Draw float32 numbers in [0, 1) from the torch stream."""
-        return torch.rand(shape, generator=self.torch)
+        """Draw float32 numbers in [0, 1) from the torch stream.
+
+        Raises:
+            TaskError: If a length is none.
+        """
+        try:
+            return torch.rand(shape, generator=self.torch)
+        except (TypeError, RuntimeError):
+            raise TaskError(
+                f"rng.uniform takes the shape of what is drawn, whole numbers; given: {shape}."
+                " uniform_between([low, …], [high, …]) draws between bounds"
+            ) from None
 
     def uniform_between(self, low: Sequence[float], high: Sequence[float]) -> Tensor:
-        """Draw one float32 number between each pair of bounds from the torch stream."""
+        """Draw one float32 number between each pair of bounds from the torch stream.
+
+        Raises:
+            TaskError: If they are no two rows of as many numbers.
+        """
         lowest, highest = torch.tensor(low), torch.tensor(high)
+        if lowest.ndim != 1 or lowest.shape != highest.shape:
+            raise TaskError(
+                "rng.uniform_between takes the lower bounds and the upper ones, as many:"
+                f" ([low, …], [high, …]); given: {low}, {high}"
+            )
         return self.uniform(1, len(low))[0] * (highest - lowest) + lowest
 
     def torch_normal(self, std: float, count: int) -> Tensor:
@@ -111,12 +131,18 @@ class EpisodeRandom:
         Args:
             layout: The robots, and how large the noise of each is.
             shared: Whether all robots get the same numbers.
+
+        A robot that takes no action number gets no noise, and nothing is drawn for it: episodes
+        begin as they do without it.
         """
+        acting = {name: place for name, place in layout.items() if place.robot.action_dim}
+        still = {n: np.zeros(p.robot.dof) for n, p in layout.items() if n not in acting}
         if not shared:
-            return {n: self.normal(p.qpos_noise, p.robot.dof) for n, p in layout.items()}
-        largest = max(placement.robot.dof for placement in layout.values())
-        noise = self.normal(max(p.qpos_noise for p in layout.values()), largest)
-        return {name: noise[: placement.robot.dof] for name, placement in layout.items()}
+            noise = {n: self.normal(p.qpos_noise, p.robot.dof) for n, p in acting.items()}
+            return {**noise, **still}
+        largest = max(placement.robot.dof for placement in acting.values())
+        common = self.normal(max(p.qpos_noise for p in acting.values()), largest)
+        return {**{name: common[: p.robot.dof] for name, p in acting.items()}, **still}
 
     def yaw_quaternion(self, low: float = 0.0, high: float = 2 * np.pi) -> Tensor:
         """Draw a rotation about z by an angle in [low, high), as a wxyz quaternion (4,), w ≥ 0.

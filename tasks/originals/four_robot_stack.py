@@ -15,6 +15,7 @@ from tasks import (
     EpisodeRandom,
     Info,
     MultiRobotTask,
+    Needs,
     PhysicsSettings,
     State,
     Target,
@@ -50,6 +51,7 @@ class FourRobotStack(MultiRobotTask):
 
     source = "robot-layouts; geometry and rewards are its own"
     layout = around_table(dict.fromkeys(ORDER, "panda"), edges=tuple(ORDER), table=(1.76, 1.76))
+    needs = {"*": Needs(fingers=True, opening=2 * CUBE_HALF_SIZE)}
     physics = PhysicsSettings()
     max_episode_steps = 300
     max_reward = 5

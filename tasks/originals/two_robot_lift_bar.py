@@ -14,6 +14,7 @@ from tasks import (
     Compound,
     Info,
     MultiRobotTask,
+    Needs,
     PhysicsSettings,
     State,
     closeness,
@@ -66,6 +67,7 @@ class TwoRobotLiftBar(MultiRobotTask):
 
     source = "robot-layouts; geometry and rewards are its own"
     layout = face_to_face({"left": "panda", "right": "panda"}, spacing=1.5)
+    needs = {"*": Needs(fingers=True, opening=2 * HALF_THICKNESS)}
     physics = PhysicsSettings()
     max_episode_steps = 100
     max_reward = 7

@@ -14,6 +14,7 @@ from tasks import (
     Goal,
     Info,
     MultiRobotTask,
+    Needs,
     PhysicsSettings,
     State,
     closeness,
@@ -40,6 +41,7 @@ class TwoRobotPushPick(MultiRobotTask):
 
     source = "robot-layouts; geometry and rewards are its own"
     layout = face_to_face({"pusher": "panda_stick", "picker": "panda_wristcam"}, spacing=1.4)
+    needs = {"picker": Needs(fingers=True, opening=2 * CUBE_HALF_SIZE)}
     physics = PhysicsSettings()
     max_episode_steps = 150
     max_reward = 8

@@ -9,6 +9,8 @@ from experts import find_expert, list_experts
 from parity.compare.native_env import make_native, native_action
 from tests.rollouts.expert_plays import REBUILT, episode, plan, seeds, task
 
+pytestmark = pytest.mark.xdist_group("experts")  # they share plans
+
 # How many of the seeds 0 ... 49 it solves at least.
 OF_50 = {
     "DrawTriangle-v1": 48,
@@ -70,18 +72,12 @@ def test_the_same_actions_do_the_same_in_native(name: str):
 
 
 @pytest.mark.parametrize("name", CLONED)
-def test_it_repeats_itself(name: str):
-    seed = seeds(name)[-1]
-    np.testing.assert_array_equal(find_expert(name)(tasks.make(name), seed), plan(name, seed))
-
-
-@pytest.mark.parametrize("name", CLONED)
-def test_it_leaves_the_task_alone(name: str):
-    env = tasks.make(name)
+def test_it_repeats_itself_and_leaves_the_task_alone(name: str):
+    env, seed = tasks.make(name), seeds(name)[-1]
     env.reset(seed=11)
     env.step(torch.zeros(1, *env.single_action_space.shape))
     before = env.get_state_dict()
-    find_expert(name)(env, seeds(name)[-1])
+    np.testing.assert_array_equal(find_expert(name)(env, seed), plan(name, seed))
     after = env.get_state_dict()
     for group, entries in before.items():
         for body, row in entries.items():

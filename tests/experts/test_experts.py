@@ -12,6 +12,8 @@ from robots import TaskError, UnknownNameError
 from tasks.episode import play
 from tests.rollouts.hand_overs import TASK, plan, task
 
+pytestmark = pytest.mark.xdist_group("experts")  # they share plans
+
 SEEDS = range(10)
 
 
@@ -29,7 +31,6 @@ def native():
 
 
 @pytest.mark.native
-@pytest.mark.xdist_group(TASK)
 @pytest.mark.filterwarnings("ignore:__array_wrap__:DeprecationWarning")  # mani_skill's own
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_same_actions_succeed_in_native(native, seed):

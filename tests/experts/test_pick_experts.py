@@ -14,6 +14,8 @@ from robots import RobotRegistry, TaskError
 from tasks.episode import play
 from tests.rollouts.expert_plays import plan, task
 
+pytestmark = pytest.mark.xdist_group("experts")  # they share plans
+
 
 @pytest.mark.parametrize(
     ("task_id", "place"),

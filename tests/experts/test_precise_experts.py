@@ -12,6 +12,8 @@ from robots import TaskError
 from tasks.episode import play
 from tests.rollouts.expert_plays import episode, plan, seeds, task
 
+pytestmark = pytest.mark.xdist_group("experts")  # they share plans
+
 HELD = {"PegInsertionSide-v1": "peg", "PlugCharger-v1": "charger"}
 
 

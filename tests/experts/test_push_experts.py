@@ -11,6 +11,8 @@ from robots import TaskError
 from tasks.episode import play
 from tests.rollouts.expert_plays import REBUILT, episode, path, plan
 
+pytestmark = pytest.mark.xdist_group("experts")  # they share plans
+
 TASKS = (
     "LiftPegUpright-v1",
     "PokeCube-v1",

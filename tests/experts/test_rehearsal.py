@@ -61,6 +61,7 @@ def test_a_plan_that_fails_is_returned_as_it_is():
     task = tasks.make("PickCube-v1")
     actions = first_success(task, 0, lambda scene: [{}])
     assert actions.shape == (50, 8)
+    assert actions.reason == "the episode ended at arm.start"
     assert not play(task, 0, actions).solved
 
 

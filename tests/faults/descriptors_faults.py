@@ -102,6 +102,7 @@ DECLARATIONS: dict[str, tuple[Callable[..., object], dict[str, tuple[Mapping[str
             "damping": (NO_NUMBERS, {"negative": (1.0, -1.0)}),
             "force_limit": (NO_NUMBERS, {"negative": -1.0}),
             "friction": (NO_NUMBERS, {"negative": -0.1}),
+            "armature": (NO_NUMBERS, {"negative": (1.0, -1.0)}),
             "delta": ({"1": 1, "a text": "yes", "None": None},),
             "mimic": ({"0": 0, "a text": "no"},),
             "unit": (NO_TEXTS, {"degrees": "deg"}),
@@ -190,6 +191,7 @@ DECLARATIONS: dict[str, tuple[Callable[..., object], dict[str, tuple[Mapping[str
             ),
             "reach": (NO_NUMBERS, {"0": 0.0, "negative": -1.0}),
             "tcp_position_links": (NO_TUPLES, {"twice the same": ("a", "a")}),
+            "tcp_offset": (NO_NUMBERS, {"two": (0, 0), "inf": (0, 0, math.inf)}),
             "gripper_material": ({"links": ("a", "b"), "a number": 5},),
             "fingers": ({"links": ("a", "b"), "True": True},),
             "cameras": (

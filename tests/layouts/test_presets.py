@@ -189,7 +189,8 @@ def test_native_poses_are_exact_to_the_last_bit():
 
 def apart(layout, *pair):
     """How far apart two robots stand if nothing else matters (m)."""
-    return max(HAND_OVER * sum(reaches(layout, *pair)), *reaches(layout, *pair))
+    smaller, larger = sorted(reaches(layout, *pair))
+    return larger if smaller < larger / 2 else max(HAND_OVER * (smaller + larger), larger)
 
 
 class TestAutomaticDistances:

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from kinematics.rotations import rotate
 from layouts import Layout, Placement
 from layouts.validation.reach import Reach
 from robots import RobotRegistry, UnknownNameError
@@ -53,7 +54,9 @@ class TestReach:
         descriptor = simulated.descriptor
         links = descriptor.tcp_position_links or (descriptor.tcp_link,)
         place = np.mean([simulated.links[name].entity_pose.p for name in links], axis=0)
-        return place.astype(float), np.array(simulated.links[descriptor.tcp_link].entity_pose.q)
+        pose = simulated.links[descriptor.tcp_link].entity_pose
+        place += rotate(pose.q, descriptor.tcp_offset)
+        return place.astype(float), np.array(pose.q)
 
     def solve(self, robot, place, quaternion=None):
         model = load_model(RobotRegistry.load(robot))

@@ -87,7 +87,9 @@ class TestProbe:
         seen = probe(Robot("mine", "small.urdf", tmp_path), 120.0)
         answers = judge(seen, Expected(kind="manipulator"))
         assert "ended" not in seen
-        for question in ("loads", "alone", "steps_50", "steps_500", "to_urdf", "to_drake"):
+        for question in (
+            "loads", "alone", "steps_50", "steps_500", "agreement", "to_urdf", "to_drake",
+        ):  # fmt: skip
             assert answers[question].good, (question, seen)
         assert str(tmp_path) not in json.dumps(seen)
 
@@ -198,6 +200,15 @@ class TestJudge:
         assert (answers["steps_500"].good, answers["steps_500"].text) == (False, "step 60")
         seen["trial"]["stands"] = False
         assert judge(seen, Expected())["steps_50"].text == "kicks"
+
+    def test_checks_and_physics(self):
+        def answer(**seen):
+            return judge({"agreement": seen}, Expected())["agreement"]
+
+        assert answer(both=100, physics=0, checks=3).good
+        assert answer(both=0, physics=0, checks=0).good
+        assert answer(both=100, physics=1, checks=0).text == "1 unseen"
+        assert answer(both=100, physics=0, checks=20).text == "20 of 120 missed"
 
     def test_nothing_seen_is_nothing_good(self):
         answers = judge({"ended": "crashed: SIGSEGV"}, self.TWO)

@@ -82,7 +82,7 @@ def test_find_demonstrations(tmp_path):
     ("changes", "complaint"),
     [
         ({"env_id": "PushT-v1"}, "was recorded in PushT-v1, not in PickCube-v1"),
-        ({"control_mode": "pd_ee_delta_pose"}, "recorded in pd_ee_delta_pose"),
+        ({"control_mode": "pd_ee_dance"}, "recorded in pd_ee_dance"),
         ({"reset_kwargs": {}}, "no reset seed"),
         ({"reset_kwargs": {"seed": [1, 2]}}, "no reset seed"),
     ],

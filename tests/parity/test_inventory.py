@@ -60,6 +60,7 @@ def test_as_json(inventory, demos):
         "observation_size": 42,
         "max_episode_steps": 50,
         "reward_modes": ["normalized_dense", "dense", "sparse", "none"],
+        "origin": "robot-layouts",
         "other_names": ["maniskill.pick_cube_native"],
         "native_id": "PickCube-v1",
         "expert": one["expert"],

@@ -67,7 +67,7 @@ def expect_honest(task_id: str) -> None:
 
 
 class TestDrawing:
-    pytestmark = NATIVE
+    pytestmark = [*NATIVE, pytest.mark.usefixtures("renderer")]
 
     @pytest.mark.parametrize("task_id", ["TwoRobotPickCube-v1", "DrawTriangle-v1"])
     def test_what_is_drawn_is_what_native_shows(self, task_id):

@@ -50,7 +50,7 @@ def panels(clip: Path) -> np.ndarray:
 
 
 class TestRendering:
-    pytestmark = NATIVE
+    pytestmark = [*NATIVE, pytest.mark.usefixtures("renderer")]
 
     def test_a_clip_of_equal_sides(self, tmp_path, capsys):
         demo = recorded(tmp_path / "wild.npz")

@@ -29,11 +29,14 @@ def contents(file: AssetFile) -> bytes:
 
 @pytest.fixture(autouse=True)
 def _own_places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Keep tests away from the developer's caches, network and settings."""
+    """Keep tests away from the network, from the Hub's cache and from the developer's settings.
+
+    Robots come from the local copy that all tests share; what fetches asks for a `store`.
+    """
     for name in list(os.environ):
         if name.startswith(("HF_", "ROBOT_LAYOUTS_")):
             monkeypatch.delenv(name)
-    monkeypatch.setenv("ROBOT_LAYOUTS_ASSETS", str(tmp_path / "assets"))
+    monkeypatch.setenv("ROBOT_LAYOUTS_ASSETS", str(REAL_ROOT))
     monkeypatch.setenv("HF_HOME", str(tmp_path / "hf_home"))
     monkeypatch.setenv("HF_TOKEN", "hf_must_never_leave_this_machine")
     monkeypatch.setenv("HF_ENDPOINT", "http://127.0.0.1:9")  # nothing listens on "discard"
@@ -41,7 +44,9 @@ def _own_places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> AssetStore:
+def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AssetStore:
+    """A local copy in which nothing is yet, in place of the shared one."""
+    monkeypatch.setenv("ROBOT_LAYOUTS_ASSETS", str(tmp_path / "assets"))
     return AssetStore(tmp_path / "assets")
 
 

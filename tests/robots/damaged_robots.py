@@ -13,6 +13,7 @@ INERTIAL = (
 BOX = '<box size="0.1 0.2 0.3"/>'
 SHAPE = f"<collision><geometry>{BOX}</geometry></collision>"
 LIMIT = '<limit lower="-1" upper="1" effort="10" velocity="1"/>'
+UPWARDS = LIMIT.replace('lower="-1"', 'lower="0"')
 XACRO = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
 
 
@@ -125,6 +126,13 @@ REPAIRS: dict[str, tuple[str, tuple[str, ...]]] = {
     "no mass and no shape": (
         with_tip(inertial("", tensor("0.1 0.1 0.1"))),
         ("link 'tip' has no mass, so its <inertial> was left out",),
+    ),
+    "a mimic out of its limits": (
+        with_wrist(UPWARDS + '<mimic joint="shoulder" multiplier="-1"/>').replace(LIMIT, UPWARDS),
+        (
+            "joint 'wrist' mimics 'shoulder' times -1, out of its own limits; it is taken times 1,"
+            " which stays within them",
+        ),
     ),
     "other programs' elements": (
         with_wrist(LIMIT, more="<transmission/><transmission/><gazebo/><tendon/>"),

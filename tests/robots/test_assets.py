@@ -21,6 +21,8 @@ from robots.urdf.summary import read_references
 from tests.catalogue import every_robot
 from tests.robots.conftest import PANDA, REAL_ROOT, contents
 
+pytestmark = pytest.mark.usefixtures("store")
+
 
 class FakeSource:
     """Gives prepared contents, and keeps a record of what it was asked for."""

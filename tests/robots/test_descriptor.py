@@ -39,6 +39,8 @@ def group(**changes) -> JointGroup:
         ({"damping": math.nan}, "JointGroup: damping is nan; it must be a finite number"),
         ({"force_limit": math.inf}, "JointGroup: force_limit is inf; it must be a finite number"),
         ({"friction": -0.1}, "friction is -0.1; it must not be negative"),
+        ({"armature": (0.1, -0.1)}, "armature is -0.1; it must not be negative"),
+        ({"armature": (0.1,)}, "armature has 1 numbers; the group has joints ('a', 'b')"),
         ({"stiffness": (1.0,)}, "stiffness has 1 numbers; the group has joints ('a', 'b')"),
         ({"damping": (1.0, -2.0)}, "damping is -2.0; it must not be negative"),
         ({"multipliers": (1.0, -1.0)}, "only a mimic group has multipliers; ('a', 'b') is none"),

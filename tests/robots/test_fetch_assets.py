@@ -15,6 +15,8 @@ from robots.assets.store import AssetStore, FileState
 from robots.fetch_assets import main
 from tests.catalogue import is_optional
 
+pytestmark = pytest.mark.usefixtures("store")
+
 CHECKOUT = Path(__file__).parents[2]
 MESH = "franka_description/meshes/collision/link4.stl"
 

@@ -22,6 +22,8 @@ from robots.assets.wheel_source import PackageWheel
 from tests.robots.conftest import contents
 from tests.robots.hub_server import HubServer, stall
 
+pytestmark = pytest.mark.usefixtures("store")
+
 HAND = "franka_description/meshes/collision/hand.stl"
 CHECKOUT = Path(__file__).parents[2]
 FETCH = [sys.executable, "-m", "robots.fetch_assets", "--physics-only"]

@@ -282,7 +282,7 @@ class TestTool:
         assert robot.tcp_position_links == ("tip_one", "tip_two")
         assert robot.tcp_link == "a_link6"
 
-    def test_without_a_frame_the_reason_says_how_far_the_tips_are(self, tmp_path):
+    def test_without_a_frame_the_tcp_is_where_the_tips_meet(self, tmp_path):
         parts, last = single_arm(end="")
         for name, sign in (("one", 1), ("two", -1)):
             finger = f"finger_{name}"
@@ -290,9 +290,11 @@ class TestTool:
             at = f"0.05 {0.01 * sign} 0"
             parts.joint(f"s_{name}", last, finger, at, axis=f"0 {sign} 0", kind="prismatic",
                         limits=(0.0, 0.03))  # fmt: skip
-        reason = next(r for r in guess(parts, tmp_path).reasons if r.startswith("TCP"))
-        assert "the finger tips meet" in reason
-        assert "where no frame lies" in reason
+        found = guess(parts, tmp_path)
+        assert found.descriptor.tcp_link == last
+        np.testing.assert_allclose(found.descriptor.tcp_offset, (0.3, 0.0, 0.0), atol=0.02)
+        reason = next(r for r in found.reasons if r.startswith("TCP"))
+        assert reason.startswith("TCP: 30 cm from the link a_link6, where the finger tips meet")
 
     @pytest.mark.parametrize("end", ["tool0", "ee_link", "suction_cup", "flange"])
     def test_an_arm_without_gripper_ends_in_its_tool(self, tmp_path, end):

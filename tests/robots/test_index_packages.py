@@ -20,6 +20,8 @@ from robots.fetch_assets import main
 from robots.write_manifest import build_manifest, build_package
 from tests.robots.wheel_index import WheelIndex, without_pip_settings
 
+pytestmark = pytest.mark.usefixtures("store")
+
 URDF = b"""<robot name="toy"><link name="base"><collision><geometry>
 <mesh filename="package://example-robot-data/robots/toy_description/meshes/base.stl"/>
 </geometry></collision></link></robot>"""

@@ -12,6 +12,8 @@ from robots.assets.locator import FileLocator, LocalUrdf
 from robots.assets.manifest import load_manifest
 from robots.assets.scenery import GROUND_TEXTURE, PACKAGE, TABLE
 
+pytestmark = pytest.mark.usefixtures("store")
+
 URDF = """<robot name="toy">
   <link name="base">
     <visual><geometry><mesh filename="meshes/base.glb"/></geometry></visual>

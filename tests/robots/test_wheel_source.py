@@ -22,6 +22,8 @@ from tests.robots.conftest import PANDA, contents
 from tests.robots.processes import is_alive, wait_until
 from tests.robots.wheel_index import WheelIndex, build_wheel, members, without_pip_settings
 
+pytestmark = pytest.mark.usefixtures("store")
+
 CHECKOUT = Path(__file__).parents[2]
 SMALL = [f for package in load_manifest().packages.values() for f in package.files]
 SMALL = [f for f in SMALL if f.bytes < 50_000 and f.origin.distribution == MANI_SKILL.name]

@@ -14,7 +14,8 @@ import rollouts.demo as demo
 from robots import AssetError, UrdfLocator
 from rollouts.__main__ import main
 from rollouts.demo import DemoOptions, run_demo
-from rollouts.video import film, overview, video_problem
+from rollouts.video import film, video_problem
+from tasks.engine.columns import overview
 from tests.rollouts.hand_overs import TASK, plan, task
 
 
@@ -117,7 +118,7 @@ def test_a_number_of_seeds_is_one_or_more(count, capsys):
     assert "--seeds" in capsys.readouterr().err
 
 
-def test_a_video_shows_the_episodes(tmp_path):
+def test_a_video_shows_the_episodes(tmp_path, renderer):
     if problem := video_problem():
         pytest.skip(problem)
     import imageio.v3 as imageio

@@ -50,6 +50,45 @@ def test_this_process_plays_the_same():
     assert here.scores == evaluate(Wanders(0.5), TASK, range(3), executor=Here()).scores
 
 
+class AtOnce:
+    """Acts for all environments that are running."""
+
+    batched = True
+
+    def __init__(self):
+        self.rows = set()
+
+    def __call__(self, obs):
+        self.rows.add(len(obs))
+        return torch.tanh(obs[:, :7] * 3)
+
+    def alone(self, obs):
+        return torch.tanh(obs[:, :7] * 3)
+
+
+def test_episodes_played_at_once_are_those_played_alone():
+    """Whatever the policy draws or remembers; the last process plays fewer than the others."""
+    alone = evaluate(Wanders(0.5), TASK, range(5), workers=0)
+    assert evaluate(Wanders(0.5), TASK, range(5), workers=0, num_envs=3).scores == alone.scores
+    assert evaluate(Wanders(0.5), TASK, range(5), workers=2, num_envs=2).scores == alone.scores
+    policy = AtOnce()
+    at_once = evaluate(policy, TASK, range(3), workers=0, num_envs=3)
+    assert at_once.scores == evaluate(policy.alone, TASK, range(3), workers=0).scores
+    assert policy.rows == {3}
+
+
+def test_episodes_that_end_early_wait_for_the_others():
+    alone = evaluate("expert", "PickCube-v1", range(3), workers=0)
+    at_once = evaluate("expert", "PickCube-v1", range(3), workers=0, num_envs=3)
+    assert at_once.scores == alone.scores
+    assert len(set(alone.lengths.values())) > 1
+
+
+def test_an_error_of_several_episodes_names_them():
+    with pytest.raises(WorkerError, match="one of the seeds 7, 8: KeyError: 'no such key'"):
+        evaluate(fails, TASK, [7, 8], workers=0, num_envs=2)
+
+
 def test_a_policy_of_a_notebook():
     program = """
         from rollouts import evaluate
@@ -108,6 +147,8 @@ def test_an_expert_plays_its_plan(monkeypatch):
     found = evaluate("expert", TASK, [4, NO_PLAN], executor=Here())
     episode = play(env := tasks.make(TASK), 4, at_random(env, 4))
     assert found.lengths == {4: 24, NO_PLAN: 0}
+    assert found.reasons == {NO_PLAN: f"no plan for seed {NO_PLAN}"}
+    assert str(found).endswith(f"seed {NO_PLAN}: no plan for seed {NO_PLAN}")
     assert found.returns == {4: pytest.approx(float(np.sum(episode.rewards))), NO_PLAN: 0}
     positions = evaluate("expert", TASK, [4], executor=Here(), control_mode="pd_joint_pos")
     assert positions.lengths == {4: 24}
@@ -136,7 +177,7 @@ def test_how_it_reads():
     [
         (still, "PushX-v1", [0], {}, UnknownNameError, "Did you mean 'PushT-v1'?"),
         (still, TASK, [0], {"obs_mod": "x"}, UnknownNameError, "Did you mean 'obs_mode'?"),
-        (still, TASK, [0], {"num_envs": 2}, TaskError, "num_envs is 2; an evaluation plays 1"),
+        (still, TASK, [0], {"num_envs": 0}, TaskError, "num_envs is 0; it must be an integer of 1"),
         (still, TASK, [], {}, TaskError, "no seeds were given; an evaluation plays one or m"),
         (still, TASK, [1, 2, 1], {}, TaskError, "seed 1 is there twice; each episode is played o"),
         (still, TASK, 5, {}, TaskError, "seeds is 5; it takes a sequence of integers"),

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 import tasks
-from rollouts.export.columns import ColumnReader, make_task
+from rollouts.export.columns import ColumnReader
 from rollouts.export.dataset import Export, export
 from rollouts.export.lerobot import LeRobotWriter, Limits
 from rollouts.export.statistics import PictureStatistics
+from rollouts.reading.recorded_task import task_for
 from rollouts.reading.trajectory import TrajectoryFile
 from rollouts.video import video_problem
 from tests.rollouts.recordings import (
@@ -215,7 +216,7 @@ def test_picture_statistics_are_those_of_the_pixels():
 
 def test_full_files_are_followed_by_others(recording, tmp_path):
     with TrajectoryFile(recording) as file:
-        reader = ColumnReader(make_task(file))
+        reader = ColumnReader(task_for(file))
         limits = Limits(data_megabytes=1e-6, files=2)
         with LeRobotWriter(
             tmp_path, reader, task_text="go", fps=20, origin={}, limits=limits
@@ -258,7 +259,7 @@ CAMERA = "observation.images.overview"
 
 
 @pytest.fixture(scope="module")
-def filmed(tmp_path_factory) -> Path:
+def filmed(tmp_path_factory, renderer) -> Path:
     """Return a folder with a recording, and a dataset with video that was made of it."""
     if problem := video_problem():
         pytest.skip(problem)

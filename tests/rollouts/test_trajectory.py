@@ -244,6 +244,13 @@ class TestOtherWorlds:
         said = self.refusal(path, tasks.make(TASK, robots=robot))
         assert said.endswith("arm.joint_groups.arm.stiffness: recorded 1000.0, here 1010.0")
 
+    def test_motors_that_the_recording_does_not_know(self, path):
+        stick = RobotRegistry.load("panda_stick")
+        heavy = replace(stick.action_split.groups["arm"], armature=0.1)
+        robot = replace(stick, action_split=stick.action_split.replace(arm=heavy))
+        said = self.refusal(path, tasks.make(TASK, robots=robot))
+        assert said.endswith("arm.joint_groups.arm.armature: recorded nothing, here 0.1")
+
     def test_other_robot_files(self, path, tmp_path):
         folder = shutil.copytree(
             RobotRegistry.load("panda_stick").urdf.locate().parent, tmp_path / "panda"

@@ -127,6 +127,7 @@ def test_no_pose_is_farther_than_the_reach_and_some_come_near(robot):
         arm.articulation.set_qpos(rng.uniform(*limits.T))
         points = found.tcp_position_links or (found.tcp_link,)
         middle = np.mean([arm.links[link].entity_pose.p for link in points], axis=0)
+        assert not any(found.tcp_offset)
         farthest = max(farthest, float(np.hypot(*middle[:2])))
     assert 0.9 * found.reach < farthest < found.reach + 1e-3
 

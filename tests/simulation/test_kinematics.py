@@ -4,6 +4,7 @@ import functools
 
 import numpy as np
 import pytest
+import sapien
 
 from layouts import Layout, Placement
 from robots import RobotRegistry, SimulationError, UnknownNameError
@@ -34,6 +35,7 @@ def reference(robot: str, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     simulated = world_of(robot).robots["arm"]
     simulated.reset(qpos)
     pose = simulated.links[simulated.descriptor.tcp_link].entity_pose
+    pose = pose * sapien.Pose(list(simulated.descriptor.tcp_offset))
     return np.array(pose.p), np.array(pose.q)
 
 

@@ -107,7 +107,7 @@ class TestCommand:
         assert "0.1 rad per step" in printed
 
     def test_what_is_wrong_is_its_exit_code(self, tmp_path, capsys, monkeypatch, small):
-        monkeypatch.setattr("robots.inspect.load", lambda name: folded(small))
+        monkeypatch.setattr("robots.inspect.named_robot", lambda name: folded(small))
         assert main(["--try", "folded"]) == 1
         printed = capsys.readouterr().out
         assert "WRONG: the likely cause: at the start l" in printed

@@ -14,6 +14,7 @@ import tasks
 from robots import SimulationError, TaskError
 from simulation import Camera
 from simulation.rendering.pictures import Observers, vulkan_problem
+from tests.fresh_process import in_fresh_process
 from tests.simulation.test_rendering import run_without_driver
 
 TASK = "PickCube-v1"
@@ -21,7 +22,7 @@ SMALL = [Camera((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1), width=48, height=32)]
 
 
 @pytest.fixture
-def drawn() -> None:
+def drawn(renderer) -> None:
     """Skip where nothing can be drawn."""
     if problem := vulkan_problem():
         pytest.skip(problem)
@@ -72,6 +73,22 @@ def test_an_observation_is_as_the_scenario_wants_it():
         depth = seen(obs, texture="depth").float()[..., 0]
         assert torch.equal(depth, -seen(obs, texture="position").float()[..., 2])
         assert 0.3 < depth[0, 16, 24] / 1000 < 0.8  # m; the table is 0.64 m away
+
+
+def _twice() -> bool:
+    """Draw, let go of all that draws, and draw again; return whether both saw the same."""
+    images: list[torch.Tensor] = []
+    for _ in range(2):
+        with closing(tasks.make(TASK, obs_mode="rgb", cameras=SMALL)) as env:
+            images.append(seen(env.reset(seed=0)[0]).clone())
+        del env
+    return torch.equal(*images)
+
+
+@pytest.mark.long  # the other tests keep what draws alive
+@drawing
+def test_a_world_after_the_last_one_that_was_drawn_is_drawn_alike():
+    assert in_fresh_process(_twice)
 
 
 @drawing

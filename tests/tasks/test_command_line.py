@@ -64,10 +64,10 @@ def test_list_has_a_row_for_every_task(capsys, only_pick_cube_recorded):
     for task_id in CATALOGUE:
         assert task_id in rows
     assert rows["PickCube-v1"] == (
-        ["PickCube-v1", "panda", "8", "42", "50", "norm", "dense", "sparse", "none", "bitwise"]
+        "PickCube-v1 panda 8 42 50 norm dense sparse none bitwise robot-layouts".split()
     )
     assert rows["TwoRobotPickCube-v1"][1:7] == ["2", "×", "panda_wristcam", "16", "66", "100"]
-    assert rows["TwoRobotPickCube-v1"][-1] == "–"
+    assert rows["TwoRobotPickCube-v1"][-2:] == ["–", "robot-layouts"]
 
 
 @pytest.mark.parametrize("task_id", CATALOGUE)

@@ -62,7 +62,7 @@ def expect_same(theirs, ours):
     (obs, info), (batch, batch_info) = theirs, ours
     assert leaves(obs) == leaves(batch, 0)
     own = {key: value for key, value in batch_info.items() if key != "reconfigure"}
-    assert set(info) == {*own, "seed"}
+    assert set(info) == {*own, "is_success", "seed"}
     assert all(info[k] == np.asarray(v).reshape(-1)[0] for k, v in own.items())
 
 

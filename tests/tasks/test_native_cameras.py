@@ -17,7 +17,7 @@ from robots import RobotRegistry
 from simulation import Camera
 from tests.native import NATIVE, TASKS
 
-pytestmark = NATIVE
+pytestmark = [*NATIVE, pytest.mark.usefixtures("renderer")]
 
 EVERYTHING = "rgb+depth+segmentation+position"
 # Pictures for people are 512 × 512 here and taken from a fixed place, by decision.

@@ -10,7 +10,8 @@ from tests.native import NATIVE, TASKS, complaints, pair
 
 pytestmark = NATIVE
 
-SEEDS = (1, 2)  # the second begins in a world that has a past, unless it is rebuilt
+# The second begins in a world that has a past; the others in one that is rebuilt.
+SEEDS = {"reused": (1, 2), "fresh": (1,)}
 
 
 def other_modes():
@@ -27,7 +28,7 @@ def has_movable_bodies(task_id):
 @pytest.mark.parametrize("task_id", TASKS)
 def test_random_and_over_range_actions(task_id, history):
     both = pair(task_id)
-    episodes = random_episodes(SEEDS, 60, both.ours.action_dim)
+    episodes = random_episodes(SEEDS[history], 60, both.ours.action_dim)
     assert abs(episodes[0].actions).max() > 2, "no action beyond the range"
     assert complaints(both.play(episodes, history)) == []
 
@@ -49,10 +50,12 @@ def test_reward_modes_are_natives():
 @pytest.mark.parametrize("history", HISTORIES)
 @pytest.mark.parametrize("task_id", TASKS)
 def test_scripted_contact(task_id, history):
-    results = pair(task_id).play([touching_episode(task_id, seed) for seed in SEEDS], history)
+    episodes = [touching_episode(task_id, seed) for seed in SEEDS[history]]
+    results = pair(task_id).play(episodes, history)
     assert complaints(results) == []
     if has_movable_bodies(task_id):
-        assert sum(result.contact_steps for result in results) >= 10, "hardly anything was touched"
+        touched = sum(result.contact_steps for result in results)
+        assert touched >= 5 * len(results), "hardly anything was touched"
 
 
 @pytest.mark.long

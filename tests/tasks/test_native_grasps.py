@@ -41,29 +41,30 @@ def play(both: Pair, task_id: str, seed: int, *, rebuild: bool) -> Iterator[list
         yield native
 
 
-@pytest.mark.parametrize("rebuild", [True, False], ids=["fresh", "reused"])
 @pytest.mark.parametrize("task_id", GRASPING_TASKS)
-def test_grasps_at_every_step(task_id, rebuild):
+def test_grasps_in_a_rebuilt_world(task_id):
     both = pair(task_id)
     both.forget()
-    for seed in (0, 1, 2):
-        held = np.array(list(play(both, task_id, seed, rebuild=rebuild)))
+    for seed in (0, 1):
+        held = np.array(list(play(both, task_id, seed, rebuild=True)))
         assert (held.sum(axis=0) >= 10).all(), "a robot grasped for less than ten steps"
 
 
 @pytest.mark.parametrize("task_id", GRASPING_TASKS)
-def test_stale_contacts_at_a_reset(task_id):
+def test_grasps_and_stale_contacts_in_a_world_with_a_past(task_id):
     """Contacts outlive a reset until the next step, so a cube may count as held in no hand."""
     both = pair(task_id)
     both.forget()
     stale = False
     for seed in (0, 1, 2):
-        held = list(play(both, task_id, seed, rebuild=False))
-        stale |= any(held[0])
-        assert any(held[-1]), "the episode should end with the cube in a hand"
+        held = np.array(list(play(both, task_id, seed, rebuild=False)))
+        assert (held.sum(axis=0) >= 10).all(), "a robot grasped for less than ten steps"
+        stale |= held[0].any()
+        assert held[-1].any(), "the episode should end with the cube in a hand"
     assert stale, "no grasp outlived a reset, so nothing was tested"
 
 
+@pytest.mark.long  # the comparisons of scripted contact do it for one pair of seeds
 @pytest.mark.parametrize("task_id", TASKS)
 def test_reset_after_contact(task_id):
     """Everything that a reset returns is equal right after contact, evaluation included."""

@@ -1,4 +1,6 @@
 import copy
+import dataclasses
+import inspect
 import pickle
 import re
 
@@ -11,6 +13,7 @@ from layouts import single
 from robots import TaskError, UnknownNameError
 from simulation import Friction, PhysicsSettings, State, World
 from simulation.sapien3.backend import worlds_below
+from tasks.engine.making import ScenarioFields
 from tasks.registry import TASKS
 
 
@@ -75,7 +78,7 @@ def test_an_unknown_field_raises():
     scenario = tasks.get_task_class("PickCube-v1").scenario
     with pytest.raises(AttributeError, match="Did you mean 'num_envs'"):
         scenario.num_env = 3
-    with pytest.raises(KeyError, match="scenario field 'num_environments'"):
+    with pytest.raises(KeyError, match="unexpected keyword argument 'num_environments'"):
         tasks.make("PickCube-v1", num_environments=3)
 
 
@@ -202,3 +205,10 @@ def test_errors_and_scenarios_travel_between_processes():
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
     scenario = tasks.get_task_class("TwoRobotPickCube-v1").scenario
     assert pickle.loads(pickle.dumps(scenario)) == scenario
+
+
+def test_type_checkers_know_every_keyword():
+    """Those that `make` has by itself, and those of a scenario, are all that there are."""
+    named = set(inspect.signature(tasks.make).parameters) - {"task_id", "robots", "fields"}
+    fields = {field.name for field in dataclasses.fields(tasks.Scenario)}
+    assert named | set(ScenarioFields.__annotations__) == fields

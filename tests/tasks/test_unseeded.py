@@ -132,7 +132,7 @@ def test_stable_baselines3_says_it_too():
     second.seed(seeds[0])
     np.testing.assert_array_equal(second.reset(), obs)
     infos = second.step(np.zeros((2, 8), np.float32))[3]
-    assert {*infos[0]} - {"TimeLimit.truncated", "is_success"} == {*second.reset_infos[0]}
+    assert {*infos[0]} - {"TimeLimit.truncated"} == {*second.reset_infos[0]}
 
 
 def test_the_task_itself_begins_with_natives_seeds():

@@ -269,7 +269,6 @@ def test_what_cannot_be_made(fields, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"mask": LATER}, "unknown reset option 'mask'. Did you mean 'reset_mask'"),
         ({"reset_mask": LATER[:2]}, "array of 3 booleans"),
         ({"reset_mask": [True, False, True]}, "array of 3 booleans"),
         ({"reset_mask": np.zeros(3, bool)}, "true somewhere"),

@@ -10,6 +10,7 @@ from robots.urdf.text_checks import link_of
 
 FREE = ("floating", "planar")  # types of joints that place a robot rather than move it
 BOUNDED = ("revolute", "prismatic")
+NOTHING = 1e-3  # of a joint's range; what it may go by and still not move
 
 
 def repair_joints(root: Element, urdf: str) -> Iterator[str]:
@@ -35,6 +36,7 @@ def repair_joints(root: Element, urdf: str) -> Iterator[str]:
             joint.remove(mimic)
             yield f"joint {joint.get('name')!r} is fixed, so what it mimics counts for nothing"
     yield from _fix_followers(joints, urdf)
+    yield from _turn_followers(joints, urdf)
 
 
 def _fix_base(joints: list[Element]) -> Iterator[str]:
@@ -86,6 +88,48 @@ def _follows(joint: Element, fixed: set[str | None], urdf: str) -> bool:
         return False
     where = f"{urdf}: joint {joint.get('name')!r}"
     return numbers_of(mimic, "offset", (0.0,), where) == (0.0,)
+
+
+def _turn_followers(joints: list[Element], urdf: str) -> Iterator[str]:
+    """Turn the multipliers of joints that mimic others, where the sign is wrong.
+
+    Their limits leave them no way to follow then, and with the other sign all of it.
+    """
+    named = {joint.get("name"): joint for joint in joints}
+    for joint in joints:
+        mimic = joint.find("mimic")
+        leader = None if mimic is None else named.get(mimic.get("joint"))
+        own, led = _span(joint, urdf), _span(leader, urdf)
+        if mimic is None or own is None or led is None:
+            continue
+        where = f"{urdf}: joint {joint.get('name')!r}"
+        (factor,) = numbers_of(mimic, "multiplier", (1.0,), where)
+        (offset,) = numbers_of(mimic, "offset", (0.0,), where)
+        ways = [_within(own, led, sign * factor, offset) for sign in (1, -1)]
+        if ways[0] < NOTHING and ways[1] > 1 - NOTHING:
+            mimic.set("multiplier", f"{-factor:.17g}")
+            yield (
+                f"joint {joint.get('name')!r} mimics {mimic.get('joint')!r} times {factor:g}, out"
+                f" of its own limits; it is taken times {-factor:g}, which stays within them"
+            )
+
+
+def _span(joint: Element | None, urdf: str) -> tuple[float, float] | None:
+    """Return the limits of a joint that has two different ones."""
+    if joint is None or joint.get("type") not in BOUNDED:
+        return None
+    where, limit = f"{urdf}: joint {joint.get('name')!r}", joint.find("limit")
+    low, high = (numbers_of(limit, key, (0.0,), where)[0] for key in ("lower", "upper"))
+    return (low, high) if low < high else None
+
+
+def _within(
+    own: tuple[float, float], led: tuple[float, float], factor: float, offset: float
+) -> float:
+    """Return the share of the way on which it is led that lies within a joint's own limits."""
+    low, high = sorted(factor * end + offset for end in led)
+    common = min(high, own[1]) - max(low, own[0])
+    return max(common, 0.0) / (high - low) if high > low else 1.0
 
 
 def _fix(joint: Element) -> None:

@@ -1,0 +1,48 @@
+"""Experts that look at every step: a function of what is seen, in the place of a script."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experts.rehearsal import Attempt, Plan, Rehearsal
+from experts.script import Scene
+from tasks import MultiRobotTask
+from tasks.engine.actions import ActionReader
+
+
+def rehearse(task: MultiRobotTask, seed: int, act: Callable[[Scene], Any]) -> Plan:
+    """Let a function act in a private copy of a task until it succeeds or the episode ends.
+
+    Args:
+        task: Says layout and physics; left alone.
+        seed: The episode.
+        act: Called before every step with what there is to see; returns the action, (A,), or a
+            mapping robot name → (a,) with every robot.
+
+    Returns:
+        What it did, (T, A), and the reason if that fails.
+
+    Raises:
+        ActionError: If an action has the wrong shape or numbers that are not finite.
+    """
+    rehearsal = Rehearsal(task)
+    try:
+        return Plan.of(_attempt(rehearsal, seed, act))
+    finally:
+        rehearsal.task.close()
+
+
+def _attempt(rehearsal: Rehearsal, seed: int, act: Callable[[Scene], Any]) -> Attempt:
+    copy, scene = rehearsal.task, rehearsal.begin(seed)
+    reader, actions = ActionReader(copy.layout, 1), list[NDArray[np.float32]]()
+    success = False
+    while not success and len(actions) < copy.max_episode_steps:
+        actions.append(reader.read(act(scene))[0].copy())
+        *_, info = copy.step(actions[-1])
+        scene, success = rehearsal.scene(), bool(info["success"][0])
+    reason = "" if success else f"no success within {len(actions)} steps"
+    return Attempt(np.stack(actions), success, reason)

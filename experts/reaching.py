@@ -1,0 +1,43 @@
+"""Bringing a tool centre point to a place, turned in any way that suits the arm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import pi
+from typing import Any
+
+import numpy as np
+
+from experts.geometry import gripper_facing, heading
+from experts.script import Pose, Scene, Waypoint
+from kinematics.rotations import Floats
+from tasks import MultiRobotTask
+
+POSE_JOINTS = 6  # of an arm that can choose how its TCP is turned
+LEANS = (0.0, pi / 6, pi / 3, pi / 2, -pi / 6)  # from straight down (rad)
+
+
+def reaching(
+    task: MultiRobotTask, robot: str, name: str, place: Callable[[Scene], Floats], **others: Any
+) -> Waypoint:
+    """Return the waypoint that brings a robot's TCP to a place.
+
+    Args:
+        task: Says which robot it is.
+        robot: Its place in the layout.
+        name: What the waypoint is called.
+        place: Where the TCP should be, (3,) (m, world), given the scene.
+        **others: Other fields of `experts.script.Waypoint`.
+    """
+    placement = task.layout.arm(robot)
+    arm, base = placement.robot, np.array(placement.base_position)
+    if len(arm.arm_joints) < POSE_JOINTS or arm.tcp_position_links:
+        return Waypoint(name, at=place, **others)
+
+    def poses(scene: Scene) -> list[Pose]:
+        point = place(scene)
+        ahead = heading(base, point)
+        own = (point, scene.tcp(robot)[1])
+        return [own, *((point, gripper_facing(ahead, lean)) for lean in LEANS)]
+
+    return Waypoint(name, to=poses, **others)

@@ -1,0 +1,94 @@
+"""Robots that were guessed from a user's own URDF: how a recording names them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+
+from layouts import Layout
+from robots import LocalUrdf, RobotDescriptor, RobotRegistry, UnreadableFileError
+from robots.common.files import read_regular
+from robots.urdf.summary import MAX_URDF_BYTES
+from rollouts.reading import json_fields
+from rollouts.reading.json_fields import TEXT, by_name, maybe
+from rollouts.reading.summary import TrajectoryError
+
+GUESSED = maybe(by_name(json_fields.fields({"urdf": TEXT, "sha256": TEXT, "descriptor": TEXT})))
+
+
+def describe_guessed(layout: Layout) -> dict[str, dict[str, str]]:
+    """Return, by place, the URDF of each robot that no registry knows, and what is made of it.
+
+    Each has ``urdf``, the file's absolute path, its ``sha256``, and ``descriptor``, a SHA-256 over
+    the descriptor's other fields. Robots that are registered, or made of several files, are not
+    among them.
+
+    Raises:
+        UnreadableFileError: If a URDF cannot be read.
+    """
+    return {
+        place: {
+            "urdf": str(path),
+            "sha256": _checksum(path),
+            "descriptor": _digest(placement.robot),
+        }
+        for place, placement in layout.items()
+        if (path := _own_file(placement.robot)) is not None
+    }
+
+
+def guess_again(place: str, recorded: Mapping[str, str], name: str) -> RobotDescriptor:
+    """Return the robot of a recording, guessed from the same file.
+
+    The file is parsed only if it has the recorded checksum, so that a recording of somebody else
+    makes nothing of other files.
+
+    Args:
+        place: Its place.
+        recorded: What `describe_guessed` returned of it.
+        name: Its name.
+
+    Raises:
+        TrajectoryError: If the file, or what is guessed from it, is another one.
+    """
+    path = Path(recorded["urdf"])
+    helps = f"name the robot, with --robots {place}=… or robots={{{place!r}: …}}"
+    try:
+        same = _checksum(path) == recorded["sha256"]
+    except UnreadableFileError as error:
+        raise TrajectoryError(
+            f"the robot of {place!r} was guessed from {path}, which cannot be read"
+            f" ({error.strerror}); {helps}"
+        ) from error
+    if not same:
+        raise TrajectoryError(
+            f"the robot of {place!r} was guessed from {path}, which has changed since; {helps}"
+        )
+    robot = RobotDescriptor.from_urdf(path, name, quiet=True)
+    if _digest(robot) != recorded["descriptor"]:
+        raise TrajectoryError(
+            f"the robot of {place!r} is not what is guessed from {path} now, with this version of"
+            f" the library and these packages, or fields of it were given; {helps}"
+        )
+    return robot
+
+
+def _own_file(robot: RobotDescriptor) -> Path | None:
+    if not isinstance(robot.urdf, LocalUrdf):
+        return None
+    if robot.name in RobotRegistry.names() and RobotRegistry.load(robot.name) == robot:
+        return None
+    path = Path(robot.urdf.path).expanduser().absolute()
+    return path if path.is_file() else None  # and no template with arguments
+
+
+def _checksum(path: Path) -> str:
+    return hashlib.sha256(read_regular(path, MAX_URDF_BYTES)).hexdigest()
+
+
+def _digest(robot: RobotDescriptor) -> str:
+    values = {f.name: getattr(robot, f.name) for f in fields(robot) if f.name != "urdf"}
+    values["keyframes"] = dict(robot.keyframes)
+    return hashlib.sha256(repr(values).encode()).hexdigest()

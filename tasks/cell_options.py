@@ -1,0 +1,81 @@
+"""``--layout`` and ``--robots``: which robots stand where, on the command line of a task."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from layouts import Layout
+from robots import RobotDescriptor, TaskError
+from robots.common.commands import notice, program
+from robots.named import is_path, named_robot
+from tasks.language.needs import ACT, HOLD
+
+
+def add_cell_options(parser: argparse.ArgumentParser, *, robots: bool = True) -> None:
+    """Add the options of a command that say which robots stand where; see `chosen_cell`.
+
+    Args:
+        parser: The command's.
+        robots: Whether to add ``--robots``, which some commands read themselves.
+    """
+    add = parser.add_argument
+    add("--layout", metavar="FILE", help="other places for the robots: a layout in YAML")
+    if robots:
+        add(
+            "--robots",
+            nargs="+",
+            metavar="PLACE=ROBOT",
+            help="other robots in some places, by name or URDF: left=ur5e.urdf right=xarm7",
+        )
+    add(
+        "--bystanders",
+        choices=(HOLD, ACT),
+        help="what robots of the layout do that have no place in the task (refuse them)",
+    )
+
+
+def chosen_cell(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the arguments of `tasks.make` that the options ask for; none if there are none.
+
+    Raises:
+        RobotLayoutsError: If a robot or layout cannot be had, or a word makes no sense.
+    """
+    chosen: dict[str, Any] = {}
+    if options.layout is not None:
+        chosen["layout"] = Layout.load(options.layout)
+    if options.robots:
+        chosen["robots"] = chosen_robots(options.robots)
+    if options.bystanders is not None:
+        chosen["bystanders"] = options.bystanders
+    return chosen
+
+
+def chosen_robots(words: list[str]) -> RobotDescriptor | dict[str, RobotDescriptor]:
+    """Return the robots of words such as ``left=panda``, or of one that names no place.
+
+    Raises:
+        TaskError: If a word is malformed, or a place is given twice.
+        UnknownNameError: If there is no such robot.
+        AssetError: If a URDF is unusable.
+    """
+    if len(words) == 1 and "=" not in words[0].partition("?")[0]:
+        return _robot(words[0])
+    robots: dict[str, RobotDescriptor] = {}
+    known: dict[str, RobotDescriptor] = {}  # guessing one takes a while
+    for word in words:
+        place, equals, name = word.partition("=")
+        if not (place and equals and name):
+            raise TaskError(f"{word!r} should be PLACE=ROBOT, for example left=panda")
+        if place in robots:
+            raise TaskError(f"the place {place!r} is given twice")
+        robots[place] = known[name] = known.get(name) or _robot(name)
+    return robots
+
+
+def _robot(name: str) -> RobotDescriptor:
+    robot = named_robot(name)
+    if is_path(name):
+        guess = program("robots.from_urdf")
+        notice(f"{robot.name}: guessed from {name}; `{guess} {name}` says what, and why")
+    return robot

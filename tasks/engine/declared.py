@@ -1,0 +1,238 @@
+"""Checks what a task's class declares, before anything is built of it."""
+
+from __future__ import annotations
+
+import inspect
+import warnings
+from collections.abc import Callable, Iterator
+from difflib import get_close_matches
+from functools import lru_cache
+from types import FunctionType
+from typing import Any
+
+from layouts import Layout
+from robots import TaskError
+from robots.common.bounds import checked_flag, checked_number, checked_numbers, checked_whole, shown
+from simulation import Camera, PhysicsSettings
+from tasks.engine.declaration import DENSE_MODES, Declaration
+from tasks.language.bodies import Body, Table, WideTable
+
+HOOKS = {
+    "design": ("rng",),
+    "build": ("world",),
+    "sample": ("world", "rng"),
+    "evaluate": ("state",),
+    "observe": ("state", "info"),
+    "dense_reward": ("state", "action", "info"),
+    "remember": ("state",),
+    "begin_episodes": ("state", "env_ids"),
+    "respond": ("state",),
+    "reset_robots": ("world", "rng"),
+}
+"""What a class may define, and what it is called with."""
+
+_ATTRIBUTES = tuple(Declaration.__annotations__)
+_ALIKE = 0.85  # of two names, 1 being the same; below it one is hardly meant for the other
+_STEPS = 2**31 - 1
+
+
+@lru_cache(maxsize=1024)
+def check_declaration(cls: type[Declaration]) -> None:
+    """Refuse a task's class that cannot work.
+
+    Args:
+        cls: The class.
+
+    Raises:
+        TaskError: If something is missing or wrong; says what it must be.
+
+    Warns:
+        UserWarning: If it defines what nothing calls, under nearly the name of what is called.
+    """
+    task = cls.__name__
+    _check_layout(cls)
+    if "max_episode_steps" not in _known(cls):
+        raise TaskError(
+            f"{task} sets no max_episode_steps: after how many control steps an episode is"
+            f" truncated, such as max_episode_steps = 100{_meant(cls, 'max_episode_steps')}"
+        )
+    checked_whole(f"{task}.max_episode_steps", cls.max_episode_steps, 1, _STEPS, TaskError)
+    if cls.evaluate is Declaration.evaluate:
+        raise TaskError(
+            f"{task} does not define evaluate(self, state), which says where it is solved:"
+            f" {{'success': (N,) bool}}{_meant(cls, 'evaluate')}"
+        )
+    for name, arguments in HOOKS.items():
+        _check_hook(cls, name, arguments)
+    _check_rewards(cls)
+    _check_numbers(cls)
+    _check_views(cls)
+    _check_bodies(cls)
+    for name, hook in _nearly_hooks(cls):
+        warnings.warn(
+            f"{task} defines {name!r}, which nothing calls. Did you mean {hook!r}?", stacklevel=3
+        )
+
+
+def _check_layout(cls: type[Declaration]) -> None:
+    task = cls.__name__
+    if "layout" not in _known(cls):
+        raise TaskError(
+            f"{task} sets no layout: which robots stand where, such as"
+            f" layout = layouts.single({{'arm': 'panda'}}){_meant(cls, 'layout')}"
+        )
+    layout, counts = cls.layout, cls.robot_counts
+    if not isinstance(layout, Layout):
+        raise TaskError(
+            f"{task}.layout is {shown(layout)}; a layouts.Layout is needed, such as"
+            " layouts.single({'arm': 'panda'})"
+        )
+    if counts is None:
+        return
+    if not isinstance(counts, range) or not counts:
+        raise TaskError(
+            f"{task}.robot_counts is {shown(counts)}; a range of 1 or more numbers is needed, such"
+            " as range(2, 5) for two to four robots"
+        )
+    if len(layout.arms) not in counts:
+        raise TaskError(
+            f"{task}.layout has {len(layout.arms)} robots, which are not in its robot_counts,"
+            f" {counts}"
+        )
+
+
+def _check_hook(cls: type[Declaration], name: str, arguments: tuple[str, ...]) -> None:
+    task, hook = cls.__name__, inspect.getattr_static(cls, name)
+    if hook is vars(Declaration)[name]:
+        return
+    written = f"def {name}({', '.join(('self', *arguments))})"
+    method = getattr(cls, name)
+    if not callable(method):
+        raise TaskError(f"{task}.{name} is {shown(method)}; it must be a method: {written}")
+    given = arguments if isinstance(hook, (staticmethod, classmethod)) else ("self", *arguments)
+    try:
+        signature = inspect.signature(method)
+    except (TypeError, ValueError):  # of something not written in Python
+        return
+    try:
+        signature.bind(*given)
+    except TypeError:
+        raise TaskError(f"{task}.{name} takes {signature}; it is called as {written}") from None
+    if inspect.iscoroutinefunction(method) or inspect.isgeneratorfunction(method):
+        raise TaskError(f"{task}.{name} must return its result; it has async or yield")
+
+
+def _check_rewards(cls: type[Declaration]) -> None:
+    task, modes = cls.__name__, cls.reward_modes
+    known = isinstance(modes, tuple) and all(mode in DENSE_MODES for mode in modes)
+    if not known or not modes:
+        raise TaskError(
+            f"{task}.reward_modes is {shown(modes)}; a tuple of {', '.join(DENSE_MODES)} is needed,"
+            " the default first"
+        )
+    if cls.dense_reward is Declaration.dense_reward and {"dense", "normalized_dense"} & {*modes}:
+        raise TaskError(
+            f"{task}.reward_modes has {modes[0]!r}, but it does not define dense_reward(self,"
+            f" state, action, info){_meant(cls, 'dense_reward')}"
+        )
+    checked_number(f"{task}.max_reward", cls.max_reward, 1e-6, 1e6, TaskError)
+
+
+def _check_numbers(cls: type[Declaration]) -> None:
+    task = cls.__name__
+    checked_whole(f"{task}.first_seed", cls.first_seed, 0, 2**32 - 1, TaskError)
+    checked_flag(f"{task}.rebuilds", cls.rebuilds, TaskError)
+    if not (cls.physics is None or isinstance(cls.physics, PhysicsSettings)):
+        raise TaskError(
+            f"{task}.physics is {shown(cls.physics)}; tasks.PhysicsSettings or None is needed"
+        )
+    sensed = cls.sensed
+    if not isinstance(sensed, tuple) or not all(isinstance(x, str) for x in sensed):
+        raise TaskError(
+            f"{task}.sensed is {shown(sensed)}; a tuple of names is needed, such as"
+            " ('*tcp_pose',) with its comma"
+        )
+
+
+def _check_views(cls: type[Declaration]) -> None:
+    task = cls.__name__
+    if not isinstance(cls.cameras, (tuple, list)) or not all(
+        isinstance(camera, Camera) for camera in cls.cameras
+    ):
+        raise TaskError(
+            f"{task}.cameras is {shown(cls.cameras)}; a tuple of tasks.Camera is needed, such as"
+            " (Camera((0.3, 0, 0.6), (0, 0, 0.1)),) with its comma"
+        )
+    if not isinstance(cls.viewpoint, (tuple, list)) or len(cls.viewpoint) != 2:
+        raise TaskError(
+            f"{task}.viewpoint is {shown(cls.viewpoint)}; the camera's position and target are"
+            " needed (m)"
+        )
+    for what, point in zip(("position", "target"), cls.viewpoint, strict=True):
+        checked_numbers(f"{task}.viewpoint's {what}", point, 3, 1e6, TaskError, "m")
+
+
+def _check_bodies(cls: type[Declaration]) -> None:
+    task = cls.__name__
+    if not isinstance(cls.table, (Table, WideTable)):
+        raise TaskError(
+            f"{task}.table is {shown(cls.table)}; a tasks.Table or tasks.WideTable is needed, and"
+            " other bodies go by other names"
+        )
+    for base in reversed(cls.__mro__):
+        for name, value in vars(base).items():
+            if isinstance(value, type) and issubclass(value, (Body, Table, WideTable)):
+                raise TaskError(
+                    f"{task}.{name} is the class {value.__name__}; a body is one that it makes:"
+                    f" {name} = {value.__name__}(…)"
+                )
+    engine = _engine(cls)
+    for name in cls.bodies:
+        if name != "table" and hasattr(engine, name):
+            raise TaskError(
+                f"{task}.{name} is a body, but {name!r} is a name that every task has for something"
+                " else; call it something else"
+            )
+
+
+def _engine(cls: type[Declaration]) -> type:
+    """Return the class that runs tasks, of which a task's class is one."""
+    return next(base for base in cls.__mro__ if base.__module__ == "tasks.engine.task")
+
+
+def _known(cls: type) -> set[str]:
+    return {name for base in cls.__mro__ for name in vars(base)}
+
+
+def _own(cls: type) -> Iterator[tuple[str, Any]]:
+    """Yield what a task's class has beyond what every task has."""
+    for base in cls.__mro__:
+        if not base.__module__.startswith("tasks.engine."):
+            yield from vars(base).items()
+
+
+def _meant(cls: type[Declaration], name: str) -> str:
+    """Return the name of the class's own that was meant for ``name``, if there is one."""
+    names = [own for own, _ in _own(cls) if not own.startswith("_") and own not in HOOKS]
+    match = get_close_matches(name, names, 1, _ALIKE)
+    return f". Is {match[0]!r} meant to be it?" if match else ""
+
+
+def _nearly_hooks(cls: type[Declaration]) -> Iterator[tuple[str, str]]:
+    """Yield methods that nothing of the class uses, and what each may have been meant for."""
+    own = dict(_own(cls))
+    missing = [name for name in (*HOOKS, *_ATTRIBUTES) if name not in own]
+    used = {name for value in own.values() for name in _names_in(value)}
+    for name, value in own.items():
+        if name.startswith("_") or name in used or isinstance(value, Body):
+            continue
+        if hasattr(_engine(cls), name):
+            continue
+        if match := get_close_matches(name, missing, 1, _ALIKE):
+            yield name, match[0]
+
+
+def _names_in(value: object) -> tuple[str, ...]:
+    function: Callable[..., Any] | object = getattr(value, "__func__", value)
+    function = inspect.unwrap(function) if isinstance(function, FunctionType) else function
+    return function.__code__.co_names if isinstance(function, FunctionType) else ()

@@ -1,0 +1,267 @@
+"""Checks what a task's methods return: in full when it is made, names and shapes ever after.
+
+A wrong shape spreads as far as NaN does: rewards of shape (N, 1) become (N, N) in somebody's loss.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+
+from robots import TaskError
+from robots.common.bounds import shown
+from simulation import State
+from simulation.maths import Array
+from tasks.arrays import array_of
+from tasks.engine.arguments import ELAPSED
+
+SUCCESS = "success"
+
+
+class ReturnedArrays:
+    """What a method returns that gives arrays by name: always the same names, shapes and types.
+
+    Attributes:
+        method: The method in words, ``TwoArmTray.evaluate()``.
+    """
+
+    def __init__(
+        self,
+        method: str,
+        num_envs: int,
+        *,
+        axes: int | None = None,
+        judges: bool = False,
+    ) -> None:
+        """Take what is known before it is called.
+
+        Args:
+            method: The method in words.
+            num_envs: Number of environments N.
+            axes: How many axes each array may have; None for any number.
+            judges: Whether it is `evaluate`, whose arrays include ``success``, of flags.
+        """
+        self.method = method
+        self._num_envs, self._axes, self._judges = num_envs, axes, judges
+        self._names: list[str] = []
+        self._shapes: list[tuple[int, ...]] = []
+        self._types: list[np.dtype[Any]] | None = None
+
+    def checked(self, values: Any) -> Mapping[str, NDArray[Any]]:
+        """Return what was returned; it is looked at closely if it is not as at first.
+
+        Raises:
+            TaskError: If it is wrong; says what it must be.
+        """
+        if type(values) is dict and list(values) == self._names:
+            try:  # arrays; all else is looked at
+                arrays = values.values()
+                same = [x.dtype for x in arrays] == self._types
+                if same and [x.shape for x in arrays] == self._shapes:
+                    return values
+            except AttributeError:
+                pass
+        return self._looked_at(values)
+
+    def _looked_at(self, values: Any) -> dict[str, NDArray[Any]]:
+        if not isinstance(values, Mapping):
+            raise TaskError(
+                f"{self.method} returned {_given(values)}; it must return a dict of arrays by name"
+            )
+        arrays = {name: self._array(name, value) for name, value in values.items()}
+        if self._types is None:
+            self._check_first(arrays)
+            self._names, self._shapes = list(arrays), [x.shape for x in arrays.values()]
+            self._types = [x.dtype for x in arrays.values()]
+        elif arrays.keys() != set(self._names):
+            self._refuse_names(arrays)
+        for name, shape, dtype in zip(self._names, self._shapes, self._types, strict=True):
+            array = arrays[name]
+            if (array.shape, array.dtype) != (shape, dtype):
+                raise TaskError(
+                    f"{self.method} returned {name!r} as {_form(array)}; at first it was"
+                    f" {dtype} of shape {shape}, and must stay that"
+                )
+        return arrays
+
+    def _check_first(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        if self._judges and SUCCESS not in arrays:
+            raise TaskError(
+                f"{self.method} returned no {SUCCESS!r}, (N,) bool, which says where the task is"
+                f" solved; it returned: {', '.join(arrays) or 'nothing'}"
+            )
+        if self._judges and ELAPSED in arrays:
+            raise TaskError(
+                f"{self.method} returned {ELAPSED}, which info already has; call it something else"
+            )
+        if self._judges and arrays[SUCCESS].dtype != bool:
+            raise TaskError(
+                f"{self.method} returned {SUCCESS!r} as {_form(arrays[SUCCESS])}; it must be bool,"
+                " as comparisons give it: distance <= 0.02"
+            )
+
+    def _refuse_names(self, arrays: Mapping[str, NDArray[Any]]) -> NoReturn:
+        more = [name for name in arrays if name not in self._names]
+        less = [name for name in self._names if name not in arrays]
+        changes = [
+            f"{what} {', '.join(map(repr, names))}"
+            for what, names in (("it has", more), ("it lacks", less))
+            if names
+        ]
+        raise TaskError(
+            f"{self.method} returned other names than at first ({' and '.join(changes)}); it must"
+            " return the same ones every time"
+        )
+
+    def _array(self, name: object, value: Any) -> NDArray[Any]:
+        what = f"{self.method} returned {shown(name)} as"
+        if not isinstance(name, str) or not name:
+            raise TaskError(f"{self.method} returned the name {shown(name)}; names must be texts")
+        most = 1 if self._judges and name == SUCCESS else self._axes
+        shape = _shape_text(self._num_envs, most)
+        array = _as_array(value, what, f"an array of shape {shape}")
+        if not 1 <= array.ndim <= (most or array.ndim) or len(array) != self._num_envs:
+            advice = _advice(array, self._num_envs)
+            raise TaskError(f"{what} {_form(array)}; it must have shape {shape}{advice}")
+        return array
+
+
+class ReturnedReward:
+    """What a method returns that gives rewards: always floating, (N,), and of one type.
+
+    Attributes:
+        dtype: Their type; None as long as there was none.
+    """
+
+    def __init__(self, method: str, num_envs: int) -> None:
+        """Take the method in words, and the number of environments N."""
+        self._method, self._num_envs = method, num_envs
+        self._shape = (num_envs,)
+        self.dtype: np.dtype[Any] | None = None
+
+    def checked(self, reward: Any) -> NDArray[np.float32]:
+        """Return a reward as float32.
+
+        Raises:
+            TaskError: If it is none; says what it must be.
+        """
+        if type(reward) is not np.ndarray or reward.dtype != self.dtype:
+            reward = self._looked_at(reward)
+        if reward.shape != self._shape:
+            raise TaskError(
+                f"{self._method} returned {_form(reward)}; it must have shape {self._shape}"
+                f"{_advice(reward, self._num_envs)}"
+            )
+        return np.asarray(reward, np.float32)
+
+    def _looked_at(self, reward: Any) -> NDArray[Any]:
+        needed = f"a floating array of shape {self._shape}, one reward for each environment"
+        array = _as_array(reward, f"{self._method} returned", needed)
+        if array.dtype.kind != "f":
+            raise TaskError(
+                f"{self._method} returned {_form(array)}; it must be {needed}: tasks.maths.floats"
+                " makes one of flags"
+            )
+        if self.dtype not in (None, array.dtype):
+            raise TaskError(
+                f"{self._method} returned {array.dtype}; at first it was {self.dtype}, and must"
+                " stay that"
+            )
+        self.dtype = array.dtype
+        return array
+
+
+_EFFECTS = {
+    "build": "it adds bodies to a world, world.add(…)",
+    "sample": "it places bodies, world.set_pose(…)",
+    "begin_episodes": "it sets what the task remembers, self.memory.…",
+    "respond": "it moves bodies, self.simulation.place(…)",
+    "reset_robots": "it stands robots, self.stand(world, …)",
+}
+
+
+def expect_nothing(task: object, method: str, returned: object) -> None:
+    """Refuse that a method returns something that nobody would look at.
+
+    Args:
+        task: Whose method.
+        method: Its name.
+        returned: What it returned.
+
+    Raises:
+        TaskError: If that is not None.
+    """
+    if returned is not None:
+        raise TaskError(
+            f"{type(task).__name__}.{method}() returned {shown(returned)}, which has no effect;"
+            f" {_EFFECTS[method]}, and returns nothing"
+        )
+
+
+@contextmanager
+def unchanged(state: State, method: str) -> Generator[None]:
+    """Look whether a method changes the state that it is given.
+
+    Raises:
+        TaskError: If it does: what comes after it would see another world than there is.
+    """
+    parts = (
+        ("poses", state.all_poses),
+        ("joint positions", state.joint_positions),
+        ("joint velocities", state.joint_velocities),
+    )
+    before = [part.copy() for _, part in parts]
+    yield
+    for (name, part), earlier in zip(parts, before, strict=True):
+        if not np.array_equal(part, earlier):
+            raise TaskError(
+                f"{method} changed the {name} of the state, which share its memory; change a copy:"
+                " tasks.maths.copy(x)"
+            )
+
+
+def _as_array(value: Any, what: str, needed: str) -> NDArray[Any]:
+    if not isinstance(value, (np.ndarray, np.generic, Tensor)):
+        raise TaskError(f"{what} {_given(value)}; it must be {needed}")
+    array = array_of(value, f"{what} what", TaskError)
+    if array.dtype.kind not in "fiub":
+        raise TaskError(f"{what} {_form(array)}; it must be {needed}, of numbers or flags")
+    return array
+
+
+def _shape_text(num_envs: int, most: int | None) -> str:
+    match most:
+        case 1:
+            return f"({num_envs},)"
+        case 2:
+            return f"({num_envs},) or ({num_envs}, k)"
+        case _:
+            return f"({num_envs}, …)"
+
+
+def _given(value: object) -> str:
+    if isinstance(value, (np.ndarray, Tensor)):
+        return f"an array, {value.dtype} of shape {tuple(value.shape)}"
+    return f"a {type(value).__name__}" if isinstance(value, (list, tuple, dict)) else shown(value)
+
+
+def _form(array: Array) -> str:
+    if array.ndim == 0:
+        return f"the single {array.dtype} {array}"
+    return f"{array.dtype} of shape {array.shape}"
+
+
+def _advice(array: Array, num_envs: int) -> str:
+    """Return what to change, if that is plain."""
+    if array.ndim == 0:
+        return ", one for each environment: x[:, 2], not x[0, 2]; x.any(1), not x.any()"
+    if array.ndim > 1 and array.shape[0] == num_envs and array.shape[-1] == 1:
+        return "; [..., 0] leaves the last axis out"
+    if array.shape[0] != num_envs:
+        return f": the first axis counts the environments, of which there are {num_envs}"
+    return ""

@@ -1,0 +1,265 @@
+"""``robot-layouts new task NAME --robots left=panda right=ur5``: a task of one's own.
+
+Writes one file with a task to go on with and its expert, and one with their tests.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from kinematics.rotations import rotate
+from layouts import Layout, Placement, face_to_face, ring, single
+from robots import RobotDescriptor, TaskError
+from robots.common.commands import exit_code, notice, program, start
+from robots.common.new_files import write_new
+from robots.named import is_path, named_robot
+from robots.urdf.reading import read_model
+from robots.urdf.summary import read_urdf
+from robots.urdf.tree import kinematic_tree, link_index
+
+SPREAD = 0.06  # of a robot's reach: how far a goal may be from the middle, to each side
+
+_TASK = '''"""{title}: every arm brings its tool centre point to a ball in the air."""
+
+from experts import register_expert
+from experts.reaching import reaching
+from experts.rehearsal import first_success
+{imports}
+from tasks.maths import norm
+
+RADIUS = 0.03  # of a goal (m)
+
+
+@register_task("{task_id}")
+class {title}(MultiRobotTask):
+    """Bring every TCP to its goal. Success: all are within 3 cm of theirs."""
+
+    layout = {layout}
+    max_episode_steps = 100
+    max_reward = 2
+{table}
+    # where each goal may be (m)
+{goals}
+
+    def evaluate(self, state):
+        """Success: every TCP is in its goal."""
+        arrived = state.full(True)
+        for place in self.layout:
+            arrived = arrived & (state.tcp_distance(place, f"goal_{{place}}") <= RADIUS)
+        return {{"success": arrived}}
+
+    def observe(self, state, info):
+        """The way of every TCP to its goal; joints are observed anyway."""
+        return {{f"{{place}}_way": self.way(state, place) for place in self.layout}}
+
+    def dense_reward(self, state, action, info):
+        """Nearness of all TCPs (1); 2 on success."""
+        near = closeness(*(norm(self.way(state, place)) for place in self.layout))
+        return sum(near) / len(near) + info["success"]
+
+    def way(self, state, place):
+        """From a TCP to its goal, (N, 3) (m)."""
+        return state.tcp_offset(place, f"goal_{{place}}")
+
+
+def reach(task, seed):
+    """The expert: actions (T, A) that solve the episode of a seed, found in a world of its own."""
+    script = {{place: [reaching(task, place, "goal", goal_of(place))] for place in task.layout}}
+    return first_success(task, seed, lambda scene: [script])
+
+
+def goal_of(place):
+    """Return what finds the goal of a place in a scene, (3,) (m)."""
+    return lambda scene: scene.body(f"goal_{{place}}")[0]
+
+
+register_expert("{task_id}", reach)
+'''
+
+_TEST = '''"""Tests of {task_id}; run them with pytest, in this folder."""
+
+import numpy as np
+
+import tasks
+from experts import find_expert
+from tasks.episode import play
+
+TASK = "{module}:{task_id}"
+
+
+def test_the_expert_solves_it():
+    env = tasks.make(TASK)
+    expert = find_expert(TASK)
+    for seed in range(3):
+        assert play(env, seed, expert(env, seed)).solved
+
+
+def test_a_seed_is_an_episode():
+    env = tasks.make(TASK, num_envs=2)
+    first, _ = env.reset(seed=[7, 8])
+    again, _ = env.reset(seed=[8, 7])
+    assert np.array_equal(first[0], again[1])
+    assert not np.array_equal(first[0], first[1])
+
+
+def test_rewards_stay_below_their_largest():
+    env = tasks.make(TASK, num_envs=4, reward_mode="normalized_dense")
+    env.reset(seed=0)
+    for _ in range(5):
+        reward = env.step(env.action_space.sample())[1]
+        assert ((reward >= 0) & (reward <= 1)).all()
+'''
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write a task's file and its test.
+
+    Returns:
+        0, or 1 if a word makes no sense or a file is there already, or 2 for an unknown robot.
+    """
+    parser = argparse.ArgumentParser(prog=program("tasks.new_task"), description=__doc__)
+    parser.add_argument("name", metavar="NAME", help="what it is called, such as TwoArmTray")
+    parser.add_argument(
+        "--robots",
+        nargs="+",
+        required=True,
+        metavar="PLACE=ROBOT",
+        help="who stands in its places, by name or URDF: left=panda right=arm.urdf",
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path(), metavar="DIR", help="folder of the files (this one)"
+    )
+    options = parser.parse_args(arguments)
+    return exit_code(lambda: _write(options))
+
+
+def _write(options: argparse.Namespace) -> None:
+    module, task_id = _names(options.name)
+    texts = {
+        f"{module}.py": task_source(task_id, _robots(options.robots)),
+        f"test_{module}.py": _TEST.format(module=module, task_id=task_id),
+    }
+    for path in write_new(options.out, texts):
+        print(path)
+    commands = program("rollouts")
+    notice(
+        f"Try it: python -m pytest {options.out / f'test_{module}.py'}\n"
+        f"In {options.out.absolute()}: {commands} record --task {module}:{task_id} --episodes 10"
+        " --out data"
+    )
+
+
+def task_source(task_id: str, robots: Mapping[str, str]) -> str:
+    """Return the file of a task in which robots reach for balls, and its expert.
+
+    Args:
+        task_id: Its id.
+        robots: Robot by place: names, or paths of URDFs.
+
+    Raises:
+        UnknownNameError: If there is no such robot.
+        AssetError: If a URDF is unusable.
+        LayoutError: If a place has no name for one.
+    """
+    preset = _preset(len(robots))
+    written = {place: _written(robot) for place, robot in robots.items()}
+    named = ", ".join(f'"{place}": {robot}' for place, robot in written.items())
+    loaded = {place: named_robot(robot) for place, robot in robots.items()}
+    layout = preset.place(loaded)
+    wide = len(robots) > 2
+    paths = any(is_path(robot) for robot in robots.values())
+    words = ["Area", "Goal", "MultiRobotTask", *(["WideTable"] if wide else []), "closeness"]
+    imports = [
+        f"from layouts import {preset.name}",
+        *(["from robots import RobotDescriptor"] if paths else []),
+        f"from tasks import {', '.join([*words, 'register_task'])}",
+    ]
+    return _TASK.format(
+        title=task_id.rpartition("-")[0],
+        task_id=task_id,
+        imports="\n".join(imports),
+        layout=f"{preset.name}({{{named}}}{preset.options})",
+        table="    table = WideTable()\n" if wide else "",
+        goals="\n".join(_goal(place, layout) for place in layout),
+    )
+
+
+def _goal(place: str, layout: Layout) -> str:
+    low, high = _area(layout[place])
+    ranges = (f"{axis}=({a:g}, {b:g})" for axis, a, b in zip("xyz", low, high, strict=True))
+    return f"    goal_{place} = Goal(RADIUS, spawn=Area({', '.join(ranges)}))"
+
+
+def _area(placement: Placement) -> tuple[list[float], list[float]]:
+    """Return the corners of where a robot's goal may be (m, world): about its TCP at the start."""
+    robot = placement.robot
+    urdf = robot.urdf.locate()
+    model = read_model(read_urdf(urdf), urdf.name)
+    others = [joint.name for joint in model.moving if joint.name not in robot.joints]
+    tree = kinematic_tree(model, [*robot.joints, *others])
+    qpos = np.zeros((1, len(tree.coordinates)))
+    qpos[0, : robot.dof] = placement.start_qpos
+    links = [link_index(tree, name) for name in robot.tcp_position_links or (robot.tcp_link,)]
+    tcp = tree.forward(qpos)[0, links, :3, 3].mean(0)
+    place = placement.base_position + rotate(np.array(placement.base_quaternion), tcp)
+    spread = SPREAD * robot.reach
+    middle = place + [0.0, 0.0, spread]
+    return (middle - spread).round(3).tolist(), (middle + spread).round(3).tolist()
+
+
+class _Preset(NamedTuple):
+    """How robots are placed: the preset's name, its options as they are written, and itself."""
+
+    name: str
+    options: str
+    place: Callable[[Mapping[str, RobotDescriptor]], Layout]
+
+
+def _preset(count: int) -> _Preset:
+    """Return the usual way to place so many robots."""
+    if count == 1:
+        return _Preset("single", "", single)
+    if count == 2:
+        by_reach = partial(face_to_face, spacing="auto", keyframe=None)
+        return _Preset("face_to_face", ', spacing="auto", keyframe=None', by_reach)
+    by_reach = partial(ring, radius="auto", keyframe=None)
+    return _Preset("ring", ', radius="auto", keyframe=None', by_reach)
+
+
+def _written(robot: str) -> str:
+    """Return a robot as it is written in a task's file."""
+    if not is_path(robot):
+        return f'"{robot}"'
+    return f'RobotDescriptor.from_urdf("{Path(robot).absolute()}", quiet=True)'
+
+
+def _robots(words: Sequence[str]) -> dict[str, str]:
+    robots: dict[str, str] = {}
+    for word in words:
+        place, equals, robot = word.partition("=")
+        if not (place.isidentifier() and equals and robot):
+            raise TaskError(f"{word!r} should be PLACE=ROBOT, for example left=panda")
+        if place in robots:
+            raise TaskError(f"the place {place!r} is given twice")
+        robots[place] = robot
+    return robots
+
+
+def _names(name: str) -> tuple[str, str]:
+    """Return the module and the id of a task that is called ``TwoArmTray`` or ``two_arm_tray``."""
+    word, _, version = name.partition("-v")
+    title = "".join(part[:1].upper() + part[1:] for part in word.split("_"))
+    if not title.isidentifier() or not title.isascii() or not (version or "1").isdigit():
+        raise TaskError(f"{name!r} is no name of a task; letters and digits make one: TwoArmTray")
+    return re.sub("(?<=[a-z0-9])(?=[A-Z])", "_", title).lower(), f"{title}-v{version or 1}"
+
+
+if __name__ == "__main__":
+    start(main)

@@ -1,0 +1,1 @@
+"""A laboratory's own tasks, as a user of robot-layouts writes them."""

@@ -1,0 +1,138 @@
+"""The console script: one tree of commands, which no file of the user's can hide."""
+
+import os
+import re
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from robots.common.console import COMMANDS, main
+from tests.outside.lab import CHECKOUT, make_folder, run
+
+PYPROJECT = (CHECKOUT / "pyproject.toml").read_text()
+
+
+def test_every_command_has_a_main():
+    for command in COMMANDS.values():
+        source = Path(find_spec(command.module).origin).read_text()
+        assert "\ndef main(" in source
+    assert 'robot-layouts = "robots.common.console:run"' in PYPROJECT
+
+
+def test_it_lists_its_commands(capsys):
+    assert main([]) == 0
+    printed = capsys.readouterr().out
+    for name, command in COMMANDS.items():
+        assert re.search(f"^  {name} +{re.escape(command.about)}$", printed, re.MULTILINE)
+    assert main(["robots"]) == 0
+    assert "robots inspect" in capsys.readouterr().out
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("robot-layouts 0.")
+
+
+@pytest.mark.parametrize(
+    ("words", "near"),
+    [
+        (["recrod"], "record"),
+        (["robots", "inspekt"], "robots inspect"),
+        (["new", "tsk"], "new task"),
+        (["task"], "tasks"),
+    ],
+)
+def test_a_wrong_word_gets_its_closest_match(capsys, words, near):
+    assert main(words) == 2
+    assert f"Did you mean {near!r}?" in capsys.readouterr().err
+
+
+def test_files_of_the_user_hide_nothing_from_it(tmp_path):
+    folder = make_folder(tmp_path, shadows=True)
+    codes, printed = run(
+        folder, "record --help", "tasks describe --help", "robots inspect panda", "parity --help"
+    )
+    assert codes == [0, 0, 0, 0], printed
+    for usage in ("robot-layouts record", "robot-layouts tasks describe", "robot-layouts parity"):
+        assert f"usage: {usage} " in printed
+
+
+def test_a_package_that_hides_ours_is_named(tmp_path):
+    folder = make_folder(tmp_path, shadows=True)
+    for module, hides in (("rollouts", "robots"), ("tasks", None)):
+        done = subprocess.run(
+            [sys.executable, "-m", module, "--help"],
+            cwd=folder,
+            env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 1
+        if hides is None:  # this one is run itself
+            assert "RuntimeError: hidden" in done.stderr
+        else:
+            theirs = folder / hides / "__init__.py"
+            assert f"{theirs} hides the package {hides!r} of robot-layouts" in done.stderr
+            assert "commands called as `robot-layouts …` do neither" in done.stderr
+
+
+class TestNew:
+    def test_task_writes_files_that_run(self, tmp_path, capsys):
+        words = ["new", "task", "two_arm_reach", "--out", str(tmp_path), "--robots"]
+        assert main([*words, "left=panda", "right=so100"]) == 0
+        assert sorted(path.name for path in tmp_path.iterdir()) == [
+            "test_two_arm_reach.py",
+            "two_arm_reach.py",
+        ]
+        source = (tmp_path / "two_arm_reach.py").read_text()
+        assert 'layout = face_to_face({"left": "panda", "right": "so100"}, spacing=' in source
+        done = self.pytest(tmp_path)
+        assert "3 passed" in done.stdout, done.stdout + done.stderr
+        (tmp_path / "two_arm_reach.py").unlink()
+        assert main([*words, "left=panda", "right=so100"]) == 1
+        said = capsys.readouterr().err
+        assert "test_two_arm_reach.py is there already, and is not overwritten" in said
+        assert not (tmp_path / "two_arm_reach.py").exists()
+
+    @pytest.mark.long
+    @pytest.mark.parametrize(
+        "robots",
+        [["arm=panda"], ["a=z1", "b=so100", "c=xarm7"], ["a=ur5", "b=panda_stick"]],
+        ids=len,
+    )
+    def test_task_of_any_robots(self, tmp_path, robots):
+        assert main(["new", "task", "Reach", "--out", str(tmp_path), "--robots", *robots]) == 0
+        assert "3 passed" in self.pytest(tmp_path).stdout
+
+    @pytest.mark.long
+    def test_robot_writes_files_that_run(self, tmp_path):
+        from robots import RobotRegistry
+
+        urdf = str(RobotRegistry.load("xarm7").urdf.locate())
+        assert main(["new", "robot", urdf, "--name", "my_arm", "--out", str(tmp_path)]) == 0
+        done = self.pytest(tmp_path)
+        assert "3 passed" in done.stdout, done.stdout + done.stderr
+
+    @pytest.mark.parametrize(
+        ("name", "robot", "words"),
+        [
+            ("9lives", "a=panda", "is no name of a task"),
+            ("Reach", "panda", "'panda' should be PLACE=ROBOT"),
+            ("Reach", "a=pandda", "Did you mean 'panda'?"),
+        ],
+    )
+    def test_task_refuses(self, tmp_path, capsys, name, robot, words):
+        assert main(["new", "task", name, "--out", str(tmp_path), "--robots", robot]) > 0
+        assert words in capsys.readouterr().err
+        assert not list(tmp_path.iterdir())
+
+    def pytest(self, folder) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "."],
+            cwd=folder,
+            env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
