@@ -169,6 +169,15 @@ class Arrangement(Mapping[str, Placement]):
         return {limb: part for limb, part in limbs if names.count(limb) == 1}
 
     @property
+    def arms_by_group(self) -> dict[tuple[str, str], str]:
+        """The arm that each joint group belongs to, by the names of robot and group."""
+        return {
+            (arm.partition(".")[0], group): arm
+            for arm, placement in self.arms.items()
+            for group in placement.robot.action_split
+        }
+
+    @property
     def places(self) -> dict[str, str]:
         """The `arms` by the names that they go by in a task: the short one, where there is one."""
         short = {full: name for name, full in self.short_names.items()}

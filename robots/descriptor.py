@@ -301,7 +301,8 @@ class RobotDescriptor:
 
         ``pd_joint_delta_pos`` is the action split as declared. The other modes of joint positions
         change every group that is relative there, those of velocities all but grippers, and those
-        of the TCP (``pd_ee_…``) the arm alone, as in ManiSkill; see `robots.control_modes`.
+        of the TCP (``pd_ee_…``) the arm alone, as in ManiSkill; see `robots.control_modes`. What
+        takes no action number at all goes on taking none.
 
         Args:
             mode: Name of a mode, or one by limb; limbs that are left out stay as they are.
@@ -319,6 +320,8 @@ class RobotDescriptor:
             if name not in self.modes:
                 raise UnknownNameError("control mode", name, self.modes)
             split, own = parts[part].action_split, self.control_modes.get(name, {})
+            if not split.size:  # all of it is held, and stays so
+                continue
             try:
                 has_tcp = not self.limbs or part in self.limbs
                 changed.update(driven_in(name, split, own, has_tcp=has_tcp))

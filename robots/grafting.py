@@ -89,8 +89,10 @@ def with_gripper(
         UnknownNameError: If there is no such link or robot.
         AssetError: If files cannot be found or make no sense.
     """
-    _refuse_limbs(robot, "another gripper")
-    tool, origin, root = _gripper_of(_robot(gripper))
+    _refuse_limbs(robot, "take another gripper")
+    lender = _robot(gripper)
+    _refuse_limbs(lender, "lend a gripper")
+    tool, origin, root = _gripper_of(lender)
     present = _gripper_joints(robot)
     mount, without = robot.tcp_link, ()
     if present:
@@ -209,7 +211,7 @@ def on_body(
         raise DescriptorError(f"the body moves ({model.moving[0].name}); only its robots may")
     robots = {key: _robot(mount.robot) for key, mount in mounts.items()}
     for key, robot in robots.items():
-        _refuse_limbs(robot, f"a body, as {key!r}")
+        _refuse_limbs(robot, f"stand on a body as {key!r}")
     parts = [
         Part(robots[key].urdf, m.link or model.root, m.position, m.quaternion, prefix=f"{key}_")
         for key, m in mounts.items()
@@ -239,14 +241,15 @@ def on_body(
         source=" and ".join(dict.fromkeys(robot.source for robot in robots.values())),
         allowed_collisions=_allowed(urdf, [(r, f"{key}_") for key, r in robots.items()]),
         limbs=_limbs(dict(zip(robots, named, strict=True)), model, parts),
+        control_modes=_joined_modes(dict(zip(robots, named, strict=True))),
     )
 
 
-def _refuse_limbs(robot: RobotDescriptor, onto: str) -> None:
+def _refuse_limbs(robot: RobotDescriptor, what: str) -> None:
     if robot.limbs:
         raise DescriptorError(
-            f"{robot.name} has the limbs {', '.join(robot.limbs)}, and cannot be joined with"
-            f" {onto}; join each arm first, and put the arms on one body with on_body"
+            f"{robot.name} has the limbs {', '.join(robot.limbs)}, and cannot {what}; arms of one"
+            " limb can, also before on_body makes them limbs"
         )
 
 
@@ -269,6 +272,30 @@ def _limbs(
             tuple(f"{key}_{group}" for group in robot.action_split.groups),
         )
     return limbs
+
+
+def _joined_modes(robots: Mapping[str, RobotDescriptor]) -> dict[str, dict[str, JointGroup]]:
+    """Return the control modes of robots on one body, whose groups are called ``NAME_GROUP``."""
+    joined: dict[str, dict[str, JointGroup]] = {}
+    for key, robot in robots.items():
+        for mode, groups in robot.control_modes.items():
+            own = {f"{key}_{name}": group for name, group in groups.items()}
+            joined.setdefault(mode, {}).update(own)
+    return joined
+
+
+def _modes_of(robot: RobotDescriptor, names: Mapping[str, str]) -> dict[str, dict[str, JointGroup]]:
+    """Return a robot's own control modes, of some of its groups.
+
+    Args:
+        robot: The robot.
+        names: What each of these groups is called from now on, by its present name.
+    """
+    chosen = {
+        mode: {names[name]: group for name, group in groups.items() if name in names}
+        for mode, groups in robot.control_modes.items()
+    }
+    return {mode: groups for mode, groups in chosen.items() if groups}
 
 
 def _robot(given: RobotLike) -> RobotDescriptor:
@@ -319,6 +346,7 @@ def _gripper_of(robot: RobotDescriptor) -> tuple[RobotDescriptor, Floats, str]:
             tcp_offset=robot.tcp_offset if robot.tcp_link in links else (0.0, 0.0, 0.0),
             cameras=tuple(camera for camera in robot.cameras if camera.link in links),
             keyframes=keyframes,
+            control_modes=_modes_of(robot, {name: name for name in groups}),
         ),
         origin,
         root,
@@ -360,7 +388,11 @@ def _with_part(
         for key, group in robot.action_split.groups.items()
         if left.issuperset(group.joints)
     }
-    new = {_group_name(key, kept): group for key, group in added.action_split.groups.items()}
+    called = {key: _group_name(key, kept) for key in added.action_split.groups}
+    new = {called[key]: group for key, group in added.action_split.groups.items()}
+    modes = _modes_of(robot, {name: name for name in kept})
+    for mode, groups in _modes_of(added, called).items():
+        modes.setdefault(mode, {}).update(groups)
     places = [robot.joints.index(joint) for group in kept.values() for joint in group.joints]
     opened = added.keyframe(added.home.keyframe)
     keyframes = {
@@ -378,6 +410,7 @@ def _with_part(
         fingers=added.fingers,
         cameras=(*(c for c in robot.cameras if c.link in model.links), *added.cameras),
         keyframes=keyframes,
+        control_modes=modes,
         source=f"{robot.source}; {tool.source}",
         allowed_collisions=_allowed(urdf, [(robot, ""), (tool, part.prefix)]),
     )
@@ -409,14 +442,21 @@ def _prefixed(robot: RobotDescriptor, prefix: str) -> RobotDescriptor:
     def renamed(names: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(prefix + name for name in names)
 
-    groups = {
-        key: replace(group, joints=renamed(group.joints))
-        for key, group in robot.action_split.groups.items()
-    }
+    def moved(groups: Mapping[str, JointGroup]) -> dict[str, JointGroup]:
+        return {
+            key: replace(
+                group,
+                joints=renamed(group.joints),
+                root_link=group.root_link and prefix + group.root_link,
+            )
+            for key, group in groups.items()
+        }
+
     material, fingers = robot.gripper_material, robot.fingers
     return replace(
         robot,
-        action_split=ActionSplit(**groups),
+        action_split=ActionSplit(**moved(robot.action_split.groups)),
+        control_modes={mode: moved(groups) for mode, groups in robot.control_modes.items()},
         tcp_link=prefix + robot.tcp_link,
         tcp_position_links=renamed(robot.tcp_position_links),
         gripper_material=material and replace(material, links=renamed(material.links)),

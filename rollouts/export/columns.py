@@ -107,18 +107,18 @@ class ColumnReader:
         )
 
     def tcp_poses(self, columns: Columns) -> dict[str, Floats]:
-        """Return each robot's TCP pose in the world frame, (T + 1, 7) (m, wxyz).
+        """Return the TCP pose of each arm, robot or limb, in the world frame, (T + 1, 7) (m, wxyz).
 
         A recording does not hold them; they follow from its joints, and are within a micrometre
         of where the TCP was.
         """
-        poses: dict[str, list[Floats]] = {place: [] for place in self.task.layout}
+        poses: dict[str, list[Floats]] = {arm: [] for arm in self.task.layout.arms}
         for t in range(len(columns) + 1):
             self.task.set_state_dict(state_row(columns.states, t))
             state = self.task.simulation.read()
-            for place, found in poses.items():
-                found.append(state.tcp_pose(place)[0].copy())
-        return {place: np.stack(found) for place, found in poses.items()}
+            for arm, found in poses.items():
+                found.append(state.tcp_pose(arm)[0].copy())
+        return {arm: np.stack(found) for arm, found in poses.items()}
 
     def _joints(self, place: str, rows: Floats) -> Floats:
         # Column by column in memory, because statistics round by the order in which they add up.
@@ -153,10 +153,16 @@ class ColumnReader:
 
 
 def action_names(robot: RobotDescriptor) -> list[str]:
-    """Return the joint that each action number drives, or the group where it drives several."""
+    """Return the joint that each action number drives, or the group where it drives several.
+
+    Where that would name two numbers alike, as those of a TCP, they are called as in
+    `robots.ActionNumber`.
+    """
+    numbers = robot.describe_action()
+    names = [n.joints[0] if len(n.joints) == 1 else n.group for n in numbers]
     return [
-        number.joints[0] if len(number.joints) == 1 else number.group
-        for number in robot.describe_action()
+        number.name if names.count(name) > 1 else name
+        for name, number in zip(names, numbers, strict=True)
     ]
 
 

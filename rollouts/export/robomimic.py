@@ -101,7 +101,8 @@ class RobomimicWriter(DatasetWriter):
         names: dict[str, Sequence[str]] = {"actions": self._reader.action_names}
         for place, placement in self._reader.task.layout.items():
             joints = placement.robot.joints
-            names |= {f"{place}_qpos": joints, f"{place}_qvel": joints, f"{place}_tcp_pose": POSE}
+            names |= {f"{place}_qpos": joints, f"{place}_qvel": joints}
+        names |= {f"{arm}_tcp_pose": POSE for arm in self._reader.task.layout.arms}
         return names | {"object": self._reader.body_names}
 
 

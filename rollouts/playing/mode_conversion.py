@@ -240,11 +240,7 @@ class ActionWriter:
 
 
 def _parts(source: MultiRobotTask, task: MultiRobotTask) -> Iterator[_Part]:
-    arms = {
-        (task.layout.owner(arm), group): arm
-        for arm, placement in task.layout.arms.items()
-        for group in placement.robot.action_split
-    }
+    arms = task.layout.arms_by_group
     number = read = joint = 0
     for robot, placement in task.layout.items():
         earlier: Mapping[str, JointGroup] = source.layout[robot].robot.action_split.groups

@@ -130,14 +130,19 @@ def _recorded(
         raise TrajectoryError(f"{file.path} has no layout that can be used: {error}") from error
     if _same(layout, cls.layout):
         return {"robots": None}
-    still = [
-        place
-        for place, about in described.items()
-        if about["action"][1] - about["action"][0] < layout[place].robot.action_dim
-    ]
     extra = cls.robot_counts is None and set(layout.places) - set(cls.layout)
-    bystanders = (HOLD if still else ACT) if extra else None
+    bystanders = (HOLD if _holds(file, layout) else ACT) if extra else None
     return {"layout": layout, "robots": None, "bystanders": bystanders, "check_layout": False}
+
+
+def _holds(file: TrajectoryFile, layout: Layout) -> bool:
+    """Return whether robots or limbs of a recording took fewer numbers than they can."""
+    acting = layout.in_control_mode(mode_by_arm(file.control_mode, layout)).robot_actions
+    recorded = {place: about["action"] for place, about in (file.layout or {}).items()}
+    return any(
+        last - first < acting[place].stop - acting[place].start
+        for place, (first, last) in recorded.items()
+    )
 
 
 def _same(first: Layout, second: Layout) -> bool:

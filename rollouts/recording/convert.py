@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from rollouts.playing.mode_conversion import converted
 from rollouts.playing.replay import FILE, task_for
@@ -52,6 +53,7 @@ def convert(
     mode: str | Mapping[str, str],
     folder: Path,
     count: int | None = None,
+    cell: Mapping[str, Any] | None = None,
     on_episode: Callable[[], None] = lambda: None,
 ) -> Conversion:
     """Record the successful episodes of a recording in another control mode.
@@ -62,6 +64,7 @@ def convert(
         folder: Where ``trajectory.h5`` and ``trajectory.json`` are written; episodes that are
             there already are kept.
         count: How many of the first episodes; None: all.
+        cell: Where robots stood and which, where the file cannot say it; see `task_for`.
         on_episode: Called after each.
 
     Raises:
@@ -69,7 +72,7 @@ def convert(
         TaskError: If the mode is none.
         RecordingError: If the folder cannot be written or holds a recording of something else.
     """
-    with closing(task_for(file)) as source:
+    with closing(task_for(file, **(cell or {}))) as source:
         task = type(source)(replace(source.scenario, control_mode=mode))
         text = f"converted from {file.control_mode}"
         with (

@@ -9,6 +9,7 @@ from robots import RecordingError
 from robots.common.commands import printable
 from rollouts.playing.command_options import add_control_mode
 from rollouts.playing.replay_command import add_recording
+from tasks.cell_options import chosen_cell
 
 DESCRIPTION = "record the episodes of a recording, ours or ManiSkill's, in another control mode"
 EPILOG = (
@@ -47,7 +48,12 @@ def run(options: argparse.Namespace) -> int:
             raise RecordingError(f"{file.path} has no episodes to convert")
         with LiveLine(count, "episodes") as line:
             summary = convert(
-                file, options.to, options.out, count, lambda: line.advance(1, "converting")
+                file,
+                options.to,
+                options.out,
+                count,
+                chosen_cell(options),
+                lambda: line.advance(1, "converting"),
             )
     print(printable(str(summary)))
     return 0 if summary.complete else 1

@@ -73,7 +73,7 @@ class ModeController:
                 self._from_target[part.joints.start : part.joints.stop] = True
         self._any_target = bool(self._from_target.any())
         self._scale = _scale(driven)
-        owners = _arm_of(layout)
+        owners = layout.arms_by_group
         self._tools = {
             (part.robot, part.name): ToolControl(_tool(part, layout, owners[part.robot, part.name]))
             for part in driven
@@ -206,15 +206,6 @@ def _velocities(driven: Sequence[_Driven]) -> tuple[NDArray[np.intp], NDArray[np
             joints += part.joints
             numbers += range(part.numbers.stop - len(part.joints), part.numbers.stop)
     return np.array(joints, np.intp), np.array(numbers, np.intp)
-
-
-def _arm_of(layout: Layout) -> dict[tuple[str, str], str]:
-    """Return the arm, a robot or a limb, that each joint group of each robot belongs to."""
-    return {
-        (layout.owner(arm), group): arm
-        for arm, placement in layout.arms.items()
-        for group in placement.robot.action_split
-    }
 
 
 def _tool(part: _Driven, layout: Layout, arm: str) -> Tool:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from kinematics.quaternions import inverted, multiplied
 from simulation.maths import Floats, cos, norm, sin, sqrt
 
 Number = np.float32
@@ -27,24 +28,6 @@ def row(numbers: Iterable[Any]) -> Row:
     return tuple(numbers)
 
 
-def product(a: Row, b: Row) -> Row:
-    """Return the product of two quaternions, of either sign."""
-    aw, ax, ay, az = a
-    bw, bx, by, bz = b
-    return (
-        aw * bw - ax * bx - ay * by - az * bz,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-    )
-
-
-def conjugate(quaternion: Row) -> Row:
-    """Return the quaternion that turns back."""
-    w, x, y, z = quaternion
-    return w, -x, -y, -z
-
-
 def upright(quaternion: Row) -> Row:
     """Return a quaternion with w ≥ 0."""
     w, x, y, z = quaternion
@@ -53,7 +36,7 @@ def upright(quaternion: Row) -> Row:
 
 def turned(quaternion: Row, point: Row) -> Row:
     """Return a point, three numbers, turned by a quaternion."""
-    return product(product(quaternion, (_NOTHING, *point)), conjugate(quaternion))[1:]
+    return multiplied(multiplied(quaternion, (_NOTHING, *point)), inverted(quaternion))[1:]
 
 
 def added(one: Row, other: Row) -> Row:
@@ -64,14 +47,14 @@ def added(one: Row, other: Row) -> Row:
 def inverse(pose: Row) -> Row:
     """Return the inverse of a pose."""
     x, y, z, *quaternion = pose
-    back = conjugate((*quaternion,))
+    back = inverted((*quaternion,))
     return *turned(back, (-x, -y, -z)), *back
 
 
 def combined(first: Row, second: Row) -> Row:
     """Return ``first · second``: the pose ``second`` of what is seen from ``first``."""
     place = added(first[:3], turned(first[3:], second[:3]))
-    return *place, *upright(product(first[3:], second[3:]))
+    return *place, *upright(multiplied(first[3:], second[3:]))
 
 
 def rotation(angles: Floats) -> Row:

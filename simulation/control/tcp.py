@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinematics.quaternions import multiplied
 from robots import JointGroup
 from simulation.backend import Backend, PoseFollower
 from simulation.control import poses
@@ -112,7 +113,7 @@ class ToolControl:
         spot, way = before[:3], before[3:]
         moved = place if self._by_root else poses.turned(way, place)
         if turn is not None:
-            way = poses.product(turn, way) if self._turns_by_root else poses.product(way, turn)
+            way = multiplied(turn, way) if self._turns_by_root else multiplied(way, turn)
         return *poses.added(spot, moved), *poses.upright(way)
 
     def _turn(self, action: Floats) -> Row:

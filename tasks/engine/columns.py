@@ -54,14 +54,18 @@ def robomimic_columns(
     Args:
         qpos: Place → joint positions.
         qvel: Place → joint velocities.
-        tcp_poses: Place → pose of the TCP in the world frame, (T, 7) (m, wxyz).
+        tcp_poses: Place, or limb, → pose of its TCP in the world frame, (T, 7) (m, wxyz).
         bodies: Poses of the bodies.
     """
     columns: dict[str, Floats] = {}
     for place in qpos:
         columns[f"{place}_qpos"] = qpos[place]
         columns[f"{place}_qvel"] = qvel[place]
-        columns[f"{place}_tcp_pose"] = tcp_poses[place]
+        columns |= {
+            f"{arm}_tcp_pose": poses
+            for arm, poses in tcp_poses.items()
+            if arm.partition(".")[0] == place
+        }
     return columns | ({"object": bodies} if bodies.shape[1] else {})
 
 
@@ -145,7 +149,7 @@ class ColumnObserver:
         }
         self._copies.write(range(count), {}, rows)
         read = self._copies.read()
-        return {place: read.tcp_pose(place) for place in self._layout}
+        return {arm: read.tcp_pose(arm) for arm in self._layout.arms}
 
 
 def _nothing(world: World, index: int) -> None:

@@ -91,9 +91,12 @@ class TestRecordings:
         with pytest.raises(TrajectoryError, match="a robot at 'arm' that cannot be had here"):
             replayed(path)
 
+    @pytest.mark.parametrize("mode", ["pd_joint_delta_pos", "pd_ee_delta_pos"])
     @pytest.mark.parametrize("bystanders", ["hold", "act"])
-    def test_of_bystanders(self, crowd, tmp_path, bystanders):
-        task = tasks.make(PICK, layout=crowd, bystanders=bystanders, obs_mode="none")
+    def test_of_bystanders(self, crowd, tmp_path, bystanders, mode):
+        task = tasks.make(
+            PICK, layout=crowd, bystanders=bystanders, obs_mode="none", control_mode=mode
+        )
         path = record_at_random(tmp_path / "trajectory.h5", task)
         assert replayed(path).difference is None
 
@@ -146,6 +149,25 @@ class TestBystanders:
     def test_are_refused_unless_asked_for(self, crowd):
         with pytest.raises(TaskError, match=r"bystanders='hold' lets \['watcher', 'helper'\]"):
             tasks.make(PICK, layout=crowd)
+
+    @pytest.mark.parametrize("mode", ["pd_joint_pos", "pd_joint_vel", "pd_ee_delta_pose"])
+    def test_that_hold_do_so_in_every_control_mode(self, mode):
+        """Also Fetch, whose head and torso move by steps in every mode of its own."""
+        own = tasks.get_task_class(PICK).layout
+        fetch = Placement("fetch", position=(2.0, 2.0, -0.92))
+        layout = Layout({**own, "fetch": fetch})
+        env = tasks.make(PICK, layout=layout, bystanders="hold", control_mode=mode)
+        alone = tasks.make(PICK, control_mode=mode)
+        assert env.single_action_space == alone.single_action_space
+
+    def test_a_limb_without_a_place_holds_still(self):
+        own = tasks.get_task_class(PICK).layout
+        dual = Placement("mobile_panda_dual", position=(2.5, 0.0, 1.0))
+        layout = Layout({**own, "cell": dual})
+        env = tasks.make(PICK, layout=layout, bystanders="hold")
+        assert env.single_action_space.shape == (8,)
+        acting = tasks.make(PICK, layout=layout, bystanders="act", control_mode="pd_ee_delta_pose")
+        assert [p.stop - p.start for p in acting.action_split.values()] == [7, 7, 7, 1]
 
     def test_that_hold_take_no_numbers_and_change_no_episode(self, crowd):
         env = tasks.make(PICK, layout=crowd, bystanders="hold", num_envs=2)

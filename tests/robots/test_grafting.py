@@ -177,6 +177,13 @@ class TestTools:
             with_camera(PANDA, CameraMount("wrist", "panda_hnad"))
 
 
+def test_a_gripper_leaves_the_control_modes_of_its_arm_behind():
+    lent = PANDA.with_gripper("fetch")
+    assert set(lent.in_control_mode("pd_joint_pos").action_split) == {"arm", "gripper"}
+    kept = RobotRegistry.load("fetch").with_gripper("panda")
+    assert kept.in_control_mode("pd_joint_pos").action_split.groups["torso"].delta
+
+
 class TestArmsOnABody:
     def test_two_arms_on_a_bench(self, bench):
         both = on_body(
@@ -198,6 +205,25 @@ class TestArmsOnABody:
             before, after = stepped(both, action, 10)
             moved = np.flatnonzero(abs(after - before) > 0.3)
             assert moved.tolist() == [both.joints.index(both.describe_action()[number].joints[0])]
+
+    def test_robots_keep_control_modes_of_their_own(self, bench):
+        mounts = {"one": Mount("koch"), "other": Mount("fetch", position=(0.0, 1.0, 0.0))}
+        both = on_body("pair", bench, mounts).in_control_mode("pd_joint_pos")
+        for key, mount in mounts.items():
+            alone = RobotRegistry.load(str(mount.robot)).in_control_mode("pd_joint_pos")
+            for name, group in alone.action_split.groups.items():
+                joined = both.action_split.groups[f"{key}_{name}"]
+                assert joined.joints == tuple(f"{key}_{joint}" for joint in group.joints)
+                assert (joined.drives, joined.bounds) == (group.drives, group.bounds)
+
+    def test_robots_of_several_arms_are_not_joined(self, bench):
+        both = on_body("pair", bench, {"one": Mount("panda"), "other": Mount("panda")})
+        with pytest.raises(DescriptorError, match="has the limbs one, other, and cannot take anot"):
+            both.with_gripper("panda")
+        with pytest.raises(DescriptorError, match="has the limbs one, other, and cannot lend a gr"):
+            PANDA.with_gripper(both)
+        with pytest.raises(DescriptorError, match="and cannot stand on a body as 'here'"):
+            on_body("more", bench, {"here": Mount(both)})
 
     def test_an_empty_or_moving_body(self, bench):
         with pytest.raises(DescriptorError, match="nothing stands on the body"):

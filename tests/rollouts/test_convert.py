@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import pytest
 
+from layouts import Layout, Placement
 from rollouts.__main__ import main
 from rollouts.playing.replay import open_recording, replay, task_for
 from rollouts.recording.record import record
+from tests.rollouts.recordings import edited
 
 TASK = "PickCube-v1"
 SEEDS = (0, 1)
@@ -54,18 +57,24 @@ def test_a_conversion_goes_on_where_it_stopped(recording, tmp_path, capsys):
 
 
 def test_episodes_that_failed_are_left_out(recording, tmp_path, capsys):
-    import shutil
-
     shutil.copytree(recording, tmp_path / "failed")
-    beside = tmp_path / "failed" / "trajectory.json"
-    with open_recording(tmp_path / "failed", None) as file:
-        assert all(episode.solved for episode in file)
-    about = json.loads(beside.read_text())
-    del about["episodes"][0]
-    beside.write_text(json.dumps(about))
+    with edited(tmp_path / "failed" / "trajectory.h5") as file:
+        file["traj_0/success"][-1] = False
     words = ["convert", str(tmp_path / "failed"), "--to", "pd_ee_pose"]
     assert main([*words, "--out", str(tmp_path / "out")]) == 0
-    assert "1 of 1" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "1 of 1 successful episodes succeed" in printed
+    assert "no seed or no success: the episodes 0" in printed
+    assert [episode.seed for episode in replays(tmp_path / "out")] == [SEEDS[1]]
+
+
+def test_the_layout_that_is_given_is_used(recording, tmp_path, capsys):
+    placement = Placement("panda", position=(-0.7, 0.0, 0.0))
+    cell = str(Layout({"arm": placement}).save(tmp_path / "cell.yaml"))
+    words = ["convert", str(recording), "--to", MODE, "--out", str(tmp_path / "x")]
+    assert main([*words, "--layout", cell]) == 1
+    assert "arm.position: recorded [-0.615, 0.0, 0.0], here [-0.7" in capsys.readouterr().err
+    assert not (tmp_path / "x").exists()
 
 
 @pytest.mark.parametrize(

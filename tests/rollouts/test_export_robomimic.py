@@ -9,6 +9,8 @@ import pyfive
 import pytest
 
 import tasks
+from layouts import Layout, Placement
+from rollouts.export.columns import ColumnReader
 from rollouts.export.dataset import Export, export
 from tests.rollouts.recordings import (
     FINGERS,
@@ -103,6 +105,20 @@ def test_tool_poses_are_where_the_tools_were(recording, dataset):
             np.testing.assert_allclose(found, state.tcp_pose(place)[0], atol=1e-6)
     moved = arrays["next_obs/left_tcp_pose"][-1] - arrays["obs/left_tcp_pose"][0]
     assert np.abs(moved).max() > 1e-3
+
+
+def test_limbs_have_tool_poses_and_numbers_of_poses_have_names():
+    cell = Layout({"cell": Placement("mobile_panda_dual", position=(2.5, 0.0, 1.0))})
+    task = tasks.make(TWO_ROBOTS, layout=cell, obs_mode="robomimic", control_mode="pd_ee_pose")
+    poses = {key for key in task.start[0] if key.endswith("_tcp_pose")}
+    assert poses == {"cell.left_tcp_pose", "cell.right_tcp_pose"}
+    read = task.simulation.read()
+    for limb in ("left", "right"):
+        given = task.start[0][f"cell.{limb}_tcp_pose"].numpy()
+        np.testing.assert_allclose(given, read.tcp_pose(limb), atol=1e-6)
+    names = ColumnReader(task).action_names
+    assert len(set(names)) == len(names) == 15
+    assert names[:2] == ["cell.left_arm.x", "cell.left_arm.y"]
 
 
 def test_numbers_have_names(dataset):
