@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import pi
 from typing import Any
 
@@ -18,15 +18,24 @@ LEANS = (0.0, pi / 6, pi / 3, pi / 2, -pi / 6)  # from straight down (rad)
 
 
 def reaching(
-    task: MultiRobotTask, robot: str, name: str, place: Callable[[Scene], Floats], **others: Any
+    task: MultiRobotTask,
+    robot: str,
+    name: str,
+    place: Callable[[Scene], Floats],
+    *,
+    leans: Sequence[float] = LEANS,
+    as_it_is: bool = True,
+    **others: Any,
 ) -> Waypoint:
-    """Return the waypoint that brings a robot's TCP to a place.
+    """Return the waypoint that brings a robot's TCP to a place, turned in the quickest way.
 
     Args:
         task: Says which robot it is.
         robot: Its place in the layout.
         name: What the waypoint is called.
         place: Where the TCP should be, (3,) (m, world), given the scene.
+        leans: How far the gripper may lean from straight down, away from its base (rad).
+        as_it_is: Whether it may also stay turned as it is.
         **others: Other fields of `experts.script.Waypoint`.
     """
     placement = task.layout.arm(robot)
@@ -37,7 +46,7 @@ def reaching(
     def poses(scene: Scene) -> list[Pose]:
         point = place(scene)
         ahead = heading(base, point)
-        own = (point, scene.tcp(robot)[1])
-        return [own, *((point, gripper_facing(ahead, lean)) for lean in LEANS)]
+        own = [(point, scene.tcp(robot)[1])] if as_it_is else []
+        return [*own, *((point, gripper_facing(ahead, lean)) for lean in leans)]
 
     return Waypoint(name, to=poses, **others)

@@ -323,7 +323,8 @@ def _stack(actions: list[NDArray[np.float32]], task: MultiRobotTask) -> NDArray[
 
 def _check_names(script: Script, task: MultiRobotTask) -> None:
     for robot in script:
-        task.layout.arm(robot)
+        if task.layout.arm_name(robot) not in task.layout.action_split:
+            raise UnknownNameError("arm that takes numbers", robot, task.layout.places)
     names = [f"{robot}.{waypoint.name}" for robot in script for waypoint in script[robot]]
     for name in names:
         if names.count(name) > 1:

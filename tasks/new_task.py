@@ -15,14 +15,15 @@ from typing import NamedTuple
 import numpy as np
 
 from kinematics.rotations import rotate
-from layouts import Layout, Placement, face_to_face, ring, single
+from layouts import Layout, face_to_face, ring, single
 from robots import RobotDescriptor, TaskError
 from robots.common.commands import exit_code, notice, program, start
 from robots.common.new_files import write_new
 from robots.named import is_path, named_robot
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
-from robots.urdf.tree import kinematic_tree, link_index
+from robots.urdf.tcp import find_tcp
+from robots.urdf.tree import kinematic_tree
 
 SPREAD = 0.06  # of a robot's reach: how far a goal may be from the middle, to each side
 
@@ -51,17 +52,17 @@ class {title}(MultiRobotTask):
     def evaluate(self, state):
         """Success: every TCP is in its goal."""
         arrived = state.full(True)
-        for place in self.layout:
+        for place in self.layout.places:
             arrived = arrived & (state.tcp_distance(place, f"goal_{{place}}") <= RADIUS)
         return {{"success": arrived}}
 
     def observe(self, state, info):
         """The way of every TCP to its goal; joints are observed anyway."""
-        return {{f"{{place}}_way": self.way(state, place) for place in self.layout}}
+        return {{f"{{place}}_way": self.way(state, place) for place in self.layout.places}}
 
     def dense_reward(self, state, action, info):
         """Nearness of all TCPs (1); 2 on success."""
-        near = closeness(*(norm(self.way(state, place)) for place in self.layout))
+        near = closeness(*(norm(self.way(state, place)) for place in self.layout.places))
         return sum(near) / len(near) + info["success"]
 
     def way(self, state, place):
@@ -71,7 +72,8 @@ class {title}(MultiRobotTask):
 
 def reach(task, seed):
     """The expert: actions (T, A) that solve the episode of a seed, found in a world of its own."""
-    script = {{place: [reaching(task, place, "goal", goal_of(place))] for place in task.layout}}
+    places = task.layout.places
+    script = {{place: [reaching(task, place, "goal", goal_of(place))] for place in places}}
     return first_success(task, seed, lambda scene: [script])
 
 
@@ -187,18 +189,19 @@ def task_source(task_id: str, robots: Mapping[str, str]) -> str:
         imports="\n".join(imports),
         layout=f"{preset.name}({{{named}}}{preset.options})",
         table="    table = WideTable()\n" if wide else "",
-        goals="\n".join(_goal(place, layout) for place in layout),
+        goals="\n".join(_goal(place, layout) for place in layout.places),
     )
 
 
 def _goal(place: str, layout: Layout) -> str:
-    low, high = _area(layout[place])
+    low, high = _area(layout, place)
     ranges = (f"{axis}=({a:g}, {b:g})" for axis, a, b in zip("xyz", low, high, strict=True))
     return f"    goal_{place} = Goal(RADIUS, spawn=Area({', '.join(ranges)}))"
 
 
-def _area(placement: Placement) -> tuple[list[float], list[float]]:
-    """Return the corners of where a robot's goal may be (m, world): about its TCP at the start."""
+def _area(layout: Layout, place: str) -> tuple[list[float], list[float]]:
+    """Return the corners of where an arm's goal may be (m, world): about its TCP at the start."""
+    arm, placement = layout.arm(place).robot, layout[layout.owner(place)]
     robot = placement.robot
     urdf = robot.urdf.locate()
     model = read_model(read_urdf(urdf), urdf.name)
@@ -206,11 +209,10 @@ def _area(placement: Placement) -> tuple[list[float], list[float]]:
     tree = kinematic_tree(model, [*robot.joints, *others])
     qpos = np.zeros((1, len(tree.coordinates)))
     qpos[0, : robot.dof] = placement.start_qpos
-    links = [link_index(tree, name) for name in robot.tcp_position_links or (robot.tcp_link,)]
-    tcp = tree.forward(qpos)[0, links, :3, 3].mean(0)
-    place = placement.base_position + rotate(np.array(placement.base_quaternion), tcp)
-    spread = SPREAD * robot.reach
-    middle = place + [0.0, 0.0, spread]
+    tcp = find_tcp(arm, tree).places(tree.forward(qpos))[0]
+    middle = placement.base_position + rotate(np.array(placement.base_quaternion), tcp)
+    spread = SPREAD * arm.reach
+    middle = middle + [0.0, 0.0, spread]
     return (middle - spread).round(3).tolist(), (middle + spread).round(3).tolist()
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from math import copysign, pi, radians, remainder
@@ -10,18 +9,17 @@ from math import copysign, pi, radians, remainder
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.geometry import gripper_facing, heading, planar_distance
+from experts.geometry import heading, planar_distance
+from experts.reaching import reaching
 from experts.rehearsal import first_success
-from experts.script import CLOSED, Pose, Scene, Script, Waypoint
+from experts.script import CLOSED, Scene, Script, Waypoint
 from kinematics.rotations import Floats
-from layouts import Placement
 from tasks import MultiRobotTask
 from tasks.originals.relay import find_zones
 
 BATON = "baton"
 HIGH = 0.07  # of the tip on its way over the table (m)
 OUT = 0.04  # how far the tip rises straight up, out of the baton (m)
-POSE_JOINTS = 6  # of an arm that can choose both place and orientation of its tip
 LEANS = tuple(map(radians, (0, 20, 40)))  # of an arm, from straight down, outwards
 
 
@@ -64,8 +62,8 @@ def _script(style: Style, task: MultiRobotTask) -> Script:
     zones = [np.array([*zone, 0.0]) for zone in find_zones(task.layout)]
     names = list(task.layout.arms)
     script: dict[str, tuple[Waypoint, ...]] = {}
-    for i, (name, placement) in enumerate(task.layout.arms.items()):
-        part = _Part(style, name, placement, zones[i - 1], zones[i])
+    for i, name in enumerate(names):
+        part = _Part(style, task, name, zones[i - 1], zones[i])
         script[name] = part.waypoints(after=names[i - 1] if i else None)
     return script
 
@@ -74,11 +72,11 @@ class _Part:
     """One robot's part of the way: an arc about its base, from the zone before to its own."""
 
     def __init__(
-        self, style: Style, robot: str, placement: Placement, start: Floats, end: Floats
+        self, style: Style, task: MultiRobotTask, robot: str, start: Floats, end: Floats
     ) -> None:
         self._style, self._robot = style, robot
-        self._base = base = np.array(placement.base_position)
-        self._poses = len(placement.robot.arm_joints) >= POSE_JOINTS
+        self._base = base = np.array(task.layout.arm(robot).base_position)
+        self._go = partial(reaching, task, robot, leans=LEANS, as_it_is=False, gripper=CLOSED)
         self._start = heading(base, start)
         self._sweep = remainder(heading(base, end) - self._start, 2 * pi)
         self._near, self._far = planar_distance(base, start), planar_distance(base, end)
@@ -102,23 +100,6 @@ class _Part:
             self._go("out", self._above, near=0.02),
             self._go("clear", self._waiting),
         )
-
-    def _go(
-        self,
-        name: str,
-        place: Callable[[Scene], Floats],
-        near: float = 0.05,
-        after: tuple[str, ...] = (),
-    ) -> Waypoint:
-        """Bring the tip to a place, closed, and leaning as it likes."""
-        if not self._poses:
-            return Waypoint(name, at=place, gripper=CLOSED, near=near, after=after)
-
-        def poses(scene: Scene) -> list[Pose]:
-            tip = place(scene)
-            return [(tip, gripper_facing(heading(self._base, tip), lean)) for lean in LEANS]
-
-        return Waypoint(name, poses, CLOSED, near=near, after=after)
 
     def _arc(self, share: float, height: float, closer: float = 1.0) -> Floats:
         """Return the place on the arc that is so far along, (3,) (m)."""

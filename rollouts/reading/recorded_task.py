@@ -130,7 +130,7 @@ def _recorded(
         raise TrajectoryError(f"{file.path} has no layout that can be used: {error}") from error
     if _same(layout, cls.layout):
         return {"robots": None}
-    extra = cls.robot_counts is None and set(layout.places) - set(cls.layout)
+    extra = cls.robot_counts is None and set(layout.places) - set(cls.layout.places)
     bystanders = (HOLD if _holds(file, layout) else ACT) if extra else None
     return {"layout": layout, "robots": None, "bystanders": bystanders, "check_layout": False}
 

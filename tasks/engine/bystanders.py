@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from layouts import Layout
@@ -16,7 +16,7 @@ EVERY_PLACE = "*"  # key of a task's needs
 def check_places(
     task: str,
     layout: Layout,
-    own: Layout,
+    places: Collection[str],
     robot_counts: range | None,
     bystanders: str | None = None,
 ) -> None:
@@ -27,8 +27,8 @@ def check_places(
     Args:
         task: The task's name.
         layout: The layout.
-        own: The task's own layout.
-        robot_counts: How many robots it may have, under any names; None for the places of ``own``.
+        places: The task's places: those of its own layout.
+        robot_counts: How many robots it may have, under any names; None for exactly ``places``.
         bystanders: What robots without a place do; None if there must be none.
 
     Raises:
@@ -41,8 +41,8 @@ def check_places(
                 f" the layout has {len(layout.arms)}: {list(layout.arms)}"
             )
         return
-    missing = [place for place in own if place not in layout.places]
-    others = [name for name in layout.places if name not in own]
+    missing = [place for place in places if place not in layout.places]
+    others = [name for name in layout.places if name not in places]
     if missing or (others and bystanders is None):
         more = "Give the layout's robots the names of the places"
         if not missing:
@@ -51,29 +51,31 @@ def check_places(
                 f" bystanders={ACT!r} take action numbers"
             )
         raise TaskError(
-            f"{task} has the places {list(own)}; the layout has {list(layout.places)}. {more}"
+            f"{task} has the places {list(places)}; the layout has {list(layout.places)}. {more}"
         )
 
 
-def check_needs(task: str, layout: Layout, own: Layout, needs: Mapping[str, Needs]) -> None:
+def check_needs(
+    task: str, layout: Layout, places: Collection[str], needs: Mapping[str, Needs]
+) -> None:
     """Refuse robots that lack what their places need.
 
     Args:
         task: The task's name.
         layout: Its robots.
-        own: The task's own layout.
+        places: The task's places.
         needs: By place; ``*`` for every place that is not named.
 
     Raises:
         TaskError: If one does, or the task names a place that it has not.
     """
     for place in needs:
-        if place not in (*own, EVERY_PLACE):
-            raise TaskError(f"{task}.needs names {place!r}; the places are {list(own)}")
+        if place not in (*places, EVERY_PLACE):
+            raise TaskError(f"{task}.needs names {place!r}; the places are {list(places)}")
     lacking = [
         f"{place!r} needs {what}: it is a {layout.arm(place).robot.name}"
         for place in layout.places
-        if (need := needs.get(place, needs.get(EVERY_PLACE) if place in own else None))
+        if (need := needs.get(place, needs.get(EVERY_PLACE) if place in places else None))
         for what in need.missing(layout.arm(place).robot)
     ]
     if lacking:
@@ -81,12 +83,12 @@ def check_needs(task: str, layout: Layout, own: Layout, needs: Mapping[str, Need
 
 
 def settled(
-    layout: Layout, own: Layout, robot_counts: range | None, bystanders: str | None
+    layout: Layout, places: Collection[str], robot_counts: range | None, bystanders: str | None
 ) -> Layout:
     """Return a layout in which the robots and limbs without a place hold still, if they are to."""
     if robot_counts is not None or bystanders != HOLD:
         return layout
-    still = [arm for place, arm in layout.places.items() if place not in own]
+    still = [arm for place, arm in layout.places.items() if place not in places]
     others = {layout.owner(arm): _holding(layout, arm, still) for arm in still}
     return layout.replace_robots(**others) if others else layout
 

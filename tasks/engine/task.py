@@ -138,10 +138,10 @@ class MultiRobotTask(Declaration, Remade):
             TaskError: If its places are not the task's, or a robot lacks what its place needs.
             DescriptorError: If a robot lacks the joint limits that the control mode needs.
         """
-        name, own, given = cls.__name__, cls.layout, scenario.layout
-        check_places(name, given, own, cls.robot_counts, scenario.bystanders)
-        check_needs(name, given, given if cls.robot_counts else own, cls.needs)
-        still = settled(given, own, cls.robot_counts, scenario.bystanders)
+        name, given, places = cls.__name__, scenario.layout, cls.layout.places
+        check_places(name, given, places, cls.robot_counts, scenario.bystanders)
+        check_needs(name, given, given.places if cls.robot_counts else places, cls.needs)
+        still = settled(given, places, cls.robot_counts, scenario.bystanders)
         return still.in_control_mode(scenario.control_mode)
 
     def __repr__(self) -> str:

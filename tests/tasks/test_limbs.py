@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from math import pi
 
+import gymnasium
 import numpy as np
 import pytest
 import torch
 
 import tasks
-from experts.registry import find_expert
+from experts import Rehearsal, Waypoint, find_expert
 from layouts import Layout, Placement
-from robots import TaskError
+from robots import TaskError, UnknownNameError
+from tasks.registry import TASKS
 from tests.catalogue import optional_problem
 
 TWO = "TwoRobotPickCube-v1"
@@ -112,3 +114,33 @@ def test_baxter_hands_over():
         for action in actions:
             *_, info = env.step(torch.from_numpy(action)[None])
         assert info["success"].item()
+
+
+def test_a_task_may_be_declared_with_a_robot_of_two_arms():
+    @tasks.register_task("OneRobotTwoArms-v1")
+    class OneRobotTwoArms(tasks.MultiRobotTask):
+        layout = CELL
+        max_episode_steps = 5
+
+        def evaluate(self, state):
+            apart = state.tcp_position("left") - state.tcp_position("right")
+            return {"success": apart[:, 1] > 10.0}
+
+    try:
+        env = tasks.make("OneRobotTwoArms-v1")
+        assert env.action_split == CELL.action_split
+        pandas = {"left": (0.0, 1.0, 0.0), "right": (0.0, -1.0, 0.0)}
+        two = Layout({n: Placement("panda", position=p) for n, p in pandas.items()})
+        assert tasks.make("OneRobotTwoArms-v1", layout=two).layout.action_dim == 16
+    finally:
+        TASKS.registered.pop("OneRobotTwoArms-v1", None)
+        gymnasium.registry.pop("RobotLayouts/OneRobotTwoArms-v1", None)
+
+
+def test_a_script_names_limbs_not_their_robot(env):
+    rehearsal = Rehearsal(env)
+    rehearsal.begin(0)
+    for name in ("left", "cell.left"):
+        rehearsal.play({name: [Waypoint("stay", most=2, steps=5)]})
+    with pytest.raises(UnknownNameError, match=r"arm that takes numbers 'cell'. .*left, right"):
+        rehearsal.play({"cell": [Waypoint("stay")]})
