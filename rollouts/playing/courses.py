@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -98,12 +98,13 @@ class Drive(Protocol):
         """Return where it is now, (n,)."""
         ...
 
-    def learnt(self, course: Course, came: Sequence[Floats]) -> Course:
-        """Return the course that goes further by as much as a try missed.
+    def learnt(self, course: Course, came: Sequence[Floats], share: float) -> Course:
+        """Return the course that goes further by a share of what a try missed.
 
         Args:
             course: What was tried.
             came: Where that led, a row for each step.
+            share: How much of it, 0 … 1.
         """
         ...
 
@@ -115,17 +116,33 @@ def drives_of(source: MultiRobotTask, task: MultiRobotTask) -> list[Drive]:
         source: The same task in the mode that is read.
         task: That in the mode that is written.
     """
-    return [_drive(part, task) for part in _parts(source, task) if part.group.size]
+    parts = [part for part in _parts(source, task) if part.group.size]
+    alike = all(_alike(part) for part in parts)  # so every step is the same to the last bit
+    return [
+        SameDrive(part)
+        if _alike(part) and (alike or not part.group.delta)
+        else (TcpDrive if part.group.asks.tcp else JointDrive)(part, task)
+        for part in parts
+    ]
 
 
-def _drive(part: Part, task: MultiRobotTask) -> Drive:
-    if part.group == part.before and not part.group.delta:
-        return SameDrive(part)
-    return TcpDrive(part, task) if part.group.asks.tcp else JointDrive(part, task)
+def _alike(part: Part) -> bool:
+    """Tell whether both modes drive a group alike, but for velocities of zero besides."""
+    group, before = part.group, part.before
+    if group.asks.positions and before.command == "position":
+        size = before.size
+        group = replace(
+            group,
+            command="position",
+            lower=tuple(low for low, _ in group.ranges[:size]),
+            upper=tuple(high for _, high in group.ranges[:size]),
+        )
+    ranges = {"lower": 0.0, "upper": 1.0}
+    return group.ranges == before.ranges and replace(group, **ranges) == replace(before, **ranges)
 
 
 class SameDrive:
-    """A group that both modes drive alike, by absolute numbers, which are copied."""
+    """A group that both modes drive alike, so that its numbers are copied."""
 
     def __init__(self, part: Part) -> None:
         """Take the group."""
@@ -134,7 +151,9 @@ class SameDrive:
     def course(self, recorded: Recorded) -> Course:
         """See `Drive`."""
         numbers = recorded.numbers[:, self._read].astype(float)
-        return Course(numbers, numbers)
+        zeros = np.zeros((len(numbers), self.numbers.stop - self.numbers.start))
+        zeros[:, : numbers.shape[1]] = numbers
+        return Course(zeros, zeros)
 
     def words(self, course: Course, step: int, state: State) -> tuple[Floats, bool]:
         """See `Drive`."""
@@ -144,7 +163,7 @@ class SameDrive:
         """See `Drive`."""
         return np.zeros(0)
 
-    def learnt(self, course: Course, came: Sequence[Floats]) -> Course:
+    def learnt(self, course: Course, came: Sequence[Floats], share: float) -> Course:
         """See `Drive`."""
         return course
 
@@ -191,9 +210,9 @@ class JointDrive:
         """See `Drive`."""
         return state.joint_positions[0, self._part.joints].astype(float)
 
-    def learnt(self, course: Course, came: Sequence[Floats]) -> Course:
+    def learnt(self, course: Course, came: Sequence[Floats], share: float) -> Course:
         """See `Drive`."""
-        return Course(course.wanted + course.passed - came, course.passed)
+        return Course(course.wanted + share * (course.passed - came), course.passed)
 
 
 class TcpDrive:
@@ -241,12 +260,9 @@ class TcpDrive:
         """See `Drive`."""
         return state.tcp_pose(self._arm)[0].astype(float)
 
-    def learnt(self, course: Course, came: Sequence[Floats]) -> Course:
+    def learnt(self, course: Course, came: Sequence[Floats], share: float) -> Course:
         """See `Drive`."""
-        wanted, passed, own = course.wanted, course.passed, np.array(came)
-        places = wanted[:, :3] + passed[:, :3] - own[:, :3]
-        missed = multiply(passed[:, 3:], inverse(own[:, 3:]))
-        return Course(np.hstack([places, multiply(missed, wanted[:, 3:])]), passed)
+        return Course(_further(course.wanted, course.passed, np.array(came), share), course.passed)
 
     # -- inside ------------------------------------------------------------------------------
 
@@ -255,7 +271,7 @@ class TcpDrive:
         robot = self._robot
         places = self._task.simulation.index.joints[self._arm]
         own = dict(zip(robot.joints, targets[places], strict=True))
-        place, turn = self._forward([own[joint] for joint in robot.arm_joints])
+        place, turn = self._forward(np.array([own[joint] for joint in robot.arm_joints]))
         link = state.link_pose(self._part.robot, robot.tcp_link)[0].astype(float)
         beside = self.where(state)[:3] - link[:3]
         return np.concatenate([place + rotate(turn, rotate(inverse(link[3:]), beside)), turn])
@@ -334,6 +350,16 @@ def _normalised(group: JointGroup, values: Floats) -> tuple[Floats, bool]:
         numbers[3:] = turn / max(length, 1.0)
         return np.clip(numbers, -1, 1), length <= _NEARLY and bool((abs(numbers) <= _NEARLY).all())
     return np.clip(numbers, -1, 1), bool((abs(numbers) <= _NEARLY).all())
+
+
+def _further(wanted: Floats, passed: Floats, own: Floats, share: float) -> Floats:
+    """Return poses further by a share of what some miss of others, (..., 7)."""
+    places = wanted[..., :3] + share * (passed[..., :3] - own[..., :3])
+    missed = multiply(passed[..., 3:], inverse(own[..., 3:]))
+    missed = missed * np.where(missed[..., :1] < 0, -share, share)
+    missed[..., 0] += 1 - share
+    missed /= np.linalg.norm(missed, axis=-1, keepdims=True)
+    return np.concatenate([places, multiply(missed, wanted[..., 3:])], -1)
 
 
 def _seen_from(root: Floats, pose: Floats) -> tuple[Floats, Floats]:

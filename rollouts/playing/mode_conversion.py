@@ -10,7 +10,6 @@ Physics repeats itself to the last bit, so that this converges where the mode ca
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,8 +20,27 @@ from simulation import State
 from tasks import MultiRobotTask
 from tasks.episode import REBUILT, follow, moments
 
-_PATIENCE = (1, 4, 10)  # steps for one of the recording; ManiSkill's replay_trajectory takes 4
-_TRIES = 8  # with each
+
+class Way(NamedTuple):
+    """A way to try.
+
+    Attributes:
+        most: Steps that may be taken for one of the recording, where one is too short.
+        tries: How often to try.
+        share: How much of what a try missed the next one adds.
+    """
+
+    most: int
+    tries: int
+    share: float
+
+
+_WAYS = (  # how often, and learning how much; ManiSkill's replay_trajectory takes 4 steps
+    Way(1, tries=8, share=1.0),
+    Way(1, tries=12, share=0.3),
+    Way(4, tries=8, share=0.5),
+    Way(10, tries=4, share=0.5),
+)
 _SETTLING = 10  # steps at the end, while the task is not solved
 
 
@@ -59,14 +77,14 @@ def converted(
     recorded = followed(source, seed, actions)
     drives = drives_of(source, task)
     found = Attempt([], False, [])
-    for most in _PATIENCE:
+    for way in _WAYS:
         courses = {drive: drive.course(recorded) for drive in drives}
-        for _ in range(_TRIES):
-            found = _attempt(courses, task, seed, len(actions), most)
+        for _ in range(way.tries):
+            found = _attempt(courses, task, seed, len(actions), way.most)
             if found.solved:
                 return np.array(found.actions, np.float32)
             courses = {
-                drive: drive.learnt(course, [drive.where(state) for state in found.states])
+                drive: drive.learnt(course, list(map(drive.where, found.states)), way.share)
                 for drive, course in courses.items()
             }
     return np.array(found.actions, np.float32)
