@@ -21,7 +21,7 @@ from rich.text import Text
 import tasks
 from experts import find_expert
 from parity.compare.both_sides import NativeSide, OurSide, Side
-from parity.compare.episodes import load_episodes, recorded_control_mode
+from parity.compare.episodes import recorded_episodes
 from parity.compare.native_env import native_agents
 from parity.compare.printed import versions
 from parity.compare.snapshot import Snapshot, largest_difference
@@ -161,8 +161,7 @@ def find_source(cls: type[MultiRobotTask], demo: Path | None, seed: int | None) 
     """
     if demo is None:
         return expert_source(cls, 0 if seed is None else seed)
-    episodes = load_episodes(demo, cls.task_id, cls.layout.action_dim)
-    mode = recorded_control_mode(demo) or CONTROL_MODES[0]
+    episodes, mode = recorded_episodes(demo, cls)
     for episode in episodes:
         if seed in (None, episode.seed):
             return Source(demo.name, episode, mode)
