@@ -136,11 +136,11 @@ def markdown(found: Mapping[str, Any]) -> Iterator[str]:
     versions = ", ".join(f"{name} {version}" for name, version in found["versions"].items())
     yield "# Recordings in other control modes"
     yield ""
-    yield "Episodes in which experts solve ManiSkill's tasks in `pd_joint_delta_pos`, converted as"
-    yield "`rollouts convert` does; `python -m measurements.conversions` writes this page. Each cell:"
-    yield "how many were kept of how many, as they succeed in the other mode, too; then in how many"
-    yield "of those native ManiSkill succeeds. *turn* is how far the TCP turns, on the average (°):"
-    yield "modes that ask for its position alone cannot turn it on purpose."
+    yield "Episodes in which experts solve ManiSkill's tasks in `pd_joint_delta_pos`, converted"
+    yield "as `rollouts convert` does; `python -m measurements.conversions` writes this page. In each"
+    yield "cell: how many were kept of how many, as they succeed in the other mode, too; then in how"
+    yield "many of those native ManiSkill succeeds. *turn* is how far the TCP turns, on the average"
+    yield "(°): modes that ask for its position alone cannot turn it on purpose."
     yield f"Made with {versions}."
     yield ""
     yield _row("task", "turn", *(f"`{mode.removeprefix('pd_')}`" for mode in MODES))
