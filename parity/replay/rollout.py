@@ -280,7 +280,7 @@ def _named(snapshot: Snapshot, robots: Mapping[str, str]) -> Arrays:
 def _play_native(
     env: MultiRobotTask, episode: Episode, film: Path | None, on_step: Callable[[str], None]
 ) -> Arrays:
-    mode, size = str(env.scenario.control_mode), PICTURE_SIZE if film else None
+    mode, size = str(env.control_mode), PICTURE_SIZE if film else None
     side = NativeSide(env.task_id, control_mode=mode, picture_size=size)
     native, keys = side.envs[0], articulation_keys(env.layout)
 
@@ -320,7 +320,7 @@ def describe(env: MultiRobotTask, source: Source, name: str) -> dict[str, Any]:
         "source": source.name,
         "seed": source.episode.seed,
         "reset": {"seed": source.episode.seed, "options": {"reconfigure": True}},
-        "control_mode": env.scenario.control_mode,
+        "control_mode": env.control_mode,
         "reward_mode": env.reward_mode,
         "control_frequency": env.scenario.control_frequency,
         "robots": {place: p.robot.name for place, p in env.layout.items()},
