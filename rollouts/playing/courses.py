@@ -27,11 +27,13 @@ class Recorded:
         numbers: The actions, (T, A).
         targets: What the drives were set to, (T, dof) (rad, m).
         states: The worlds before the first step and after every one, T + 1.
+        solved: Whether the task was solved after the last.
     """
 
     numbers: NDArray[np.float32]
     targets: Floats
     states: Sequence[State]
+    solved: bool
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,7 @@ def converted(
     recorded = followed(source, seed, actions)
     drives = drives_of(source, task)
     found = Attempt([], False, [])
-    for way in _WAYS:
+    for way in _WAYS if recorded.solved else _WAYS[:1]:
         courses = {drive: drive.course(recorded) for drive in drives}
         for _ in range(way.tries):
             found = _attempt(courses, task, seed, len(actions), way.most)
@@ -101,10 +101,12 @@ def followed(task: MultiRobotTask, seed: int, actions: NDArray[np.float32]) -> R
     happening = moments(task, seed, follow(actions), len(actions))
     next(happening)
     states, targets = [task.simulation.read()], []
-    for _ in happening:
+    solved = False
+    for moment in happening:
+        solved = moment.success
         states.append(task.simulation.read())
         targets.append(task.simulation.drive_targets[0].astype(float))
-    return Recorded(np.asarray(actions, np.float32), np.array(targets), states)
+    return Recorded(np.asarray(actions, np.float32), np.array(targets), states, solved)
 
 
 def _attempt(
