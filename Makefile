@@ -12,7 +12,7 @@ help:
 	@echo "make test      the tests"
 	@echo "make test-all  the tests, those that take minutes included"
 	@echo "make faults    whatever can go wrong, tried; writes docs/faults.md"
-	@echo "make check     lint, format, types, which room imports which, README's tables"
+	@echo "make check     lint, format, types, which room imports which, tables, the distribution"
 	@echo "make bench     what steps, resets and vectors cost beside native ManiSkill"
 	@echo "make parity    every task beside native ManiSkill; writes README.md's table"
 	@echo "make clean     remove .venv"
@@ -38,6 +38,8 @@ check: $(VENV)/.check
 	$(RUN) -m pyright --pythonpath $(RUN)
 	$(VENV)/bin/lint-imports
 	$(RUN) -m parity readme --check
+	rm -rf $(VENV)/dist && $(RUN) -m hatchling -q build --directory $(VENV)/dist
+	$(RUN) -m twine check --strict $(VENV)/dist/*
 
 # ARGS="--record" keeps the figures for README.md.
 bench: $(VENV)/.test

@@ -9,6 +9,7 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+import yaml
 
 from robots.common.rooms import ROOMS
 
@@ -68,6 +69,17 @@ class TestWheel:
         for name in wheel.namelist():
             assert not name.lower().endswith(ROBOT_FILES)
             assert name.split("/")[0] in ROOMS or ".dist-info/" in name
+
+
+class TestRelease:
+    def test_one_version_everywhere(self):
+        cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+        latest = re.search(
+            r"^## (\d\S*) – (\S+)$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE
+        )
+        assert latest is not None
+        assert latest.groups() == (cited["version"], cited["date-released"])
+        assert cited["version"] == PROJECT["version"]
 
 
 class TestRepository:
