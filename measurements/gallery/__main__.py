@@ -11,7 +11,7 @@ import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from measurements.gallery.pages import stale_pages, write_pages
+from measurements.gallery.pages import complaints, write_pages
 from measurements.gallery.record import Record
 from robots import AssetError, UnknownNameError
 from robots.common.commands import FAILED, exit_code, notice, program, start
@@ -46,10 +46,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(options: argparse.Namespace) -> int:
     names = _chosen(options.names)
     if options.check:
-        stale = stale_pages(Record.read(), FOLDER)
-        for page, why in stale.items():
-            notice(f"{page} {why}; run `{program('measurements.gallery')}`")
-        return FAILED if stale else 0
+        found = list(complaints(Record.read(), FOLDER))
+        for complaint in found:
+            notice(complaint)
+        return FAILED if found else 0
     complete = True
     if options.measure:
         complete = _measure(names)
@@ -87,7 +87,8 @@ def _measure(names: Sequence[str]) -> bool:
             record.tasks[name] = measure_task(name, advance)
         record.write()
 
-    return _each(names, [EPISODES if name in TASKS else 1 for name in names], measure)
+    sizes = [EPISODES if name in TASKS else 1 for name in names]
+    return _each(names, LiveLine(sum(sizes), "episodes and robots"), measure)
 
 
 def _draw(names: Sequence[str]) -> bool:
@@ -102,11 +103,11 @@ def _draw(names: Sequence[str]) -> bool:
             artist.film_task(name)
         advance()
 
-    return _each(names, [1] * len(names), draw)
+    return _each(names, LiveLine(len(names), "pictures"), draw)
 
 
 def _each(
-    names: Sequence[str], sizes: Sequence[int], do: Callable[[str, Callable[[], None]], None]
+    names: Sequence[str], line: LiveLine, do: Callable[[str, Callable[[], None]], None]
 ) -> bool:
     """Do something for each name; those whose files cannot be had are left out, and said.
 
@@ -114,7 +115,7 @@ def _each(
         Whether none was left out.
     """
     left_out = 0
-    with LiveLine(sum(sizes), "episodes and robots") as line:
+    with line:
         for name in names:
             try:
                 do(name, lambda name=name: line.advance(1, name))

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 
+from rich.table import Table
+
 INDEX = "index.md"
+
+# No list of pages beside the page, which is wider then; and the way back.
+WIDE = ("---", "hide:", "  - navigation", "---", "")
+BACK = "[Back to the gallery](../index.md)"
 
 
 def task_path(task_id: str) -> str:
@@ -27,9 +33,10 @@ def portrait_path(name: str) -> str:
     return f"media/robots/{name}.webp"
 
 
-def picture(path: str, alt: str, *, lazy: bool = False) -> str:
-    """Return a picture of 320 pixels along each side, at most as wide as the page."""
-    return f'![{alt}]({path}){{ width="320" height="320"{" loading=lazy" if lazy else ""} }}'
+def picture(path: str, alt: str, *, height: int = 320, lazy: bool = False) -> str:
+    """Return a picture of 320 × ``height`` pixels, at most as wide as the page."""
+    loading = " loading=lazy" if lazy else ""
+    return f'![{alt}]({path}){{ width="320" height="{height}"{loading} }}'
 
 
 def table(
@@ -41,9 +48,18 @@ def table(
     yield from map(_row, rows)
 
 
+def printed(rows: Table, quote: Collection[int] = ()) -> Iterator[str]:
+    """Yield the lines of a table that is made to be printed; some columns are code."""
+    cells = [[str(cell) for cell in column.cells] for column in rows.columns]
+    quoting = [[f"`{c}`" for c in row] if i in quote else row for i, row in enumerate(cells)]
+    numbers = [i for i, column in enumerate(rows.columns) if column.justify == "right"]
+    headings = [str(column.header) for column in rows.columns]
+    yield from table(headings, zip(*quoting, strict=True), numbers)
+
+
 def facts(rows: Iterable[tuple[str, str]]) -> Iterator[str]:
-    """Yield the lines of a table of names and values; what has no value is left out."""
-    yield from table(("", ""), ((f"**{name}**", value) for name, value in rows if value))
+    """Yield the lines of a list of names and values; what has no value is left out."""
+    yield from (f"- **{name}:** {value}" for name, value in rows if value)
 
 
 def code(language: str, text: str) -> Iterator[str]:
@@ -72,6 +88,11 @@ def sentence(text: str) -> str:
 def quoted(names: Iterable[str]) -> str:
     """Return names as code, one after the other."""
     return ", ".join(f"`{name}`" for name in names)
+
+
+def breakable(name: str) -> str:
+    """Return a name that may go on in a new line behind each underscore."""
+    return name.replace("_", "_<wbr>")
 
 
 def _row(cells: Sequence[str]) -> str:

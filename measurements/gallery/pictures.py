@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from measurements.gallery.camera import Picture
@@ -11,6 +12,8 @@ from measurements.gallery.clip import FRAMES_PER_SECOND, Performance
 from measurements.gallery.markdown import clip_path, portrait_path
 from measurements.gallery.portrait import Sitter
 from measurements.gallery.record import GalleryError, Record
+from measurements.gallery.shapes import seen_as_shapes
+from measurements.gallery.sources import can_be_drawn
 from robots import MissingPackageError, RobotRegistry
 from robots.common.writing import write_whole
 from simulation.rendering.pictures import vulkan_problem
@@ -45,15 +48,18 @@ class Artist:
         self._kept: Any = None
 
     def draw_robot(self, name: str) -> None:
-        """Draw a robot's portrait.
+        """Draw a robot's portrait; of one that has no visual meshes, its collision shapes.
 
         Raises:
-            AssetError: If its files cannot be had, or it cannot be drawn.
+            AssetError: If its files cannot be had.
             UnwritableFileError: If the picture cannot be written.
         """
-        sitter = Sitter(RobotRegistry.load(name))
-        self._kept = self._kept or sitter
-        content = _smallest([sitter.portrait()], LARGEST_PORTRAIT)
+        robot = RobotRegistry.load(name)
+        with TemporaryDirectory() as folder:
+            drawn = robot if can_be_drawn(robot) else seen_as_shapes(robot, Path(folder))
+            sitter = Sitter(drawn)
+            self._kept = self._kept or sitter
+            content = _smallest([sitter.portrait()], LARGEST_PORTRAIT)
         write_whole(self._folder / portrait_path(name), content)
 
     def film_task(self, task_id: str) -> None:

@@ -86,7 +86,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class ExpertRecord:
-    """How the expert of a task did in the episodes of the seeds 0, 1, 2, …
+    """How the expert of a task did in the episodes of the first seeds, from 0.
 
     Attributes:
         episodes: How many it played.
@@ -104,7 +104,7 @@ class ExpertRecord:
         """Refuse what cannot be."""
         settle_fields(self, GalleryError)
         if len(self.steps) != self.episodes:
-            raise GalleryError(f"there are {self.episodes} episodes, and steps of {len(self.steps)}")
+            raise GalleryError(f"{self.episodes} episodes have steps of {len(self.steps)}")
 
     @property
     def solved(self) -> int:
