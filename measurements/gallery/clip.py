@@ -30,7 +30,7 @@ def steps_per_frame(steps: int, control_frequency: float) -> int:
 
 
 def speed(steps: int, control_frequency: float) -> float:
-    """Return how much faster than in truth an episode of so many steps is shown."""
+    """Return how many times its real speed an episode of so many steps is shown at."""
     return steps_per_frame(steps, control_frequency) * FRAMES_PER_SECOND / control_frequency
 
 

@@ -25,8 +25,9 @@ KINDS = {
     "humanoid": "Humanoids",
     "hand": "Hands",
 }
-# Two cards beside each other on a phone, five on a wide screen.
-NARROW = "grid-template-columns: repeat(auto-fill, minmax(min(45%, 8rem), 1fr))"
+# How many cards stand beside each other on a phone and on a wide screen: 1 and 3, or 2 and 5.
+LARGE = "grid-template-columns: repeat(auto-fill, minmax(min(100%, 13rem), 1fr))"
+SMALL = "grid-template-columns: repeat(auto-fill, minmax(min(45%, 8rem), 1fr))"
 
 
 def index_page(sources: Sources) -> Iterator[str]:
@@ -43,25 +44,22 @@ def index_page(sources: Sources) -> Iterator[str]:
     yield ""
     yield (
         f"{len(tasks)} tasks and {len(every)} robots come with the library. In each clip an expert,"
-        " a script, plays the task. Any robot can take a place of a task, and any number of robots"
-        " can stand in a layout."
+        " a script, plays the task. Other robots can take the places of a task, and robots and"
+        " tasks of your own stand beside these."
     )
     yield ""
-    yield from _section("Tasks of our own", (_task_card(cls, sources) for cls in own.values()))
-    yield from _section(
-        "Tasks that clone ManiSkill's", (_task_card(cls, sources) for cls in clones.values())
-    )
+    for title, chosen in {"Tasks of our own": own, "Tasks that clone ManiSkill's": clones}.items():
+        yield from _section(title, (_task_card(cls, sources) for cls in chosen.values()), LARGE)
     for name, title in KINDS.items():
-        chosen = [robot for robot in every.values() if kind(robot) == name]
-        cards = (_robot_card(robot, sources) for robot in chosen)
-        yield from _section(title, cards, style=NARROW)
+        alike = [robot for robot in every.values() if kind(robot) == name]
+        yield from _section(title, (_robot_card(robot, sources) for robot in alike), SMALL)
+    yield "Written from the code and its records by `python -m measurements.gallery`."
 
 
-def _section(title: str, cards: Iterable[Iterator[str]], style: str = "") -> Iterator[str]:
-    styled = f' style="{style}"' if style else ""
+def _section(title: str, cards: Iterable[Iterator[str]], style: str) -> Iterator[str]:
     yield f"## {title}"
     yield ""
-    yield f'<div class="grid cards"{styled} markdown>'
+    yield f'<div class="grid cards" style="{style}" markdown>'
     yield ""
     for card in cards:
         yield from card

@@ -60,7 +60,7 @@ def task_page(cls: type[MultiRobotTask], sources: Sources) -> Iterator[str]:
     yield from _clip(cls, measured, sources)
     yield from facts(_facts(cls, measured, sources))
     yield ""
-    yield from section("Goal", _lines(sentence(text.success)))
+    yield from section("Success", _lines(sentence(text.success)))
     yield from section("What differs from episode to episode", _lines(sentence(text.randomisation)))
     yield from section("Run it", _python(cls), _console(cls))
     yield from section("Who stands where", _places(cls.layout), _others(cls))
@@ -104,10 +104,10 @@ def _clip(cls: type[MultiRobotTask], measured: TaskRecord, sources: Sources) -> 
         return
     seed = measured.expert.first_solved
     times = speed(measured.expert.steps[seed], cls.scenario.control_frequency)
-    pace = "at its real speed" if times == 1 else f"{times:g} times as fast as in truth"
+    pace = "real speed" if times == 1 else f"{times:g} times real speed"
     yield picture(f"{UP}{path}", f"The expert plays {cls.task_id}", height=240)
     yield ""
-    yield f"The expert plays the episode of seed {seed}, {pace}."
+    yield f"The expert plays the episode of seed {seed}, shown at {pace}."
     yield ""
 
 
