@@ -38,6 +38,7 @@ check: $(VENV)/.check
 	$(RUN) -m pyright --pythonpath $(RUN)
 	$(VENV)/bin/lint-imports
 	$(RUN) -m parity readme --check
+	$(RUN) -m measurements.gallery --check
 	rm -rf $(VENV)/dist && $(RUN) -m hatchling -q build --directory $(VENV)/dist
 	$(RUN) -m twine check --strict $(VENV)/dist/*
 
@@ -50,6 +51,7 @@ bench: $(VENV)/.test
 parity: $(VENV)/.test
 	OMP_NUM_THREADS=1 $(RUN) -m parity compare --all --record $(ARGS)
 	$(RUN) -m parity readme
+	$(RUN) -m measurements.gallery
 
 clean:
 	rm -rf $(VENV)
