@@ -39,7 +39,7 @@ check: $(VENV)/.check
 	$(VENV)/bin/lint-imports
 	$(RUN) -m parity readme --check
 	$(RUN) -m measurements.gallery --check
-	rm -rf $(VENV)/dist && $(RUN) -m hatchling -q build --directory $(VENV)/dist
+	rm -rf $(VENV)/dist && $(RUN) -m hatchling build --directory $(VENV)/dist
 	$(RUN) -m twine check --strict $(VENV)/dist/*
 
 # ARGS="--record" keeps the figures for README.md.
