@@ -4,6 +4,7 @@ from functools import partial
 from math import pi
 
 import numpy as np
+from tray import TwoArmTray
 
 from experts import (
     CLOSED,
@@ -16,7 +17,6 @@ from experts import (
     register_expert,
     yaw_of,
 )
-from tray import TwoArmTray
 
 ENDS = {"left": -0.25, "right": 0.25}  # along the tray's own y axis (m)
 HEIGHTS = np.linspace(0.02, 0.23, 9)[1:]  # of the tray, step by step (m)

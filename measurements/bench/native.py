@@ -19,10 +19,10 @@ from measurements.bench.command import add_arguments, run_benchmarks, settings_o
 from measurements.bench.episodes import timed_resets
 from measurements.bench.measurement import BenchmarkError, Measurement, by_series
 from measurements.bench.processes import PhysicsProcesses, TimedVector, vector
-from measurements.bench.tables import RECORD
 from measurements.bench.report import Report
 from measurements.bench.settings import Benchmark, Settings
 from measurements.bench.steps import PHYSICS, Played
+from measurements.bench.tables import RECORD
 from parity.compare.native_env import make_native, make_native_front, native_action
 from robots import RobotLayoutsError, TaskError
 from robots.common.commands import program, start

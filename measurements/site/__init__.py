@@ -1,1 +1,1 @@
-"""What the documentation's site is made with, besides its pages: the commands, and a check of links."""
+"""What the documentation's site is made with, besides its pages."""

@@ -37,7 +37,7 @@ def parser_of(module: str, words: Sequence[str]) -> argparse.ArgumentParser:
             main([*words, "--help"])
         except _ParserError as given:
             return given.parser
-    raise LookupError(f"{module} {' '.join(words)} --help printed no help of a parser")
+    raise LookupError(f"{' '.join([module, *words])} --help printed no help of a parser")
 
 
 class _ParserError(Exception):
@@ -66,8 +66,10 @@ def _parser(parser: argparse.ArgumentParser, heading: str) -> Iterator[str]:
     """Yield what a parser reads; below it, that of the commands that it has."""
     if parser.prog != heading:
         yield from ("", f"### {parser.prog}", "")
+    if parser.description:
+        yield from (_sentence(_markdown_text(parser.description)), "")
     below = _Below()
-    parser.formatter_class = below.formatter
+    parser.description, parser.formatter_class = None, below.formatter
     yield from (parser.format_help(), "")
     for one in below.parsers:
         yield from _parser(one, heading)

@@ -1,4 +1,4 @@
-"""Whether what pages refer to exists: in the site as it was built, and in the repository's files."""
+"""Whether what pages refer to exists: in the site as it was built, and in the repository."""
 
 from __future__ import annotations
 
@@ -104,12 +104,12 @@ def _has(page: Page, fragment: str) -> bool:
 
 def _leads_somewhere(link: str, text: str, file: Path) -> bool:
     path, _, fragment = unquote(link).partition("#")
-    target = file.parent / path if path else file
-    if not target.exists():
-        return False
+    if not path:
+        return fragment in anchors_of(text)
+    target = file.parent / path
     if not fragment or target.suffix != ".md":
-        return True
-    return fragment in anchors_of(target.read_text(encoding="utf-8") if path else text)
+        return target.exists()
+    return target.exists() and fragment in anchors_of(target.read_text(encoding="utf-8"))
 
 
 def _is_of_repository(path: str, root: Path) -> bool:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).parents[2]
 FENCE = re.compile(
-    r'(?P<skipped><!-- not run: [^>]*-->\n\s*)?^(?P<indent> *)```(?P<language>\w+)'
+    r"(?P<skipped><!-- not run: [^>]*-->\n\s*)?^(?P<indent> *)```(?:\{\.)?(?P<language>\w+)"
     r'(?: title="(?P<file>[^"]+)")?[^\n]*\n(?P<code>.*?)^(?P=indent)```$',
     re.MULTILINE | re.DOTALL,
 )
@@ -28,7 +28,6 @@ SHORTER = {
     "learn(100_000)": "learn(1)",
     "range(100)": "range(2)",
     "num_envs=64": "num_envs=4",
-    "--episodes 100": "--episodes 2",
     "--episodes 20": "--episodes 2",
 }
 
@@ -75,7 +74,7 @@ def shortened(code: str) -> str:
 
 
 def commands(console: str) -> list[str]:
-    """Return what is typed after the ``$`` of a console, each with the lines that go on after ``\\``."""
+    """Return what is typed after each ``$``, with the lines that a backslash joins to it."""
     joined = console.replace("\\\n", "")
     return [line[2:] for line in joined.splitlines() if line.startswith("$ ")]
 

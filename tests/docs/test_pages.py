@@ -80,7 +80,7 @@ assert x + y == {sum}
         (tmp_path / "run").mkdir()
         done = play_apart(page(4), tmp_path / "run")
         assert done.returncode != 0
-        assert 'page.md", line 31' in done.stderr
+        assert 'page.md", line 30' in done.stderr
 
     def test_a_command_that_fails_fails(self, tmp_path):
         page = tmp_path / "page.md"
@@ -98,5 +98,3 @@ def test_nothing_that_is_made_shorter_is_missing():
     pages = [ROOT / "README.md", *(DOCS / page for page in PLAYED)]
     code = "\n".join(block.code for page in pages for block in blocks(page))
     assert [long for long in SHORTER if long not in code] == []
-
-
