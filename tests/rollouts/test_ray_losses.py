@@ -185,7 +185,7 @@ def test_a_short_recording_may_go_on_without_the_head(nodes, tmp_path):
 
 @contextmanager
 def guarded_head(monkeypatch, tmp_path):
-    """Start a head that asks for a token, as README shows it; yields its address."""
+    """Start a head that asks for a token, as the tutorial does; yields its address."""
     folder = tempfile.mkdtemp(prefix="ray-")  # short: it holds sockets
     monkeypatch.setenv("RAY_TMPDIR", folder)
     monkeypatch.setenv("HOME", str(tmp_path))

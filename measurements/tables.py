@@ -1,4 +1,4 @@
-"""``python -m parity readme``: the records as tables in README.md, and their check."""
+"""``python -m parity tables``: the records as tables in docs/parity.md, and their check."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from measurements.bench import readme_table as bench_table
+from measurements.bench import tables as bench_table
 from parity.compare.results import RESULTS, ResultsError, read
 from parity.compare.task_summary import REWARD_MODES, number_text, reward_text, success_text
 from robots import RobotLayoutsError
 from robots.common.commands import program
 from tasks import list_clones
 
-README = Path(__file__).parents[1] / "README.md"
+PAGE = Path(__file__).parents[1] / "docs" / "parity.md"
 PARITY_TABLE, BENCH_TABLES = "parity table", "benchmarks"  # what the markers call them
 DIFFERENCES = ("object pose", "qpos", "observation")  # the rest stands in the record
 
@@ -24,34 +24,34 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
     Returns:
-        0 if README.md shows the records, 1 if a check finds that it does not or that the record
+        0 if the page shows the records, 1 if a check finds that it does not or that the record
         of parity does not hold exactly the tasks there are, 2 if a file cannot be read.
     """
     parser = argparse.ArgumentParser(
-        prog=f"{program('parity')} readme",
+        prog=f"{program('parity')} tables",
         description="Write what `python -m parity compare --all --record` and `python -m parity"
-        " bench --record` found into README.md.",
+        " bench --record` found into docs/parity.md.",
     )
     add = parser.add_argument
     add("--check", action="store_true", help="write nothing; tell what is stale")
-    add("--readme", type=Path, default=README, help="the README (this project's)")
+    add("--page", type=Path, default=PAGE, help="the page (this project's)")
     add("--results", type=Path, default=RESULTS, help="the comparison (this project's)")
     add("--bench", type=Path, default=bench_table.RECORD, help="the benchmarks (this project's)")
     args = parser.parse_args(argv)
     try:
         record, measured = read(args.results), bench_table.read(args.bench)
-        text = _read_text(args.readme)
+        text = _read_text(args.page)
         fresh = with_lines(text, PARITY_TABLE, _lines(markdown(record), "make parity"))
         shown = _lines(bench_table.markdown(measured), bench_table.COMMAND)
         fresh = with_lines(fresh, BENCH_TABLES, shown)
         if not args.check and fresh != text:
-            args.readme.write_text(fresh, encoding="utf-8")
+            args.page.write_text(fresh, encoding="utf-8")
     except (RobotLayoutsError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     complaints = list(missing_and_extra(record["tasks"], list_clones()))
     if args.check and fresh != text:
-        complaints.append(f"{args.readme.name} is stale; run `python -m parity readme`")
+        complaints.append(f"{args.page.name} is stale; run `python -m parity tables`")
     for complaint in complaints:
         print(complaint, file=sys.stderr)
     return 1 if args.check and complaints else 0
@@ -59,7 +59,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def begin(name: str) -> str:
     """Return the line after which something generated stands."""
-    return f"<!-- {name}: begin; written by `python -m parity readme` -->"
+    return f"<!-- {name}: begin; written by `python -m parity tables` -->"
 
 
 def end(name: str) -> str:
@@ -67,20 +67,20 @@ def end(name: str) -> str:
     return f"<!-- {name}: end -->"
 
 
-def with_lines(readme: str, name: str, lines: Iterable[str]) -> str:
-    """Return a README with lines between the two markers of a name.
+def with_lines(page: str, name: str, lines: Iterable[str]) -> str:
+    """Return a page with lines between the two markers of a name.
 
     Raises:
         ResultsError: If there is not exactly one of each marker, in order.
     """
     for marker in (begin(name), end(name)):
-        if readme.count(marker) != 1:
+        if page.count(marker) != 1:
             raise ResultsError(
-                f"the README has the line {marker!r} {readme.count(marker)} times; it needs it once"
+                f"the page has the line {marker!r} {page.count(marker)} times; it needs it once"
             )
-    before, _, rest = readme.partition(begin(name))
+    before, _, rest = page.partition(begin(name))
     if end(name) not in rest:
-        raise ResultsError(f"the README has the line {end(name)!r} before {begin(name)!r}")
+        raise ResultsError(f"the page has the line {end(name)!r} before {begin(name)!r}")
     _, _, after = rest.partition(end(name))
     return "\n".join([f"{before}{begin(name)}", "", *lines, "", f"{end(name)}{after}"])
 

@@ -1,50 +1,25 @@
 """The Python of README.md runs as it stands, but for the length of what takes minutes."""
 
-import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-README = Path(__file__).parents[1] / "README.md"
-BLOCKS = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), flags=re.DOTALL)
-GUARDED = [block for block in BLOCKS if "__main__" in block]  # those that start processes
-PLAIN = [block for block in BLOCKS if "__main__" not in block]
-SHORTER = {"learn(100_000)": "learn(1)", "range(100)": "range(2)", "num_envs=64": "num_envs=4"}
+from tests.docs.blocks import ROOT, blocks, play_apart
 
-
-def run(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    for long, short in SHORTER.items():
-        code = code.replace(long, short)
-    script = folder / "script.py"
-    script.write_text(code, encoding="utf-8")
-    command = [sys.executable, str(script)]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-
-
-def test_nothing_that_is_made_shorter_is_missing():
-    assert all(any(long in block for block in BLOCKS) for long in SHORTER)
+README = ROOT / "README.md"
+PYTHON = [block.code for block in blocks(README) if block.language == "python"]
+(DECLARED,) = [code for code in PYTHON if "register_task" in code]
 
 
 @pytest.mark.long
-@pytest.mark.native  # because of the cameras
-def test_what_builds_on_each_other_runs(tmp_path):
-    done = run("\n".join(PLAIN), tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert {"cell.png", "cell.yaml", "cell.urdf", "check.png"} <= {
-        p.name for p in tmp_path.iterdir()
-    }
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("block", GUARDED)
-def test_what_starts_processes_runs(block, tmp_path):
-    done = run("import tasks\n" + block, tmp_path)
+def test_it_runs(tmp_path):
+    done = play_apart(README, tmp_path)
     assert done.returncode == 0, done.stderr
 
 
-(DECLARED,) = [block for block in PLAIN if "register_task" in block]
+def test_a_newcomer_reads_it_in_three_minutes():
+    assert len(README.read_text(encoding="utf-8").splitlines()) <= 150
 
 
 def test_a_task_of_ones_own_is_short():
@@ -53,7 +28,11 @@ def test_a_task_of_ones_own_is_short():
 
 def test_a_task_in_a_file_of_ones_own_runs(tmp_path):
     (tmp_path / "tray.py").write_text(DECLARED, encoding="utf-8")
-    done = run(USES_THE_TRAY, tmp_path)
+    script = tmp_path / "script.py"
+    script.write_text(USES_THE_TRAY, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
 
 

@@ -1,4 +1,4 @@
-"""The recorded benchmarks as the tables that README.md shows."""
+"""The recorded benchmarks as the tables that docs/parity.md shows."""
 
 from __future__ import annotations
 

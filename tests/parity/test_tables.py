@@ -1,4 +1,4 @@
-"""``python -m parity readme``: the table, and every way in which it can be stale."""
+"""``python -m parity tables``: the table, and every way in which it can be stale."""
 
 import copy
 import json
@@ -11,7 +11,7 @@ import pytest
 
 from measurements.bench.measurement import Measurement
 from measurements.bench.report import Report
-from measurements.readme import BENCH_TABLES, PARITY_TABLE, begin, end, with_lines
+from measurements.tables import BENCH_TABLES, PARITY_TABLE, begin, end, with_lines
 from parity.__main__ import main
 from parity.compare.results import ResultsError, read
 from parity.compare.snapshot import QUANTITIES
@@ -48,7 +48,7 @@ def a_record(*task_ids: str) -> dict:
 
 
 def some_benchmarks(*task_ids: str) -> Report:
-    """What is in the README's tables: native three times as slow, ours twice the physics."""
+    """What is in the page's tables: native three times as slow, ours twice the physics."""
 
     def on(values, name, unit, ratios=(), **series) -> Measurement:
         samples = {key.replace("_", " "): [[x]] * len(values) for key, x in series.items()}
@@ -76,12 +76,12 @@ def some_benchmarks(*task_ids: str) -> Report:
 
 
 class Files:
-    """A README and two records in a folder of their own."""
+    """A page and two records in a folder of their own."""
 
     def __init__(self, folder: Path, record: dict) -> None:
-        self.readme, self.results = folder / "README.md", folder / "results.json"
+        self.page, self.results = folder / "parity.md", folder / "results.json"
         self.bench = folder / "bench.json"
-        self.readme.write_text(MARKERS, encoding="utf-8")
+        self.page.write_text(MARKERS, encoding="utf-8")
         self.write(record)
         self.write_bench(some_benchmarks(*CATALOGUE))
 
@@ -92,20 +92,20 @@ class Files:
         self.results.write_text(json.dumps(record))
 
     def run(self, *options: str) -> int:
-        paths = ("--readme", str(self.readme), "--results", str(self.results))
+        paths = ("--page", str(self.page), "--results", str(self.results))
         paths += ("--bench", str(self.bench))
-        return main(["readme", *paths, *options])
+        return main(["tables", *paths, *options])
 
 
 @pytest.fixture
 def files(tmp_path, monkeypatch):
-    monkeypatch.setattr("measurements.readme.list_clones", lambda: tuple(CATALOGUE))
+    monkeypatch.setattr("measurements.tables.list_clones", lambda: tuple(CATALOGUE))
     return Files(tmp_path, a_record(*CATALOGUE))
 
 
 def test_a_row_says_everything(files):
     assert files.run() == 0
-    text = files.readme.read_text(encoding="utf-8")
+    text = files.page.read_text(encoding="utf-8")
     assert text.startswith("# Title\n\n")
     assert text.endswith("\n\nThe end.\n")
     shown, _, _ = text.partition(END)
@@ -136,7 +136,7 @@ def test_a_row_says_everything(files):
 
 def test_benchmarks_are_shown(files):
     files.run()
-    text = files.readme.read_text(encoding="utf-8")
+    text = files.page.read_text(encoding="utf-8")
     _, _, shown = text.partition(begin(BENCH_TABLES))
     lines = shown.splitlines()
     heading = "| task | step, here (µs) | step, native (µs) | step, physics alone (µs) |"
@@ -152,28 +152,28 @@ def test_benchmarks_are_shown(files):
 
 def test_a_fresh_table_passes_and_stays(files, capsys):
     files.run()
-    text = files.readme.read_text(encoding="utf-8")
+    text = files.page.read_text(encoding="utf-8")
     assert files.run("--check") == 0
     assert files.run() == 0
-    assert files.readme.read_text(encoding="utf-8") == text
+    assert files.page.read_text(encoding="utf-8") == text
     assert capsys.readouterr() == ("", "")
 
 
 class TestStale:
     def expect(self, files, capsys, complaint):
-        before = files.readme.read_bytes()
+        before = files.page.read_bytes()
         assert files.run("--check") == 1
         assert complaint in capsys.readouterr().err
-        assert files.readme.read_bytes() == before
+        assert files.page.read_bytes() == before
 
     def test_no_table_yet(self, files, capsys):
-        self.expect(files, capsys, "README.md is stale; run `python -m parity readme`")
+        self.expect(files, capsys, "parity.md is stale; run `python -m parity tables`")
 
     def test_an_edited_cell(self, files, capsys):
         files.run()
-        text = files.readme.read_text(encoding="utf-8")
-        files.readme.write_text(text.replace("2.5e-07", "0", 1), encoding="utf-8")
-        self.expect(files, capsys, "README.md is stale")
+        text = files.page.read_text(encoding="utf-8")
+        files.page.write_text(text.replace("2.5e-07", "0", 1), encoding="utf-8")
+        self.expect(files, capsys, "parity.md is stale")
 
     @pytest.mark.parametrize(
         ("key", "value"),
@@ -184,7 +184,7 @@ class TestStale:
         record = a_record(*CATALOGUE)
         record["tasks"]["PushT-v1"][key] = value
         files.write(record)
-        self.expect(files, capsys, "README.md is stale")
+        self.expect(files, capsys, "parity.md is stale")
 
     @pytest.mark.parametrize("quantity", ["object pose", "qpos", "observation", "info"])
     def test_a_new_difference(self, files, capsys, quantity):
@@ -192,12 +192,12 @@ class TestStale:
         record = a_record(*CATALOGUE)
         record["tasks"]["PushT-v1"]["max_difference"][quantity] = "inf"
         files.write(record)
-        self.expect(files, capsys, "README.md is stale")
+        self.expect(files, capsys, "parity.md is stale")
 
     def test_another_version(self, files, capsys):
         files.run()
         files.write(a_record(*CATALOGUE) | {"versions": {"mani_skill": "3.1"}})
-        self.expect(files, capsys, "README.md is stale")
+        self.expect(files, capsys, "parity.md is stale")
 
     def test_a_task_that_was_never_compared(self, files, capsys):
         files.write(a_record(*sorted(CATALOGUE)[1:]))
@@ -213,7 +213,7 @@ class TestStale:
         faster = {**step.samples, "here": [[1.9]] * len(step.values)}
         others = tuple(one for one in report.measurements if one.name != "step")
         files.write_bench(replace(report, measurements=(replace(step, samples=faster), *others)))
-        self.expect(files, capsys, "README.md is stale")
+        self.expect(files, capsys, "parity.md is stale")
 
     def test_a_task_that_is_gone(self, files, capsys):
         files.write(a_record(*CATALOGUE, "Gone-v1"))
@@ -234,11 +234,11 @@ def test_markers_must_be_there_once_and_in_order(text, complaint, files, capsys)
     with pytest.raises(ResultsError, match=complaint):
         with_lines(text, PARITY_TABLE, [])
     text += BENCHES
-    files.readme.write_text(text)
+    files.page.write_text(text)
     for options in ([], ["--check"]):
         assert files.run(*options) == 2
-        assert capsys.readouterr().err.startswith("error: the README has the line")
-    assert files.readme.read_text() == text
+        assert capsys.readouterr().err.startswith("error: the page has the line")
+    assert files.page.read_text() == text
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[]", "3", '{"tasks": {}}'])
@@ -271,9 +271,9 @@ def test_benchmarks_that_lack_something(files, capsys):
 
 
 def test_missing_files_are_named(files, capsys):
-    files.readme.unlink()
+    files.page.unlink()
     assert files.run() == 2
-    assert f"cannot read {files.readme}: No such file" in capsys.readouterr().err
+    assert f"cannot read {files.page}: No such file" in capsys.readouterr().err
     files.results.unlink()
     assert files.run() == 2
     assert f"cannot read {files.results}" in capsys.readouterr().err
@@ -282,7 +282,7 @@ def test_missing_files_are_named(files, capsys):
 def test_the_check_needs_no_native():
     code = (
         "import sys; sys.modules['mani_skill'] = None\n"
-        "from parity.__main__ import main; sys.exit(main(['readme', '--check']) == 2)"
+        "from parity.__main__ import main; sys.exit(main(['tables', '--check']) == 2)"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False)
     assert done.returncode == 0
