@@ -10,6 +10,8 @@ from pathlib import Path
 from robots import LayoutError
 from robots.common.writing import PARTIAL, remove, written_whole
 
+LICENCES = "LICENCES.md"  # a note on those of robot files
+
 
 @contextmanager
 def replaced_folder(folder: Path, is_own: Callable[[Path], bool], advice: str) -> Generator[Path]:
@@ -38,11 +40,3 @@ def replaced_folder(folder: Path, is_own: Callable[[Path], bool], advice: str) -
         if folder.is_dir():
             os.replace(folder, old)
     remove(old)
-
-
-def copied_licences(folder: Path, text: str) -> None:
-    """Write a note on the licences of robot files into a folder."""
-    (folder / LICENCES).write_text(text, encoding="utf-8")
-
-
-LICENCES = "LICENCES.md"

@@ -14,7 +14,7 @@ import numpy as np
 from kinematics.quaternions import multiplied
 from kinematics.rotations import Floats, quaternion_of
 from layouts.export.cell import ExportedCell, Inertial, RobotSource, Standing
-from layouts.export.folders import LICENCES, copied_licences, replaced_folder
+from layouts.export.folders import LICENCES, replaced_folder
 from layouts.export.licences import licence_note
 from layouts.export.meshes import Drawn, MeshFolder, Solid, drawn_meshes, solid_shapes
 from layouts.visuals import GREY, Rgba
@@ -42,7 +42,8 @@ def write_mjcf(layout: Arrangement, path: str | os.PathLike[str], *, visuals: bo
     cell = ExportedCell.read(layout, visuals=visuals)
     folder = target.absolute().with_name(f"{target.stem}_assets")
     with replaced_folder(folder, _is_own, "save the model under another name") as made:
-        copied_licences(made, licence_note(source.robot for source in cell.sources))
+        note = licence_note(source.robot for source in cell.sources)
+        (made / LICENCES).write_text(note, encoding="utf-8")
         model = _Model(cell, target.stem, folder.name)
         for source in cell.sources:
             model.add_meshes(source, made / source.name, visuals=visuals)
@@ -210,9 +211,10 @@ def _stable_steps(source: RobotSource) -> Iterator[float]:
     yield TIMESTEPS[0]
     children = {joint.name: joint.child for joint in source.model.moving}
     for joint in source.leaders:
-        drive, inertial = source.drives[joint], source.inertials.get(children[joint])
-        least = 0.0 if inertial is None else float(np.linalg.eigvalsh(inertial.tensor)[0])
-        inertia = max(least, 0.0) + drive.armature
+        drive, moved = source.drives[joint], source.model.rigid_with(children[joint])
+        own = (source.inertials[link].tensor for link in moved if link in source.inertials)
+        least = sum(max(0.0, float(np.linalg.eigvalsh(tensor)[0])) for tensor in own)
+        inertia = drive.armature + least
         if drive.stiffness > 0 and drive.force > 0:
             root = math.sqrt(drive.damping**2 + 2 * drive.stiffness * inertia)
             yield (drive.damping + root) / drive.stiffness
