@@ -30,6 +30,12 @@ TIMESTEPS = (0.002, 0.001, 0.0005, 0.0002, 0.0001)  # s; the first at which all 
 HULLS = ("mesh",)  # all other shapes of a URDF are MuJoCo's, too
 DRAWN, SOLID = "drawn", "solid"  # default classes
 SOLID_RGBA = (0.5, 0.6, 0.7, 0.5)
+# MuJoCo's own are a black sky and a dim light.
+SKY = {
+    "type": "skybox", "builtin": "gradient", "rgb1": "1 1 1", "rgb2": "0.7 0.75 0.8",
+    "width": "256", "height": "1536",
+}  # fmt: skip
+HEADLIGHT = {"ambient": "0.35 0.35 0.35", "diffuse": "0.6 0.6 0.6", "specular": "0 0 0"}
 # From a camera that looks along +x, z up, to MuJoCo's, which looks along -z, y up (wxyz).
 LOOKING = (0.5, 0.5, -0.5, -0.5)
 
@@ -72,7 +78,10 @@ class _Model:
         # Which links may touch is said pair by pair, below.
         SubElement(option, "flag", filterparent="disable")
         self._add_defaults()
+        visual = SubElement(self._root, "visual")
+        SubElement(visual, "headlight", HEADLIGHT)
         self._assets = SubElement(self._root, "asset")
+        SubElement(self._assets, "texture", SKY)
         self._world = SubElement(self._root, "worldbody")
         self._qpos: list[float] = []
 
