@@ -50,7 +50,7 @@ COMMANDS: Mapping[str, Command] = {
         soak="step all tasks for long; nothing may grow",
     ),
     "tasks": Command("tasks.__main__", "list tasks, describe one, or look at it"),
-    "layouts": Command("layouts.__main__", "show, validate or look at a layout"),
+    "layouts": Command("layouts.__main__", "show, validate, export or look at a layout"),
     "robots inspect": Command("robots.inspect", "joints, action numbers and files of robots"),
     "robots fetch": Command("robots.fetch_assets", "bring the files of robots here, or check them"),
     "robots guess": Command("robots.from_urdf", "guess a robot from its URDF"),
