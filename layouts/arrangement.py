@@ -18,7 +18,7 @@ from layouts.frames import (
     resolve,
 )
 from layouts.placement import Placement, RobotLike, placed
-from robots import LayoutError, UnknownNameError
+from robots import CONTROL_MODES, LayoutError, UnknownNameError
 from robots.common.bounds import FAR, checked_number, shown
 from robots.descriptor import Vector3
 from robots.limbs import BODY
@@ -215,17 +215,42 @@ class Arrangement(Mapping[str, Placement]):
     @property
     def action_split(self) -> dict[str, slice]:
         """The slice of the flat action that each of `parts` takes, in declared order."""
-        return _slices(self.parts)
+        return _slices(self._acting.parts)
 
     @property
     def robot_actions(self) -> dict[str, slice]:
         """The slice of the flat action that each robot takes, all its limbs together."""
-        return _slices(self)
+        return _slices(self._acting)
 
     @property
     def action_dim(self) -> int:
         """How many numbers the flat action of all robots has."""
-        return sum(placement.robot.action_dim for placement in self.values())
+        return sum(placement.robot.action_dim for placement in self._acting.values())
+
+    @property
+    def control_modes(self) -> dict[str, str]:
+        """The control modes that places say, by robot or by the full name of a limb."""
+        return {
+            f"{name}.{limb}" if limb else name: mode
+            for name, placement in self.items()
+            for limb, mode in placement.own_modes.items()
+        }
+
+    def control_mode(self, asked: str | Mapping[str, str] | None = None) -> str | dict[str, str]:
+        """Return the control mode of all robots, or those by arm.
+
+        Args:
+            asked: A mode for all of them, or by arm; what is left out is as the places say, and
+                where they do not, ``"pd_joint_delta_pos"``.
+
+        Raises:
+            UnknownNameError: If there is no such arm.
+        """
+        if isinstance(asked, str):
+            return asked
+        named = {self.arm_name(arm): mode for arm, mode in (asked or {}).items()}
+        modes = {arm: mode for arm, mode in self.control_modes.items() if arm not in named}
+        return {**modes, **(asked or {})} or CONTROL_MODES[0]
 
     def replace_robots(self: _Self, **robots: RobotLike) -> _Self:
         """Return the layout with other robots in some places, facing the same way.
@@ -261,26 +286,36 @@ class Arrangement(Mapping[str, Placement]):
     @property
     def action_bounds(self) -> tuple[tuple[float, float], ...]:
         """The least and the largest value of each number of the flat action."""
-        return tuple(b for placement in self.values() for b in placement.robot.action_bounds)
+        return tuple(b for one in self._acting.values() for b in one.robot.action_bounds)
 
-    def in_control_mode(self: _Self, mode: str | Mapping[str, str]) -> _Self:
+    def in_control_mode(self: _Self, mode: str | Mapping[str, str] | None = None) -> _Self:
         """Return the layout with robots that take the actions of a control mode.
+
+        Their places say no mode any more.
 
         Args:
             mode: Name of a mode, or one by arm: a robot, or a limb by its full name or its short
-                one. Arms that are left out stay as they are.
+                one. Arms that are left out take the mode that their place says, or stay as they
+                are.
 
         Raises:
             UnknownNameError: If there is no such control mode, or no such arm.
             DescriptorError: If a robot lacks what the mode needs; see
                 `robots.RobotDescriptor.in_control_mode`.
         """
+        mode = self.control_mode(mode)
         if not isinstance(mode, Mapping):
             chosen: dict[str, str | Mapping[str, str]] = dict.fromkeys(self, mode)
         else:
             chosen = {**self._modes_by_robot(mode)}
         robots = {name: self[name].robot.in_control_mode(own) for name, own in chosen.items()}
-        return self.replace_robots(**robots)
+        changed = {name: replace(self[name], control_mode=None) for name in robots}
+        return self._with({name: changed[name].with_robot(r) for name, r in robots.items()})
+
+    @property
+    def _acting(self: _Self) -> _Self:
+        """The layout with robots that take the actions of the modes that their places say."""
+        return self.in_control_mode(self.control_modes) if self.control_modes else self
 
     def _modes_by_robot(self, modes: Mapping[str, str]) -> dict[str, str | dict[str, str]]:
         """Return the mode of each robot that some are named for, or those of its limbs."""

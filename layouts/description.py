@@ -22,6 +22,7 @@ def describe(layout: Arrangement) -> str:
     on, where one hangs.
     """
     parts, split = layout.parts, layout.action_split
+    modes = layout.control_modes
     hanging = any(placement.on is not None for placement in layout.values())
     rows = [
         (
@@ -34,10 +35,11 @@ def describe(layout: Arrangement) -> str:
             placement.start_keyframe,
             f"{placement.robot.reach:g}",
             *([layout[layout.owner(name)].on or "–"] if hanging else []),
+            *([modes.get(name) or modes.get(layout.owner(name), "–")] if modes else []),
         )
         for number, (name, placement) in enumerate(parts.items(), start=1)
     ]
-    columns = (*COLUMNS, "on") if hanging else COLUMNS
+    columns = (*COLUMNS, *(["on"] if hanging else []), *(["control mode"] if modes else []))
     return "\n".join([headline(layout), *_aligned([columns, *rows])])
 
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 from kinematics.quaternions import inverted, multiplied, normalised
 from layouts.frames import ORIGIN, Pose, check_pose, declared_quaternion
-from robots import LayoutError, RobotDescriptor
+from robots import CONTROL_MODES, LayoutError, RobotDescriptor
 from robots.common.bounds import as_float, shown
+from robots.control_modes import read_mode, written_mode
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 from robots.named import named_robot
 
@@ -36,6 +37,10 @@ class Placement:
         rpy: Base orientation as roll, pitch and yaw (rad, about fixed x, y, z as in a URDF),
             instead of a quaternion.
         on: Name of the frame or robot it hangs on; None is the world.
+        control_mode: What its action numbers mean, one of `robots.CONTROL_MODES` or of its own;
+            or those of its limbs, as ``"left=pd_ee_pose,right=pd_joint_pos"`` or a mapping, which
+            is kept as such a text. None is the task's. The robot stays as it was declared; see
+            `Layout.in_control_mode`.
     """
 
     robot: RobotDescriptor
@@ -45,6 +50,7 @@ class Placement:
     qpos_noise: float = 0.02
     rpy: Vector3 | None = field(default=None, kw_only=True)
     on: str | None = field(default=None, kw_only=True)
+    control_mode: str | None = field(default=None, kw_only=True)
     _world: Pose | None = field(default=None, init=False, repr=False, compare=False)
 
     if TYPE_CHECKING:  # a robot may be named; what is kept is its descriptor
@@ -59,6 +65,7 @@ class Placement:
             *,
             rpy: Vector3 | None = None,
             on: str | None = None,
+            control_mode: str | Mapping[str, str] | None = None,
         ) -> None:
             """Take a place."""
 
@@ -77,6 +84,16 @@ class Placement:
                 f" {LARGEST_NOISE:g} at most"
             )
         object.__setattr__(self, "qpos_noise", noise)
+        if self.control_mode is not None:
+            object.__setattr__(self, "control_mode", _checked_mode(self.robot, self.control_mode))
+
+    @property
+    def own_modes(self) -> dict[str, str]:
+        """The control mode that the place says, by limb; that of the whole robot at ``""``."""
+        if self.control_mode is None:
+            return {}
+        mode = read_mode(self.control_mode)
+        return {"": mode} if isinstance(mode, str) else mode
 
     @property
     def local_pose(self) -> Pose:
@@ -146,6 +163,7 @@ class Placement:
                 quaternion=base.quaternion,
                 rpy=None,
                 on=None,
+                control_mode=None,
             )
         return parts
 
@@ -210,6 +228,24 @@ def placed(placement: Placement, world: Pose) -> Placement:
     hung = replace(placement)
     object.__setattr__(hung, "_world", world)
     return hung
+
+
+def _checked_mode(robot: RobotDescriptor, mode: object) -> str:
+    """Return a control mode, or those of limbs, as one text.
+
+    Raises:
+        LayoutError: If it is none.
+        UnknownNameError: If the robot has no such mode, or no such limb.
+        DescriptorError: If the robot lacks what the mode needs.
+    """
+    if not isinstance(mode, (str, Mapping)):
+        raise LayoutError(
+            f"control_mode is {shown(mode)}; it takes a mode's name, such as {CONTROL_MODES[0]!r},"
+            " or a mapping from limbs to modes"
+        )
+    asked = read_mode(mode) if isinstance(mode, str) else dict(mode)
+    robot.in_control_mode(asked)
+    return asked if isinstance(asked, str) else written_mode(asked)
 
 
 def _without(home: Quaternion, quaternion: Quaternion) -> Quaternion:

@@ -37,7 +37,7 @@ UNITS = "# positions in m; quaternion: w, x, y, z; rpy and qpos_noise in rad"
 
 # Keys in the order in which they are written. Left-out keys keep the value of the declaration.
 FRAME_KEYS = ("on", "position", "quaternion", "rpy")
-ROBOT_KEYS = ("robot", *FRAME_KEYS, "keyframe", "qpos_noise")
+ROBOT_KEYS = ("robot", *FRAME_KEYS, "keyframe", "qpos_noise", "control_mode")
 
 NUMBER = re.compile(r"[-+]?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 NOT_FINITE = re.compile(r"[-+]?\.?(?:inf|infinity|nan)", re.IGNORECASE)
@@ -181,6 +181,7 @@ class _Reader:
             "on": self._word,
             "keyframe": self._word,
             "qpos_noise": self._number,
+            "control_mode": self._word,
         }
         for key, (_, node) in entries.items():
             value = readers.get(key, self._numbers)(node, key)

@@ -74,6 +74,11 @@ def read_mode(text: str) -> str | dict[str, str]:
     return {arm.strip(): mode.strip() for arm, mode in pairs}
 
 
+def written_mode(modes: Mapping[str, str]) -> str:
+    """Return control modes by arm as the text that `read_mode` reads."""
+    return ",".join(f"{arm}={mode}" for arm, mode in modes.items())
+
+
 def plain_mode(mode: str | Mapping[str, str]) -> str | dict[str, str]:
     """Return a control mode, or those by arm, as plain data."""
     return mode if isinstance(mode, str) else dict(mode)

@@ -7,7 +7,7 @@ import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from robots import CONTROL_MODES, TaskError
+from robots import TaskError
 from rollouts.playing import command_options as workers
 from rollouts.playing.command_options import INTERRUPTED, one_or_more, stop_signals, zero_or_more
 from tasks.cell_options import add_cell_options, chosen_cell
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--episodes", type=one_or_more, default=100, metavar="N", help="how many (%(default)s)")
     workers.add_arguments(parser)
     add("--seed", type=zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
-    workers.add_control_mode(parser, default=CONTROL_MODES[0])
+    workers.add_control_mode(parser)
     add_cell_options(parser)
 
 

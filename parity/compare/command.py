@@ -16,10 +16,9 @@ import tasks
 from parity.compare.episodes import (
     Episode,
     find_demonstrations,
-    load_episodes,
     over_range_episodes,
     random_episodes,
-    recorded_control_mode,
+    recorded_episodes,
 )
 from parity.compare.lockstep import HISTORIES, History
 from parity.compare.printed import document, sentences, table
@@ -168,8 +167,7 @@ def _sources(
 
 
 def _recorded(cls: type[MultiRobotTask], path: Path, name: str, asked: str | None) -> _Source:
-    episodes = load_episodes(path, cls.task_id, cls.layout.action_dim)
-    mode = recorded_control_mode(path) or asked or CONTROL_MODES[0]
+    episodes, mode = recorded_episodes(path, cls, asked)
     if asked not in (None, mode):
         raise TaskError(f"{path} was recorded in {mode}; leave --control-mode {asked} out")
     return _Source(name, mode, episodes)

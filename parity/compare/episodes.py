@@ -10,6 +10,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from robots import CONTROL_MODES
 from rollouts.reading.damage import damage_errors
 from rollouts.reading.hdf5_reading import MAX_BYTES
 from rollouts.reading.summary import MAX_SEED, recorded_task
@@ -19,6 +20,7 @@ from rollouts.reading.trajectory import (
     TrajectoryFile,
     expect_file,
 )
+from tasks import MultiRobotTask
 from tasks.episode import Episode
 
 Bounds = Sequence[tuple[float, float]]
@@ -85,6 +87,25 @@ def load_episodes(path: Path, task_id: str, action_dim: int) -> list[Episode]:
     if not episodes:
         raise TrajectoryError(f"{path} holds no episodes")
     return [_checked(path, number, episode, action_dim) for number, episode in enumerate(episodes)]
+
+
+def recorded_episodes(
+    path: Path, cls: type[MultiRobotTask], asked: str | None = None
+) -> tuple[list[Episode], str]:
+    """Read recorded episodes of a task, and the control mode that they are in.
+
+    Args:
+        path: The file; see `load_episodes`.
+        cls: The task.
+        asked: The mode of a file that does not say.
+
+    Raises:
+        TrajectoryError: If the file cannot be read, does not fit the task, or its arms are in
+            different modes.
+    """
+    mode = recorded_control_mode(path) or asked or CONTROL_MODES[0]
+    width = cls.layout.in_control_mode(mode).action_dim
+    return load_episodes(path, cls.task_id, width), mode
 
 
 def recorded_control_mode(path: Path) -> str | None:

@@ -13,10 +13,10 @@ from rich.console import Console
 from rich.table import Table
 
 import tasks
-from parity.compare.episodes import load_episodes, recorded_control_mode
+from parity.compare.episodes import recorded_episodes
 from parity.compare.lockstep import EpisodeResult
 from parity.compare.runs import Run, RunResult, play
-from robots import CONTROL_MODES, TaskError
+from robots import TaskError
 from robots.common.commands import program
 from rollouts.playing.executor import ProcessExecutor
 from rollouts.playing.replay import find_official, task_for
@@ -89,7 +89,7 @@ def _find(cls: type[MultiRobotTask], episodes: int, out: Path) -> Path:
 
 
 def _run(cls: type[MultiRobotTask], path: Path, count: int) -> Run:
-    episodes = load_episodes(path, cls.task_id, cls.layout.action_dim)[:count]
+    episodes, mode = recorded_episodes(path, cls)
     if path.suffix == ".h5":
         with TrajectoryFile(path) as file:
             # Native has the layout of the task alone; a file of another one is refused.
@@ -97,10 +97,10 @@ def _run(cls: type[MultiRobotTask], path: Path, count: int) -> Run:
     return Run(
         cls.task_id,
         path.name,
-        tuple(episodes),
+        tuple(episodes[:count]),
         "fresh",
         cls.reward_modes[0],
-        control_mode=recorded_control_mode(path) or CONTROL_MODES[0],
+        control_mode=mode,
     )
 
 

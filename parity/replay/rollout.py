@@ -21,7 +21,7 @@ from rich.text import Text
 import tasks
 from experts import find_expert
 from parity.compare.both_sides import NativeSide, OurSide, Side
-from parity.compare.episodes import load_episodes, recorded_control_mode
+from parity.compare.episodes import recorded_episodes
 from parity.compare.native_env import native_agents
 from parity.compare.printed import versions
 from parity.compare.snapshot import Snapshot, largest_difference
@@ -161,8 +161,7 @@ def find_source(cls: type[MultiRobotTask], demo: Path | None, seed: int | None) 
     """
     if demo is None:
         return expert_source(cls, 0 if seed is None else seed)
-    episodes = load_episodes(demo, cls.task_id, cls.layout.action_dim)
-    mode = recorded_control_mode(demo) or CONTROL_MODES[0]
+    episodes, mode = recorded_episodes(demo, cls)
     for episode in episodes:
         if seed in (None, episode.seed):
             return Source(demo.name, episode, mode)
@@ -281,7 +280,7 @@ def _named(snapshot: Snapshot, robots: Mapping[str, str]) -> Arrays:
 def _play_native(
     env: MultiRobotTask, episode: Episode, film: Path | None, on_step: Callable[[str], None]
 ) -> Arrays:
-    mode, size = str(env.scenario.control_mode), PICTURE_SIZE if film else None
+    mode, size = str(env.control_mode), PICTURE_SIZE if film else None
     side = NativeSide(env.task_id, control_mode=mode, picture_size=size)
     native, keys = side.envs[0], articulation_keys(env.layout)
 
@@ -321,7 +320,7 @@ def describe(env: MultiRobotTask, source: Source, name: str) -> dict[str, Any]:
         "source": source.name,
         "seed": source.episode.seed,
         "reset": {"seed": source.episode.seed, "options": {"reconfigure": True}},
-        "control_mode": env.scenario.control_mode,
+        "control_mode": env.control_mode,
         "reward_mode": env.reward_mode,
         "control_frequency": env.scenario.control_frequency,
         "robots": {place: p.robot.name for place, p in env.layout.items()},

@@ -12,7 +12,7 @@ from typing import Any
 import tasks
 from experts import list_experts
 from parity.compare.both_sides import NativeSide, OurSide
-from parity.compare.episodes import load_episodes, random_episodes, recorded_control_mode
+from parity.compare.episodes import random_episodes, recorded_episodes
 from parity.compare.lockstep import EpisodeResult
 from parity.compare.runs import Run, play
 from parity.replay.command import agree
@@ -20,7 +20,6 @@ from parity.replay.rollout import Source, expert_source, roll_out
 from parity.show.clip import Candidate, Clip
 from parity.sweep.entries import Entry
 from parity.sweep.plan import Plan
-from robots import CONTROL_MODES
 
 PANEL = 384  # pixels of each of a clip's three pictures
 STAGES = ("agreement", "rollout", "clip")
@@ -58,9 +57,9 @@ def _episodes(plan: Plan) -> tuple[list[Run], str]:
         runs: list[Run] = []
         left = plan.episodes
         for path in map(Path, plan.demos):
-            episodes = load_episodes(path, cls.task_id, cls.layout.action_dim)[:left]
+            recorded, mode = recorded_episodes(path, cls)
+            episodes = recorded[:left]
             left -= len(episodes)
-            mode = recorded_control_mode(path) or CONTROL_MODES[0]
             if episodes:
                 run = replace(blank, source=str(path), episodes=tuple(episodes), control_mode=mode)
                 runs.append(run)

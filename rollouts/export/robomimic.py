@@ -90,7 +90,7 @@ class RobomimicWriter(DatasetWriter):
             "type": GYM,
             "env_kwargs": {
                 "robots": {place: p.robot.name for place, p in task.layout.items()},
-                "control_mode": plain_mode(task.scenario.control_mode),
+                "control_mode": plain_mode(task.control_mode),
                 "reward_mode": task.reward_mode,
                 "control_frequency": task.scenario.control_frequency,
             },

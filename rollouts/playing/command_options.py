@@ -114,11 +114,12 @@ def add_control_mode(
         details: Other arguments of ``add_argument``.
     """
     example = f"left={CONTROL_MODES[0]},right={CONTROL_MODES[1]}"
+    without = "" if details.get("required") else f" (as the layout says, else {CONTROL_MODES[0]})"
     parser.add_argument(
         name,
         type=control_mode,
         metavar="MODE",
-        help=f"one of {', '.join(CONTROL_MODES)}; or by arm: {example}",
+        help=f"one of {', '.join(CONTROL_MODES)}; or by arm: {example}{without}",
         **details,
     )
 

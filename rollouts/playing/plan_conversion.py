@@ -27,7 +27,7 @@ class Planner:
     def __init__(self, task: MultiRobotTask, expert: Expert) -> None:
         """Make a task in deltas for the expert to plan for, if this one is in another mode."""
         self._task, self._expert, self._played, self.reason = task, expert, task, ""
-        self._converts = task.scenario.control_mode != DELTAS
+        self._converts = task.control_mode != DELTAS
         if self._converts:
             self._task = type(task)(replace(task.scenario, control_mode=DELTAS))
 
@@ -41,7 +41,7 @@ class Planner:
         self.reason = getattr(actions, "reason", "")
         if not self._converts:
             return actions
-        if self._played.scenario.control_mode == POSITIONS:
+        if self._played.control_mode == POSITIONS:
             return as_positions(self._task, seed, actions)
         return converted(self._task, seed, actions, self._played)
 
@@ -70,10 +70,8 @@ def as_positions(
     Raises:
         TaskError: If the task is in another control mode.
     """
-    if task.scenario.control_mode != DELTAS:
-        raise TaskError(
-            f"actions of {DELTAS} are converted; the task has {task.scenario.control_mode}"
-        )
+    if task.control_mode != DELTAS:
+        raise TaskError(f"actions of {DELTAS} are converted; the task has {task.control_mode}")
     positions = np.array(actions, np.float32)
     happening = moments(task, seed, follow(positions), len(positions))
     next(happening)

@@ -15,7 +15,7 @@ from experts import find_expert
 from experts.registry import Expert
 from layouts import Layout
 from layouts.placement import RobotLike
-from robots import CONTROL_MODES, RecordingError
+from robots import RecordingError
 from rollouts.playing.executor import (
     EPISODE_SECONDS,
     Event,
@@ -126,7 +126,7 @@ def record(
     *,
     workers: int | None = None,
     episode_timeout: float | None = EPISODE_SECONDS,
-    control_mode: str | Mapping[str, str] = CONTROL_MODES[0],
+    control_mode: str | Mapping[str, str] | None = None,
     layout: Layout | None = None,
     robots: RobotLike | Mapping[str, RobotLike] | None = None,
     bystanders: str | None = None,
@@ -144,7 +144,7 @@ def record(
             but this one.
         episode_timeout: Seconds that an episode may take in a worker until that is ended and the
             episode played again, three times in all; None if it may take for ever.
-        control_mode: Control mode of the recorded actions, or those by arm.
+        control_mode: Control mode of the recorded actions, or those by arm; see `tasks.Scenario`.
         layout: Where robots stand, if not where the task's own do; see `tasks.make`.
         robots: Other robots for some places; see `tasks.make`.
         bystanders: What robots do that have no place in the task; see `tasks.Scenario`.

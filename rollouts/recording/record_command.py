@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robots import CONTROL_MODES, RecordingError
+from robots import RecordingError
 from rollouts.playing import command_options as workers
 from rollouts.playing.command_options import INTERRUPTED, one_or_more, stop_signals, zero_or_more
 from tasks.cell_options import add_cell_options, chosen_cell
@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--seed", type=zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
     add("--out", type=Path, required=True, metavar="DIR", help="folder of trajectory.h5 and .json")
     add_cell_options(parser)
-    workers.add_control_mode(parser, default=CONTROL_MODES[0])
+    workers.add_control_mode(parser)
 
 
 def run(options: argparse.Namespace) -> int:

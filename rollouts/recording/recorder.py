@@ -272,7 +272,7 @@ def _header(task: MultiRobotTask, source: str, source_desc: str | None) -> dict[
             "env_kwargs": {
                 "obs_mode": "none",
                 "reward_mode": task.reward_mode,
-                "control_mode": plain_mode(task.scenario.control_mode),
+                "control_mode": plain_mode(task.control_mode),
                 "sim_backend": "physx_cpu",
             },
             "max_episode_steps": task.max_episode_steps,
@@ -306,7 +306,7 @@ def _control_mode(task: MultiRobotTask) -> str | dict[str, str]:
 
     Where the arms of a robot have modes of their own, it is the mode by arm.
     """
-    mode, keys = task.scenario.control_mode, observation_keys(task.layout)
+    mode, keys = task.control_mode, observation_keys(task.layout)
     if isinstance(mode, str):
         return mode if None in keys.values() else {str(key): mode for key in keys.values()}
     modes = {task.layout.arm_name(arm): own for arm, own in mode.items()}

@@ -41,7 +41,7 @@ def task_rows(task: Task) -> dict[str, str]:
     return {
         "robots": robots,
         "action": f"{task.layout.action_dim} numbers: {split}",
-        "control": str(task.scenario.control_mode),
+        "control": str(task.control_mode),
         "observation": observed,
         "reward": task.reward_mode,
     }

@@ -14,7 +14,7 @@ class ScenarioFields(TypedDict, total=False):
     """Fields of `tasks.Scenario` that `tasks.make` takes by keyword alone."""
 
     physics: PhysicsSettings | None
-    control_mode: str | Mapping[str, str]
+    control_mode: str | Mapping[str, str] | None
     control_frequency: float
     max_episode_steps: int | None
     render_mode: str | None

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from layouts import Layout
-from robots import CONTROL_MODES, TaskError, UnknownNameError
+from robots import TaskError, UnknownNameError
 from robots.common.bounds import checked_choice, checked_flag, checked_whole, shown
 from simulation import SAPIEN_DEFAULTS, Camera, PhysicsSettings
 from simulation.physics import substeps
@@ -40,8 +40,9 @@ class Scenario:
             ``"lerobot+video"`` gives the pictures of exports with video, too.
         reward_mode: One of the task's modes; None takes its first.
         control_mode: One of `robots.CONTROL_MODES`, or of the robots' own; or a mapping from arms
-            to modes, in which arms that are left out stay in ``"pd_joint_delta_pos"``. An arm is a
-            robot, or a limb of one.
+            to modes. An arm is a robot, or a limb of one. Arms that are left out, and all if this
+            is None, are in the mode that their place in the layout says, and where it says none,
+            in ``"pd_joint_delta_pos"``.
         control_frequency: Control steps per second (Hz); a whole number of physics steps each.
         max_episode_steps: Control steps until an episode is truncated; None takes the task's.
         render_mode: ``"rgb_array"`` to draw pictures (needs a Vulkan driver), or None.
@@ -61,7 +62,7 @@ class Scenario:
     physics: PhysicsSettings | None = None
     obs_mode: str = "state"
     reward_mode: str | None = None
-    control_mode: str | Mapping[str, str] = CONTROL_MODES[0]
+    control_mode: str | Mapping[str, str] | None = None
     control_frequency: float = 20.0
     max_episode_steps: int | None = None
     render_mode: str | None = None
@@ -115,7 +116,8 @@ class Scenario:
             ("reward_mode", (None, *reward_modes)),
         ):
             checked_choice(name, getattr(self, name), choices, TaskError)
-        check_control_mode(self.layout, self.control_mode)
+        if self.control_mode is not None:
+            check_control_mode(self.layout, self.control_mode)
         read_mode(self.obs_mode)
         for name in ("check_layout", "headless"):
             checked_flag(name, getattr(self, name), TaskError)

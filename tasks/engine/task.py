@@ -57,6 +57,7 @@ class MultiRobotTask(Declaration, Remade):
     Attributes:
         scenario: A fresh scenario of the class at every access; that of a task that was made is the
             one it was made from.
+        control_mode: Control mode of all robots, or those by arm.
         num_envs: Number of environments N.
         single_action_space: Action of one environment, (A,); joint limits (rad) where the control
             mode asks for positions, else [-1, 1].
@@ -94,6 +95,7 @@ class MultiRobotTask(Declaration, Remade):
             refuse_collisions(scenario.layout, self.table.outline(scenario.layout))
         self.scenario = scenario
         self.layout = layout
+        self.control_mode = scenario.layout.control_mode(scenario.control_mode)
         self.num_envs = scenario.num_envs
         self.obs_mode = scenario.obs_mode
         self.reward_mode = scenario.reward_mode or self.reward_modes[0]

@@ -141,7 +141,7 @@ def test_the_environment_can_be_made_again(dataset):
     assert set(environment) == {"env_name", "type", "env_kwargs"}
     env = tasks.make(environment["env_name"], **environment["env_kwargs"])
     assert env.layout.action_dim == 15
-    assert env.scenario.control_mode == "pd_joint_delta_pos"
+    assert env.control_mode == "pd_joint_delta_pos"
 
 
 def test_filter_keys_split_the_demonstrations(dataset, tmp_path):
