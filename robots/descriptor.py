@@ -165,6 +165,33 @@ class RobotDescriptor:
             print(found, file=sys.stderr)
         return found.descriptor
 
+    @classmethod
+    def from_mjcf(
+        cls,
+        path_or_name: str | os.PathLike[str],
+        name: str | None = None,
+        *,
+        quiet: bool = False,
+        **overrides: Any,
+    ) -> RobotDescriptor:
+        """Guess a robot from its MJCF, and say on stderr what was guessed and why.
+
+        MuJoCo compiles the file (``pip install 'robot-layouts[mjcf]'``), and what it makes of it
+        becomes a URDF. Keyframes, actuators, tool sites and excluded contacts are taken over.
+
+        Args:
+            path_or_name: An MJCF on this machine, or a name of the package robot_descriptions.
+            name: Registry name; None takes that of the model.
+            quiet: Whether to say nothing.
+            **overrides: Fields that are known better than guessed.
+        """
+        from robots.from_urdf import guess_descriptor
+
+        found = guess_descriptor(path_or_name, name, form="mjcf", **overrides)
+        if not quiet:
+            print(found, file=sys.stderr)
+        return found.descriptor
+
     def with_gripper(
         self, gripper: RobotDescriptor | str | os.PathLike[str], **details: Any
     ) -> RobotDescriptor:
