@@ -144,6 +144,7 @@ class RobotDescriptor:
         *,
         quiet: bool = False,
         xacro: Mapping[str, object] | None = None,
+        srdf: str | os.PathLike[str] | None = None,
         **overrides: Any,
     ) -> RobotDescriptor:
         """Guess a robot from its URDF, and say on stderr what was guessed and why.
@@ -156,11 +157,12 @@ class RobotDescriptor:
             name: Registry name; None takes that of the URDF.
             quiet: Whether to say nothing.
             xacro: Arguments of a xacro template, as in ``{"prefix": "left_"}``.
+            srdf: An SRDF: its groups, states, TCPs and disabled pairs are taken over.
             **overrides: Fields that are known better than guessed.
         """
         from robots.from_urdf import guess_descriptor
 
-        found = guess_descriptor(path_or_name, name, xacro=xacro, **overrides)
+        found = guess_descriptor(path_or_name, name, xacro=xacro, srdf=srdf, **overrides)
         if not quiet:
             print(found, file=sys.stderr)
         return found.descriptor

@@ -19,12 +19,21 @@ from typing import Any
 
 from robots.assets.locator import LocalUrdf
 from robots.common.commands import exit_code, program, start
-from robots.common.errors import AssetError, MissingPackageError, UnknownNameError
+from robots.common.errors import (
+    AssetError,
+    DescriptorError,
+    MissingPackageError,
+    UnknownNameError,
+)
 from robots.common.paths import absolute
 from robots.guess import Guess, guess
-from robots.mjcf.locator import LocalMjcf
-from robots.mjcf.text import is_mjcf
+from robots.guessing.hints import NOTHING, Hints
+from robots.guessing.semantics import hints_of
+from robots.mjcf.locator import LocalMjcf, is_mjcf
 from robots.urdf.cleaning.xacro_files import template_of, with_arguments
+from robots.urdf.reading import read_model
+from robots.urdf.srdf import read_semantics
+from robots.urdf.summary import read_urdf
 
 __all__ = ["Guess", "guess_descriptor", "main"]
 
@@ -37,6 +46,7 @@ def guess_descriptor(
     *,
     form: str | None = None,
     xacro: Mapping[str, object] | None = None,
+    srdf: str | os.PathLike[str] | None = None,
     **overrides: Any,
 ) -> Guess:
     """Guess a robot's descriptor from its URDF or its MJCF; nothing is fetched for a path.
@@ -48,6 +58,9 @@ def guess_descriptor(
         name: Registry name; None takes that of the URDF or MJCF.
         form: ``"urdf"`` or ``"mjcf"``; None goes by the ending, ``.xml`` and ``.mjcf`` for an MJCF.
         xacro: Arguments of the template, as in ``{"prefix": "left_"}``.
+        srdf: An SRDF, whose groups are the arms and grippers, whose chains end in TCPs, and whose
+            states and disabled pairs are taken over. None takes disabled pairs of one beside the
+            URDF that is called as it, and nothing else.
         **overrides: Fields of `robots.RobotDescriptor` that are known better than guessed.
 
     Returns:
@@ -58,15 +71,27 @@ def guess_descriptor(
         DescriptorError: If nothing moves, or an override contradicts the rest.
         MissingPackageError: If a name is given and robot_descriptions is not installed, a template
             and xacro is not, or an MJCF and MuJoCo is not.
-        UnknownNameError: If robot_descriptions has no robot of that name.
+        UnknownNameError: If robot_descriptions has no robot of that name, or the SRDF names a
+            group, link or joint that there is not.
     """
     path = _find(path_or_name, form)
     if form == MJCF or (form is None and is_mjcf(path)):
+        if xacro or srdf:
+            what = "arguments of xacro" if xacro else "SRDF"
+            raise DescriptorError(f"{path} is an MJCF, which takes no {what}")
         from robots.mjcf.conversion import convert
 
         hints = convert(path).hints
         return guess(LocalMjcf(str(path)), name, overrides, file=path, hints=hints)
-    return guess(LocalUrdf(str(with_arguments(path, xacro or {}))), name, overrides)
+    source = LocalUrdf(str(with_arguments(path, xacro or {})))
+    return guess(source, name, overrides, hints=_semantics(source, srdf) if srdf else NOTHING)
+
+
+def _semantics(source: LocalUrdf, srdf: str | os.PathLike[str]) -> Hints:
+    """Return what an SRDF makes known of the robot of a URDF."""
+    urdf, file = source.locate(), absolute(srdf, "the path of the SRDF")
+    model = read_model(read_urdf(urdf), urdf.as_posix())
+    return hints_of(read_semantics(file, model), file.name)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -87,12 +112,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         type=_argument,
         help="argument of a xacro template; may be given again",
     )
+    parser.add_argument("--srdf", metavar="FILE", help="groups, states and disabled pairs of it")
     options = parser.parse_args(arguments)
     return exit_code(lambda: _print(options))
 
 
 def _print(options: argparse.Namespace) -> None:
-    found = guess_descriptor(options.urdf, options.name, xacro=dict(options.xacro))
+    found = guess_descriptor(
+        options.urdf, options.name, xacro=dict(options.xacro), srdf=options.srdf
+    )
     print(found.module().rstrip("\n") if options.module else found)
 
 

@@ -26,6 +26,7 @@ from robots.guessing.hints import NOTHING, Hints
 from robots.guessing.masses import read_masses
 from robots.guessing.posture import Posture, PostureSearch
 from robots.guessing.reach import find_base, find_reach
+from robots.guessing.semantics import known_anatomy, known_tip
 from robots.guessing.stance import Stance
 from robots.guessing.tool import BETWEEN, EXACT, Tool, find_tool
 from robots.parts import Limb as LimbDescription
@@ -36,6 +37,7 @@ from robots.urdf.summary import parse_urdf, read_cleaned
 LinkPairs = tuple[tuple[str, str], ...]
 
 LISTED = 6  # pairs of links that a reason names
+BEYOND = 1e-2  # rad, m; how far beyond its limits a joint of a known posture may be
 HOMES = ("home", "rest", "ready", "neutral", "initial", "init", "start", "default")  # best first
 
 
@@ -131,17 +133,19 @@ def guess(
     repairs = [f"repaired: {repair}" for repair in cleaned.repairs]
     hands_too = (*_about_hands(parts), grasping) if parts.grippers else ()
     drives = parts.drives.reasons()
-    about = (*parts.anatomy.reasons, *tools, *hands_too, *drives, *posture.reasons, measured)
+    known = () if hints.limbs else hints.reasons
+    about = (*known, *parts.anatomy.reasons, *tools, *hands_too, *drives, *_out_of_limits(parts))
+    about = (*about, *posture.reasons, measured)
     given = tuple(f"{field}: given, not guessed" for field in overrides)
     return Guess(
         RobotDescriptor(**{**fields, **overrides}),
-        (*repairs, *hints.reasons, *about, *overlaps, *given),
+        (*repairs, *about, *overlaps, *given),
     )
 
 
 def _look_at(path: Path, xml: bytes, hints: Hints) -> _Parts:
     model = read_model(xml, path.as_posix())
-    anatomy = find_anatomy(model, path.as_posix())
+    anatomy = known_anatomy(model, find_anatomy(model, path.as_posix()), hints)
     stance = Stance(model)
     hulls = read_hulls(model, path) if find_spec("fcl") and find_spec("trimesh") else ()
     bodies: dict[int, list[Floats]] = {}
@@ -153,11 +157,19 @@ def _look_at(path: Path, xml: bytes, hints: Hints) -> _Parts:
     tips = {limb.name: Fingertips(stance, limb, hulls) for limb in hands}
     between = EXACT if hints.frames_at_joints else BETWEEN
     tools = {
-        limb.name: find_tool(stance, limb, tips.get(limb.name), between=between)
+        limb.name: _known_tool(model, limb, hints)
+        or find_tool(stance, limb, tips.get(limb.name), between=between)
         for limb in anatomy.limbs
     }
     grippers = {limb.name: find_gripper(limb, tips[limb.name], drives) for limb in hands}
     return _Parts(model, stance, anatomy, hulls, drives, tips, tools, grippers, hints)
+
+
+def _known_tool(model: UrdfModel, limb: Limb, hints: Hints) -> Tool | None:
+    """Return the tool centre point that is known as a limb's end, if any is."""
+    tip = known_tip(model, limb, hints)
+    which = f"{limb.name} TCP" if limb.name else "TCP"
+    return Tool(tip, (), f"{which}: the link {tip}, as {hints.source} says") if tip else None
 
 
 def _as_name(text: str) -> str:
@@ -292,18 +304,42 @@ def _rest(parts: _Parts, allowed: LinkPairs) -> tuple[dict[str, float], Posture]
 def _home(parts: _Parts) -> str:
     """Return the name of a known posture to start from: of all joints of the arms, or none."""
     arms = {j.name for limb in parts.anatomy.limbs for j in limb.arm if j.mimics is None}
-    whole = [name for name, joints in parts.hints.postures.items() if arms <= joints.keys()]
+    whole = [name for name, joints in _postures(parts).items() if arms <= joints.keys()]
     homes = [name for home in HOMES for name in whole if home in words.words(name)]
     return next(iter((*homes, *(whole if parts.hints.first_is_home else ()))), "")
+
+
+def _postures(parts: _Parts) -> dict[str, Mapping[str, float]]:
+    """Return the known postures that keep within the joints' limits."""
+    return {
+        name: joints
+        for name, joints in parts.hints.postures.items()
+        if not any(_outside(parts, joint, at) for joint, at in joints.items())
+    }
+
+
+def _out_of_limits(parts: _Parts) -> Iterator[str]:
+    for name, joints in parts.hints.postures.items():
+        outside = [joint for joint, at in joints.items() if _outside(parts, joint, at)]
+        if outside:
+            yield (
+                f"the posture {name!r} of {parts.hints.source} is left out, as it is beyond the"
+                f" limits of {', '.join(outside)}"
+            )
+
+
+def _outside(parts: _Parts, joint: str, at: float) -> bool:
+    low, high = next(j.span for j in parts.model.moving if j.name == joint)
+    return not low - BEYOND <= at <= high + BEYOND
 
 
 def _keyframes(
     parts: _Parts, split: ActionSplit, rest: Mapping[str, float]
 ) -> dict[str, tuple[float, ...]]:
-    """Return the posture to rest in, and those that are known by name, within the limits."""
+    """Return the posture to rest in, and those that are known by name."""
     spans = {joint.name: joint.span for joint in parts.model.moving}
     found = {"rest": tuple(rest[joint] for joint in split.joints)}
-    for name, joints in parts.hints.postures.items():
+    for name, joints in _postures(parts).items():
         at = {**rest, **{j: min(max(x, spans[j][0]), spans[j][1]) for j, x in joints.items()}}
         found.setdefault(name, tuple(at[joint] for joint in split.joints))
     return found

@@ -22,7 +22,8 @@ from robots.mjcf.robot import JOINT, JOINT_IN_PARENT, SLIDE, TENDON, MjcfRobot, 
 
 CONNECT, WELD, BETWEEN_JOINTS = range(3)  # MuJoCo's kinds of equalities
 PLACES = 9  # of a leader's range, at which its followers are looked at
-EXACT = 1e-6  # rad, m; what counts as no deviation
+EXACT = 1e-4  # rad, m; what counts as no deviation
+STILL = {"rad": 0.02, "m": 5e-4}  # what a follower may move by and still count as fixed
 FARTHEST_OFF = {"rad": 0.15, "m": 0.005}  # of a follower from the straight line
 SETTLING = 1500  # steps of `STEP` until a closed loop has come to rest
 STEP = 0.001  # s
@@ -224,12 +225,12 @@ class _Search:
                 f"{self._path}: joint {names[0]} follows {names[1]} {why}, but by up to"
                 f" {off:.2g} {unit} in no straight line; a URDF's joints follow in proportion"
             )
-        if abs(multiplier) < EXACT:
-            self._made.fixed[follower] = float(values[0])
+        if abs(multiplier) * np.ptp(places) < STILL[unit]:
+            self._made.fixed[follower] = float(values.mean())
             self._made.notes.append(f"joint {names[0]} stays where it is, {why}, so it is fixed")
             return
         self._made.of[follower] = Coupling(leader, _tidy(multiplier), _tidy(offset))
-        about = f", up to {off:.2g} {unit} off" if off > 100 * EXACT else ""
+        about = f", up to {off:.2g} {unit} off" if off > EXACT else ""
         self._made.notes.append(
             f"joint {self._name(follower)} follows {self._name(leader)}, {why}{about}"
         )

@@ -6,6 +6,20 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from robots.assets.locator import LocalUrdf
+
+ENDINGS = (".xml", ".mjcf")
+
+
+def is_mjcf(path: str | os.PathLike[str]) -> bool:
+    """Tell whether a path is that of an MJCF, by its ending."""
+    return os.fspath(path).lower().endswith(ENDINGS)
+
+
+def local_source(path: str | os.PathLike[str]) -> LocalMjcf | LocalUrdf:
+    """Return the source of a URDF that is, or is made of, a file of the user's."""
+    return LocalMjcf(path) if is_mjcf(path) else LocalUrdf(path)
+
 
 @dataclass(frozen=True)
 class LocalMjcf:

@@ -22,7 +22,6 @@ from robots.urdf.paths import is_allowed
 from robots.urdf.summary import MAX_URDF_BYTES
 from robots.urdf.xml_text import parse_xml
 
-ENDINGS = (".xml", ".mjcf")
 MESH_ENDINGS = (".stl", ".obj", ".msh")
 MOST_FILES = 2000  # that one MJCF refers to
 MOST_BYTES = 1 << 30  # of them together
@@ -49,22 +48,13 @@ class MjcfText:
         name: What it calls its model, or its file's name.
         xml: Its text, without includes.
         meshes: Contents of mesh files, by the names that the text has for them.
-        files: Every file that was read, the MJCF first.
         digest: SHA-256 over the text and the meshes, in hex.
-        texts: SHA-256 over the MJCF and what it includes, as they are on the disk, in hex.
     """
 
     name: str
     xml: str
     meshes: Mapping[str, bytes]
-    files: tuple[Path, ...]
     digest: str
-    texts: str
-
-
-def is_mjcf(path: str | os.PathLike[str]) -> bool:
-    """Tell whether a path is that of an MJCF, by its ending."""
-    return os.fspath(path).lower().endswith(ENDINGS)
 
 
 def read_mjcf(path: Path) -> MjcfText:
@@ -80,17 +70,6 @@ def read_mjcf(path: Path) -> MjcfText:
     return _Reading(path).text()
 
 
-def texts_digest(path: Path) -> str:
-    """Return the SHA-256 over an MJCF and what it includes, in hex; see `MjcfText`.
-
-    Raises:
-        AssetError: As `read_mjcf`.
-    """
-    reading = _Reading(path)
-    reading.expanded()
-    return reading.texts.hexdigest()
-
-
 class _Reading:
     """One MJCF that is being read."""
 
@@ -100,7 +79,6 @@ class _Reading:
         self._meshes: dict[str, bytes] = {}
         self._named: dict[str, str] = {}  # of meshes: path -> name in the text
         self._folders: dict[int, str] = {}  # of included elements that name a mesh, by identity
-        self.texts = hashlib.sha256()
 
     def text(self) -> MjcfText:
         root = self.expanded()
@@ -112,8 +90,7 @@ class _Reading:
         for name, contents in sorted(self._meshes.items()):
             digest.update(f"{name} {hashlib.sha256(contents).hexdigest()}\n".encode())
         name = root.get("model", "").strip() or self._path.stem
-        files = tuple(self._files)
-        return MjcfText(name, xml, self._meshes, files, digest.hexdigest(), self.texts.hexdigest())
+        return MjcfText(name, xml, self._meshes, digest.hexdigest())
 
     def expanded(self) -> Element:
         """Return the root element with what it includes, and without what is not needed."""
@@ -135,7 +112,6 @@ class _Reading:
 
     def _root(self, path: Path, *kinds: str) -> Element:
         contents = self._read(path, MAX_URDF_BYTES, "the MJCF" if not self._files else "the file")
-        self.texts.update(f"{hashlib.sha256(contents).hexdigest()}\n".encode())
         root = parse_xml(contents, str(path), "an MJCF")
         if root.tag not in kinds:
             raise AssetError(f"{path} is not an MJCF: it holds <{root.tag}>, not <{kinds[0]}>")
