@@ -158,7 +158,9 @@ def _look_at(path: Path, xml: bytes, hints: Hints) -> _Parts:
     between = EXACT if hints.frames_at_joints else BETWEEN
     tools = {
         limb.name: _known_tool(model, limb, hints)
-        or find_tool(stance, limb, tips.get(limb.name), between=between)
+        or find_tool(
+            stance, limb, tips.get(limb.name), between=between, before=hints.frames_at_joints
+        )
         for limb in anatomy.limbs
     }
     grippers = {limb.name: find_gripper(limb, tips[limb.name], drives) for limb in hands}

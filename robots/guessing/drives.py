@@ -170,7 +170,8 @@ class Drives:
             return drive
         inertia = self._inertia(joint)
         stiffness = min(known.stiffness, inertia * stiffest**2)
-        damping = max(known.damping or 0.0, 2 * (stiffness * inertia) ** 0.5)
+        damping = (known.damping or 0.0) * stiffness / known.stiffness
+        damping = max(damping, 2 * (stiffness * inertia) ** 0.5)
         taken = _covered(stiffness, damping, inertia) >= SHARE
         self._taken[joint.name] = taken
         if not taken:

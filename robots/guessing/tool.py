@@ -43,7 +43,12 @@ class Tool:
 
 
 def find_tool(
-    stance: Stance, limb: Limb, tips: Fingertips | None, *, between: float = BETWEEN
+    stance: Stance,
+    limb: Limb,
+    tips: Fingertips | None,
+    *,
+    between: float = BETWEEN,
+    before: bool = False,
 ) -> Tool:
     """Return the tool centre point of a limb.
 
@@ -53,9 +58,12 @@ def find_tool(
         tips: The tips of its fingers, if it has any.
         between: How far from the place between the tips the middle of the fingers' frames may be
             and still count (m).
+        before: Whether frames count, too, that are rigid with the palm but carried by what is
+            before it.
     """
     which = f"{limb.name} TCP" if limb.name else "TCP"
-    rigid = [link for link in stance.model.rigid_with(limb.palm) if link != limb.palm]
+    start = _first_rigid(stance, limb.palm) if before else limb.palm
+    rigid = [link for link in stance.model.rigid_with(start) if link != limb.palm]
     rigid = [link for link in rigid if not words.has(link, BLIND)]
     for known, what in ((words.TCP, "tcp"), (words.GRASP, "a grasp")):
         named = [link for link in (*rigid, limb.palm) if words.has(link, known)]
@@ -66,6 +74,14 @@ def find_tool(
     if tips is None:
         return _end(stance, limb, rigid, which)
     return _between(stance, limb, rigid, tips, which, between)
+
+
+def _first_rigid(stance: Stance, link: str) -> str:
+    """Return the first of the links that are rigid with one, seen from the root."""
+    carriers = stance.model.parent_joint
+    while link in carriers and not carriers[link].moves:
+        link = carriers[link].parent
+    return link
 
 
 def _end(stance: Stance, limb: Limb, rigid: list[str], which: str) -> Tool:
