@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +31,21 @@ def mujoco() -> Any:
     return mujoco
 
 
+@contextmanager
+def without_log() -> Generator[None]:
+    """Have MuJoCo write its warnings nowhere; else it adds them to a file where it was started."""
+    library = mujoco()
+    library.set_mju_user_warning(_ignore)
+    try:
+        yield
+    finally:
+        library.set_mju_user_warning(None)
+
+
+def _ignore(warning: str) -> None:
+    """Do nothing about a warning: what is wrong with a model is an error."""
+
+
 def compiled(text: MjcfText, path: Path) -> Model:
     """Return the model that MuJoCo makes of an MJCF.
 
@@ -42,8 +59,9 @@ def compiled(text: MjcfText, path: Path) -> Model:
     """
     library = mujoco()
     try:
-        return library.MjModel.from_xml_string(text.xml, dict(text.meshes))
-    except (ValueError, library.FatalError) as error:
+        with without_log():
+            return library.MjModel.from_xml_string(text.xml, dict(text.meshes))
+    except Exception as error:  # a compiler that raises whatever it meets
         reason = " ".join(str(error).split())[:MESSAGE]
         raise AssetError(f"MuJoCo cannot compile {path}: {reason}") from error
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from kinematics.rotations import Floats
 from robots.common.errors import AssetError
-from robots.mjcf.compiling import Model, mujoco, name_of
+from robots.mjcf.compiling import Model, mujoco, name_of, without_log
 from robots.mjcf.robot import JOINT, JOINT_IN_PARENT, SLIDE, TENDON, MjcfRobot, tendon_joints
 
 CONNECT, WELD, BETWEEN_JOINTS = range(3)  # MuJoCo's kinds of equalities
@@ -173,16 +173,17 @@ class _Search:
     def _settled(self, leader: int, place: float) -> Floats:
         """Return the positions (nq,) at which MuJoCo comes to rest while a joint stands still."""
         library = mujoco()
-        model, data = self._quiet(), None
+        model = self._quiet()
         data = library.MjData(model)
         held = {joint: self._at(joint, leader, place) for joint in self._made.of}
         held = {joint: value for joint, value in held.items() if value is not None}
         held[leader] = place
-        for _ in range(SETTLING):
-            for joint, value in held.items():
-                data.qpos[model.jnt_qposadr[joint]] = value
-                data.qvel[model.jnt_dofadr[joint]] = 0.0
-            library.mj_step(model, data)
+        with without_log():
+            for _ in range(SETTLING):
+                for joint, value in held.items():
+                    data.qpos[model.jnt_qposadr[joint]] = value
+                    data.qvel[model.jnt_dofadr[joint]] = 0.0
+                library.mj_step(model, data)
         return np.array(data.qpos)
 
     def _at(self, joint: int, leader: int, place: float) -> float | None:

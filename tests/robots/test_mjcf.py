@@ -256,6 +256,15 @@ class TestFiles:
         with pytest.raises(AssetError, match=message):
             guess_descriptor(path)
 
+    def test_nothing_is_left_where_it_was_started(self, tmp_path, monkeypatch):
+        """MuJoCo would write a log there, of a model that it warns of."""
+        path = write(tmp_path, mjcf(arm(end='<body><geom size="nan"/></body>')))
+        (tmp_path / "here").mkdir()
+        monkeypatch.chdir(tmp_path / "here")
+        with pytest.raises(AssetError, match="MuJoCo cannot compile"):
+            guess_descriptor(path)
+        assert not list((tmp_path / "here").iterdir())
+
     def test_what_holds_no_robot(self, tmp_path):
         with pytest.raises(DescriptorError, match="no joint that turns or slides"):
             guess_descriptor(write(tmp_path, mjcf('<body><freejoint/><geom size="1"/></body>')))
