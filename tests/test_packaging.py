@@ -113,10 +113,12 @@ class TestDependencies:
             "view",
             "video",
             "export",
+            "mjcf",
             "parity",
             "pettingzoo",
             "ray",
             "sb3",
+            "usd",
             "xacro",
         ):
             declared |= names_of(PROJECT["optional-dependencies"][extra])

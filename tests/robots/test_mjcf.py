@@ -28,8 +28,6 @@ from rollouts.reading.summary import TrajectoryError
 
 from .mjcf_parts import JAWS, arm, mjcf, motors, write
 
-pytest.importorskip("mujoco")
-
 
 @pytest.fixture(autouse=True)
 def _local_copy(tmp_path_factory, monkeypatch):
