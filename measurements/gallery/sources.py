@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from measurements.bench import readme_table
+from measurements.bench import tables as bench_tables
 from measurements.bench.report import Report
 from measurements.gallery.record import Record
 from measurements.robots.expectations import EXPECTED, read_expectations
@@ -56,7 +56,7 @@ class Sources:
             record,
             compared["tasks"],
             compared["versions"],
-            readme_table.read(),
+            bench_tables.read(),
             frozenset(path.relative_to(folder).as_posix() for path in media),
         )
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from measurements.bench import readme_table
+from measurements.bench import tables as bench_tables
 from measurements.bench.measurement import number_text
 from measurements.gallery import __main__ as command
 from measurements.gallery.camera import BACKGROUND, Lens, shrunk
@@ -126,7 +126,7 @@ class TestFigures:
             assert f"**Observation:** {found['observation_size']} numbers" in page
 
     def test_of_the_benchmarks(self, pages):
-        step = readme_table.read().find("step")
+        step = bench_tables.read().find("step")
         for task_id in step.values:
             cells = [number_text(step.median(name, task_id)) for name in step.samples]
             assert f"| {' | '.join(cells)} |" in pages[task_path(str(task_id))]
