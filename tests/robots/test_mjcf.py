@@ -48,7 +48,7 @@ class TestWhatIsGuessed:
         hand = JAWS.format(site='<site name="pinch" pos="0.09 0 0"/>')
         rest = (
             "<actuator>"
-            + motors(kind="position", kp=3000, kv=300, forcerange="-70 70")
+            + motors(kind="position", kp=3000, kv=60, forcerange="-70 70")
             + "</actuator>"
             '<equality><joint joint1="slide_two" joint2="slide_one"/></equality>'
             '<keyframe><key name="other" qpos="0 0 0 0 0 0 0 0"/>'
@@ -68,7 +68,7 @@ class TestWhatIsGuessed:
         assert robot.keyframe("home")[6:] == pytest.approx((0.02, 0.02))
         assert ("base", "link4") in robot.allowed_collisions
         arms = robot.action_split.groups["arm"]
-        assert arms.drives[:5] == ((3000, 300, 70),) * 5
+        assert arms.drives[:5] == ((3000, 60, 70),) * 5
         assert arms.drives[5][0] < 3000  # stiffer, what it carries would shake
 
     def test_a_drive_that_is_too_weak_is_not_taken(self, tmp_path):
