@@ -230,8 +230,8 @@ def placed(placement: Placement, world: Pose) -> Placement:
     return hung
 
 
-def _checked_mode(robot: RobotDescriptor, mode: object) -> str:
-    """Return a control mode, or those of limbs, as one text.
+def _checked_mode(robot: RobotDescriptor, mode: object) -> str | None:
+    """Return a control mode, or those of limbs, as one text; None if there are none.
 
     Raises:
         LayoutError: If it is none.
@@ -245,7 +245,9 @@ def _checked_mode(robot: RobotDescriptor, mode: object) -> str:
         )
     asked = read_mode(mode) if isinstance(mode, str) else dict(mode)
     robot.in_control_mode(asked)
-    return asked if isinstance(asked, str) else written_mode(asked)
+    if isinstance(asked, str):
+        return asked
+    return (written_mode(asked) if robot.parts else next(iter(asked.values()), None)) or None
 
 
 def _without(home: Quaternion, quaternion: Quaternion) -> Quaternion:

@@ -24,7 +24,7 @@ WRONG_FIELDS: dict[str, tuple[Any, ...]] = {
     "num_envs": (0, -1, 2.5, "4", None, True, NAN, 2**31, 10**30, [2], np.array([2, 3])),
     "obs_mode": (*NO_NAMES, "rgb+", "state+rgb+rgb", None, "rgb\0"),
     "reward_mode": (*NO_NAMES, "DENSE"),
-    "control_mode": (*NO_NAMES, None, "pd_joint_delta"),
+    "control_mode": (*NO_NAMES, "pd_joint_delta"),
     "simulator": (*NO_NAMES, None, "mujoco"),
     "render_mode": (*NO_NAMES, "human"),
     "headless": (False, None, 0, 1, "yes", []),

@@ -25,6 +25,8 @@ WRONG_PLACEMENTS: dict[str, tuple[Any, ...]] = {
     "rpy": WRONG_POINTS,
     "quaternion": (*WRONG_POINTS, (1e-9, 0, 0, 0), (2, 0, 0, 0), (1, 1, 0, 0))
     + ((NAN, 0, 0, 0), (1, 0, 0, None)),
+    "control_mode": (5, "nowhere", "", "left=", "a=b,a=c", ["pd_joint_pos"], {"left": 5})
+    + ({"panda": None}, {5: "pd_joint_pos"}, b"pd_joint_pos", True, 2.5),
     "keyframe": (5, "nowhere", "", ["rest"], {"rest": 1}, b"rest", True),
     "qpos_noise": (
         None,
@@ -133,7 +135,7 @@ def faults() -> Iterator[Fault]:
         {"left": "x"},
     ):
         yield Fault(AREA, f"replace_robots({value!r})", partial(_replaced, value))
-    for mode in (None, 5, "pd_joint", ["pd_joint_pos"], True):
+    for mode in (5, "pd_joint", ["pd_joint_pos"], True):
         yield Fault(AREA, f"in_control_mode({mode!r})", partial(_mode, mode))
     for fields in ({"position": (1e308, 0, 0)}, {"qpos_noise": 1e300}, {"position": (0, NAN, 0)}):
         yield Fault(AREA, f"a task with a robot at {fields!r}", partial(_task, fields))

@@ -40,6 +40,7 @@ VALUES = {
     "on": "version: 1\nrobots: {{a: {{robot: panda, on: {}}}}}",
     "keyframe": "version: 1\nrobots: {{a: {{robot: panda, keyframe: {}}}}}",
     "qpos_noise": "version: 1\nrobots: {{a: {{robot: panda, qpos_noise: {}}}}}",
+    "control_mode": "version: 1\nrobots: {{a: {{robot: panda, control_mode: {}}}}}",
     "a frame's position": _FRAME.replace("{}", "position: {}"),
     "a frame's on": _FRAME.replace("{}", "on: {}"),
 }
