@@ -108,8 +108,9 @@ class _Markdown(argparse.HelpFormatter):
 
     def add_arguments(self, actions: Iterable[argparse.Action]) -> None:
         for action in actions:
-            if isinstance(action.choices, dict):
-                self._below += action.choices.values()
+            choices = action.choices.values() if isinstance(action.choices, dict) else ()
+            if below := [one for one in choices if isinstance(one, argparse.ArgumentParser)]:
+                self._below += below
             elif action.help != argparse.SUPPRESS and "--help" not in action.option_strings:
                 about = self._expand_help(action) if action.help else ""
                 self._lines += [
