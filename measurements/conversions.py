@@ -60,7 +60,7 @@ def _run(options: argparse.Namespace) -> int:
     torch.set_num_threads(1)
     found: dict[str, Any] = {"versions": versions_of("sapien", "mani_skill"), "tasks": {}}
     if options.out.exists():
-        found = json.loads(options.out.read_text(encoding="utf-8"))
+        found = _read(options.out)
     names = [get_task_class(name).task_id for name in options.tasks or list_clones()]
     with LiveLine(len(names) * len(options.modes), "conversions") as line:
         for task_id in names:
@@ -74,6 +74,14 @@ def _run(options: argparse.Namespace) -> int:
     write_whole(table, "\n".join(markdown(found)) + "\n")
     print(f"{options.out}, {table}: {len(found['tasks'])} tasks")
     return 0
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        return {"versions": dict(found["versions"]), "tasks": dict(found["tasks"])}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise RecordingError(f"{path} holds no record of conversions: {error!r}") from error
 
 
 def _try(seen: Seen, task_id: str, mode: str, options: argparse.Namespace) -> None:

@@ -6,13 +6,19 @@ import h5py
 import numpy as np
 import pytest
 
-from parity.compare.episodes import find_demonstrations, load_episodes, random_episodes
+import tasks
+from parity.compare.episodes import (
+    find_demonstrations,
+    load_episodes,
+    random_episodes,
+    recorded_episodes,
+)
 from rollouts.reading.trajectory import TrajectoryError
 
 TASK = "PickCube-v1"
 
 
-def demonstration(folder, name="trajectory", env_id=TASK, **changes):
+def demonstration(folder, name="trajectory", env_id=TASK, width=8, **changes):
     """Write a demonstration of two episodes in ManiSkill's format; return its path."""
     folder.mkdir(parents=True, exist_ok=True)
     episodes = [
@@ -29,7 +35,7 @@ def demonstration(folder, name="trajectory", env_id=TASK, **changes):
     path.with_suffix(".json").write_text(json.dumps(about))
     with h5py.File(path, "w") as file:
         for number in (0, 1):
-            file[f"traj_{number}/actions"] = np.full((3 + number, 8), number, np.float32)
+            file[f"traj_{number}/actions"] = np.full((3 + number, width), number, np.float32)
     return path
 
 
@@ -50,6 +56,13 @@ def test_demonstrations(tmp_path):
     assert (first.seed, second.seed) == (40, 41)
     assert first.actions.shape == (3, 8)
     np.testing.assert_array_equal(second.actions, np.ones((4, 8), np.float32))
+
+
+def test_a_control_mode_of_other_width(tmp_path):
+    path = demonstration(tmp_path, width=7, control_mode="pd_ee_delta_pose")
+    episodes, mode = recorded_episodes(path, tasks.get_task_class(TASK))
+    assert mode == "pd_ee_delta_pose"
+    assert episodes[1].actions.shape == (4, 7)
 
 
 def test_seed_in_a_list_and_control_mode_by_robot(tmp_path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 
+import numpy as np
 import pytest
 
 from layouts import Layout, Placement
@@ -43,6 +44,21 @@ def test_there_and_back(recording, tmp_path, capsys):
     words = ["convert", str(tmp_path / "poses"), "--to", "pd_joint_delta_pos"]
     assert main([*words, "--out", str(tmp_path / "deltas")]) == 0
     assert all(episode.success for episode in replays(tmp_path / "deltas"))
+
+
+def test_what_pressed_presses_as_much(tmp_path):
+    record("PegInsertionSide-v1", [0], tmp_path / "deltas", workers=0)
+    for mode in ("pd_joint_vel", "pd_joint_delta_pos_vel"):
+        words = ["convert", str(tmp_path / "deltas"), "--to", mode, "--out", str(tmp_path / mode)]
+        assert main(words) == 0
+    with (
+        open_recording(tmp_path / "deltas", None) as before,
+        open_recording(tmp_path / "pd_joint_vel", None) as speeds,
+        open_recording(tmp_path / "pd_joint_delta_pos_vel", None) as same,
+    ):
+        assert len(speeds[0].actions) == len(before[0].actions)
+        for name, rows in before[0].states["articulations"].items():
+            np.testing.assert_array_equal(same[0].states["articulations"][name], rows)
 
 
 def test_a_conversion_goes_on_where_it_stopped(recording, tmp_path, capsys):
