@@ -20,7 +20,7 @@ import torch
 
 from kinematics.rotations import inverse, multiply
 from measurements.robots.record import versions_of
-from robots import CONTROL_MODES, RecordingError
+from robots import CONTROL_MODES, RecordingError, TaskError
 from robots.common.commands import exit_code, program, start
 from robots.common.writing import write_whole
 from rollouts.playing.mode_conversion import followed
@@ -120,7 +120,10 @@ def _in_native(task_id: str, path: Path) -> Seen:
     cls = get_task_class(task_id)
     episodes, mode = recorded_episodes(path, cls)
     run = Run(task_id, path.name, tuple(episodes), "fresh", cls.reward_modes[0], control_mode=mode)
-    (result,) = play([run], lambda _, count: None)
+    try:
+        (result,) = play([run], lambda _, count: None)
+    except TaskError:  # native's robot has no such mode
+        return {"native": None}
     native, _, _ = result.successes
     return {"native": native, "equal": sum(episode.equal for episode in result.episodes)}
 
@@ -148,7 +151,8 @@ def markdown(found: Mapping[str, Any]) -> Iterator[str]:
     yield "as `rollouts convert` does; `python -m measurements.conversions` writes this page. In"
     yield "each cell: how many were kept of how many, as they succeed in the other mode, too; then"
     yield "in how many of those native ManiSkill succeeds. *turn* is how far the TCP turns, on the"
-    yield "average (°): modes that ask for its position alone cannot turn it on purpose."
+    yield "average (°): modes that ask for its position alone cannot turn it on purpose. A dash is"
+    yield "where native's robot has no such mode."
     yield f"Made with {versions}."
     yield ""
     yield _row("task", "turn", *(f"`{mode.removeprefix('pd_')}`" for mode in MODES))
@@ -164,7 +168,9 @@ def _cell(one: Seen) -> str:
         return "–"
     kept = f"{one['kept']} / {one['tried']}"
     kept = kept if one["kept"] == one["tried"] else f"**{kept}**"
-    return f"{kept}, {one['native']}" if "native" in one else kept
+    if "native" not in one:
+        return kept
+    return f"{kept}, {'–' if one['native'] is None else one['native']}"
 
 
 def _total(ones: Sequence[Seen]) -> str:

@@ -41,7 +41,7 @@ def make_native(
     Raises:
         MissingPackageError: If mani_skill, or a package that it needs, is not installed.
         SimulationError: If there is no Vulkan driver, without which native builds no scene.
-        TaskError: If mani_skill has no such task or the task no such reward mode.
+        TaskError: If mani_skill has no such task, or the task no such reward mode or control mode.
     """
     with quiet():
         gym = _import_native()
@@ -58,6 +58,10 @@ def make_native(
                 render_backend="cpu",
                 **chosen,
             ).unwrapped
+        except AssertionError as error:
+            if "supported modes" not in str(error):
+                raise
+            raise TaskError(f"native's {task_id} has no such control mode: {error}") from error
         except RuntimeError as error:
             if not any(word in str(error).lower() for word in _VULKAN_WORDS):
                 raise
