@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python
 
-.PHONY: help demo test test-all faults check bench parity clean
+.PHONY: help demo test test-all faults check docs bench parity clean
 .NOTPARALLEL:
 
 help:
@@ -12,9 +12,10 @@ help:
 	@echo "make test      the tests"
 	@echo "make test-all  the tests, those that take minutes included"
 	@echo "make faults    whatever can go wrong, tried; writes docs/faults.md"
-	@echo "make check     lint, format, types, which room imports which, README's tables"
+	@echo "make check     lint, format, types, which room imports which, documentation, distribution"
+	@echo "make docs      the documentation as a site: open site/index.html"
 	@echo "make bench     what steps, resets and vectors cost beside native ManiSkill"
-	@echo "make parity    every task beside native ManiSkill; writes README.md's table"
+	@echo "make parity    every task beside native ManiSkill; writes docs/parity.md's table"
 	@echo "make clean     remove .venv"
 
 demo: $(VENV)/.demo
@@ -37,17 +38,27 @@ check: $(VENV)/.check
 	$(RUN) -m ruff format --check .
 	$(RUN) -m pyright --pythonpath $(RUN)
 	$(VENV)/bin/lint-imports
-	$(RUN) -m parity readme --check
+	$(RUN) -m parity tables --check
+	$(RUN) -m measurements.gallery --check
+	NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --quiet --strict
+	rm -rf $(VENV)/dist && $(RUN) -m hatchling build --directory $(VENV)/dist
+	$(RUN) -m twine check --strict $(VENV)/dist/*
 
-# ARGS="--record" keeps the figures for README.md.
+docs: $(VENV)/.docs
+	NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --strict
+	@echo "Open site/index.html."
+
+# ARGS="--record" keeps the figures for docs/parity.md.
 bench: $(VENV)/.test
 	OMP_NUM_THREADS=1 $(RUN) -m parity bench --out runs/bench $(ARGS)
-	$(RUN) -m parity readme
+	$(RUN) -m parity tables
+	$(RUN) -m measurements.gallery
 
 # ARGS="--demos DIR" plays recorded demonstrations as well.
 parity: $(VENV)/.test
 	OMP_NUM_THREADS=1 $(RUN) -m parity compare --all --record $(ARGS)
-	$(RUN) -m parity readme
+	$(RUN) -m parity tables
+	$(RUN) -m measurements.gallery
 
 clean:
 	rm -rf $(VENV)
@@ -67,6 +78,9 @@ $(VENV)/.demo: pyproject.toml constraints.txt
 
 $(VENV)/.test: pyproject.toml constraints.txt
 	$(call install,test)
+
+$(VENV)/.docs: pyproject.toml constraints.txt
+	$(call install,docs)
 
 $(VENV)/.check: pyproject.toml constraints.txt
 	$(call install,check)

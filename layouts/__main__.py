@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from layouts.export_command import add_export_options
 from layouts.frames import EDGES
 from layouts.layout import Layout
 from layouts.maniskill import TASKS, from_maniskill
@@ -171,6 +172,9 @@ def _parser() -> argparse.ArgumentParser:
     view = commands.add_parser("view", help="look at a layout in a browser, and move its joints")
     add_layout_words(view)
     add_view_options(view, chosen_layout)
+    export = commands.add_parser("export", help="write a layout for MuJoCo, USD, ROS 2, Drake …")
+    add_layout_words(export)
+    add_export_options(export, chosen_layout)
     return parser
 
 

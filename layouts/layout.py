@@ -135,6 +135,95 @@ class Layout(Arrangement):
 
         return write_drake(self, path, visuals=visuals)
 
+    def to_mjcf(self, path: str | PathLike[str], *, visuals: bool = True) -> Path:
+        """Save the layout as one MJCF model for MuJoCo, with meshes in a folder ``NAME_assets``.
+
+        Names of bodies, joints and actuators stand behind their place: ``left/panda_hand``. Each
+        joint that follows no other has a position actuator with stiffness, damping and force limit
+        of the descriptor, in the order of its joints; joints that mimic others are tied to them.
+        Links have no weight (``gravcomp``), as in the tasks here, so that the keyframe ``home``,
+        where the layout starts, holds. Bodies may touch unless `validate` lets their links
+        overlap. Meshes collide by their convex hulls. TCPs (``left/tcp``) and frames are sites,
+        tables are boxes; there is no floor, as a layout has none. The timestep is the longest of
+        2 ms and less at which every drive is stable.
+
+        Args:
+            path: Where to save; must end in ``.xml``. The folder beside it is replaced if it
+                exists.
+            visuals: Whether to include what the robots look like. A robot whose visual meshes
+                cannot be had is drawn by its collision shapes; a line on stderr says so.
+
+        Returns:
+            The path of the model.
+
+        Raises:
+            LayoutError: If the path ends otherwise, or the folder holds something else.
+            AssetError: If a robot's files cannot be found or make no sense.
+            DescriptorError: If a descriptor contradicts its URDF.
+            MissingPackageError: If trimesh or scipy is not installed.
+        """
+        from layouts.export import write_mjcf
+
+        return write_mjcf(self, path, visuals=visuals)
+
+    def to_usd(self, path: str | PathLike[str], *, visuals: bool = True) -> Path:
+        """Save the layout as one USD stage with UsdPhysics articulations, meshes included.
+
+        Lengths are in m, z is up. Each place is an articulation ``/NAME/left`` whose root is fixed
+        to the world, its links ``/NAME/left/panda_hand`` stand where the layout starts the robot,
+        and its joints are in ``/NAME/left/joints``, with limits, and drives of the descriptor's
+        stiffness, damping and force limit. Letters that USD has not are ``_``; the display name
+        keeps them. Links that `validate` lets overlap are filtered pairs. What UsdPhysics lacks is
+        given as PhysX's attributes, which others ignore: joints that mimic others, armature,
+        largest speeds, joint positions, links without weight. TCPs, frames and cameras are prims;
+        tables are boxes; there is no floor.
+
+        Args:
+            path: Where to save; must end in ``.usd``, ``.usda`` or ``.usdc``.
+            visuals: See `to_mjcf`.
+
+        Returns:
+            The path of the stage.
+
+        Raises:
+            LayoutError: If the path ends otherwise.
+            AssetError: If a robot's files cannot be found or make no sense.
+            DescriptorError: If a descriptor contradicts its URDF.
+            MissingPackageError: If usd-core, trimesh or scipy is not installed.
+        """
+        from layouts.export import write_usd
+
+        return write_usd(self, path, visuals=visuals)
+
+    def to_ros2(self, folder: str | PathLike[str], *, visuals: bool = True) -> Path:
+        """Save the layout as a ROS 2 package for MoveIt and ros2_control, meshes included.
+
+        Names of links and joints stand behind their place: ``left_panda_hand``. The URDF has every
+        robot fixed to a link ``world``, and links for frames and TCPs (``left_tcp``). Planning
+        groups are ``left`` for each place, ``left_arm`` and ``left_gripper`` for what it moves,
+        ``left_LIMB…`` for each limb, and ``all``; each has a state ``home``, where the layout
+        starts. Collision shapes are the convex hulls of `validate`, and the disabled pairs those
+        that it leaves out. ``launch/demo.launch.py`` starts controllers on mock hardware, and
+        MoveIt. The format is that of ROS 2 Jazzy and later.
+
+        Args:
+            folder: The package, whose name is that of the folder. It is replaced if it exists and
+                holds nothing but what an export leaves.
+            visuals: See `to_mjcf`.
+
+        Returns:
+            The folder.
+
+        Raises:
+            LayoutError: If the folder's name is none of a package, or it holds something else.
+            AssetError: If a robot's files cannot be found or make no sense.
+            DescriptorError: If a descriptor contradicts its URDF.
+            MissingPackageError: If trimesh or scipy is not installed.
+        """
+        from layouts.export import write_ros2
+
+        return write_ros2(self, folder, visuals=visuals)
+
     def preview(
         self,
         path: str | PathLike[str],

@@ -28,9 +28,9 @@ COMMANDS = {
         "make one HTML page of a sweep and the recorded results",
     ),
     "bench": ("measurements.bench.native", "time steps, resets and vectors beside native"),
-    "readme": (
-        "measurements.readme",
-        "write the recorded results into README.md, or check them there",
+    "tables": (
+        "measurements.tables",
+        "write the recorded results into docs/parity.md, or check them there",
     ),
 }
 

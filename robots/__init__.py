@@ -31,6 +31,7 @@ from robots.descriptor import (
     Limb,
     RobotDescriptor,
 )
+from robots.mjcf.locator import LocalMjcf
 from robots.registry import RobotRegistry
 
 __all__ = [
@@ -47,6 +48,7 @@ __all__ = [
     "JointGroup",
     "LayoutError",
     "Limb",
+    "LocalMjcf",
     "LocalUrdf",
     "MissingPackageError",
     "RecordingError",

@@ -13,7 +13,11 @@ from robots.action_split import ActionSplit, names
 from robots.descriptor import RobotDescriptor
 
 WIDTH = 100
-_HOMES = {"LocalUrdf": "robots.assets.locator", "UrdfLocator": "robots.assets.locator"}
+_HOMES = {
+    "LocalMjcf": "robots.mjcf.locator",
+    "LocalUrdf": "robots.assets.locator",
+    "UrdfLocator": "robots.assets.locator",
+}
 
 
 def write_module(robot: RobotDescriptor, reasons: Sequence[str] = ()) -> str:

@@ -144,6 +144,7 @@ class RobotDescriptor:
         *,
         quiet: bool = False,
         xacro: Mapping[str, object] | None = None,
+        srdf: str | os.PathLike[str] | None = None,
         **overrides: Any,
     ) -> RobotDescriptor:
         """Guess a robot from its URDF, and say on stderr what was guessed and why.
@@ -156,11 +157,39 @@ class RobotDescriptor:
             name: Registry name; None takes that of the URDF.
             quiet: Whether to say nothing.
             xacro: Arguments of a xacro template, as in ``{"prefix": "left_"}``.
+            srdf: An SRDF: its groups, states, TCPs and disabled pairs are taken over.
             **overrides: Fields that are known better than guessed.
         """
         from robots.from_urdf import guess_descriptor
 
-        found = guess_descriptor(path_or_name, name, xacro=xacro, **overrides)
+        found = guess_descriptor(path_or_name, name, xacro=xacro, srdf=srdf, **overrides)
+        if not quiet:
+            print(found, file=sys.stderr)
+        return found.descriptor
+
+    @classmethod
+    def from_mjcf(
+        cls,
+        path_or_name: str | os.PathLike[str],
+        name: str | None = None,
+        *,
+        quiet: bool = False,
+        **overrides: Any,
+    ) -> RobotDescriptor:
+        """Guess a robot from its MJCF, and say on stderr what was guessed and why.
+
+        MuJoCo compiles the file (``pip install 'robot-layouts[mjcf]'``), and what it makes of it
+        becomes a URDF. Keyframes, actuators, tool sites and excluded contacts are taken over.
+
+        Args:
+            path_or_name: An MJCF on this machine, or a name of the package robot_descriptions.
+            name: Registry name; None takes that of the model.
+            quiet: Whether to say nothing.
+            **overrides: Fields that are known better than guessed.
+        """
+        from robots.from_urdf import guess_descriptor
+
+        found = guess_descriptor(path_or_name, name, form="mjcf", **overrides)
         if not quiet:
             print(found, file=sys.stderr)
         return found.descriptor

@@ -1,7 +1,7 @@
-"""`python -m robots.from_urdf PATH`: guesses a descriptor from a URDF, and says why.
+"""`python -m robots.from_urdf PATH`: guesses a descriptor from a URDF or MJCF, and says why.
 
-PATH is a URDF on this machine, or a name of the package robot_descriptions, such as
-`panda_description`, which keeps its own copies of robots.
+PATH is a URDF or an MJCF (``.xml``) on this machine, or a name of the package robot_descriptions,
+such as `panda_description` or `panda_mj_description`, which keeps its own copies of robots.
 """
 
 from __future__ import annotations
@@ -17,43 +17,81 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from robots.assets.locator import LocalUrdf
 from robots.common.commands import exit_code, program, start
-from robots.common.errors import AssetError, MissingPackageError, UnknownNameError
+from robots.common.errors import (
+    AssetError,
+    DescriptorError,
+    MissingPackageError,
+    UnknownNameError,
+)
 from robots.common.paths import absolute
 from robots.guess import Guess, guess
+from robots.guessing.hints import NOTHING, Hints
+from robots.guessing.semantics import hints_of
+from robots.mjcf.locator import LocalMjcf, is_mjcf
 from robots.urdf.cleaning.xacro_files import template_of, with_arguments
+from robots.urdf.reading import read_model
+from robots.urdf.srdf import read_semantics
+from robots.urdf.summary import read_urdf
 
 __all__ = ["Guess", "guess_descriptor", "main"]
+
+URDF, MJCF = "urdf", "mjcf"  # as robot_descriptions has them, too
 
 
 def guess_descriptor(
     path_or_name: str | os.PathLike[str],
     name: str | None = None,
     *,
+    form: str | None = None,
     xacro: Mapping[str, object] | None = None,
+    srdf: str | os.PathLike[str] | None = None,
     **overrides: Any,
 ) -> Guess:
-    """Guess a robot's descriptor from its URDF; nothing is fetched for a path.
+    """Guess a robot's descriptor from its URDF or its MJCF; nothing is fetched for a path.
 
     Args:
-        path_or_name: A URDF on this machine, or a name of the package robot_descriptions, which
-            clones the robot's repository if it has not before. A xacro template will do, if the
-            package xacro is installed.
-        name: Registry name; None takes that of the URDF.
+        path_or_name: A URDF or an MJCF on this machine, or a name of the package
+            robot_descriptions, which clones the robot's repository if it has not before. A xacro
+            template will do, if the package xacro is installed.
+        name: Registry name; None takes that of the URDF or MJCF.
+        form: ``"urdf"`` or ``"mjcf"``; None goes by the ending, ``.xml`` and ``.mjcf`` for an MJCF.
         xacro: Arguments of the template, as in ``{"prefix": "left_"}``.
+        srdf: An SRDF, whose groups are the arms and grippers, whose chains end in TCPs, and whose
+            states and disabled pairs are taken over. None takes disabled pairs of one beside the
+            URDF that is called as it, and nothing else.
         **overrides: Fields of `robots.RobotDescriptor` that are known better than guessed.
 
     Returns:
         The guess: ``.descriptor``, ``.reasons``, and ``.module()``, the data module to paste.
 
     Raises:
-        AssetError: If the URDF or a mesh of it is missing, or it describes no robot.
+        AssetError: If the file or a mesh of it is missing, or it describes no robot.
         DescriptorError: If nothing moves, or an override contradicts the rest.
-        MissingPackageError: If a name is given and robot_descriptions is not installed, or a
-            template and xacro is not.
-        UnknownNameError: If robot_descriptions has no URDF of that name.
+        MissingPackageError: If a name is given and robot_descriptions is not installed, a template
+            and xacro is not, or an MJCF and MuJoCo is not.
+        UnknownNameError: If robot_descriptions has no robot of that name, or the SRDF names a
+            group, link or joint that there is not.
     """
-    return guess(with_arguments(_find(path_or_name), xacro or {}), name, overrides)
+    path = _find(path_or_name, form)
+    if form == MJCF or (form is None and is_mjcf(path)):
+        if xacro or srdf:
+            what = "arguments of xacro" if xacro else "SRDF"
+            raise DescriptorError(f"{path} is an MJCF, which takes no {what}")
+        from robots.mjcf.conversion import convert
+
+        hints = convert(path).hints
+        return guess(LocalMjcf(str(path)), name, overrides, file=path, hints=hints)
+    source = LocalUrdf(str(with_arguments(path, xacro or {})))
+    return guess(source, name, overrides, hints=_semantics(source, srdf) if srdf else NOTHING)
+
+
+def _semantics(source: LocalUrdf, srdf: str | os.PathLike[str]) -> Hints:
+    """Return what an SRDF makes known of the robot of a URDF."""
+    urdf, file = source.locate(), absolute(srdf, "the path of the SRDF")
+    model = read_model(read_urdf(urdf), urdf.as_posix())
+    return hints_of(read_semantics(file, model), file.name)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -63,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0, or 1 if the URDF is unusable, or 2 if there is no robot of that name.
     """
     parser = argparse.ArgumentParser(prog=program("robots.from_urdf"), description=__doc__)
-    parser.add_argument("urdf", metavar="PATH", help="URDF, or name in robot_descriptions")
+    parser.add_argument("urdf", metavar="PATH", help="URDF or MJCF, or name in robot_descriptions")
     parser.add_argument("--name", help="registry name of the robot")
     parser.add_argument("--module", action="store_true", help="print the data module to paste")
     parser.add_argument(
@@ -74,12 +112,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         type=_argument,
         help="argument of a xacro template; may be given again",
     )
+    parser.add_argument("--srdf", metavar="FILE", help="groups, states and disabled pairs of it")
     options = parser.parse_args(arguments)
     return exit_code(lambda: _print(options))
 
 
 def _print(options: argparse.Namespace) -> None:
-    found = guess_descriptor(options.urdf, options.name, xacro=dict(options.xacro))
+    found = guess_descriptor(
+        options.urdf, options.name, xacro=dict(options.xacro), srdf=options.srdf
+    )
     print(found.module().rstrip("\n") if options.module else found)
 
 
@@ -90,33 +131,38 @@ def _argument(text: str) -> tuple[str, str]:
     return key, value
 
 
-def _find(path_or_name: str | os.PathLike[str]) -> Path:
+def _find(path_or_name: str | os.PathLike[str], form: str | None) -> Path:
     """Return the path, or what robot_descriptions has of that name."""
-    path = absolute(path_or_name, "the path of the URDF")
+    path = absolute(path_or_name, f"the path of the {(form or URDF).upper()}")
     is_name = isinstance(path_or_name, str) and path_or_name.isidentifier()
     if os.path.exists(template_of(path)[0]) or not is_name:
         return path
-    return _described(str(path_or_name))
+    return _described(str(path_or_name), form)
 
 
-def _described(name: str) -> Path:
+def _described(name: str, form: str | None) -> Path:
     if find_spec("robot_descriptions") is None:
         raise MissingPackageError(
             f"there is no file {name}; names of robots are looked up in the package"
             " robot_descriptions, which is not installed: pip install robot_descriptions"
         )
     catalogue: Any = import_module("robot_descriptions._descriptions").DESCRIPTIONS
-    with_urdf = [key for key, about in catalogue.items() if about.has_urdf]
-    if name not in with_urdf:
-        near = get_close_matches(name, with_urdf, n=8, cutoff=0.4)
-        hint = f"These are the closest of {len(with_urdf)}; `robot_descriptions list` has them all."
-        raise UnknownNameError("robot of robot_descriptions with a URDF", name, near, hint)
+    forms = (form,) if form else (URDF, MJCF)
+    has = {
+        key: [f for f in forms if getattr(about, f"has_{f}")] for key, about in catalogue.items()
+    }
+    known = [key for key, found in has.items() if found]
+    if name not in known:
+        near = get_close_matches(name, known, n=8, cutoff=0.4)
+        hint = f"These are the closest of {len(known)}; `robot_descriptions list` has them all."
+        what = " or ".join(f"{'an' if f == MJCF else 'a'} {f.upper()}" for f in forms)
+        raise UnknownNameError(f"robot of robot_descriptions with {what}", name, near, hint)
     try:
         with redirect_stdout(sys.stderr):  # clones, or finds its clone, and talks about it
             module: Any = import_module(f"robot_descriptions.{name}")
     except Exception as error:  # git's own errors, of a package that need not be installed here
         raise AssetError(f"robot_descriptions could not bring {name}: {error}") from error
-    path = getattr(module, "URDF_PATH", None)
+    path = getattr(module, f"{has[name][0].upper()}_PATH", None)
     if path is None:
         raise AssetError(f"{name} of robot_descriptions is a xacro template, not a URDF")
     return Path(path)

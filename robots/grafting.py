@@ -18,7 +18,6 @@ import numpy as np
 from kinematics.rotations import Floats, inverse_pose, quaternion_of, transform
 from robots.action_split import ActionSplit, JointGroup, is_gripper
 from robots.assets.assembled import AssembledUrdf, Part, carried_by
-from robots.assets.locator import LocalUrdf
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
 from robots.bodies.overlaps import guess_allowed
 from robots.common.errors import DescriptorError, UnknownNameError
@@ -34,7 +33,8 @@ from robots.descriptor import (
     UrdfSource,
     Vector3,
 )
-from robots.registry import RobotRegistry
+from robots.mjcf.locator import local_source
+from robots.named import named_robot
 from robots.urdf.model import UrdfModel
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
@@ -136,7 +136,7 @@ def with_tool(
         UnknownNameError: If there is no such link.
         AssetError: If files cannot be found or make no sense.
     """
-    source = LocalUrdf(tool) if isinstance(tool, str | os.PathLike) else tool
+    source = local_source(tool) if isinstance(tool, str | os.PathLike) else tool
     model = _model(source)
     if model.moving:
         raise DescriptorError(
@@ -205,7 +205,7 @@ def on_body(
     """
     if not mounts:
         raise DescriptorError("nothing stands on the body; name at least one robot")
-    source = LocalUrdf(body) if isinstance(body, str | os.PathLike) else body
+    source = local_source(body) if isinstance(body, str | os.PathLike) else body
     model = _model(source)
     if model.moving:
         raise DescriptorError(f"the body moves ({model.moving[0].name}); only its robots may")
@@ -299,11 +299,7 @@ def _modes_of(robot: RobotDescriptor, names: Mapping[str, str]) -> dict[str, dic
 
 
 def _robot(given: RobotLike) -> RobotDescriptor:
-    if isinstance(given, RobotDescriptor):
-        return given
-    if isinstance(given, str) and not given.lower().endswith((".urdf", ".xacro")):
-        return RobotRegistry.load(given)
-    return RobotDescriptor.from_urdf(given, quiet=True)
+    return given if isinstance(given, RobotDescriptor) else named_robot(given)
 
 
 def _model(source: UrdfSource) -> UrdfModel:

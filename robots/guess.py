@@ -1,4 +1,4 @@
-"""A descriptor guessed from a URDF alone, with the reason for every guess."""
+"""A descriptor guessed from a URDF, with the reason for every guess."""
 
 from __future__ import annotations
 
@@ -10,23 +10,25 @@ from pathlib import Path
 from typing import Any
 
 from kinematics.rotations import Floats
-from robots.assets.locator import LocalUrdf
 from robots.bodies.allowed import joined_pairs, rigid_pairs
 from robots.bodies.hulls import Hull, counted_pairs, read_hulls
 from robots.bodies.overlaps import guess_allowed, overlapping
 from robots.common.errors import DescriptorError
-from robots.descriptor import ActionSplit, Fingers, JointGroup, RobotDescriptor
+from robots.descriptor import ActionSplit, Fingers, JointGroup, RobotDescriptor, UrdfSource
+from robots.guessing import words
 from robots.guessing.anatomy import Anatomy, Limb, find_anatomy
 from robots.guessing.drives import Drives
 from robots.guessing.fingertips import Fingertips
 from robots.guessing.grasps import find_fingers, find_material
 from robots.guessing.grippers import Gripper, entangled, find_gripper
 from robots.guessing.groups import arm_groups, held_groups
+from robots.guessing.hints import NOTHING, Hints
 from robots.guessing.masses import read_masses
 from robots.guessing.posture import Posture, PostureSearch
 from robots.guessing.reach import find_base, find_reach
+from robots.guessing.semantics import known_anatomy, known_tip
 from robots.guessing.stance import Stance
-from robots.guessing.tool import Tool, find_tool
+from robots.guessing.tool import BETWEEN, EXACT, Tool, find_tool
 from robots.parts import Limb as LimbDescription
 from robots.urdf.model import UrdfModel
 from robots.urdf.reading import read_model
@@ -35,6 +37,8 @@ from robots.urdf.summary import parse_urdf, read_cleaned
 LinkPairs = tuple[tuple[str, str], ...]
 
 LISTED = 6  # pairs of links that a reason names
+BEYOND = 1e-2  # rad, m; how far beyond its limits a joint of a known posture may be
+HOMES = ("home", "rest", "ready", "neutral", "initial", "init", "start", "default")  # best first
 
 
 @dataclass(frozen=True)
@@ -73,24 +77,33 @@ class _Parts:
     tips: Mapping[str, Fingertips]
     tools: Mapping[str, Tool]
     grippers: Mapping[str, Gripper]
+    hints: Hints
 
 
-def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
+def guess(
+    source: UrdfSource,
+    name: str | None,
+    overrides: dict[str, Any],
+    *,
+    file: Path | None = None,
+    hints: Hints = NOTHING,
+) -> Guess:
     """Guess a descriptor.
 
     Args:
-        urdf: The URDF.
+        source: Where its URDF comes from.
         name: Registry name; None takes that of the URDF.
         overrides: Fields of the descriptor that are known better.
+        file: The file that the robot is described in; None if it is the URDF.
+        hints: What else is known of it.
 
     Raises:
         AssetError: If the URDF or a mesh of it is missing, or it describes no robot.
         DescriptorError: If nothing moves, or an override contradicts the rest.
     """
-    locator = LocalUrdf(str(urdf))
-    path = locator.locate()
+    path = source.locate()
     cleaned = read_cleaned(path)
-    parts = _look_at(path, cleaned.xml)
+    parts = _look_at(path, cleaned.xml, hints)
     main = parts.anatomy.limbs[0]
     split = _action_split(parts)
     allowed, overlaps = _may_overlap(parts, path)
@@ -99,16 +112,16 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     fingers, grasping = _fingers(parts, main)
     fields: dict[str, Any] = {
         "name": name or _as_name(parts.model.name or path.stem),
-        "urdf": locator,
+        "urdf": source,
         "action_split": split,
         "tcp_link": parts.tools[main.name].link,
         "tcp_position_links": parts.tools[main.name].links,
         "tcp_offset": parts.tools[main.name].offset,
         "gripper_material": find_material(parts.anatomy.limbs),
         "fingers": fingers,
-        "keyframes": {"rest": tuple(rest[joint] for joint in split.joints)},
+        "keyframes": _keyframes(parts, split, rest),
         "reach": distance,
-        "source": f"guessed from {path.name}",
+        "source": f"guessed from {(file or path).name}",
         "allowed_collisions": (*allowed, *posture.overlapping),
         "limbs": _limbs(parts, rest),
     }
@@ -120,7 +133,9 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     repairs = [f"repaired: {repair}" for repair in cleaned.repairs]
     hands_too = (*_about_hands(parts), grasping) if parts.grippers else ()
     drives = parts.drives.reasons()
-    about = (*parts.anatomy.reasons, *tools, *hands_too, *drives, *posture.reasons, measured)
+    known = () if hints.limbs else hints.reasons
+    about = (*known, *parts.anatomy.reasons, *tools, *hands_too, *drives, *_out_of_limits(parts))
+    about = (*about, *posture.reasons, measured)
     given = tuple(f"{field}: given, not guessed" for field in overrides)
     return Guess(
         RobotDescriptor(**{**fields, **overrides}),
@@ -128,21 +143,35 @@ def guess(urdf: Path, name: str | None, overrides: dict[str, Any]) -> Guess:
     )
 
 
-def _look_at(path: Path, xml: bytes) -> _Parts:
+def _look_at(path: Path, xml: bytes, hints: Hints) -> _Parts:
     model = read_model(xml, path.as_posix())
-    anatomy = find_anatomy(model, path.as_posix())
+    anatomy = known_anatomy(model, find_anatomy(model, path.as_posix()), hints)
     stance = Stance(model)
     hulls = read_hulls(model, path) if find_spec("fcl") and find_spec("trimesh") else ()
     bodies: dict[int, list[Floats]] = {}
     for hull in hulls:
         bodies.setdefault(hull.link, []).append(hull.corners)
     masses = read_masses(parse_urdf(xml, path.as_posix()), stance.tree, bodies)
-    drives = Drives(stance, masses)
+    drives = Drives(stance, masses, hints.drives, hints.source)
     hands = [limb for limb in anatomy.limbs if limb.fingers]
     tips = {limb.name: Fingertips(stance, limb, hulls) for limb in hands}
-    tools = {limb.name: find_tool(stance, limb, tips.get(limb.name)) for limb in anatomy.limbs}
+    between = EXACT if hints.frames_at_joints else BETWEEN
+    tools = {
+        limb.name: _known_tool(model, limb, hints)
+        or find_tool(
+            stance, limb, tips.get(limb.name), between=between, before=hints.frames_at_joints
+        )
+        for limb in anatomy.limbs
+    }
     grippers = {limb.name: find_gripper(limb, tips[limb.name], drives) for limb in hands}
-    return _Parts(model, stance, anatomy, hulls, drives, tips, tools, grippers)
+    return _Parts(model, stance, anatomy, hulls, drives, tips, tools, grippers, hints)
+
+
+def _known_tool(model: UrdfModel, limb: Limb, hints: Hints) -> Tool | None:
+    """Return the tool centre point that is known as a limb's end, if any is."""
+    tip = known_tip(model, limb, hints)
+    which = f"{limb.name} TCP" if limb.name else "TCP"
+    return Tool(tip, (), f"{which}: the link {tip}, as {hints.source} says") if tip else None
 
 
 def _as_name(text: str) -> str:
@@ -192,6 +221,10 @@ def _about_hands(parts: _Parts) -> Iterator[str]:
 def _may_overlap(parts: _Parts, path: Path) -> tuple[LinkPairs, tuple[str, ...]]:
     """Return the pairs of links that may overlap, and the reasons."""
     allowed, reasons = guess_allowed(parts.model, path)
+    known = _known_pairs(parts, allowed)
+    if known:
+        reasons = (*reasons, _too(known, f"which {parts.hints.source} leaves out"))
+    allowed = (*allowed, *known)
     hands = _within_hands(parts, allowed)
     if hands:
         reasons = (*reasons, _too(hands, "of hands, which overlap while these are open"))
@@ -199,6 +232,14 @@ def _may_overlap(parts: _Parts, path: Path) -> tuple[LinkPairs, tuple[str, ...]]
     if still:
         reasons = (*reasons, _too(still, "of what is held still, which overlap there"))
     return (*allowed, *hands, *still), reasons
+
+
+def _known_pairs(parts: _Parts, allowed: LinkPairs) -> LinkPairs:
+    """Return the pairs of links that are known to be allowed, but those that are so anyhow."""
+    fixed = joined_pairs(parts.model) | rigid_pairs(parts.model) | {frozenset(p) for p in allowed}
+    links = set(parts.model.links)
+    pairs = [pair for pair in parts.hints.allowed if frozenset(pair) not in fixed]
+    return tuple({frozenset(pair): pair for pair in pairs if links.issuperset(pair)}.values())
 
 
 def _too(pairs: LinkPairs, why: str) -> str:
@@ -252,11 +293,58 @@ def _rest(parts: _Parts, allowed: LinkPairs) -> tuple[dict[str, float], Posture]
     hands = [gripper.postures for gripper in parts.grippers.values()]
     tools = [(limb, parts.tools[limb.name]) for limb in parts.anatomy.limbs]
     torso = parts.anatomy.parts.get("torso", ())
-    found = PostureSearch(parts.stance, tools, parts.hulls, pairs, hands, torso).run()
+    search = PostureSearch(parts.stance, tools, parts.hulls, pairs, hands, torso)
+    home = _home(parts)
+    where = f"the posture {home!r} of {parts.hints.source}"
+    found = search.given(parts.hints.postures[home], where) if home else search.run()
     rest = parts.stance.all_joints(found.position)
     for postures in hands:  # joints that one number drives need not mimic each other in the URDF
         rest |= next(p for p in postures if _agree(p, rest, parts.stance))
     return rest, found
+
+
+def _home(parts: _Parts) -> str:
+    """Return the name of a known posture to start from: of all joints of the arms, or none."""
+    arms = {j.name for limb in parts.anatomy.limbs for j in limb.arm if j.mimics is None}
+    whole = [name for name, joints in _postures(parts).items() if arms <= joints.keys()]
+    homes = [name for home in HOMES for name in whole if home in words.words(name)]
+    return next(iter((*homes, *(whole if parts.hints.first_is_home else ()))), "")
+
+
+def _postures(parts: _Parts) -> dict[str, Mapping[str, float]]:
+    """Return the known postures that keep within the joints' limits."""
+    return {
+        name: joints
+        for name, joints in parts.hints.postures.items()
+        if not any(_outside(parts, joint, at) for joint, at in joints.items())
+    }
+
+
+def _out_of_limits(parts: _Parts) -> Iterator[str]:
+    for name, joints in parts.hints.postures.items():
+        outside = [joint for joint, at in joints.items() if _outside(parts, joint, at)]
+        if outside:
+            yield (
+                f"the posture {name!r} of {parts.hints.source} is left out, as it is beyond the"
+                f" limits of {', '.join(outside)}"
+            )
+
+
+def _outside(parts: _Parts, joint: str, at: float) -> bool:
+    low, high = next(j.span for j in parts.model.moving if j.name == joint)
+    return not low - BEYOND <= at <= high + BEYOND
+
+
+def _keyframes(
+    parts: _Parts, split: ActionSplit, rest: Mapping[str, float]
+) -> dict[str, tuple[float, ...]]:
+    """Return the posture to rest in, and those that are known by name."""
+    spans = {joint.name: joint.span for joint in parts.model.moving}
+    found = {"rest": tuple(rest[joint] for joint in split.joints)}
+    for name, joints in _postures(parts).items():
+        at = {**rest, **{j: min(max(x, spans[j][0]), spans[j][1]) for j, x in joints.items()}}
+        found.setdefault(name, tuple(at[joint] for joint in split.joints))
+    return found
 
 
 def _agree(posture: Mapping[str, float], rest: Mapping[str, float], stance: Stance) -> bool:

@@ -1,7 +1,7 @@
 """`python -m robots.inspect panda`: joints, action numbers, gripper, cameras, files of a robot.
 
-ROBOT is a name of the catalogue, or the path of a URDF, whose descriptor is guessed. With `--try`
-robots are stood, stepped and moved in physics instead, and the report is what was seen.
+ROBOT is a name of the catalogue, or the path of a URDF or MJCF, whose descriptor is guessed. With
+`--try` robots are stood, stepped and moved in physics instead, and the report is what was seen.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from robots.assets.store import AssetStore, FileState, default_root
 from robots.common.commands import exit_code, print_error, program, start
 from robots.descriptor import JointGroup, RobotDescriptor
 from robots.fetch_assets import describe_file
+from robots.mjcf.locator import LocalMjcf
 from robots.named import named_robot
 from robots.registry import RobotRegistry
 from robots.urdf.model import ModelJoint
@@ -118,6 +119,9 @@ def find_urdf(robot: RobotDescriptor, store: AssetStore) -> tuple[Path | None, s
     if isinstance(urdf, LocalUrdf):
         path = urdf.locate()
         return path, str(path)
+    if isinstance(urdf, LocalMjcf):
+        path = urdf.locate()
+        return path, f"{path}, made of {urdf.path}"
     if not isinstance(urdf, UrdfLocator):
         return None, f"{urdf!r}: unknown kind of locator, not read"
     package = load_manifest().package(urdf.package)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import re
-import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import count
 from pathlib import Path
@@ -15,10 +14,12 @@ from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 import yaml
 
 from kinematics.quaternions import quaternion_rpy
+from layouts.export.folders import replaced_folder
+from layouts.export.names import Names
 from layouts.export.urdf import base_link
 from layouts.visuals import Part, load_meshes, read_visuals, require_trimesh, simplified
 from robots import LayoutError, RobotDescriptor
-from robots.common.writing import write_whole, written_whole
+from robots.common.writing import write_whole
 from robots.urdf.paths import resolve
 from robots.urdf.summary import parse_urdf, read_urdf
 
@@ -88,36 +89,18 @@ def _write_models(
     robots: Sequence[RobotDescriptor], folder: Path, visuals: bool
 ) -> dict[RobotDescriptor, Path]:
     """Write each robot once into a folder, which takes its place whole, and return the URDFs."""
-    names: dict[RobotDescriptor, str] = {}
-    for robot in robots:
-        if robot not in names:
-            twins = sum(other.name == robot.name for other in names)
-            names[robot] = f"{robot.name}_{twins + 1}" if twins else robot.name
-    _expect_own(folder)
-    with written_whole(folder) as made:
+    given = Names()
+    names = {robot: given.new(robot.name) for robot in dict.fromkeys(robots)}
+    with replaced_folder(folder, _is_own, "save the directives under another name") as made:
         for robot, name in names.items():
             urdf = robot.urdf.locate(pictures=visuals)
             drawn = read_visuals(urdf) if visuals else {}
             _write_model(urdf, drawn, made / name, f"{name}.urdf")
-        if folder.exists():
-            shutil.rmtree(folder)
     return {robot: folder / name / f"{name}.urdf" for robot, name in names.items()}
 
 
-def _expect_own(folder: Path) -> None:
-    """Refuse to replace a folder that holds anything but what an export leaves."""
-    strange = [
-        found.name for found in _listed(folder) if not (found / f"{found.name}.urdf").exists()
-    ]
-    if strange:
-        raise LayoutError(
-            f"{folder} would be replaced, but holds {', '.join(strange)}, which no export of a"
-            " layout leaves; move it, or save the directives under another name"
-        )
-
-
-def _listed(folder: Path) -> list[Path]:
-    return sorted(folder.iterdir()) if folder.is_dir() else []
+def _is_own(found: Path) -> bool:
+    return (found / f"{found.name}.urdf").exists()
 
 
 def _write_model(

@@ -19,10 +19,10 @@ from measurements.bench.command import add_arguments, run_benchmarks, settings_o
 from measurements.bench.episodes import timed_resets
 from measurements.bench.measurement import BenchmarkError, Measurement, by_series
 from measurements.bench.processes import PhysicsProcesses, TimedVector, vector
-from measurements.bench.readme_table import RECORD
 from measurements.bench.report import Report
 from measurements.bench.settings import Benchmark, Settings
 from measurements.bench.steps import PHYSICS, Played
+from measurements.bench.tables import RECORD
 from parity.compare.native_env import make_native, make_native_front, native_action
 from robots import RobotLayoutsError, TaskError
 from robots.common.commands import program, start
@@ -192,7 +192,7 @@ def _keep(report: Report) -> None:
     if report.left_out:
         raise BenchmarkError(f"nothing is recorded, as {', '.join(report.left_out)} was left out")
     write_whole(RECORD, report.as_json())
-    print(f"{RECORD}: recorded; `python -m parity readme` shows it in README.md")
+    print(f"{RECORD}: recorded; `python -m parity tables` shows it in docs/parity.md")
 
 
 if __name__ == "__main__":

@@ -26,12 +26,14 @@ class ExpectedArm:
         gripper: Its gripper's joints; none if it has no gripper.
         tcp: Links that are its TCP.
         tips: Links whose mean is, any of them.
+        offset: Where it is in the frame of one of ``tcp`` (m); its origin if empty.
     """
 
     joints: tuple[str, ...]
     gripper: tuple[str, ...] = ()
     tcp: tuple[str, ...] = ()
     tips: tuple[str, ...] = ()
+    offset: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,11 @@ class Expectations:
     def __init__(self, expected: Mapping[str, Expected]) -> None:
         """Take them in order."""
         self._expected = expected
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The patterns, in order."""
+        return tuple(self._expected)
 
     def of(self, key: str) -> Expected:
         """Return what is expected of a robot; if nothing is, its kind is unknown."""

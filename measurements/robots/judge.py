@@ -145,7 +145,9 @@ def _limbs(loaded: Seen, part: str) -> list[frozenset[str]]:
     for name, group in loaded["groups"].items():
         words = name.split("_")
         if part in words and group["numbers"]:
-            limb = "_".join(words[: words.index(part)])
+            here = words.index(part)
+            numbers = [word for word in words[here + 1 :] if word.isdigit()]
+            limb = "_".join([*words[:here], *numbers])
             limbs.setdefault(limb, set()).update(group["joints"])
     return [frozenset(limb) for limb in limbs.values()]
 

@@ -31,6 +31,7 @@ def survey(
     *,
     workers: int = 1,
     seconds: float = 180.0,
+    module: str | None = None,
 ) -> None:
     """Try robots.
 
@@ -39,12 +40,13 @@ def survey(
         keep: Called in this thread with what was seen of each, as soon as it is known.
         workers: Processes at a time.
         seconds: What each may take.
+        module: What a process runs, if not the probe of URDFs.
 
     Raises:
         OSError: If no process can be started.
     """
     with ThreadPoolExecutor(workers) as pool:
-        waiting = {pool.submit(probe, robot, seconds): robot for robot in robots}
+        waiting = {pool.submit(probe, robot, seconds, module): robot for robot in robots}
         try:
             for done in as_completed(waiting):
                 keep(waiting[done], done.result())
@@ -52,9 +54,9 @@ def survey(
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def probe(robot: Robot, seconds: float) -> Seen:
+def probe(robot: Robot, seconds: float, module: str | None = None) -> Seen:
     """Return what one process sees of a robot; ``ended`` says how, where it did not end well."""
-    command = [sys.executable, "-m", PROBE, str(robot.urdf)]
+    command = [sys.executable, "-m", module or PROBE, str(robot.urdf)]
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as errors:
         with running(

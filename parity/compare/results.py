@@ -15,7 +15,7 @@ RESULTS = Path(__file__).parents[1] / "results.json"
 
 
 class ResultsError(RobotLayoutsError, ValueError):
-    """A record of comparisons, or a README, that cannot be read."""
+    """A record of comparisons, or a page, that cannot be read."""
 
 
 def record(found: Mapping[str, Any], summaries: Mapping[str, Summary]) -> str:

@@ -1,1 +1,1 @@
-"""The recorded results, and the tables that README.md shows of them."""
+"""The recorded results, and the tables that docs/parity.md shows of them."""

@@ -50,7 +50,7 @@ COMMANDS: Mapping[str, Command] = {
         soak="step all tasks for long; nothing may grow",
     ),
     "tasks": Command("tasks.__main__", "list tasks, describe one, or look at it"),
-    "layouts": Command("layouts.__main__", "show, validate or look at a layout"),
+    "layouts": Command("layouts.__main__", "show, validate, export or look at a layout"),
     "robots inspect": Command("robots.inspect", "joints, action numbers and files of robots"),
     "robots fetch": Command("robots.fetch_assets", "bring the files of robots here, or check them"),
     "robots guess": Command("robots.from_urdf", "guess a robot from its URDF"),
@@ -96,18 +96,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return MEANINGLESS
 
 
-def _run(command: Command, words: Sequence[str]) -> int:
-    spelt = {
+def spellings() -> dict[str, str]:
+    """Return how the console script calls the command of each module; see `commands_spelt`."""
+    return {
         about.module.removesuffix(".__main__"): f"{NAME} {name}".removesuffix(
             f" {' '.join(about.words)}"
         )
         for name, about in COMMANDS.items()
     }
+
+
+def _run(command: Command, words: Sequence[str]) -> int:
     with suppress(OSError):  # it may have been deleted
         if (folder := os.getcwd()) not in sys.path:
             sys.path.append(folder)
     module: Any = import_module(command.module)
-    with commands_spelt(spelt):
+    with commands_spelt(spellings()):
         return module.main([*command.words, *words])
 
 

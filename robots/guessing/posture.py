@@ -75,11 +75,27 @@ class PostureSearch:
         """
         self._stance, self._hulls, self._pairs = stance, hulls, np.array(pairs, int).reshape(-1, 2)
         self._start = self._posed = self._opened(hands)
+        self._hands = {joint for choices in hands for joint in choices[0]}
         self._front = np.array([1.0, 0.0, 0.0])
         self._generator = np.random.default_rng(0)
         self._torso = torso
         self._views = [View(stance, limb, tool) for limb, tool in tools if _searchable(limb)]
         self._ground = self._lowest()
+
+    def given(self, joints: Mapping[str, float], where: str) -> Posture:
+        """Return a posture that is known, with the hands open.
+
+        Args:
+            joints: Where joints are (rad, m); the others stay where the search starts.
+            where: What says so, for the reason.
+        """
+        known = {
+            leader.name: min(max(joints[leader.name], leader.span[0]), leader.span[1])
+            for leader in self._stance.leaders
+            if leader.name in joints and leader.name not in self._hands
+        }
+        about = f"{where}, the hands open" if self._hands else where
+        return self._made(self._stance.with_joints(known, self._start), about)
 
     def run(self) -> Posture:
         """Return the posture with all joints at 0 or mid-range if it is fine, else a better one."""
@@ -111,9 +127,7 @@ class PostureSearch:
         reasons = [f"keyframe 'rest': {about}"]
         if pairs:
             listing = ", ".join(f"{one} and {other}" for one, other in pairs)
-            reasons.append(
-                f"allowed_collisions, too: {listing}, which overlap in the best posture there is"
-            )
+            reasons.append(f"allowed_collisions, too: {listing}, which overlap in that posture")
         return Posture(position, pairs, tuple(reasons))
 
     def _starts(self) -> Iterator[Floats]:

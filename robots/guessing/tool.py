@@ -42,16 +42,28 @@ class Tool:
         return place_tcp(tree, self.link, self.links, self.offset)
 
 
-def find_tool(stance: Stance, limb: Limb, tips: Fingertips | None) -> Tool:
+def find_tool(
+    stance: Stance,
+    limb: Limb,
+    tips: Fingertips | None,
+    *,
+    between: float = BETWEEN,
+    before: bool = False,
+) -> Tool:
     """Return the tool centre point of a limb.
 
     Args:
         stance: The robot.
         limb: The limb.
         tips: The tips of its fingers, if it has any.
+        between: How far from the place between the tips the middle of the fingers' frames may be
+            and still count (m).
+        before: Whether frames count, too, that are rigid with the palm but carried by what is
+            before it.
     """
     which = f"{limb.name} TCP" if limb.name else "TCP"
-    rigid = [link for link in stance.model.rigid_with(limb.palm) if link != limb.palm]
+    start = _first_rigid(stance, limb.palm) if before else limb.palm
+    rigid = [link for link in stance.model.rigid_with(start) if link != limb.palm]
     rigid = [link for link in rigid if not words.has(link, BLIND)]
     for known, what in ((words.TCP, "tcp"), (words.GRASP, "a grasp")):
         named = [link for link in (*rigid, limb.palm) if words.has(link, known)]
@@ -61,7 +73,15 @@ def find_tool(stance: Stance, limb: Limb, tips: Fingertips | None) -> Tool:
             return Tool(named[0], (), reason + also)
     if tips is None:
         return _end(stance, limb, rigid, which)
-    return _between(stance, limb, rigid, tips, which)
+    return _between(stance, limb, rigid, tips, which, between)
+
+
+def _first_rigid(stance: Stance, link: str) -> str:
+    """Return the first of the links that are rigid with one, seen from the root."""
+    carriers = stance.model.parent_joint
+    while link in carriers and not carriers[link].moves:
+        link = carriers[link].parent
+    return link
 
 
 def _end(stance: Stance, limb: Limb, rigid: list[str], which: str) -> Tool:
@@ -70,7 +90,7 @@ def _end(stance: Stance, limb: Limb, rigid: list[str], which: str) -> Tool:
         lambda link: "tool" in words.words(link),
         words.is_tool,
         lambda link: words.has(link, words.TOOL),
-        lambda link: words.has(link, (*words.HAND, "flange")),
+        lambda link: words.has(link, (*words.HAND, *words.FLANGE)),
     )
     for fits in ranks:
         named = [link for link in rigid if fits(link)]
@@ -93,7 +113,9 @@ def _has_shape(stance: Stance, link: str) -> bool:
     return link in stance.model.collisions or link in stance.model.visuals
 
 
-def _between(stance: Stance, limb: Limb, rigid: list[str], tips: Fingertips, which: str) -> Tool:
+def _between(
+    stance: Stance, limb: Limb, rigid: list[str], tips: Fingertips, which: str, near: float
+) -> Tool:
     """Return the frame, or the mean of two, that lies nearest between the finger tips."""
     middle, everywhere = tips.middle(), stance.places(stance.tree.links)
 
@@ -113,7 +135,7 @@ def _between(stance: Stance, limb: Limb, rigid: list[str], tips: Fingertips, whi
         reason = f"{which}: the link {named[1]}, which lies between the finger tips"
         return Tool(named[1], (), reason)
     frames = _grasping(stance, tips)
-    if off(frames) <= BETWEEN:
+    if off(frames) <= near:
         return _mean(limb, frames, which, off(frames))
     if tips.solid:
         return _beside(stance, limb, which, off((limb.palm,)), middle)

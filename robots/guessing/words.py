@@ -37,10 +37,11 @@ WHEEL = (
 TORSO = ("torso", "waist", "spine", "trunk", "chest", "lumbar", "thoracic", "lift", "column")
 ARM = ("arm", "shoulder", "elbow", "wrist", "forearm", "upperarm", "lowerarm", "clavicle")
 TCP = ("tcp",)
-GRASP = ("grasp", "grasping", "grasptarget", "pinch")
+GRASP = ("grasp", "grasping", "grasptarget", "pinch", "grip")
 TOOL = ("tool", "tip", "nozzle", "suction", "vacuum", "cup")
 END = ("ee", "eef", "endeffector", "effector")
 HAND = ("gripper", "hand")
+FLANGE = ("flange", "attachment")
 TIP = ("tip", "fingertip")
 
 LEFT = ("left", "l", "lf", "lh")

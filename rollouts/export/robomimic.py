@@ -99,10 +99,11 @@ class RobomimicWriter(DatasetWriter):
     def _names(self) -> dict[str, Sequence[str]]:
         """Return what each number of the datasets is called, by dataset."""
         names: dict[str, Sequence[str]] = {"actions": self._reader.action_names}
-        for place, placement in self._reader.task.layout.items():
-            joints = placement.robot.joints
-            names |= {f"{place}_qpos": joints, f"{place}_qvel": joints}
-        names |= {f"{arm}_tcp_pose": POSE for arm in self._reader.task.layout.arms}
+        layout = self._reader.task.layout
+        for arm in layout.arms:
+            place = arm.partition(".")[0]
+            joints = layout[place].robot.joints
+            names |= {f"{place}_qpos": joints, f"{place}_qvel": joints, f"{arm}_tcp_pose": POSE}
         return names | {"object": self._reader.body_names}
 
 

@@ -1,4 +1,4 @@
-"""Robots that were guessed from a user's own URDF: how a recording names them."""
+"""Robots that were guessed from a user's own URDF or MJCF: how a recording names them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from dataclasses import fields
 from pathlib import Path
 
 from layouts import Layout
-from robots import LocalUrdf, RobotDescriptor, RobotRegistry, UnreadableFileError
+from robots import LocalMjcf, LocalUrdf, RobotDescriptor, RobotRegistry, UnreadableFileError
 from robots.common.files import read_regular
+from robots.mjcf.locator import is_mjcf
 from robots.urdf.summary import MAX_URDF_BYTES
 from rollouts.reading import json_fields
 from rollouts.reading.json_fields import TEXT, by_name, maybe
@@ -76,11 +77,13 @@ def guess_again(place: str, recorded: Mapping[str, str], name: str) -> RobotDesc
 
 
 def _own_file(robot: RobotDescriptor) -> Path | None:
-    if not isinstance(robot.urdf, LocalUrdf):
+    if not isinstance(robot.urdf, LocalUrdf | LocalMjcf):
         return None
     if robot.name in RobotRegistry.names() and RobotRegistry.load(robot.name) == robot:
         return None
     path = Path(robot.urdf.path).expanduser().absolute()
+    if is_mjcf(path) != isinstance(robot.urdf, LocalMjcf):
+        return None  # which its path alone does not tell
     return path if path.is_file() else None  # and no template with arguments
 
 

@@ -221,19 +221,21 @@ class Observer:
 
     def _state(self, simulation: Simulation, state: State, parts: Mapping[str, Array]) -> Any:
         index = simulation.index
+        robots = [
+            [
+                native_joints(index, name, state.qpos(name)),
+                native_joints(index, name, state.qvel(name)),
+            ]
+            for name in self._robots
+        ]
         kept = controllers.entries(simulation)
-        rows = controllers.recall(simulation, kept)
-        robots: list[dict[str, Floats]] = []
-        for name in self._robots:
-            own = {key: native_joints(index, name, getattr(state, key)(name)) for key in JOINTS}
-            for entry, row in zip(kept, rows, strict=True):
-                if entry.robot == name:
-                    own[f"{controllers.CONTROLLER}/{entry.key}"] = row
-            robots.append(own)
-        return self._flat(robots, parts) if self.mode.flat else self._named(robots, parts)
+        if kept:
+            for entry, row in zip(kept, controllers.recall(simulation, kept), strict=True):
+                robots[self._robots.index(entry.robot)].append(row)
+        return self._flat(robots, parts) if self.mode.flat else self._named(robots, kept, parts)
 
-    def _flat(self, robots: Sequence[Mapping[str, Floats]], parts: Mapping[str, Array]) -> Floats:
-        joined = [row for own in robots for row in own.values()]
+    def _flat(self, robots: Sequence[Sequence[Floats]], parts: Mapping[str, Array]) -> Floats:
+        joined = [row for own in robots for row in own]
         joined.extend(part if part.ndim == 2 else part[:, None] for part in parts.values())
         flat = np.concatenate(joined, 1, dtype=np.float32)
         if not all_finite(flat):
@@ -241,14 +243,19 @@ class Observer:
         return flat
 
     def _named(
-        self, robots: Sequence[Mapping[str, Floats]], parts: Mapping[str, Array]
+        self,
+        robots: Sequence[Sequence[Floats]],
+        kept: Sequence[controllers.Entry],
+        parts: Mapping[str, Array],
     ) -> dict[str, Any]:
-        joints = [row for own in robots for row in own.values()]
+        joints = [row for own in robots for row in own]
         if not all(map(all_finite, (*joints, *parts.values()))):
             raise NotFinite
         agent: dict[str, Any] = {}
-        for key, own in zip(self._keys.values(), robots, strict=True):
-            tree = controllers.nested({name: row.copy() for name, row in own.items()})
+        for (name, key), own in zip(self._keys.items(), robots, strict=True):
+            remembered = [f"{controllers.CONTROLLER}/{e.key}" for e in kept if e.robot == name]
+            rows = zip((*JOINTS, *remembered), own, strict=True)
+            tree = controllers.nested({row_name: row.copy() for row_name, row in rows})
             agent.update(tree if key is None else {key: tree})
         return {"agent": agent, "extra": {key: x.copy() for key, x in parts.items()}}
 

@@ -111,7 +111,7 @@ class Relay(MultiRobotTask):
             "baton_to_zone_pos": self._next_zone(state, visited) - state.position("baton"),
             "share_visited": floats(visited) / len(self._zones),
         }
-        for robot in self.layout.arms:
+        for robot in self._arms:
             parts[f"{robot}_tcp_pose"] = state.tcp_pose(robot)
             parts[f"{robot}_tcp_to_baton_pos"] = state.tcp_offset(robot, "baton")
         return parts
@@ -119,7 +119,7 @@ class Relay(MultiRobotTask):
     def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Zones visited, and for the next its robot's reach (0.3) and the way (0.6); 1 in all."""
         visited = info["zones_visited"]
-        ways = [state.tcp_distance(robot, "baton") for robot in self.layout.arms]
+        ways = [state.tcp_distance(robot, "baton") for robot in self._arms]
         turn = minimum(visited, len(ways) - 1)
         reach, carry = closeness(
             stack(ways)[turn, state.env_ids],
@@ -127,6 +127,10 @@ class Relay(MultiRobotTask):
         )
         reward = floats(visited) + 0.3 * reach + 0.6 * carry
         return where(info["success"], 1.0, reward / (len(ways) + 1))
+
+    @cached_property
+    def _arms(self) -> tuple[str, ...]:
+        return tuple(self.layout.arms)
 
     @cached_property
     def _zones(self) -> tuple[Vector3, ...]:

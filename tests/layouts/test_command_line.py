@@ -109,3 +109,27 @@ def test_it_runs_as_a_module():
     command = [sys.executable, "-m", "layouts", "show", "single", "arm=panda"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout.startswith("1 robot, 8 action numbers\n")
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "written"),
+    [
+        ("mjcf", "cell.xml", "cell.xml"),
+        ("ros2", "cell", "cell/config/cell.srdf"),
+        ("urdf", "cell.urdf", "cell.urdf"),
+        ("drake", "cell.dmd.yaml", "cell.dmd.yaml"),
+    ],
+)
+def test_export_writes_a_layout(kind, name, written, tmp_path, capsys):
+    layout = single({"arm": "floating_panda_gripper"}).save(tmp_path / "cell.yaml")
+    out = tmp_path / "out" / name
+    words = ["export", str(layout), "--format", kind, "--out", str(out), "--no-visuals"]
+    assert run(*words, capsys=capsys)[:2] == (0, f"{kind}: {out}\n")
+    assert (tmp_path / "out" / written).is_file()
+
+
+def test_export_says_what_a_format_takes(tmp_path, capsys):
+    words = ["export", "single", "arm=panda", "--format", "mjcf", "--out", str(tmp_path / "a.urdf")]
+    status, out, err = run(*words, capsys=capsys)
+    assert (status, out) == (1, "")
+    assert err == "error: cannot save MJCF as 'a.urdf'; the name must end in .xml\n"

@@ -8,7 +8,7 @@ import pytest
 
 import tasks
 from measurements.bench import native as bench
-from measurements.bench import readme_table as bench_table
+from measurements.bench import tables as bench_table
 from measurements.bench.native import benchmarks, vectors
 from measurements.bench.report import read
 from measurements.bench.settings import Settings

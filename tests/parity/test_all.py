@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tasks
-from measurements.readme import markdown
+from measurements.tables import markdown
 from parity.__main__ import main
 from parity.compare.command import parser, plan
 from parity.compare.episodes import over_range_episodes

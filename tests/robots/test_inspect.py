@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from robots import RobotRegistry
+from robots.assets.store import AssetStore, default_root
 from robots.inspect import find_urdf, main, report
 from tests.catalogue import every_robot
 
@@ -16,9 +17,9 @@ ROBOTS = RobotRegistry.names()
 
 
 @pytest.mark.parametrize("name", every_robot())
-def test_a_report_names_every_joint_number_keyframe_and_camera(name, store):
+def test_a_report_names_every_joint_number_keyframe_and_camera(name):
     robot = RobotRegistry.load(name)
-    text = report(robot, store)
+    text = report(robot, AssetStore(default_root()))
     for part in (*robot.joints, *robot.keyframes, robot.source, robot.tcp_link):
         assert part in text
     for number in robot.describe_action():

@@ -149,7 +149,7 @@ def test_what_comes_along_and_is_wrong_is_no_reason_to_fail(index, store, physic
 
 @pytest.mark.long
 def test_no_room_for_what_comes_along_is_no_reason_to_fail(index, physics, tmp_path, capfd):
-    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1M", "none", tmp_path]).returncode:
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1600K", "none", tmp_path]).returncode:
         pytest.skip("may not mount a small disk")
     try:
         store = AssetStore(tmp_path / "assets")

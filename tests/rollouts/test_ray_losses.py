@@ -90,11 +90,11 @@ def test_an_actor_that_is_stopped(nodes):
 
 @pytest.mark.long
 def test_an_actor_that_is_stopped_before_it_is_ready(nodes, monkeypatch, tmp_path):
-    monkeypatch.setattr(rollouts.playing.dispatch, "START_SECONDS", 15.0)
+    monkeypatch.setattr(rollouts.playing.dispatch, "START_SECONDS", 30.0)
     executor = RayExecutor(nodes.address, 1, modules=MODULES)
     played = list(executor.run(StopsItselfOnce(tmp_path), range(6)))
     (death,) = [event for event in played if event.died is not None]
-    assert "was not ready within 15 s and was ended" in death.died
+    assert "was not ready within 30 s and was ended" in death.died
     assert squares(played) == {seed: seed**2 for seed in range(6)}
     nodes.wait_for_no_player()
 
@@ -185,7 +185,7 @@ def test_a_short_recording_may_go_on_without_the_head(nodes, tmp_path):
 
 @contextmanager
 def guarded_head(monkeypatch, tmp_path):
-    """Start a head that asks for a token, as README shows it; yields its address."""
+    """Start a head that asks for a token, as the tutorial does; yields its address."""
     folder = tempfile.mkdtemp(prefix="ray-")  # short: it holds sockets
     monkeypatch.setenv("RAY_TMPDIR", folder)
     monkeypatch.setenv("HOME", str(tmp_path))

@@ -1,0 +1,314 @@
+"""What every format asks of a layout: links, joints, masses, drives and poses of its robots."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from kinematics.rotations import Floats, inverse_pose, pose_matrix, rpy_pose, transform
+from layouts.arrangement import Arrangement
+from layouts.export.names import Names
+from layouts.placement import Placement
+from robots import AssetError, RobotDescriptor
+from robots.bodies.allowed import LinkPair, read_allowed_pairs
+from robots.common.commands import notice
+from robots.descriptor import JointGroup
+from robots.urdf.inertia import MOMENTS, PRODUCTS
+from robots.urdf.model import ModelJoint, UrdfModel
+from robots.urdf.numbers import numbers_of
+from robots.urdf.reading import read_model
+from robots.urdf.summary import parse_urdf, read_urdf
+from robots.urdf.tcp import find_tcp
+from robots.urdf.tree import kinematic_tree
+
+TABLE_DEPTH = 0.9  # m; tables are solid, from their tops down, as checks of layouts have them
+SMALLEST_INERTIA = 1e-6  # kg, kg·m²; of links that move and have none, as SAPIEN takes it
+
+
+@dataclass(frozen=True, eq=False)
+class Inertial:
+    """Mass and inertia of a link.
+
+    Attributes:
+        mass: In kg.
+        position: Centre of mass in the link's frame, (3,) (m).
+        tensor: Inertia about it, along the axes of the link's frame, (3, 3) (kg·m²).
+    """
+
+    mass: float
+    position: Floats
+    tensor: Floats
+
+
+@dataclass(frozen=True)
+class Drive:
+    """How the descriptor drives a joint; see `robots.JointGroup` for the units.
+
+    Attributes:
+        stiffness: Of the spring.
+        damping: Of the damper.
+        force: The largest force.
+        armature: Inertia of motor and gear.
+        friction: PhysX's coefficient.
+    """
+
+    stiffness: float
+    damping: float
+    force: float
+    armature: float
+    friction: float
+
+
+@dataclass(frozen=True, eq=False)
+class RobotSource:
+    """A robot's description and files, read once for all its places.
+
+    Attributes:
+        robot: Its descriptor.
+        name: What its files are called in an export.
+        urdf: Its URDF.
+        root: The ``<robot>`` of that, repaired where it is clear how.
+        model: What it describes.
+        drawn: Whether the files that it is drawn by are there.
+    """
+
+    robot: RobotDescriptor
+    name: str
+    urdf: Path
+    root: Element
+    model: UrdfModel
+    drawn: bool
+
+    @cached_property
+    def inertials(self) -> dict[str, Inertial]:
+        """Masses and inertias by link; links whose shapes give them are left out."""
+        found: dict[str, Inertial] = {}
+        moved = {joint.child for joint in self.model.moving}
+        for link in self.root.iterfind("link"):
+            name = link.get("name", "")
+            inertial = _inertial(link)
+            if inertial is not None:
+                found[name] = inertial
+            elif name in moved and name not in self.model.collisions:
+                tensor = SMALLEST_INERTIA * np.eye(3)
+                found[name] = Inertial(SMALLEST_INERTIA, np.zeros(3), tensor)
+        return found
+
+    @cached_property
+    def dynamics(self) -> dict[str, tuple[float, float]]:
+        """Damping and friction that the URDF gives joints (N·m·s/rad and N·m, N·s/m and N)."""
+        found: dict[str, tuple[float, float]] = {}
+        for joint in self.root.iterfind("joint"):
+            part = joint.find("dynamics")
+            if part is not None:
+                damping, friction = (
+                    max(0.0, numbers_of(part, key, (0.0,), str(self.urdf))[0])
+                    for key in ("damping", "friction")
+                )
+                found[joint.get("name", "")] = (damping, friction)
+        return found
+
+    @cached_property
+    def drives(self) -> dict[str, Drive]:
+        """Drives by joint, in the descriptor's order."""
+        groups = self.robot.action_split.groups.values()
+        return {joint: drive for group in groups for joint, drive in _drives(group)}
+
+    @cached_property
+    def allowed(self) -> frozenset[LinkPair]:
+        """Pairs of links with shapes whose contacts do not count; see `robots.bodies.allowed`."""
+        pairs = read_allowed_pairs(self.robot, self.model, self.urdf)
+        return frozenset(pair for pair in pairs if pair <= self.model.collisions.keys())
+
+    @property
+    def followers(self) -> tuple[ModelJoint, ...]:
+        """Joints that follow another one, by the URDF."""
+        return tuple(joint for joint in self.model.moving if joint.mimics is not None)
+
+    @property
+    def leaders(self) -> tuple[str, ...]:
+        """Joints that the descriptor drives and that follow none, in its order."""
+        following = {joint.name for joint in self.followers}
+        return tuple(joint for joint in self.robot.joints if joint not in following)
+
+    def friction_of(self, link: str) -> tuple[float, float] | None:
+        """Return static and dynamic friction of a link's surface, if the descriptor has them."""
+        material = self.robot.gripper_material
+        if material is None or link not in material.links:
+            return None
+        return material.static_friction, material.dynamic_friction
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A robot in its place.
+
+    Attributes:
+        place: The place's name.
+        placement: Where it stands, and how it starts.
+        source: Its description.
+    """
+
+    place: str
+    placement: Placement
+    source: RobotSource
+
+    @cached_property
+    def base(self) -> Floats:
+        """Pose of the root link in the world, (4, 4) (m)."""
+        return pose_matrix(self.placement.base_position, self.placement.base_quaternion)
+
+    @cached_property
+    def home(self) -> dict[str, float]:
+        """Position of every joint that moves where the layout starts the robot (rad, m)."""
+        robot, model = self.placement.robot, self.source.model
+        home = dict(zip(robot.joints, self.placement.start_qpos, strict=True))
+        waiting = list(self.source.followers)
+        while waiting:
+            joint = waiting.pop(0)
+            following = {other.name for other in waiting}
+            if joint.mimics in following:
+                waiting.append(joint)
+            else:
+                home[joint.name] = joint.multiplier * home[joint.mimics or ""] + joint.offset
+        return {joint.name: home[joint.name] for joint in model.moving}
+
+    @cached_property
+    def poses(self) -> dict[str, Floats]:
+        """Pose of every link in the world at `home`, (4, 4) (m)."""
+        tree = kinematic_tree(self.source.model)
+        qpos = np.array([[self.home[joint] for joint in tree.coordinates]])
+        return dict(zip(tree.links, self.base @ tree.forward(qpos)[0], strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Tool:
+    """A tool centre point, fixed to the link that orients it where it is at home.
+
+    Attributes:
+        arm: The arm's name: a place, or ``place.limb``.
+        place: The robot's place.
+        link: The link.
+        position: In the link's frame, (3,) (m).
+    """
+
+    arm: str
+    place: str
+    link: str
+    position: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class ExportedCell:
+    """A layout, with all that an export reads of its robots' files.
+
+    Attributes:
+        layout: The layout.
+        robots: The robots, by place.
+    """
+
+    layout: Arrangement
+    robots: Mapping[str, Standing]
+
+    @classmethod
+    def read(cls, layout: Arrangement, *, visuals: bool) -> ExportedCell:
+        """Read the robots' files.
+
+        Args:
+            layout: The layout.
+            visuals: Whether the files that only pictures need are wanted, too. A robot without
+                them is drawn by its collision shapes; a notice says so.
+
+        Raises:
+            AssetError: If a robot's files cannot be found or make no sense.
+            DescriptorError: If a descriptor contradicts its URDF.
+        """
+        sources: dict[RobotDescriptor, RobotSource] = {}
+        names = Names()
+        for placement in layout.values():
+            robot = placement.robot
+            if robot not in sources:
+                name = names.new(robot.name)
+                sources[robot] = _source(robot, name, visuals=visuals)
+        return cls(layout, {n: Standing(n, p, sources[p.robot]) for n, p in layout.items()})
+
+    @property
+    def sources(self) -> tuple[RobotSource, ...]:
+        """What the robots are, each once."""
+        return tuple({id(robot.source): robot.source for robot in self.robots.values()}.values())
+
+    @property
+    def tools(self) -> Iterator[Tool]:
+        """The tool centre points of all arms, in their order."""
+        for arm, part in self.layout.arms.items():
+            place = self.layout.owner(arm)
+            standing = self.robots[place]
+            tree = kinematic_tree(standing.source.model)
+            tcp = find_tcp(part.robot, tree)
+            poses = np.array([[standing.poses[link] for link in tree.links]])
+            turned = poses[0, tcp.turned]
+            position = transform(inverse_pose(turned), tcp.places(poses)[0])
+            yield Tool(arm, place, tree.links[tcp.turned], position)
+
+    @property
+    def tables(self) -> dict[str, tuple[Floats, Floats]]:
+        """Tables as solid boxes: pose of the middle, (4, 4), and size, (3,) (m), by name."""
+        frames, found = self.layout.frame_poses, dict[str, tuple[Floats, Floats]]()
+        for name, pose in frames.items():
+            edges = [frames.get(f"{name}.{edge}") for edge in ("east", "west", "north", "south")]
+            if any(edge is None for edge in edges):
+                continue
+            east, west, north, south = (np.array(edge.position) for edge in edges if edge)
+            middle = pose_matrix(pose.position, pose.quaternion)
+            size = np.array([np.linalg.norm(east - west), np.linalg.norm(north - south), 0.0])
+            size[2] = TABLE_DEPTH
+            middle[:3, 3] -= middle[:3, 2] * TABLE_DEPTH / 2
+            found[name] = (middle, size)
+        return found
+
+
+def _source(robot: RobotDescriptor, name: str, *, visuals: bool) -> RobotSource:
+    urdf, drawn = _located(robot) if visuals else (robot.urdf.locate(), False)
+    contents = read_urdf(urdf)
+    model = read_model(contents, str(urdf))
+    kinematic_tree(model, robot.joints)  # refuses a descriptor that contradicts its URDF
+    return RobotSource(robot, name, urdf, parse_urdf(contents, str(urdf)), model, drawn)
+
+
+def _located(robot: RobotDescriptor) -> tuple[Path, bool]:
+    """Return a robot's URDF, and whether the files that it is drawn by are there."""
+    try:
+        return robot.urdf.locate(pictures=True), True
+    except AssetError as error:
+        urdf = robot.urdf.locate()
+        notice(f"{robot.name} is drawn by its collision shapes: {error}")
+        return urdf, False
+
+
+def _drives(group: JointGroup) -> Iterator[tuple[str, Drive]]:
+    for joint, drive, armature in zip(group.joints, group.drives, group.armatures, strict=True):
+        yield joint, Drive(*drive, armature, group.friction)
+
+
+def _inertial(link: Element) -> Inertial | None:
+    """Return mass and inertia of a link, or None if its URDF gives none or zeros."""
+    inertial, where = link.find("inertial"), f"link {link.get('name')!r}"
+    if inertial is None:
+        return None
+    mass, tensor, origin = (inertial.find(tag) for tag in ("mass", "inertia", "origin"))
+    weight = numbers_of(mass, "value", (0.0,), where)[0]
+    xx, yy, zz, xy, xz, yz = (
+        numbers_of(tensor, key, (0.0,), where)[0] for key in (*MOMENTS, *PRODUCTS)
+    )
+    if weight == 0 or not any((xx, yy, zz)):
+        return None
+    xyz, rpy = (numbers_of(origin, key, (0.0, 0.0, 0.0), where) for key in ("xyz", "rpy"))
+    pose = rpy_pose(xyz, rpy)
+    turn = pose[:3, :3]
+    own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return Inertial(weight, pose[:3, 3], turn @ own @ turn.T)

@@ -1,0 +1,42 @@
+"""Folders that an export fills, and only then puts in the place of those of an earlier one."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from pathlib import Path
+
+from robots import LayoutError
+from robots.common.writing import PARTIAL, remove, written_whole
+
+LICENCES = "LICENCES.md"  # a note on those of robot files
+
+
+@contextmanager
+def replaced_folder(folder: Path, is_own: Callable[[Path], bool], advice: str) -> Generator[Path]:
+    """Give a folder to fill; at the end it takes the place of what an earlier export left.
+
+    Args:
+        folder: The folder to be.
+        is_own: Tells of what lies in a folder of that name whether an export leaves such.
+        advice: What to do if there is something else, for the message.
+
+    Raises:
+        LayoutError: If the folder holds something else, which would be lost.
+        UnwritableFileError: If it cannot be written.
+    """
+    there = sorted(folder.iterdir()) if folder.is_dir() else []
+    strange = [found.name for found in there if not is_own(found)]
+    if strange:
+        raise LayoutError(
+            f"{folder} would be replaced, but holds {', '.join(strange)}, which no export of a"
+            f" layout leaves; move it, or {advice}"
+        )
+    with written_whole(folder) as made:
+        made.mkdir(parents=True)
+        yield made
+        old = made.with_name(f"{made.name.removesuffix(PARTIAL)}.old{PARTIAL}")
+        if folder.is_dir():
+            os.replace(folder, old)
+    remove(old)

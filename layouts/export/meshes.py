@@ -1,0 +1,139 @@
+"""What robots look like and collide with, as mesh files that other programs read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kinematics.rotations import Floats
+from layouts.export.cell import RobotSource
+from layouts.export.names import Names
+from layouts.visuals import GREY, Rgba, read_visuals, simplified
+from robots import AssetError, MissingPackageError
+from robots.bodies.hulls import shape_corners
+from robots.urdf.shapes import SIZES, UrdfShape
+
+AS_HULLS = ("mesh", "capsule")  # of which most formats' own shapes are not what they are here
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A mesh that is drawn.
+
+    Attributes:
+        mesh: A trimesh in the link's frame (m).
+        rgba: Its colour.
+    """
+
+    mesh: Any
+    rgba: Rgba
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A shape that collides.
+
+    Attributes:
+        shape: The shape of the URDF.
+        hull: Its convex hull in the link's frame, a trimesh (m); None for a shape that the format
+            has itself.
+    """
+
+    shape: UrdfShape
+    hull: Any
+
+
+def drawn_meshes(source: RobotSource, *, visuals: bool) -> dict[str, tuple[Drawn, ...]]:
+    """Return what is drawn of each link; meshes of very many triangles are made coarser.
+
+    Args:
+        source: The robot.
+        visuals: Whether anything is to be drawn.
+
+    Raises:
+        AssetError: If a mesh is missing or cannot be read.
+        MissingPackageError: If trimesh is not installed.
+    """
+    if not visuals:
+        return {}
+    if not source.drawn:
+        solids = solid_shapes(source, hulls=tuple(SIZES))
+        return {link: tuple(Drawn(s.hull, GREY) for s in some) for link, some in solids.items()}
+    parts = read_visuals(source.urdf)
+    coarse = {link: map(simplified, of_link) for link, of_link in parts.items()}
+    return {link: tuple(Drawn(p.mesh, p.rgba) for p in some) for link, some in coarse.items()}
+
+
+def solid_shapes(
+    source: RobotSource, hulls: Sequence[str] = AS_HULLS
+) -> dict[str, tuple[Solid, ...]]:
+    """Return what each link collides with: plain shapes, and convex hulls of the others.
+
+    Args:
+        source: The robot.
+        hulls: Kinds of shapes that are given as their hulls, the same that checks of layouts use.
+
+    Raises:
+        AssetError: If a mesh is missing or cannot be read, or a shape has no volume.
+        MissingPackageError: If trimesh or scipy is not installed.
+    """
+    return {
+        link: tuple(
+            Solid(shape, _hull(shape, source) if shape.kind in hulls else None) for shape in shapes
+        )
+        for link, shapes in source.model.collisions.items()
+    }
+
+
+def _hull(shape: UrdfShape, source: RobotSource) -> Any:
+    corners = shape_corners(shape, source.urdf)
+    try:
+        import scipy  # noqa: F401  # pyright: ignore[reportUnusedImport]
+        import trimesh
+    except ImportError as error:
+        raise MissingPackageError(
+            "convex hulls need trimesh and scipy: pip install 'robot-layouts[checks]'"
+        ) from error
+    try:
+        return trimesh.convex.convex_hull(corners)
+    except Exception as error:  # qhull's own, for what is all but flat
+        raise AssetError(f"{shape.where}: a collision shape without a volume") from error
+
+
+class MeshFolder:
+    """A folder of binary STL files, whose names lead to no other folder."""
+
+    def __init__(self, folder: Path) -> None:
+        """Make it if need be."""
+        folder.mkdir(parents=True, exist_ok=True)
+        self._folder, self._names = folder, Names()
+
+    def save(self, mesh: Any, name: str) -> str:
+        """Write a trimesh under a name like the one given, and return the file's name."""
+        file = f"{self._names.new(name)}.stl"
+        save_stl(mesh.vertices, mesh.faces, self._folder / file)
+        return file
+
+
+def save_stl(vertices: Floats, faces: Any, path: Path) -> None:
+    """Write a mesh as binary STL; triangles without an area are left out.
+
+    Args:
+        vertices: (n, 3) (m).
+        faces: Indices of three corners each, (m, 3).
+        path: The file.
+    """
+    corners = np.asarray(vertices, float)[np.asarray(faces, int)]  # (m, 3, 3)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)
+    kept = lengths > 0
+    kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
+    triangles = np.zeros(int(kept.sum()), kind)
+    triangles["normal"] = normals[kept] / lengths[kept, None]
+    triangles["corners"] = corners[kept]
+    header = b"binary STL".ljust(80) + np.uint32(len(triangles)).tobytes()
+    path.write_bytes(header + triangles.tobytes())

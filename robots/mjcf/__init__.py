@@ -1,0 +1,1 @@
+"""Robots from MuJoCo's MJCF files: read without trust, compiled by MuJoCo, converted to URDF."""

@@ -1,0 +1,151 @@
+"""An MJCF as a robot of this library: a URDF in the local copy of robot files, and hints."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from kinematics.rotations import Floats
+from robots.assets.store import default_root
+from robots.common.errors import UnwritableFileError
+from robots.common.writing import written_whole
+from robots.guessing.hints import DriveHint, Hints
+from robots.mjcf.compiling import Model, compiled, name_of
+from robots.mjcf.couplings import Couplings, find_couplings
+from robots.mjcf.drives import dry_friction, find_drives, find_efforts
+from robots.mjcf.robot import MjcfRobot, find_robot
+from robots.mjcf.text import MjcfText, read_mjcf
+from robots.mjcf.to_urdf import excluded, write_urdf
+
+FORM = 1  # of what is made of an MJCF; counted up whenever that changes
+SOURCE = "the MJCF"
+KEPT = 8  # robots that are kept in memory
+
+
+@dataclass(frozen=True)
+class Converted:
+    """A robot that an MJCF describes.
+
+    Attributes:
+        name: What the MJCF calls it.
+        xml: Its URDF.
+        meshes: Contents of meshes, by file name beside the URDF.
+        hints: What the MJCF knows and a URDF does not say.
+        frames: Pose of each body's frame in its link's, by link, (4, 4) (m).
+    """
+
+    name: str
+    xml: bytes
+    meshes: dict[str, bytes]
+    hints: Hints
+    frames: dict[str, Floats]
+
+
+def convert(path: Path) -> Converted:
+    """Return the robot that an MJCF describes; the same contents are converted once.
+
+    Args:
+        path: Absolute path.
+
+    Raises:
+        AssetError: If the MJCF or a file of it cannot be read, MuJoCo refuses it, or it has what
+            no URDF can have.
+        DescriptorError: If nothing moves in it.
+        MissingPackageError: If MuJoCo is not installed.
+    """
+    return _convert(_Read(path, read_mjcf(path)))
+
+
+def locate(path: Path) -> Path:
+    """Return the URDF of an MJCF, in a folder that is named by what it was made of.
+
+    Args:
+        path: Absolute path of the MJCF.
+
+    Raises:
+        AssetError: As `convert`.
+        DescriptorError: As `convert`.
+        MissingPackageError: If it has to be converted, and MuJoCo is not installed.
+        UnwritableFileError: If the folder cannot be written.
+    """
+    text = read_mjcf(path)
+    key = f"{FORM} {path.stem} {text.digest}"
+    folder = default_root() / "mjcf" / hashlib.sha256(key.encode()).hexdigest()[:16]
+    urdf = folder / f"{path.stem}.urdf"
+    if not urdf.is_file():
+        _write(folder, urdf.name, _convert(_Read(path, text)))
+    return urdf
+
+
+@dataclass(frozen=True)
+class _Read:
+    """An MJCF that was read; two are equal if they have the same contents."""
+
+    path: Path
+    text: MjcfText
+
+    def __hash__(self) -> int:
+        return hash((self.path, self.text.digest))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, _Read):
+            return False
+        return (self.path, self.text.digest) == (other.path, other.text.digest)
+
+
+@lru_cache(maxsize=KEPT)
+def _convert(read: _Read) -> Converted:
+    model = compiled(read.text, read.path)
+    robot = find_robot(model, read.path)
+    couplings = find_couplings(robot, read.path)
+    urdf = write_urdf(robot, couplings, find_efforts(robot), read.text.name)
+    rubbing = dry_friction(robot)
+    notes = [*robot.notes, *couplings.notes, *urdf.notes]
+    if rubbing:
+        notes.append(
+            f"dry friction of {', '.join(rubbing)} is left out: PhysX has none in N·m or N"
+        )
+    hints = Hints(
+        source=SOURCE,
+        postures=_postures(model, robot, couplings),
+        first_is_home=True,
+        allowed=excluded(robot),
+        drives=_drives(robot),
+        frames_at_joints=True,
+        reasons=tuple(f"MJCF: {note}" for note in notes),
+    )
+    return Converted(read.text.name, urdf.xml, urdf.meshes, hints, urdf.frames)
+
+
+def _drives(robot: MjcfRobot) -> dict[str, DriveHint]:
+    return {robot.names[joint]: drive for joint, drive in find_drives(robot).items()}
+
+
+def _postures(model: Model, robot: MjcfRobot, couplings: Couplings) -> dict[str, dict[str, float]]:
+    """Return where the joints are in each keyframe (rad, m)."""
+    postures: dict[str, dict[str, float]] = {}
+    for key in range(model.nkey):
+        name = name_of(model, "key", key) or f"key{key}"
+        postures[name] = {
+            robot.names[joint]: float(model.key_qpos[key, model.jnt_qposadr[joint]])
+            for joint in robot.moving
+            if joint not in couplings.fixed
+        }
+    return {name: at for name, at in postures.items() if np.isfinite(list(at.values())).all()}
+
+
+def _write(folder: Path, name: str, converted: Converted) -> None:
+    """Make the folder of a URDF, unless another process is faster."""
+    try:
+        with written_whole(folder) as unfinished:
+            unfinished.mkdir(parents=True)
+            for mesh, contents in converted.meshes.items():
+                (unfinished / mesh).write_bytes(contents)
+            (unfinished / name).write_bytes(converted.xml)
+    except UnwritableFileError:
+        if not (folder / name).is_file():
+            raise

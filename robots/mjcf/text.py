@@ -1,0 +1,231 @@
+"""The text of an MJCF file with what it includes, and the meshes that it refers to.
+
+MuJoCo is given only what was read here: one XML text without includes, and the contents of meshes.
+It opens no file. What a robot's motion does not need is left out: textures, skins, lights, sensors.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import posixpath
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree.ElementTree import Element, tostring
+
+from robots.common.errors import AssetError, UnreadableFileError
+from robots.common.files import read_regular
+from robots.urdf.mesh_files import MAX_MESH_BYTES
+from robots.urdf.numbers import shown
+from robots.urdf.paths import is_allowed
+from robots.urdf.summary import MAX_URDF_BYTES
+from robots.urdf.xml_text import parse_xml
+
+MESH_ENDINGS = (".stl", ".obj", ".msh")
+MOST_FILES = 2000  # that one MJCF refers to
+MOST_BYTES = 1 << 30  # of them together
+
+# Parts of an MJCF that say nothing of links, joints and drives; some of them name files.
+UNUSED = ("size", "visual", "statistic", "option", "custom", "sensor", "extension")
+UNUSED_ASSETS = ("texture", "skin", "hfield")
+# What makes many bodies of one, or bodies that bend.
+REFUSED = {
+    "replicate": "copies bodies",
+    "composite": "makes a rope or cloth",
+    "flexcomp": "makes a body that bends",
+    "flex": "makes a body that bends",
+    "attach": "attaches another model",
+    "plugin": "runs a plugin of MuJoCo",
+}
+
+
+@dataclass(frozen=True)
+class MjcfText:
+    """An MJCF as MuJoCo is given it.
+
+    Attributes:
+        name: What it calls its model, or its file's name.
+        xml: Its text, without includes.
+        meshes: Contents of mesh files, by the names that the text has for them.
+        digest: SHA-256 over the text and the meshes, in hex.
+    """
+
+    name: str
+    xml: str
+    meshes: Mapping[str, bytes]
+    digest: str
+
+
+def read_mjcf(path: Path) -> MjcfText:
+    """Read an MJCF with all that it includes and refers to.
+
+    Args:
+        path: Absolute path.
+
+    Raises:
+        AssetError: If a file of it cannot be read, is no MJCF, lies outside of its folder and its
+            package, or there are too many; or if it has elements that make no robot.
+    """
+    return _Reading(path).text()
+
+
+class _Reading:
+    """One MJCF that is being read."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._folder = path, path.parent.as_posix()
+        self._files: dict[Path, int] = {}  # and their bytes
+        self._meshes: dict[str, bytes] = {}
+        self._named: dict[str, str] = {}  # of meshes: path -> name in the text
+        self._folders: dict[int, str] = {}  # of included elements that name a mesh, by identity
+
+    def text(self) -> MjcfText:
+        root = self.expanded()
+        folder = _mesh_folder(root)
+        for mesh in list(root.iterfind("asset/mesh")):
+            self._take(mesh, folder)
+        xml = tostring(root, encoding="unicode")
+        digest = hashlib.sha256(xml.encode())
+        for name, contents in sorted(self._meshes.items()):
+            digest.update(f"{name} {hashlib.sha256(contents).hexdigest()}\n".encode())
+        name = root.get("model", "").strip() or self._path.stem
+        return MjcfText(name, xml, self._meshes, digest.hexdigest())
+
+    def expanded(self) -> Element:
+        """Return the root element with what it includes, and without what is not needed."""
+        root = self._root(self._path, "mujoco")
+        self._include(root, (self._path,))
+        _drop(root, UNUSED)
+        for element in root.iter():
+            if element.tag in REFUSED:
+                raise AssetError(
+                    f"{self._path} has a <{element.tag}>, which {REFUSED[element.tag]}; only bodies"
+                    " that are written out are read (MuJoCo writes them out with mj_saveLastXML)"
+                )
+        for asset in root.iterfind("asset"):
+            _drop(asset, UNUSED_ASSETS)
+        for material in root.iter("material"):
+            material.attrib.pop("texture", None)
+            _drop(material, ("layer",))
+        return root
+
+    def _root(self, path: Path, *kinds: str) -> Element:
+        contents = self._read(path, MAX_URDF_BYTES, "the MJCF" if not self._files else "the file")
+        root = parse_xml(contents, str(path), "an MJCF")
+        if root.tag not in kinds:
+            raise AssetError(f"{path} is not an MJCF: it holds <{root.tag}>, not <{kinds[0]}>")
+        return root
+
+    def _include(self, element: Element, chain: tuple[Path, ...]) -> None:
+        """Put what is included in the place of each ``<include>``, again and again."""
+        for i in reversed(range(len(element))):
+            child = element[i]
+            if child.tag != "include":
+                self._include(child, chain)
+                continue
+            folders = self._folder, chain[-1].parent.as_posix()
+            path = self._resolve(child.get("file", ""), *folders)
+            if path in chain:
+                raise AssetError(f"{self._path} includes {path} in itself")
+            if len(self._files) >= MOST_FILES:
+                raise AssetError(f"{self._path} refers to more than {MOST_FILES} files")
+            included = self._root(path, "mujoco", "mujocoinclude")
+            self._include(included, (*chain, path))
+            for mesh in included.iter("mesh"):
+                self._folders.setdefault(id(mesh), path.parent.as_posix())
+            element[i : i + 1] = list(included)
+
+    def _take(self, mesh: Element, folder: str) -> None:
+        """Read the file of a mesh, and give it the name that MuJoCo finds it by."""
+        reference = mesh.get("file")
+        if reference is None:
+            return
+        around = self._folders.get(id(mesh), self._folder)
+        path = self._resolve(
+            reference, *(posixpath.join(f, folder) for f in (self._folder, around))
+        )
+        ending = path.suffix.lower()
+        if ending not in MESH_ENDINGS:
+            raise AssetError(
+                f"{self._path} refers to the mesh {path.name!r}; MuJoCo reads"
+                f" {', '.join(MESH_ENDINGS)}"
+            )
+        name = self._named.setdefault(path.as_posix(), f"{len(self._named)}{ending}")
+        if name not in self._meshes:
+            self._meshes[name] = self._read(path, MAX_MESH_BYTES, "the mesh")
+        if "name" not in mesh.keys():  # noqa: SIM118  # which an Element's own `in` would not ask
+            mesh.set("name", posixpath.splitext(posixpath.basename(reference))[0])
+        mesh.set("file", name)
+        mesh.attrib.pop("content_type", None)
+
+    def _read(self, path: Path, limit: int, what: str) -> bytes:
+        try:
+            contents = read_regular(path, limit)
+        except UnreadableFileError as error:
+            raise AssetError(f"cannot read {what} {path}: {error.strerror}") from error
+        self._files[path] = len(contents)
+        if len(self._files) > MOST_FILES or sum(self._files.values()) > MOST_BYTES:
+            raise AssetError(
+                f"{self._path} refers to more than {MOST_FILES} files or {MOST_BYTES:,} bytes"
+            )
+        return contents
+
+    def _resolve(self, reference: str, *folders: str) -> Path:
+        """Return the file that a reference means, from the first folder in which it is there.
+
+        These are those of the MJCF itself, and of the file that it includes.
+        """
+        if not reference.strip() or "\0" in reference:
+            raise AssetError(f"{self._path} refers to {shown(reference)}, which is no file")
+        reference = reference.replace("\\", "/")
+        tried = dict.fromkeys(
+            posixpath.normpath(posixpath.join(folder, reference)) for folder in folders
+        )
+        allowed = [path for path in tried if self._may(path)]
+        if not allowed:
+            raise AssetError(
+                f"{self._path} refers to {shown(reference)}, which leads out of its folder and its"
+                " package (the folder around it with a package.xml, .git or __init__.py); files"
+                " elsewhere are not opened: copy it beside the MJCF"
+            )
+        return Path(next((path for path in allowed if os.path.isfile(path)), allowed[0]))
+
+    def _may(self, path: str) -> bool:
+        package = _python_package(self._folder)
+        inside = bool(package) and path.startswith(f"{package}/")
+        return inside or is_allowed(path, self._folder, os.path.exists)
+
+
+def _mesh_folder(root: Element) -> str:
+    """Return the folder of meshes that an MJCF names, and have it name none to MuJoCo."""
+    found = {"assetdir": "", "meshdir": ""}
+    names_only = False
+    for compiler in root.iterfind("compiler"):
+        for key in found:
+            found[key] = compiler.attrib.pop(key, found[key]).replace("\\", "/")
+        compiler.attrib.pop("texturedir", None)
+        names_only |= compiler.attrib.pop("strippath", "") == "true"
+    if names_only:
+        for mesh in root.iterfind("asset/mesh"):
+            if file := mesh.get("file"):
+                mesh.set("file", posixpath.basename(file.replace("\\", "/")))
+    return found["meshdir"] or found["assetdir"]
+
+
+def _python_package(folder: str) -> str:
+    """Return the nearest folder around a folder, or itself, that is a Python package."""
+    while posixpath.dirname(folder) not in ("", "/", folder):
+        if os.path.isfile(f"{folder}/__init__.py"):
+            return folder
+        folder = posixpath.dirname(folder)
+    return ""
+
+
+def _drop(parent: Element, tags: tuple[str, ...]) -> None:
+    for child in list(_children(parent, tags)):
+        parent.remove(child)
+
+
+def _children(parent: Element, tags: tuple[str, ...]) -> Iterator[Element]:
+    return (child for child in parent if child.tag in tags)
