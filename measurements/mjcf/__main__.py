@@ -15,10 +15,9 @@ from measurements.mjcf.table import markdown
 from measurements.robots.expectations import read_expectations
 from measurements.robots.record import Record, versions_of
 from measurements.robots.sources import Robot, named_folder
-from measurements.robots.survey import Seen, survey
+from measurements.robots.survey import survey_into
 from robots.common.commands import exit_code, program, start
 from robots.common.writing import write_whole
-from rollouts.progress import LiveLine
 
 EXPECTED = Path(__file__).with_name("expected.yaml")
 RECORD = Path("docs/mjcf.json")
@@ -50,15 +49,7 @@ def _run(options: argparse.Namespace) -> None:
         folders = dict(map(named_folder, options.folders))
         robots = [robot for robot in _robots(folders) if robot.key not in record.robots]
         record.versions |= versions_of("robot-layouts", "sapien", "mujoco") | _versions(folders)
-        with LiveLine(len(robots), "MJCFs") as line:
-
-            def keep(robot: Robot, seen: Seen) -> None:
-                record.robots[robot.key] = seen
-                record.write(options.out)
-                line.advance(1, robot.key)
-
-            survey(robots, keep, seconds=options.seconds, module=PROBE)
-        record.write(options.out)
+        survey_into(record, options.out, robots, "MJCFs", seconds=options.seconds, module=PROBE)
     table = options.out.with_suffix(".md")
     write_whole(table, "\n".join(markdown(record, expected)) + "\n")
     print(f"{options.out}, {table}: {len(record.robots)} MJCFs")

@@ -15,12 +15,11 @@ from pathlib import Path
 from measurements.robots.expectations import EXPECTED, read_expectations
 from measurements.robots.record import Record, SurveyError, versions_of
 from measurements.robots.sources import PACKAGES, Robot, find_robots, named_folder, package_folder
-from measurements.robots.survey import Seen, survey
+from measurements.robots.survey import survey_into
 from measurements.robots.table import markdown
 from robots import MissingPackageError
 from robots.common.commands import exit_code, notice, program, start
 from robots.common.writing import write_whole
-from rollouts.progress import LiveLine
 
 RECORD = Path("docs/robots.json")
 
@@ -58,23 +57,12 @@ def _run(options: argparse.Namespace) -> int:
             raise SurveyError(f"--workers is {options.workers}; it must be 1 or more")
         robots = [robot for robot in _robots(options) if robot.key not in record.robots]
         record.versions |= versions_of("robot-layouts", "sapien", *PACKAGES)
-        _try(robots, record, options)
+        limits = {"workers": options.workers, "seconds": options.seconds}
+        survey_into(record, options.out, robots, "robots", **limits)
     table = options.out.with_suffix(".md")
     write_whole(table, "\n".join(markdown(record, expected)) + "\n")
     print(f"{options.out}, {table}: {len(record.robots)} robots")
     return 0
-
-
-def _try(robots: Sequence[Robot], record: Record, options: argparse.Namespace) -> None:
-    with LiveLine(len(robots), "robots") as line:
-
-        def keep(robot: Robot, seen: Seen) -> None:
-            record.robots[robot.key] = seen
-            record.write(options.out)
-            line.advance(1, robot.key)
-
-        survey(robots, keep, workers=options.workers, seconds=options.seconds)
-    record.write(options.out)
 
 
 def _robots(options: argparse.Namespace) -> list[Robot]:

@@ -11,10 +11,12 @@ import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from typing import Any
+from pathlib import Path
 
+from measurements.robots.record import Record, Seen
 from measurements.robots.sources import Robot
 from robots.common.child_process import running
+from rollouts.progress import LiveLine
 
 MEMORY = 8 << 30  # bytes of a process
 PROBE = "measurements.robots.probe"
@@ -22,7 +24,41 @@ PROBE = "measurements.robots.probe"
 _PASSING = re.compile(re.escape(tempfile.gettempdir()) + r"/tmp\w+/")
 _CUT_SHORT = re.compile(r"(/[^\s'\"…]*)…")
 
-Seen = dict[str, Any]
+
+def survey_into(
+    record: Record,
+    out: Path,
+    robots: Sequence[Robot],
+    what: str,
+    *,
+    workers: int = 1,
+    seconds: float = 180.0,
+    module: str | None = None,
+) -> None:
+    """Try robots, and keep what was seen of each in a file at once, with progress on stderr.
+
+    Args:
+        record: What is known already; grows.
+        out: Its file.
+        robots: Which ones.
+        what: What they are called while it goes on.
+        workers: See `survey`.
+        seconds: See `survey`.
+        module: See `survey`.
+
+    Raises:
+        UnwritableFileError: If the file cannot be written.
+        OSError: If no process can be started.
+    """
+    with LiveLine(len(robots), what) as line:
+
+        def keep(robot: Robot, seen: Seen) -> None:
+            record.robots[robot.key] = seen
+            record.write(out)
+            line.advance(1, robot.key)
+
+        survey(robots, keep, workers=workers, seconds=seconds, module=module)
+    record.write(out)
 
 
 def survey(

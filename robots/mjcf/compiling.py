@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from robots.common.errors import AssetError, MissingPackageError
 from robots.mjcf.text import MjcfText
 
@@ -14,6 +16,12 @@ Model = Any
 """A ``mujoco.MjModel``, whose package need not be installed."""
 
 MESSAGE = 400  # characters of MuJoCo's own that an error keeps
+NUMBERS = {  # MuJoCo takes "nan" for a number
+    "a body": ("body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat"),
+    "a joint": ("jnt_pos", "jnt_axis", "jnt_range", "qpos0", "dof_armature", "dof_damping"),
+    "a shape": ("geom_pos", "geom_quat", "geom_size"),
+    "a site": ("site_pos", "site_quat"),
+}
 
 
 def mujoco() -> Any:
@@ -54,16 +62,20 @@ def compiled(text: MjcfText, path: Path) -> Model:
         path: Where it lies, for messages.
 
     Raises:
-        AssetError: If MuJoCo refuses it.
+        AssetError: If MuJoCo refuses it, or a number of it is not finite.
         MissingPackageError: If MuJoCo is not installed.
     """
     library = mujoco()
     try:
         with without_log():
-            return library.MjModel.from_xml_string(text.xml, dict(text.meshes))
+            model = library.MjModel.from_xml_string(text.xml, dict(text.meshes))
     except Exception as error:  # a compiler that raises whatever it meets
         reason = " ".join(str(error).split())[:MESSAGE]
         raise AssetError(f"MuJoCo cannot compile {path}: {reason}") from error
+    for what, fields in NUMBERS.items():
+        if not all(np.isfinite(getattr(model, field)).all() for field in fields):
+            raise AssetError(f"{path} has {what} with a number that is not finite")
+    return model
 
 
 def name_of(model: Model, kind: str, index: int) -> str:

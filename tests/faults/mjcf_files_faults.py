@@ -1,0 +1,82 @@
+"""MJCFs that are none, that lie, or that refer to other files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from robots import RobotDescriptor
+from tests.faults.fault import GOES_ON, Fault
+from tests.robots.mjcf_parts import arm, mjcf
+
+AREA = "MJCFs"
+GOOD = mjcf(arm())
+
+
+def faults() -> Iterator[Fault]:
+    """Go through this area's faults."""
+    for what, text in _TEXTS.items():
+        yield Fault(AREA, what, lambda folder, t=text: _read(folder, t))
+    for what, make in _FILES.items():
+        yield Fault(AREA, f"the file is {what}", lambda folder, m=make: _no_file(folder, m))
+    for number in ("nan", "inf", "1e400", "one"):
+        for what, (old, new) in _NUMBERS.items():
+            changed = GOOD.replace(old, new.format(number))
+            assert changed != GOOD
+            yield Fault(AREA, f"{what} is {number}", lambda folder, t=changed: _read(folder, t))
+    for file in _ELSEWHERE:
+        for what, text in _NAMING.items():
+            given = text.format(file)
+            yield Fault(AREA, f"{what} names {file}", lambda folder, t=given: _read(folder, t))
+    yield Fault(AREA, "good", lambda folder: _read(folder, GOOD), GOES_ON)
+
+
+_TEXTS = {
+    "nothing": "",
+    "no XML": "hello",
+    "a URDF": "<robot name='x'><link name='a'/></robot>",
+    "half of it": GOOD[: len(GOOD) // 2],
+    "an entity": GOOD.replace("<mujoco", "<!DOCTYPE a [<!ENTITY x 'y'>]><mujoco", 1),
+    "a file as an entity": "<!DOCTYPE a [<!ENTITY x SYSTEM 'file:///etc/passwd'>]>" + GOOD,
+    "bodies 3000 deep": mjcf("<body>" * 3000 + "</body>" * 3000),
+    "nothing that moves": mjcf("<body><geom size='0.1'/></body>"),
+    "two bodies of one name": GOOD.replace('name="link2"', 'name="link1"'),
+    "an unknown element": GOOD.replace("</worldbody>", "<arms/></worldbody>"),
+    "an unknown joint is driven": mjcf(arm(), "<actuator><motor joint='elbow'/></actuator>"),
+    "a loop of includes": GOOD.replace("</mujoco>", "<include file='arm.xml'/></mujoco>"),
+    "a mesh that is not there": GOOD.replace(
+        "</mujoco>", "<asset><mesh name='m' file='m.stl'/></asset></mujoco>"
+    ),
+}
+_FILES: dict[str, Callable[[Path], object]] = {
+    "not there": lambda path: None,
+    "a folder": Path.mkdir,
+    "a FIFO": os.mkfifo,
+    "a link to /dev/zero": lambda path: path.symlink_to("/dev/zero"),
+    "5 GB of nothing": lambda path: (path.touch(), os.truncate(path, 5 << 30)),
+    "bytes that are no text": lambda path: path.write_bytes(bytes(range(256))),
+}
+_NUMBERS = {
+    "a place": ('pos="0.12 0 0"', 'pos="0.12 {} 0"'),
+    "an axis": ('axis="0 1 0"', 'axis="0 {} 0"'),
+    "a limit": ('range="-100 100"', 'range="-100 {}"'),
+    "a size": ('size="0.04 0.015 0.015"', 'size="0.04 {} 0.015"'),
+    "a density": ('density="800"', 'density="{}"'),
+}
+_ELSEWHERE = ("/etc/passwd", "../../secret.xml", "~/secret.xml", "/proc/self/environ", "/dev/zero")
+_NAMING = {
+    "an include": GOOD.replace("</mujoco>", "<include file='{}'/></mujoco>"),
+    "a mesh": GOOD.replace("</mujoco>", "<asset><mesh name='m' file='{}'/></asset></mujoco>"),
+}
+
+
+def _read(folder: Path, text: str) -> None:
+    path = folder / "arm.xml"
+    path.write_text(text, "utf-8")
+    RobotDescriptor.from_mjcf(path, quiet=True)
+
+
+def _no_file(folder: Path, make: Callable[[Path], object]) -> None:
+    make(folder / "arm.xml")
+    RobotDescriptor.from_mjcf(folder / "arm.xml", quiet=True)
