@@ -246,8 +246,8 @@ class Arrangement(Mapping[str, Placement]):
         Raises:
             UnknownNameError: If there is no such arm.
         """
-        if isinstance(asked, str):
-            return asked
+        if asked is not None and not isinstance(asked, Mapping):
+            return asked  # whatever it is, the robots know whether it is a mode
         named = {self.arm_name(arm): mode for arm, mode in (asked or {}).items()}
         modes = {arm: mode for arm, mode in self.control_modes.items() if arm not in named}
         return {**modes, **(asked or {})} or CONTROL_MODES[0]
