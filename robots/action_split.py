@@ -43,6 +43,11 @@ class JointGroup:
         multipliers: In a mimic group, what each joint multiplies the value by; 1 if empty.
         offsets: In a mimic group that is not ``delta``, what each joint adds to it then
             (``unit``); 0 if empty.
+        leaders: In a mimic group that is a linkage, the joints that carry its fingers. They are
+            driven at most ``lead`` ahead of where they are, and all other joints to where these
+            are, so that jaws stay parallel when something stops them. Empty if each joint goes to
+            its own place.
+        lead: How far ahead of its leaders' mean place the value may be (``unit``).
         held: Whether no action number drives the group: its joints are held where the layout
             starts them. ``lower`` and ``upper`` then mean nothing.
         armature: Inertia of motor and gear as the joint feels it (kg·m² or kg), one number for all
@@ -84,6 +89,8 @@ class JointGroup:
     target: bool = False
     frame: str = FRAMES[0]
     root_link: str | None = None
+    leaders: tuple[str, ...] = ()
+    lead: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse empty groups, repeated joints, inverted ranges and non-physical drives."""
@@ -154,6 +161,26 @@ class JointGroup:
                 raise DescriptorError(
                     f"{name} has {len(given)} numbers; the group has joints {self.joints}"
                 )
+
+        self._refuse_bad_leaders()
+
+    def _refuse_bad_leaders(self) -> None:
+        if not self.leaders and not self.lead:
+            return
+        if not self.mimic or self.delta:
+            raise DescriptorError(
+                f"only a mimic group that is driven to places has leaders; {self.joints} is none"
+            )
+        for joint in self.leaders:
+            if joint not in self.joints:
+                raise DescriptorError(
+                    unknown_name_message("leader of a joint group", joint, self.joints)
+                )
+        if not (self.leaders and self.lead > 0):
+            raise DescriptorError(
+                f"the leaders of {self.joints} are {self.leaders} and lead is {self.lead}; a"
+                " linkage needs at least one leader, and a lead above 0"
+            )
 
     def _refuse_bad_commands(self) -> None:
         if self.target and not self.delta:

@@ -443,6 +443,7 @@ def _prefixed(robot: RobotDescriptor, prefix: str) -> RobotDescriptor:
             key: replace(
                 group,
                 joints=renamed(group.joints),
+                leaders=renamed(group.leaders),
                 root_link=group.root_link and prefix + group.root_link,
             )
             for key, group in groups.items()

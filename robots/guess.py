@@ -117,7 +117,7 @@ def guess(
         "tcp_link": parts.tools[main.name].link,
         "tcp_position_links": parts.tools[main.name].links,
         "tcp_offset": parts.tools[main.name].offset,
-        "gripper_material": find_material(parts.anatomy.limbs),
+        "gripper_material": find_material(parts.model, parts.anatomy.limbs),
         "fingers": fingers,
         "keyframes": _keyframes(parts, split, rest),
         "reach": distance,
@@ -212,7 +212,7 @@ def _limbs(parts: _Parts, rest: Mapping[str, float]) -> dict[str, LimbDescriptio
 def _about_hands(parts: _Parts) -> Iterator[str]:
     for gripper in parts.grippers.values():
         yield from gripper.reasons
-    material = find_material(parts.anatomy.limbs)
+    material = find_material(parts.model, parts.anatomy.limbs)
     if material is not None:
         links = ", ".join(material.links)
         yield f"gripper_material: friction 2 on {links}, as ManiSkill's grippers have"

@@ -197,6 +197,8 @@ def _drives(robot: RobotDescriptor) -> Iterator[str]:
 def _how_driven(group: JointGroup) -> str:
     if group.held:
         return " held still"
+    if group.leaders:
+        return f" on one number, led by {' and '.join(group.leaders)}"
     return " on one number" if group.mimic else ""
 
 

@@ -205,6 +205,33 @@ class Drives:
             drive, stiffness=_rounded(stiffness), damping=_rounded(damping), force_limit=force
         )
 
+    def moved_by(self, joint: ModelJoint) -> float:
+        """Return the inertia that a joint's drive moves, with motor and gear (kg·m², kg)."""
+        return self._inertia(joint)
+
+    def geared(
+        self,
+        joint: ModelJoint,
+        inertia: float,
+        stiffness: float,
+        force: float,
+        settling: float = 0.0,
+    ) -> Drive:
+        """Return the drive of a joint that one motor turns with others, at least critically damped.
+
+        Args:
+            joint: The joint.
+            inertia: What the motor moves in all, as the joint feels it (kg·m², kg).
+            stiffness: Of the drive (N·m/rad, N/m).
+            force: The largest (N·m, N).
+            settling: Time in which it goes as far as its target is ahead (s).
+        """
+        more = max(inertia - self._inertia(joint), 0.0)
+        critical = 2 * (stiffness * (self._inertia(joint) + more)) ** 0.5
+        damping = max(critical, stiffness * settling)
+        numbers = (stiffness, damping, force, self._armature(joint) + more)
+        return Drive(*map(_rounded, numbers), step=LONGEST_STEP)
+
     def holding(self, joint: ModelJoint) -> Drive:
         """Return the drive of a joint that stays where it starts."""
         drive, _ = self._drive(joint, STIFFEST)

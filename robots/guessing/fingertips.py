@@ -16,6 +16,7 @@ from robots.urdf.model import ModelJoint
 SHORT = 0.6  # of the longest finger; what ends before it is a knuckle, not a tip
 FOLLOWING = 0.85  # the same where all joints follow one, as in grippers with knuckles
 PAD = 0.02  # of a finger's length; a pad that ends so near the finger's end is what touches
+FLUSH = 5e-4  # m; how much farther in a pad must lie than what carries it
 CAP = 0.15  # of a finger's length; its corners within it from the end make its tip
 
 
@@ -74,18 +75,30 @@ class Fingertips:
         """Return the link that touches what a finger holds: of those rigid with ``end`` the last.
 
         Where pads or tips are links of their own, fixed to one that moves, they have the corners
-        that are farthest from the palm.
+        that are farthest from the palm. Of several that go as far it is the innermost one.
         """
         rigid = {self.stance.tree.link(link): link for link in self.stance.model.rigid_with(end)}
-        far = {
-            rigid[hull.link]: float(np.linalg.norm(corners - self._palm[:3, 3], axis=1).max())
-            for hull in self._hulls
-            if hull.link in rigid
-            for corners in (transform(self._poses[hull.link], hull.corners),)
-        }
+        outwards = self._outwards(end)
+        far, inner = dict.fromkeys(rigid.values(), 0.0), dict.fromkeys(rigid.values(), np.inf)
+        for hull in self._hulls:
+            if hull.link in rigid:
+                link = rigid[hull.link]
+                corners = transform(self._poses[hull.link], hull.corners)
+                reach = np.linalg.norm(corners - self._palm[:3, 3], axis=1).max()
+                far[link] = max(far[link], float(reach))
+                inner[link] = min(inner[link], float((corners @ outwards).min()))
         farthest = max(far.values(), default=0.0)
-        near = [link for link, reach in far.items() if reach >= farthest * (1 - PAD)]
+        near = [link for link, reach in far.items() if 0 < farthest * (1 - PAD) <= reach]
+        innermost = min((inner[link] for link in near), default=0.0) + FLUSH
+        near = [link for link in near if inner[link] <= innermost]
         return end if end in near or not near else near[-1]
+
+    def lever(self, end: str, joint: ModelJoint) -> float:
+        """Return how far a tip goes outwards as one joint alone moves (m per rad, or 1)."""
+        link = self.stance.tree.link(joint.child)
+        pose, axis = self._poses[link], self._poses[link, :3, :3] @ self.stance.tree.axes[link]
+        way = axis if joint.unit == "m" else np.cross(axis, self._tips[end] - pose[:3, 3])
+        return abs(float(way @ self._outwards(end)))
 
     def opening(self, positions: Mapping[str, float]) -> list[float]:
         """Return for each finger how well its y axis points away from the others, -1 … 1."""
@@ -115,6 +128,11 @@ class Fingertips:
     def tip(self, end: str) -> Floats:
         """Return the tip of one of ``ends``, in the root's frame, (3,) (m)."""
         return self._tips[end]
+
+    def _outwards(self, end: str) -> Floats:
+        """Return the direction from the middle of the tips to one of them, (3,)."""
+        way = self._tips[end] - np.mean(list(self._tips.values()), axis=0)
+        return way / max(float(np.linalg.norm(way)), 1e-9)
 
     def _tip(self, link: str) -> Floats:
         """Return the mean of the outermost points of a link and what is rigid with it."""

@@ -7,14 +7,15 @@ from collections.abc import Mapping, Sequence
 from robots.descriptor import Fingers, GripperMaterial
 from robots.guessing.anatomy import Limb
 from robots.guessing.fingertips import Fingertips
+from robots.urdf.model import UrdfModel
 
 ALONG = 0.7  # cosine; how well a finger's y axis must lie along the way in which it opens
 WIDE = 110.0  # degrees; of a finger that swings, as ManiSkill's SO-100 has it
 
 
-def find_material(limbs: Sequence[Limb]) -> GripperMaterial | None:
+def find_material(model: UrdfModel, limbs: Sequence[Limb]) -> GripperMaterial | None:
     """Return the contact material of all fingers, as ManiSkill's grippers have it."""
-    links = tuple(link for limb in limbs if limb.fingers for link in _finger_links(limb))
+    links = tuple(link for limb in limbs if limb.fingers for link in _finger_links(model, limb))
     return GripperMaterial(links, 2.0, 2.0, 0.0, patch_radius=0.1) if links else None
 
 
@@ -36,14 +37,17 @@ def find_fingers(
         return None, none
     swings = any(joint.type != "prismatic" for joint in limb.fingers)
     one, other = (1 if way > 0 else -1 for way in ways)
-    fingers = Fingers((tips.ends[0], tips.ends[1]), opening_signs=(one, other))
+    links = tips.touching(tips.ends[0]), tips.touching(tips.ends[1])
+    fingers = Fingers(links, opening_signs=(one, other))
     if swings:
         return Fingers(fingers.links, fingers.opening_signs, max_angle=WIDE), (
-            f"fingers: {' and '.join(tips.ends)} swing open along their y axes"
+            f"fingers: {' and '.join(links)} swing open along their y axes"
         )
     return fingers, "fingers: both slide along their y axis, in which they open"
 
 
-def _finger_links(limb: Limb) -> tuple[str, ...]:
-    links = tuple(joint.child for joint in limb.fingers)
-    return (limb.palm, *links) if len(links) == 1 else links
+def _finger_links(model: UrdfModel, limb: Limb) -> tuple[str, ...]:
+    """Return the links of a hand's fingers, with the pads that are fixed to them."""
+    own = [joint.child for joint in limb.fingers]
+    pads = [p for link in own for p in model.rigid_with(link)[1:] if p in model.collisions]
+    return (*((limb.palm,) if len(own) == 1 else ()), *own, *pads)

@@ -17,6 +17,7 @@ from robots.guessing.anatomy import Limb
 from robots.guessing.drives import Drives, drive_fields
 from robots.guessing.fingertips import Fingertips
 from robots.guessing.groups import by_steps, name_of
+from robots.guessing.linkages import Follower, find_linkage
 from robots.guessing.stance import Stance, middle_of
 from robots.urdf.model import ModelJoint
 
@@ -44,15 +45,6 @@ class Gripper:
     reasons: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class _Follower:
-    """A joint that goes to multiplier · lead + offset."""
-
-    joint: ModelJoint
-    multiplier: float
-    offset: float
-
-
 def find_gripper(limb: Limb, tips: Fingertips, drives: Drives) -> Gripper:
     """Return the groups of a hand: one number for what moves together, else one for each leader.
 
@@ -72,11 +64,11 @@ def find_gripper(limb: Limb, tips: Fingertips, drives: Drives) -> Gripper:
         reasons = []
     if len(leaders) > 1:
         return _many(name, leaders, followers, drives)
-    group, postures, reason = _one(name, leaders[0], followers[leaders[0].name], tips, drives)
+    group, postures, about = _one(name, leaders[0], followers[leaders[0].name], tips, drives)
     mimics = [f"{j.name} follows {j.mimics}" for j in limb.fingers if j.mimics]
     if mimics:
         reasons.append(f"{name}, mimic joints, from the URDF: {', '.join(mimics)}")
-    return Gripper({name: group}, postures, (*reasons, reason))
+    return Gripper({name: group}, postures, (*reasons, *about))
 
 
 def entangled(
@@ -146,11 +138,11 @@ def _links(limb: Limb) -> tuple[str, ...]:
     return (limb.palm, *(joint.child for joint in limb.fingers))
 
 
-def _followers(fingers: Sequence[ModelJoint]) -> dict[str, list[_Follower]]:
+def _followers(fingers: Sequence[ModelJoint]) -> dict[str, list[Follower]]:
     """Return for each leading joint what follows it, itself first."""
     named = {joint.name: joint for joint in fingers}
-    groups: dict[str, list[_Follower]] = {
-        joint.name: [_Follower(joint, 1.0, 0.0)] for joint in fingers if joint.mimics not in named
+    groups: dict[str, list[Follower]] = {
+        joint.name: [Follower(joint, 1.0, 0.0)] for joint in fingers if joint.mimics not in named
     }
     for joint in fingers:
         if joint.name not in groups:
@@ -159,13 +151,13 @@ def _followers(fingers: Sequence[ModelJoint]) -> dict[str, list[_Follower]]:
                 offset += multiplier * at.offset
                 multiplier *= at.multiplier
                 at = named[at.mimics or ""]
-            groups[at.name].append(_Follower(joint, multiplier, offset))
+            groups[at.name].append(Follower(joint, multiplier, offset))
     return groups
 
 
 def _merged(
-    leaders: Sequence[ModelJoint], followers: Mapping[str, Sequence[_Follower]], tips: Fingertips
-) -> list[_Follower]:
+    leaders: Sequence[ModelJoint], followers: Mapping[str, Sequence[Follower]], tips: Fingertips
+) -> list[Follower]:
     """Return what one number can drive, if the leaders are fingers that move alike or mirrored."""
     first = leaders[0]
     if len(leaders) < 2 or any(not _alike(first, joint) for joint in leaders[1:]):
@@ -180,7 +172,7 @@ def _merged(
         low, _ = joint.span
         offset = low - first.span[0] if sign > 0 else low + first.span[1]
         merged += [
-            _Follower(f.joint, f.multiplier * sign, f.multiplier * _tidy(offset) + f.offset)
+            Follower(f.joint, f.multiplier * sign, f.multiplier * _tidy(offset) + f.offset)
             for f in followers[joint.name]
         ]
     return merged
@@ -208,11 +200,11 @@ def _sense(first: ModelJoint, other: ModelJoint, tips: Fingertips) -> float:
 def _one(
     name: str,
     leader: ModelJoint,
-    followers: Sequence[_Follower],
+    followers: Sequence[Follower],
     tips: Fingertips,
     drives: Drives,
-) -> tuple[JointGroup, tuple[dict[str, float], ...], str]:
-    """Return the group that one number drives, where it is open, and the reason.
+) -> tuple[JointGroup, tuple[dict[str, float], ...], tuple[str, ...]]:
+    """Return the group that one number drives, where it is open, and the reasons.
 
     The number grows as the hand opens: where it opens towards the leader's lower limit, it counts
     from the upper one.
@@ -221,11 +213,13 @@ def _one(
     opens_down = _apart(tips, followers, low) > _apart(tips, followers, high) + NOTICEABLE
     if opens_down:
         flipped = [
-            _Follower(f.joint, -f.multiplier, f.multiplier * high + f.offset) for f in followers
+            Follower(f.joint, -f.multiplier, f.multiplier * high + f.offset) for f in followers
         ]
         followers, low, high = flipped, 0.0, high - low
     joints = [f.joint for f in followers]
     mimic = len(followers) > 1 or opens_down
+    linkage = find_linkage(followers, (low, high), tips, drives)
+    made = linkage.drives if linkage else [drives.gripping(joint) for joint in joints]
     group = JointGroup(
         tuple(joint.name for joint in joints),
         lower=_tidy(low - SQUEEZE if leader.unit == "m" else low),
@@ -236,21 +230,27 @@ def _one(
         unit=leader.unit,
         reset_noise=False,
         limits=tuple(joint.span for joint in joints),
-        **drive_fields([drives.gripping(joint) for joint in joints]),
+        leaders=linkage.leaders if linkage else (),
+        lead=linkage.lead if linkage else 0.0,
+        **drive_fields(made),
     )
     postures = tuple(_led_to(followers, low + (high - low) * part) for part in OPENINGS)
     where = f"{leader.name} at {postures[0][leader.name]:g} {leader.unit}"
-    return group, postures, f"{name}: +1 opens it, with {where}, as the finger tips part there"
+    reasons = [f"{name}: +1 opens it, with {where}, as the finger tips part there"]
+    if linkage:
+        led = " and ".join(linkage.leaders)
+        reasons.append(f"{name}: a linkage, in which all joints go where {led} are")
+    return group, postures, tuple(reasons)
 
 
-def _apart(tips: Fingertips, followers: Sequence[_Follower], lead: float) -> float:
+def _apart(tips: Fingertips, followers: Sequence[Follower], lead: float) -> float:
     return tips.apart({f.joint.name: f.multiplier * lead + f.offset for f in followers})
 
 
 def _many(
     name: str,
     leaders: Sequence[ModelJoint],
-    followers: Mapping[str, Sequence[_Follower]],
+    followers: Mapping[str, Sequence[Follower]],
     drives: Drives,
 ) -> Gripper:
     """Return the groups of a hand whose fingers move each on its own."""
@@ -276,7 +276,7 @@ def _many(
     return Gripper(groups, tuple(postures), (f"{name}: {counts}",))
 
 
-def _led_to(followers: Sequence[_Follower], lead: float) -> dict[str, float]:
+def _led_to(followers: Sequence[Follower], lead: float) -> dict[str, float]:
     """Return where joints go, each within its limits."""
     return {
         f.joint.name: min(
@@ -286,7 +286,7 @@ def _led_to(followers: Sequence[_Follower], lead: float) -> dict[str, float]:
     }
 
 
-def _led(followers: Sequence[_Follower], drives: Drives) -> JointGroup:
+def _led(followers: Sequence[Follower], drives: Drives) -> JointGroup:
     leader = followers[0].joint
     low, high = leader.span
     fields: dict[str, Any] = drive_fields([drives.gripping(f.joint) for f in followers])

@@ -87,6 +87,7 @@ def _describe_group(group: JointGroup) -> dict[str, Any]:
     silent |= set() if any(group.armatures) else {"armature"}
     silent |= {"command"} if group.command == "position" else set()
     silent |= set() if group.target else {"target"}
+    silent |= set() if group.leaders else {"leaders", "lead"}
     return {name: value for name, value in asdict(group).items() if name not in silent}
 
 

@@ -44,7 +44,7 @@ class SapienBackend:
         robots = [robot for world in self.worlds for robot in world.robots.values()]
         self._articulations: list[Any] = [robot.articulation for robot in robots]
         self._setters: list[list[Callable[[float], None]]] = [
-            [joint.set_drive_target for robot in world.robots.values() for joint in robot.driven]
+            [set_target for robot in world.robots.values() for set_target in robot.setters]
             for world in self.worlds
         ]
         self._velocity_setters: list[list[Callable[[float], None]]] = [
@@ -56,7 +56,7 @@ class SapienBackend:
             for world in self.worlds
         ]
         self._packers = [world.scene.pack_poses for world in self.worlds]
-        self._steps = [world.system.step for world in self.worlds]
+        self._steps = [world.stepper() for world in self.worlds]
         self._places = _pose_places(len(self.worlds), len(self.worlds[0].scene.entities))
         self._order = _declared_order(self.worlds[0])
         self._forces: dict[tuple[Pair, ...], PairForces] = {}

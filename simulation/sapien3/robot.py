@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from layouts import Placement
 from robots import DescriptorError, RobotDescriptor, UnknownNameError
 from robots.urdf.model import UrdfModel
 from simulation.sapien3.blueprint import Blueprint
+from simulation.sapien3.linkage import Linkage
 
 # Per unit of a joint: the least that is taken for its largest speed, what is taken where the URDF
 # has none, and the most (1/s). Wrists of arms turn at 2π rad/s; URDFs also have 0, and 1e6. Fingers
@@ -34,6 +35,8 @@ class SimulatedRobot:
         driven: Active joints in the order of the descriptor's joints.
         active_index: For each joint of the descriptor, its place in SAPIEN's order.
         loaded_order: For each active joint in SAPIEN's order, its place in the descriptor.
+        setters: What sets the drive target of each of these (rad, m).
+        linkages: Joint groups whose fingers lead.
         speeds: What is taken as the limits of the descriptor's joints' speeds, (dof,) (rad/s, m/s).
         root: The root link.
     """
@@ -71,6 +74,8 @@ class SimulatedRobot:
         self.driven = [self.joints[i] for i in self.active_index]
         self.speeds = _speeds(descriptor, blueprint.model)
         self._set_drives()
+        self.linkages: list[Linkage] = []
+        self.setters = list(self._setters())
         for link in self.links.values():
             link.disable_gravity = True
 
@@ -132,6 +137,17 @@ class SimulatedRobot:
                 joint.set_friction(group.friction)
                 if armature:
                     joint.set_armature(np.array([armature], np.float32))
+
+    def _setters(self) -> Iterator[Callable[[float], None]]:
+        first = 0
+        for group in self.descriptor.action_split.groups.values():
+            joints = self.driven[first : first + len(group.joints)]
+            if group.leaders:
+                self.linkages.append(Linkage(group, joints, self.articulation))
+                yield from self.linkages[-1].setters
+            else:
+                yield from (joint.set_drive_target for joint in joints)
+            first += len(joints)
 
 
 def _speeds(descriptor: RobotDescriptor, model: UrdfModel) -> NDArray[np.float32]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import sapien
@@ -134,6 +135,20 @@ class BuiltWorld:
         for body in self.bodies.values():
             if body.declared.anchored:
                 body.entity.set_pose(body.start_pose)
+
+    def stepper(self) -> Callable[[], None]:
+        """Return what advances physics by one step."""
+        linkages = [linkage for robot in self.robots.values() for linkage in robot.linkages]
+        step: Callable[[], None] = self.system.step
+        if not linkages:
+            return step
+
+        def pulled() -> None:
+            for linkage in linkages:
+                linkage.pull()
+            step()
+
+        return pulled
 
     def set_pose(self, name: str, row: list[float]) -> None:
         """Move a body to a position (m) and quaternion (wxyz), (7,)."""

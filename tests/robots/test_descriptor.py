@@ -49,6 +49,18 @@ def group(**changes) -> JointGroup:
             {"mimic": True, "offsets": (0.0, math.nan)},
             "offsets[1] is nan; it must be a finite",
         ),
+        (
+            {"leaders": ("a",), "lead": 0.1},
+            "only a mimic group that is driven to places has leaders; ('a', 'b') is none",
+        ),
+        (
+            {"mimic": True, "leaders": ("b2",), "lead": 0.1},
+            "unknown leader of a joint group 'b2'. Did you mean 'b'?",
+        ),
+        (
+            {"mimic": True, "leaders": ("a",)},
+            "the leaders of ('a', 'b') are ('a',) and lead is 0.0; a linkage needs",
+        ),
         ({"lower": (-1.0,)}, "lower has 1 numbers; the group ('a', 'b') takes 2"),
         ({"upper": (1.0, 2.0), "mimic": True}, "upper has 2 numbers; the group ('a', 'b') takes 1"),
         ({"upper": -1.0}, "range [-1.0, -1.0] of ('a', 'b') is not increasing"),

@@ -185,6 +185,28 @@ class TestHands:
         rest = dict(zip(found.descriptor.joints, found.descriptor.keyframe("rest"), strict=True))
         assert {rest[joint] for joint in group.joints} == {0.0}
 
+    def test_the_joints_that_carry_fingers_lead_those_that_hang_on_them(self, tmp_path):
+        parts, last = single_arm(end="")
+        knuckles(parts, last)
+        found = guess(parts, tmp_path)
+        group = found.descriptor.action_split.groups["gripper"]
+        assert group.leaders == ("drive", "right_outer_joint")
+        assert group.lead == pytest.approx(0.1)
+        assert min(group.armatures) > 0
+        led = "a linkage, in which all joints go where drive and right_outer_joint are"
+        assert any(led in reason for reason in found.reasons)
+
+    def test_a_pad_inside_what_carries_it_is_what_touches(self, tmp_path):
+        parts, last = single_arm(end="")
+        knuckles(parts, last)
+        for side, sign in (("left", 1), ("right", -1)):
+            parts.link(f"{side}_rubber", 0.001, "0.06 0.004 0.02", "0 0 0")
+            place = f"0.03 {-0.007 * sign} 0"
+            parts.joint(f"{side}_glue", f"{side}_pad", f"{side}_rubber", place, kind="fixed")
+        robot = guess(parts, tmp_path).descriptor
+        assert robot.fingers.links == ("left_rubber", "right_rubber")
+        assert set(robot.fingers.links) < set(robot.gripper_material.links)
+
     def test_a_gripper_that_turns_and_slides_is_driven_by_one_number(self, tmp_path):
         parts, last = single_arm(end="")
         parts.link("finger_a", 0.05, "0.06 0.01 0.02", "0.03 0 0")

@@ -11,7 +11,7 @@ import pytest
 from layouts import single
 from robots import RobotDescriptor
 from robots.from_urdf import guess_descriptor
-from simulation import PhysicsSettings, Simulation
+from simulation import Box, PhysicsSettings, Simulation
 from simulation.trial import try_robot
 from tests.robots.test_guessing import knuckles, single_arm
 from tests.robots.urdf_parts import Parts
@@ -114,3 +114,37 @@ def test_every_joint_of_a_mimic_tree_goes_where_its_leader_sends_it(tmp_path):
             assert after[joint] == pytest.approx(multiplier * lead + offset, abs=0.02), joint
         speeds = np.abs(np.array(standing.simulation.read().joint_velocities))
         assert speeds.max() < 1.0
+
+
+@pytest.mark.parametrize("linked", [True, False])
+def test_jaws_that_hold_something_stay_parallel_if_their_joints_are_a_linkage(tmp_path, linked):
+    parts, last = single_arm(end="")
+    knuckles(parts, last)
+    robot = guess_descriptor(parts.write(tmp_path), "made").descriptor
+    group = robot.action_split.groups["gripper"]
+    if not linked:
+        loose = robot.action_split.replace(gripper=replace(group, leaders=(), lead=0.0))
+        robot = replace(robot, action_split=loose)
+    layout = single({"arm": robot})
+    alone = Simulation(layout, lambda world, _: None, 1, PhysicsSettings())
+    alone.worlds[0].stand("arm", robot.keyframe("rest"))
+    centre = alone.read().tcp_position("arm")[0]
+    turned = alone.read().link_pose("arm", robot.tcp_link)[0, 3:]
+    block = Box(half_size=(0.03, 0.025, 0.03))
+
+    def build(world, _):
+        world.add("block", block, kind="static", position=centre, quaternion=turned)
+
+    simulation = Simulation(layout, build, 1, PhysicsSettings())
+    simulation.worlds[0].stand("arm", robot.keyframe("rest"))
+    action = np.zeros((1, robot.action_dim), np.float32)
+    action[0, -1] = -1.0
+    for _ in range(30):
+        simulation.step(action, simulation.read().joint_positions)
+    state = simulation.read()
+    at = dict(zip(robot.joints, state.qpos("arm")[0], strict=True))
+    sides = (("drive", "left_pad_joint"), ("right_outer_joint", "right_pad_joint"))
+    splayed = max(abs(at[pad] - at[knuckle]) for knuckle, pad in sides)
+    assert (splayed < 0.05) == linked
+    assert not linked or 0.2 < at["drive"] < 0.5  # the block stops it
+    assert not linked or np.abs(state.joint_velocities).max() < 0.2
