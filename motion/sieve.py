@@ -30,6 +30,10 @@ _PRODUCT = np.zeros((6, 6))  # M: -2 c c' - 2 r r' + (c² - r²) 1 + 1 (c'² - r
 _PRODUCT[range(4), range(4)] = -2.0
 _PRODUCT[4, 5] = _PRODUCT[5, 4] = 1.0
 
+_Found = tuple[Indices, Indices, Indices, Floats]  # states, solids, other solids, lower bounds
+_NONE = np.zeros(0, np.intp)
+NOTHING: _Found = (_NONE, _NONE, _NONE, np.zeros(0))
+
 
 class Candidates(NamedTuple):
     """Pairs of solids that may be near each other, each in one state.
@@ -61,6 +65,7 @@ class _Clusters:
         inner: Their radii, (C, BALLS) (m).
         features: x M of those within, (C, BALLS, 6).
         solids: The solid of each of those, (C, BALLS).
+        whole: Whether these are all the same, (C,).
     """
 
     rows: Indices
@@ -70,6 +75,7 @@ class _Clusters:
     inner: Floats
     features: Floats
     solids: Indices
+    whole: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +132,8 @@ class Sieve:
             self._from_clusters(places, middles, within),
             *([self._from_flats(places, middles, within)] if len(self._flats.solids) else []),
         ]
-        states, a, b, bounds = (np.concatenate(column) for column in zip(*found, strict=True))
-        return self._in_order(states, a, b, bounds)
+        columns = [np.concatenate(column) for column in zip(*found, strict=True)]
+        return self._in_order(*columns)
 
     def nearest(self, places: Floats) -> Candidates:
         """Return for each state a pair of solids that are near each other, if any are balls.
@@ -138,8 +144,7 @@ class Sieve:
         values = self._values(places, self._middles(places))
         count = len(values)
         if not values.size:
-            none = np.zeros(0, np.intp)
-            return Candidates(none, none.reshape(0, 2), np.zeros(0))
+            return self._in_order(*NOTHING)
         with np.errstate(invalid="ignore"):
             distances = np.sqrt(np.maximum(values + self._sums**2, 0.0))
         counts = self._pair_apart > -np.inf
@@ -206,9 +211,7 @@ class Sieve:
         features[..., 5] = 1.0
         return (features[:, self._left] @ _PRODUCT) @ features[:, self._right].transpose(0, 2, 1)
 
-    def _from_clusters(
-        self, places: Floats, middles: Floats, within: Floats | None
-    ) -> tuple[Indices, Indices, Indices, Floats]:
+    def _from_clusters(self, places: Floats, middles: Floats, within: Floats | None) -> _Found:
         values = self._values(places, middles)
         limits = self._limits
         if within is not None:
@@ -220,8 +223,10 @@ class Sieve:
 
     def _within_clusters(
         self, places: Floats, states: Indices, one: Indices, other: Indices, apart: Floats
-    ) -> tuple[Indices, Indices, Indices, Floats]:
+    ) -> _Found:
         """Look at the balls in pairs of clusters; return states, solids and lower bounds."""
+        if not len(states):
+            return NOTHING
         clusters = self._clusters
         relative = seen_from(
             places[clusters.rows[one], states], places[clusters.rows[other], states]
@@ -233,27 +238,27 @@ class Sieve:
         features[:, 3] = radii
         features[:, 4] = squares * (1 - _RELATIVE) - radii * radii
         features[:, 5] = 1.0
-        values = (clusters.features[one] @ features).reshape(len(states), BALLS * BALLS)
-        near = np.flatnonzero(values.min(axis=1) <= 0.0) if len(values) else np.zeros(0, np.intp)
-        values = values[near]
-        at, ball = np.unravel_index(np.flatnonzero(values <= 0.0), values.shape)
-        entry = near[at]
+        values = clusters.features[one] @ features
+        near = np.flatnonzero((values.reshape(len(states), BALLS * BALLS) <= 0.0).any(axis=1))
+        states, one, other, apart = states[near], one[near], other[near], apart[near]
+        sums = clusters.inner[one, :, None] + clusters.inner[other, None]
+        squares = values[near] + (sums + apart[:, None, None]) ** 2
+        gaps = (np.sqrt(np.maximum(squares, 0.0)) - sums).reshape(len(near), BALLS * BALLS)
+        whole = clusters.whole[one] & clusters.whole[other]
+        entry, ball = np.nonzero((gaps <= apart[:, None]) & ~whole[:, None])
         first, second = np.divmod(ball, BALLS)
-        one, other = one[entry], other[entry]
-        sums = clusters.inner[one, first] + clusters.inner[other, second]
-        squares = values[at, ball] + (sums + apart[entry]) ** 2
         return (
-            states[entry],
-            clusters.solids[one, first],
-            clusters.solids[other, second],
-            np.sqrt(np.maximum(squares, 0.0)) - sums,
+            np.concatenate([states[whole], states[entry]]),
+            np.concatenate([clusters.solids[one[whole], 0], clusters.solids[one[entry], first]]),
+            np.concatenate(
+                [clusters.solids[other[whole], 0], clusters.solids[other[entry], second]]
+            ),
+            np.concatenate([gaps[whole].min(axis=1, initial=np.inf), gaps[entry, ball]]),
         )
 
     # -- half-spaces -------------------------------------------------------------------------
 
-    def _from_flats(
-        self, places: Floats, middles: Floats, within: Floats | None
-    ) -> tuple[Indices, Indices, Indices, Floats]:
+    def _from_flats(self, places: Floats, middles: Floats, within: Floats | None) -> _Found:
         flats, clusters = self._flats, self._clusters
         heights = middles[self._beside] @ flats.normals.reshape(-1, 3).T  # (B, n, F * sides)
         heights = heights.reshape(*heights.shape[:2], *flats.offsets.shape) - flats.offsets
@@ -275,6 +280,8 @@ class Sieve:
 
     def _in_order(self, states: Indices, a: Indices, b: Indices, bounds: Floats) -> Candidates:
         """Return each pair once in each state, with its least bound, the least first."""
+        if not len(states):
+            return Candidates(states, np.zeros((0, 2), np.intp), bounds)
         counts = np.flatnonzero(self._apart[a, b] > -np.inf)
         states, a, b, bounds = states[counts], a[counts], b[counts], bounds[counts]
         size = len(self._apart)
@@ -327,6 +334,7 @@ def _gather(bodies: Bodies, solids: list[int], chains: Chains) -> _Clusters:
         inner=features[..., 3].copy(),
         features=features @ _PRODUCT,
         solids=solid,
+        whole=(solid == solid[:, :1]).all(axis=1),
     )
 
 
