@@ -292,7 +292,8 @@ class Sieve:
         if not len(states):
             return Candidates(states, np.zeros((0, 2), np.intp), bounds)
         counts = np.flatnonzero(self._apart[a, b] > -np.inf)
-        states, a, b, bounds = states[counts], a[counts], b[counts], bounds[counts]
+        states, bounds = states[counts], bounds[counts]
+        a, b = np.minimum(a[counts], b[counts]), np.maximum(a[counts], b[counts])
         size = len(self._apart)
         keys = (states * size + a) * size + b
         order = np.lexsort((bounds, keys))
