@@ -14,13 +14,14 @@ from layouts.validation.collisions import FAR
 from layouts.validation.findings import length_text
 from motion.bodies import Bodies
 from motion.exact import Measure
-from motion.sieve import Sieve
+from motion.sieve import Candidates, Sieve
 from motion.travel import Travel, in_halves
 from robots import LayoutError
 
 Flags = NDArray[np.bool_]
 
 MOST_STATES = 256  # that are looked at together
+RESOLUTION = (0.01, 0.05)  # of edges: how far points travel (m) and links turn (rad) in a step
 
 
 @dataclass(frozen=True)
@@ -160,7 +161,7 @@ class Checker:
         self,
         start: ArrayLike,
         end: ArrayLike,
-        resolution: tuple[float, float] = (0.01, 0.05),
+        resolution: tuple[float, float] = RESOLUTION,
         times: tuple[float, float] | None = None,
     ) -> bool:
         """Tell whether all states on the straight way between two states are free, ends included.
@@ -182,6 +183,28 @@ class Checker:
             if not self._free(a + shares[:, None] * (b - a), moments).all():
                 return False
         return True
+
+    def steps(
+        self,
+        start: Floats,
+        end: Floats,
+        resolution: tuple[float, float] = RESOLUTION,
+        times: tuple[float, float] | None = None,
+    ) -> int:
+        """Return into how many steps `edge_free` cuts a way; see there."""
+        return self._travel.steps(start, end, resolution, times)
+
+    def candidates(self, qpos: ArrayLike, times: ArrayLike | None = None) -> Candidates:
+        """Return the pairs of solids that bounds alone do not show to be far enough apart.
+
+        Args:
+            qpos: Coordinates, (n, D) (rad, m).
+            times: Where obstacles that move are, (n,) (s); None is 0.
+
+        Raises:
+            LayoutError: If a shape is wrong, or a number not finite.
+        """
+        return self._sieve.candidates(self._places(*self._states(qpos, times)))
 
     # -- one batch ---------------------------------------------------------------------------
 
