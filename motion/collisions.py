@@ -13,9 +13,10 @@ from kinematics.rotations import Floats
 from layouts.validation.collisions import FAR
 from layouts.validation.findings import length_text
 from motion.bodies import Bodies
+from motion.edges import Edges
 from motion.exact import Measure
 from motion.sieve import Candidates, Sieve
-from motion.travel import Travel, in_halves
+from motion.travel import Travel
 from robots import LayoutError
 
 Flags = NDArray[np.bool_]
@@ -73,6 +74,10 @@ class Checker:
         self.apart = apart = np.broadcast_to(np.asarray(apart, float), (len(pairs),))
         self._sieve = Sieve(cell, pairs, apart)
         self._measure = Measure(cell, pairs, apart, self._sieve.chains)
+
+    @cached_property
+    def _edges(self) -> Edges:
+        return Edges(self._sieve, self._measure, self._travel)
 
     @cached_property
     def _travel(self) -> Travel:
@@ -177,12 +182,7 @@ class Checker:
             LayoutError: If a shape is wrong, or a number not finite.
         """
         (a, b), _ = self._states(np.stack([np.asarray(start, float), np.asarray(end, float)]), None)
-        steps = self._travel.steps(a, b, resolution, times)
-        for shares in in_halves(steps):
-            moments = None if times is None else times[0] + shares * (times[1] - times[0])
-            if not self._free(a + shares[:, None] * (b - a), moments).all():
-                return False
-        return True
+        return self._edges.free(a, b, self.steps(a, b, resolution, times), times)
 
     def steps(
         self,

@@ -11,7 +11,7 @@ from motion.bodies import WORLD
 from motion.cell import Cell
 from motion.collisions import Checker
 from motion.obstacles import Track, box
-from motion.travel import Travel, in_halves
+from motion.travel import Travel
 from robots import LayoutError, UnknownNameError
 from tests.motion import cells
 
@@ -21,6 +21,11 @@ UPTURNED = np.array([0.0, 0.0, 0.0, -0.1, 0.0, 2.0, 0.8, 0.04, 0.04])  # a Panda
 @pytest.fixture(scope="module")
 def crowd() -> Cell:
     return cells.crowded()
+
+
+@pytest.fixture(scope="module")
+def drive() -> Cell:
+    return cells.driving()
 
 
 @pytest.fixture(params=["crowded", "pandas", "guessed", "driving", "dual"])
@@ -34,23 +39,22 @@ def cell(request, tmp_path):
     return make(tmp_path) if request.param == "guessed" else make()
 
 
-@pytest.mark.parametrize("clearance", [0.0, 0.03])
-def test_free_is_what_fcl_alone_says(cell, clearance):
-    checker = cell.checker(clearance=clearance)
-    qpos, times = cells.states(cell, 16)
-    apart = cells.least_distances(checker, qpos, times)
-    bad = (apart < checker.apart) | (apart == 0.0)
-    free = checker.free(qpos, times)
-    assert free.tolist() == (~bad.any(axis=1)).tolist()
-    assert free.any() or not free.all()
-    for i in range(0, 16, 3):
-        assert checker.close(qpos[i], times[i]).tolist() == bad[i].tolist()
-        assert checker.free(qpos[i : i + 1], times[i]).tolist() == [bool(free[i])]
+def test_free_is_what_fcl_alone_says(cell):
+    qpos, times = cells.states(cell, 12)
+    apart = cells.least_distances(cell.checker(), qpos, times)
+    for clearance in (0.0, 0.03):
+        checker = cell.checker(clearance=clearance)
+        bad = (apart < checker.apart) | (apart == 0.0)
+        free = checker.free(qpos, times)
+        assert free.tolist() == (~bad.any(axis=1)).tolist()
+        for i in range(0, 12, 3):
+            assert checker.close(qpos[i], times[i]).tolist() == bad[i].tolist()
+            assert checker.free(qpos[i : i + 1], times[i]).tolist() == [bool(free[i])]
 
 
 def test_distance_is_the_least_that_fcl_finds(cell):
     checker = cell.checker(own=None)
-    qpos, times = cells.states(cell, 8, seed=1)
+    qpos, times = cells.states(cell, 6, seed=1)
     least = cells.least_distances(checker, qpos, times).min(axis=1)
     distance = checker.distance(qpos, times)
     np.testing.assert_allclose(np.maximum(distance, 0.0), least, atol=1e-6)
@@ -209,40 +213,73 @@ def test_what_moves_is_where_its_time_says():
 # -- edges -----------------------------------------------------------------------------------
 
 
-def test_an_edge_is_as_free_as_its_states(crowd):
-    checker = crowd.checker()
-    qpos, _ = cells.states(crowd, 40, seed=3)
-    answers = []
-    for a, b in zip(qpos[:-1], qpos[1:], strict=True):
-        b = a + 0.2 * (b - a)
-        shares = np.linspace(0, 1, Travel(crowd).steps(a, b, (0.01, 0.05)) + 1)[:, None]
-        answers.append(checker.edge_free(a, b))
-        assert answers[-1] == checker.free(a + shares * (b - a)).all()
-    assert 0 < np.mean(answers) < 1
-
-
-@given(seed=st.integers(0, 1000), way=st.sampled_from([0.005, 0.05]))
-@settings(max_examples=15)
-def test_no_corner_travels_farther_than_the_resolution(crowd, seed, way):
+def an_edge(cell, seed):
+    """Return a way from somewhere to somewhere not far from there; slides go out by metres."""
     random = np.random.default_rng(seed)
-    low, high = crowd.limits.T
+    low, high = np.clip(cell.limits, -3.0, 3.0).T
     a = random.uniform(low, high)
-    b = np.clip(a + random.normal(0, 0.3, crowd.size), low, high)
-    steps = Travel(crowd).steps(a, b, (way, 0.1))
-    shares = np.linspace(0.0, 1.0, steps + 1)[:12, None]
-    poses = cells.solid_poses(crowd, a + shares * (b - a), np.zeros(len(shares)))
-    for i, solid in enumerate(crowd.solids):
+    return cell, a, np.clip(a + random.normal(0, 0.3, cell.size), low, high)
+
+
+@pytest.mark.parametrize("name", ["crowd", "drive"])
+@given(seed=st.integers(0, 1000), way=st.sampled_from([0.005, 0.05]))
+@settings(max_examples=12)
+def test_no_corner_travels_farther_than_the_resolution(crowd, drive, name, seed, way):
+    cell, a, b = an_edge({"crowd": crowd, "drive": drive}[name], seed)
+    steps = Travel(cell).steps(a, b, (way, 0.1))
+    shares = np.linspace(0.0, 1.0, steps + 1)[-12:, None]
+    poses = cells.solid_poses(cell, a + shares * (b - a), np.zeros(len(shares)))
+    for i, solid in enumerate(cell.solids):
         corners = poses[:, i, :3, :3] @ solid.hull.corners.T + poses[:, i, :3, 3:]
         assert np.linalg.norm(np.diff(corners, axis=0), axis=1).max() <= way * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("steps", [1, 2, 3, 7, 64, 100])
-def test_a_way_is_looked_at_from_its_ends_and_its_middle(steps):
-    shares = list(in_halves(steps))
-    assert sorted(np.concatenate(shares).tolist()) == [i / steps for i in range(steps + 1)]
-    assert shares[0][:2].tolist() == [0.0, 1.0]
-    if steps == 64:
-        assert shares[0][2:5].tolist() == [0.5, 0.25, 0.75]
+@pytest.mark.parametrize("name", ["crowd", "drive"])
+@given(seed=st.integers(0, 1000))
+@settings(max_examples=12)
+def test_no_distance_changes_more_than_its_bound(crowd, drive, name, seed):
+    cell, a, b = an_edge({"crowd": crowd, "drive": drive}[name], seed)
+    times = (0.5, 2.5)
+    most = Travel(cell).between(a, b, times)
+    shares = np.linspace(0.0, 1.0, 5)[:, None]
+    moments = times[0] + shares[:, 0] * (times[1] - times[0])
+    poses = cells.solid_poses(cell, a + shares * (b - a), moments)
+    points = np.stack(
+        [
+            poses[:, i, :3, :3] @ solid.hull.corners[seed % len(solid.hull.corners)]
+            + poses[:, i, :3, 3]
+            for i, solid in enumerate(cell.solids)
+        ],
+        axis=1,
+    )
+    gaps = np.linalg.norm(points[:, :, None] - points[:, None], axis=-1)
+    parts = [solid.part for solid in cell.solids]
+    changes = np.abs(gaps - gaps[:1]) / np.maximum(shares[:, :, None], 1e-9)
+    assert (changes.max(axis=0) <= most[np.ix_(parts, parts)] + 1e-9).all()
+
+
+def test_what_moves_both_of_two_links_brings_them_no_nearer(crowd):
+    turned = crowd.start.copy()
+    turned[crowd.slices["left"].start] += 0.5
+    between = Travel(crowd).between(crowd.start, turned)
+    own = [i for i, part in enumerate(crowd.parts) if part.robot == "left"]
+    assert (between[np.ix_(own, own)] == 0.0).all()
+    assert (between[own[0], WORLD], between[WORLD, own[-1]]) > (0.0, 0.3)
+
+
+@pytest.mark.parametrize("resolution", [(0.05, 0.2), (0.003, 0.02)])
+def test_an_edge_is_as_free_as_its_states(crowd, resolution):
+    checker = crowd.checker(clearance=0.01)
+    qpos, _ = cells.states(crowd, 300, seed=3)
+    free = qpos[checker.free(qpos)]
+    answers = []
+    for a, b in zip(free[:12], free[1:13], strict=True):
+        b = a + 0.1 * (b - a)
+        shares = np.linspace(0.0, 1.0, checker.steps(a, b, resolution) + 1)
+        alone = checker.free(a + shares[:, None] * (b - a), 1.5 * shares).all()
+        answers.append(checker.edge_free(a, b, resolution, times=(0.0, 1.5)))
+        assert answers[-1] == alone
+    assert 0 < np.mean(answers) < 1
 
 
 # -- what makes no sense ---------------------------------------------------------------------
