@@ -21,7 +21,7 @@ from robots import LayoutError
 
 Flags = NDArray[np.bool_]
 
-MOST_STATES = 256  # that are looked at together
+MOST_STATES = 64  # that are looked at together; what more need no longer fits into the caches
 RESOLUTION = (0.01, 0.05)  # of edges: how far points travel (m) and links turn (rad) in a step
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinematics.rotations import Floats, rotation_vector, transform
+from kinematics.tree import FIXED
 from motion.bodies import Bodies
 from motion.obstacles import Track
 from robots import LayoutError
@@ -28,7 +29,8 @@ class Travel:
         count, radii = len(bodies.parts), _radii(bodies)
         self._turns = np.zeros((count, bodies.size))  # of each part, per unit of each coordinate
         self._ways = np.zeros((count, bodies.size))
-        self._slides = np.zeros((count, bodies.size, bodies.size))  # and per length of a slide
+        self._sliding = _sliding(bodies)
+        self._slides = np.zeros((count, bodies.size, len(self._sliding)))  # and of each slide
         self._stretch = np.zeros(bodies.size)
         for part, radius in enumerate(radii):
             self._follow(part, radius)
@@ -64,7 +66,7 @@ class Travel:
         turns = self._turns @ np.abs(end - start)
         most = max(ways.max(initial=0.0) / way, turns.max(initial=0.0) / turn)
         for track in self._tracks.values() if times is not None else ():
-            travelled, turned = track.between(*times) if times else (0.0, 0.0)
+            travelled, turned = track.fastest(*times) if times else (0.0, 0.0)
             most = max(most, travelled / way, turned / turn)
         return max(1, int(np.ceil(most - 1e-9)))
 
@@ -83,7 +85,7 @@ class Travel:
         shares = self._shares(start, end)
         ways = shares.sum(axis=1)
         for part, track in self._tracks.items() if times is not None else ():
-            ways[part] = track.fastest(*times) if times else 0.0
+            ways[part] = track.fastest(*times)[0] if times else 0.0
         changes = ways[:, None] + ways
         for parts, columns, common in self._common:
             moved = shares[parts, columns]
@@ -94,7 +96,7 @@ class Travel:
     def _shares(self, start: Floats, end: Floats) -> Floats:
         """Return how far each coordinate takes the points of each part at most, (parts, D) (m)."""
         out = np.maximum(np.abs(start), np.abs(end)) + self._stretch
-        return (self._ways + self._slides @ out) * np.abs(end - start)
+        return (self._ways + self._slides @ out[self._sliding]) * np.abs(end - start)
 
     def _gather_common(self) -> Iterator[tuple[NDArray[np.intp], slice, Floats]]:
         """Yield for each robot its parts, its coordinates, and which of these move two parts alike.
@@ -136,7 +138,7 @@ class Travel:
             else:
                 self._turns[part, driver] += factor
                 self._ways[part, driver] += factor * length
-                self._slides[part, driver] += factor * slides
+                self._slides[part, driver] += factor * slides[self._sliding]
             length += float(np.linalg.norm(here.joint[:3, 3]))
             at = here.parent
 
@@ -157,21 +159,32 @@ class _Way:
         sums = (np.concatenate([[0.0], np.cumsum(values)]) for values in (ways, turns))
         return cls(track.times, *sums)
 
-    def between(self, start: float, end: float) -> tuple[float, float]:
-        """Return how far it leads (m) and turns (rad) between two times (s)."""
-        ways, turns = (
-            np.interp([start, end], self._times, values) for values in (self._ways, self._turns)
-        )
-        return float(abs(ways[1] - ways[0])), float(abs(turns[1] - turns[0]))
+    def fastest(self, start: float, end: float) -> tuple[float, float]:
+        """Return how far it would lead (m) and turn (rad) between two times at full speed.
 
-    def fastest(self, start: float, end: float) -> float:
-        """Return how far it would lead between two times at its greatest speed there (m)."""
-        inner = self._times[(self._times > min(start, end)) & (self._times < max(start, end))]
-        moments = np.array([min(start, end), *inner, max(start, end)])
-        spans = np.diff(moments)
-        ways = np.diff(np.interp(moments, self._times, self._ways))
-        speeds = ways[spans > 0] / spans[spans > 0]
-        return float(speeds.max(initial=0.0) * abs(end - start))
+        Full is the greatest speed that there is between them.
+        """
+        start, end = min(start, end), max(start, end)
+        inner = self._times[(self._times > start) & (self._times < end)]
+        moments = np.unique([start, *inner, end])
+        way, turn = (
+            float(
+                (np.diff(np.interp(moments, self._times, sums)) / np.diff(moments)).max(initial=0.0)
+            )
+            for sums in (self._ways, self._turns)
+        )
+        return way * (end - start), turn * (end - start)
+
+
+def _sliding(bodies: Bodies) -> NDArray[np.intp]:
+    """Return the coordinates that move a slide."""
+    coordinates = {
+        int(tree.drivers[i]) + bodies.slices[name].start
+        for name, model in bodies.models.items()
+        for tree in (model.kinematics,)
+        for i in np.flatnonzero(tree.slides & (tree.drivers != FIXED)).tolist()
+    }
+    return np.array(sorted(coordinates), np.intp)
 
 
 def _radii(bodies: Bodies) -> list[float]:

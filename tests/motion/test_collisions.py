@@ -59,7 +59,7 @@ def test_distance_is_the_least_that_fcl_finds(cell):
     distance = checker.distance(qpos, times)
     np.testing.assert_allclose(np.maximum(distance, 0.0), least, atol=1e-6)
     for state, time, known in zip(qpos[:4], times[:4], distance[:4], strict=True):
-        assert checker.nearest(state, time).distance == pytest.approx(known, abs=1e-9)
+        assert checker.nearest(state, time).distance == pytest.approx(known, abs=1e-6)
 
 
 def test_states_that_are_free_and_states_that_are_not_are_both_among_those_compared(crowd):
