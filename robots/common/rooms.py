@@ -1,6 +1,15 @@
 """The rooms of the library: its top-level packages."""
 
-PLAYING = ("kinematics", "robots", "layouts", "simulation", "tasks", "experts", "rollouts")
+PLAYING = (
+    "kinematics",
+    "robots",
+    "layouts",
+    "motion",
+    "simulation",
+    "tasks",
+    "experts",
+    "rollouts",
+)
 """What plays episodes, each room importing only those before it."""
 
 ROOMS = (*PLAYING, "parity", "measurements")

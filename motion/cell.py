@@ -1,0 +1,100 @@
+"""A cell: all robots of a layout, what stands around them and what they hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kinematics.rotations import inverse_pose
+from motion.bodies import Bodies
+from motion.collisions import Checker
+from motion.obstacles import Held, Obstacle
+from robots import LayoutError, UnknownNameError
+from robots.common.bounds import checked_number
+
+LARGEST_CLEARANCE = 1.0  # m
+
+
+class Cell(Bodies):
+    """All robots of a layout, and the bodies around them; what checks of collisions begin with."""
+
+    def checker(
+        self,
+        moving: Iterable[str] | None = None,
+        clearance: float = 0.0,
+        own: float | None = 0.0,
+        except_: Iterable[tuple[str, str]] = (),
+    ) -> Checker:
+        """Return what tells whether robots touch each other or anything else.
+
+        Pairs that count: those of each robot's own links that a layout's check looks at; links of
+        different robots; links and what is held with tables and obstacles. A table does not count
+        against what never moves, such as the base that stands on it, nor does an obstacle that
+        does not move either.
+
+        Args:
+            moving: The robots that move; only pairs in which one of them, or what it holds, takes
+                part are looked at. None is all of them.
+            clearance: How far bodies have to be apart (m).
+            own: How far links of one robot, and what it holds, have to be apart from each other
+                (m), which many a robot is built to be by a few millimetres only; None leaves these
+                pairs out.
+            except_: Pairs that may touch; each a pair of names of `names`.
+
+        Raises:
+            LayoutError: If a distance makes no sense.
+            UnknownNameError: If there is no such robot or body.
+        """
+        clearance = _distance("clearance", clearance)
+        own = None if own is None else _distance("own", own)
+        movers = {self.layout.owner(name) for name in (self.robots if moving is None else moving)}
+        excepted = [tuple(self._named(name) for name in pair) for pair in except_]
+        apart = {
+            (a, b): own if self._is_own(a, b) else clearance
+            for a, b in self.counted_pairs
+            if not movers.isdisjoint((self.solids[a].mover, self.solids[b].mover))
+            and not any(self._is((a, b), names) for names in excepted)
+        }
+        counted = {pair: distance for pair, distance in apart.items() if distance is not None}
+        pairs = np.array([*counted], np.intp).reshape(-1, 2)
+        return Checker(self, pairs, np.array([*counted.values()], float))
+
+    def grasped(self, place: str, obstacle: Obstacle, qpos: ArrayLike | None = None) -> Held:
+        """Return a body as it is held by an arm that grasps it where it is.
+
+        Args:
+            place: The arm: a robot, or a limb.
+            obstacle: The body, at its pose in the world.
+            qpos: The coordinates there, (D,) (rad, m); None is the cell's start.
+
+        Raises:
+            LayoutError: If the body moves by itself.
+            UnknownNameError: If there is no such arm.
+        """
+        robot, link = self.tcp(place)
+        poses = self.poses(np.atleast_2d(self.start if qpos is None else np.asarray(qpos, float)))
+        tcp = poses[0, self.links.index((robot, self.models[robot].kinematics.links[link]))]
+        if obstacle.moves:
+            return Held(place, obstacle)  # says what is wrong
+        return Held(place, obstacle.moved(inverse_pose(tcp) @ obstacle.poses(None, 1)[0]))
+
+    def _is_own(self, a: int, b: int) -> bool:
+        """Whether one robot moves two solids."""
+        return self.solids[a].mover == self.solids[b].mover
+
+    def _named(self, name: str) -> str:
+        if name not in self.names:
+            raise UnknownNameError("body of this cell", name, self.names)
+        return name
+
+    def _is(self, pair: Sequence[int], names: Sequence[str]) -> bool:
+        """Whether two solids are those that two names stand for."""
+        one, other = ({self.solids[i].owner, self.solids[i].name} for i in pair)
+        first, second = names
+        return (first in one and second in other) or (second in one and first in other)
+
+
+def _distance(what: str, value: float) -> float:
+    return checked_number(what, value, 0.0, LARGEST_CLEARANCE, LayoutError, "m")
