@@ -24,7 +24,7 @@ def search(
     heights: float | Mapping[str, float] = 0.0,
     reached_by: ReachedBy = "any",
     keyframe: str | None = None,
-    clearance: float = 0.05,
+    clearance: float = 0.1,
     partial: bool = False,
     seed: int = 0,
     tries: int = 4,

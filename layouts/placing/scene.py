@@ -18,7 +18,15 @@ from layouts.placing.arms import Arm
 from layouts.placing.demands import Demand
 from layouts.placing.sites import Ground, Seat
 from layouts.validation.check import TABLE_DEPTH, moving_hulls, noisy_postures
-from layouts.validation.collisions import FAR, Postures, fixed, nearest, stand, touching
+from layouts.validation.collisions import (
+    FAR,
+    Postures,
+    fixed,
+    nearer_than,
+    nearest,
+    stand,
+    touching,
+)
 from layouts.validation.reach import Workspace
 from layouts.validation.slabs import slab_hull
 from robots import RobotDescriptor
@@ -199,6 +207,10 @@ class Scene:
         """Tell whether a robot touches neither itself nor a table."""
         pairs = self.models[name].self_pairs
         return not touching(posture, posture, pairs) and not self._sinks(name, posture)
+
+    def near(self, posture: Postures, other: str, seat: Seat, distance: float) -> bool:
+        """Tell whether a robot in a posture is nearer than that to another at its keyframe (m)."""
+        return nearer_than(posture, self.stood(other, seat).start.first, distance)
 
     def gap_to_start(self, posture: Postures, other: str, seat: Seat) -> float:
         """Return how far a robot in a posture is from another one at its keyframe (m)."""

@@ -16,10 +16,10 @@ from layouts.placing.sites import Seat
 UNREACHED = 100.0  # loss per m that is missing to a target
 BLOCKED = 0.05  # m; a target that only a collision keeps from being reached counts as this far
 CRAMPED = 20.0  # loss where a clearance that is asked for is missing altogether
-ROOM = 0.5  # what full clearance is worth, beside all workspace that can be shared
+ROOM = 1.0  # what full clearance is worth, beside all workspace that can be shared
 FACING = 0.3  # loss where all robots look away from their work
 HELP = 0.5  # what it is worth that all robots that may reach a target are near enough
-HOPELESS = 0.2  # m; what is so far from every sampled posture is not tried
+HOPELESS = 0.15  # m; what is so far from every sampled posture is not tried
 FEW_STARTS, FEW_STEPS = 8, 30  # of inverse kinematics, where a robot is only moved a little
 ALL_STEPS = 80
 
@@ -75,7 +75,7 @@ class Trials:
 
     def afresh(self, seats: Seats) -> Trial:
         """Try seats of which nothing is known."""
-        services = [self._served(demand, seats, tuple(demand.arms)) for demand in self._demands]
+        services = [self._served(demand, seats, demand.arms) for demand in self._demands]
         return Trial(seats, tuple(services), self._loss(seats, services))
 
     def moved(self, trial: Trial, name: str, seat: Seat) -> Trial | None:
@@ -88,9 +88,10 @@ class Trials:
         """
         self.count += 1
         seats = {**trial.seats, name: seat}
-        if self._loss(seats, ()) >= trial.loss:
+        spare = (trial.loss - self._loss(seats, ())) / UNREACHED
+        services = self._followed(trial, name, seats, spare) if spare > 0 else None
+        if services is None:
             return None
-        services = self._followed(trial, name, seats)
         loss = self._loss(seats, services)
         return Trial(seats, tuple(services), loss) if loss < trial.loss else None
 
@@ -160,13 +161,22 @@ class Trials:
 
     # -- targets -----------------------------------------------------------------------------
 
-    def _followed(self, trial: Trial, name: str, seats: Seats) -> list[Service]:
-        """Return how the demands are met after one robot has moved."""
+    def _followed(
+        self, trial: Trial, name: str, seats: Seats, spare: float
+    ) -> list[Service] | None:
+        """Return how the demands are met after one robot has moved.
+
+        None as soon as more is missing to the targets than may be (``spare``, m).
+        """
         kept = self._kept(trial, name, seats)
-        return [
-            kept.get(number) or self._served_otherwise(number, trial, name, seats)
-            for number in range(len(self._demands))
-        ]
+        services: list[Service] = []
+        for number in range(len(self._demands)):
+            service = kept.get(number) or self._served_otherwise(number, trial, name, seats)
+            spare -= service.missing
+            if spare <= 0:
+                return None
+            services.append(service)
+        return services
 
     def _kept(self, trial: Trial, name: str, seats: Seats) -> dict[int, Service]:
         """Return the services that go on as they were, or that follow their robot."""
@@ -195,9 +205,9 @@ class Trials:
         """Return a service of another robot than the moved one; None if that is in the way."""
         owner = self._scene.arms[service.arm].owner
         (posture,) = self._scene.postures(owner, before[owner], service.qpos[None])
-        gap = self._scene.gap_to_start(posture, name, seats[name])
-        if gap < self._clearance:
+        if self._scene.near(posture, name, seats[name], self._clearance):
             return None
+        gap = self._scene.gap_to_start(posture, name, seats[name])
         return Service(service.arm, service.qpos, 0.0, {**service.gaps, name: gap})
 
     def _served_otherwise(self, number: int, trial: Trial, name: str, seats: Seats) -> Service:
@@ -218,11 +228,12 @@ class Trials:
         scene = self._scene
         best = Service(demand.arms[0], scene.start(scene.arms[demand.arms[0]].owner), np.inf, {})
         far = {arm: self._beyond(scene.arms[arm], demand, seats) for arm in arms}
-        for arm in sorted(arms, key=lambda arm: far[arm]):
-            tried = self._by(scene.arms[arm], demand, seats, far[arm], quick=quick)
-            if tried.missing == 0:
-                return tried
-            best = tried if tried.missing < best.missing else best
+        for brief in (True,) if quick else (True, False):
+            for arm in sorted(arms, key=lambda arm: far[arm]):
+                tried = self._by(scene.arms[arm], demand, seats, far[arm], quick=brief)
+                if tried.missing == 0:
+                    return tried
+                best = tried if tried.missing < best.missing else best
         return best
 
     def _beyond(self, arm: Arm, demand: Demand, seats: Seats) -> float:
@@ -251,10 +262,10 @@ class Trials:
         scene = self._scene
         owner = scene.arms[arm].owner
         (posture,) = scene.postures(owner, seats[owner], qpos[None])
-        gaps: dict[str, float] = {}
-        for other, seat in seats.items():
-            if other != owner:
-                gaps[other] = scene.gap_to_start(posture, other, seat)
-                if gaps[other] < self._clearance:
-                    return None
-        return Service(arm, qpos, 0.0, gaps) if scene.free(owner, posture) else None
+        others = {other: seat for other, seat in seats.items() if other != owner}
+        if not scene.free(owner, posture) or any(
+            scene.near(posture, other, seat, self._clearance) for other, seat in others.items()
+        ):
+            return None
+        gaps = {other: scene.gap_to_start(posture, other, seat) for other, seat in others.items()}
+        return Service(arm, qpos, 0.0, gaps)
