@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from layouts.frames import Frame
 from layouts.layout import Layout
 from layouts.placement import RobotLike
+from layouts.placing.demands import ReachedBy
 
-if TYPE_CHECKING:
-    from layouts.placing.demands import ReachedBy
-
-__all__ = ["search"]
+__all__ = ["ReachedBy", "search"]
 
 
 def search(

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinematics.quaternions import yaw_quaternion
-from kinematics.rotations import Floats
+from kinematics.rotations import pose_matrix
 from layouts.frames import EDGES, Frame, Pose, resolve, table_outlines
 from layouts.placement import Placement, faced
-from robots import LayoutError, RobotDescriptor
+from robots import LayoutError, RobotDescriptor, UnknownNameError
 from robots.common.bounds import FAR, checked_numbers, shown
-from robots.descriptor import Vector3
+from robots.descriptor import IDENTITY, Vector3
 
 Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)
 Around = Mapping[str, Frame] | Frame | Sequence[float]
@@ -113,6 +113,8 @@ class Ground:
         self, name: str, robot: RobotDescriptor, keyframe: str | None, seat: Seat, on: str | None
     ) -> Placement:
         position = (seat.x, seat.y, self.heights[name])
+        if robot.home.quaternion == IDENTITY:  # written as a turn, which people read more easily
+            return Placement(robot, position, keyframe=keyframe, rpy=(0.0, 0.0, seat.yaw), on=on)
         return Placement(robot, position, faced(robot, yaw_quaternion(seat.yaw)), keyframe, on=on)
 
 
@@ -221,8 +223,6 @@ def _plane(
     targets: Sequence[Sequence[float]],
     reach: float,
 ) -> Site:
-    from kinematics.rotations import pose_matrix
-
     places = np.array([target[:3] for target in targets] or [pose.position])
     back = np.linalg.inv(pose_matrix(pose.position, pose.quaternion))
     local = places @ back[:2, :3].T + back[:2, 3]
@@ -235,8 +235,6 @@ def _plane(
 def _heights(
     heights: float | Mapping[str, float], robots: Mapping[str, RobotDescriptor]
 ) -> dict[str, float]:
-    from robots import UnknownNameError
-
     given = heights if isinstance(heights, Mapping) else dict.fromkeys(robots, heights)
     for name in given:
         if name not in robots:
@@ -245,8 +243,3 @@ def _heights(
         name: checked_numbers("heights", (given.get(name, 0.0),), 1, FAR, LayoutError)[0]
         for name in robots
     }
-
-
-def as_arrays(seats: Sequence[Seat]) -> Floats:
-    """Return seats as an array, (n, 4)."""
-    return np.array([(seat.site, seat.x, seat.y, seat.yaw) for seat in seats])
