@@ -18,7 +18,7 @@ from layouts.placing.arms import corners_of, unique_points
 from layouts.placing.demands import Demand
 from layouts.placing.scene import Scene
 from layouts.placing.sites import Seat, Site
-from layouts.placing.trials import CRAMPED, FACING, HELP, ROOM, UNREACHED, Seats
+from layouts.placing.trials import AWKWARD, CRAMPED, FARTHEST, HELP, ROOM, UNREACHED, Seats
 
 MOST_SEATS = 1500  # of one robot
 TURNS = 8  # in which a base may face, of a whole turn
@@ -102,9 +102,9 @@ class Coarse:
             beyond = np.minimum(beyond, self.robots[other].beyond[at])
         losses = UNREACHED * beyond.sum(axis=1)
         bases = [self.robots[other].bases[at] for other, at in others.items()]
-        away = self._scene.turned_away(name, own.bases, bases)
+        awkward = self._scene.awkward(name, own.bases, bases)
         near = self._near(own)
-        losses += FACING * away / len(chosen) - HELP * near
+        losses += AWKWARD * awkward / len(chosen) - HELP * near
         if not others:
             return losses
         field, bodies = self._grid.empty(), self._grid.empty()
@@ -148,7 +148,7 @@ class Coarse:
         return Candidates(
             seats,
             bases,
-            np.minimum(beyond, 1e3),
+            np.minimum(beyond, FARTHEST),
             self._grid.cells(bases, _some(points, POINTS)),
             self._grid.cells(bases, _some(unique_points(corners, self._grid.size), CORNERS)),
         )
