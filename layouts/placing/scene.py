@@ -239,9 +239,9 @@ class Scene:
             self.ground.frames,
         )
 
-    def forget(self, kept: Sequence[tuple[str, Seat]]) -> None:
-        """Drop what is known of all seats but some."""
-        self._stood = {key: self._stood[key] for key in kept if key in self._stood}
+    def forget(self) -> None:
+        """Drop what is known of seats; it takes memory, and few of them are tried again."""
+        self._stood.clear()
         self._gaps.clear()
         self._shared.clear()
 

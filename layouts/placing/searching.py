@@ -149,6 +149,7 @@ class _Search:
     ) -> Trial:
         """Step to better seats until no step of any length makes a robot's better."""
         reach = max(robot.reach for robot in self._scene.robots.values())
+        self._scene.forget()
         for length in STEPS:
             for _ in range(SWEEPS):
                 before = trial
