@@ -2,7 +2,7 @@
 
 The same robots stand in ``ring(radius="auto")`` and where the search puts them. Of both it measures
 by `Layout.validate` how much space pairs of robots share, how near they come, and which targets
-are reached. The record is JSON; the table is beside it as markdown.
+are reached. The record is JSON, and goes on where it stopped; the table is beside it as markdown.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from layouts import Layout, ring, search
-from measurements.robots.record import versions_of
+from measurements.robots.record import SurveyError, versions_of
 from robots import RobotRegistry
 from robots.common.commands import exit_code, notice, program, start
 from robots.common.writing import write_whole
@@ -35,6 +35,7 @@ CELLS: Mapping[str, tuple[str, ...]] = {
     "five arms": ("panda", "xarm7", "ur3_gripper", "z1", "ur5_gripper"),
 }
 TARGETS = 12
+PATIENCE = 1e6  # s; busy machines are slow
 LEVELS = 3  # heights of targets
 
 Seen = dict[str, Any]
@@ -58,7 +59,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     seen: dict[str, Any] = {"versions": versions_of("numpy", "python-fcl"), "cells": {}}
+    if options.out.exists():
+        seen["cells"] = _read(options.out)
     for name in options.cells:
+        if name in seen["cells"]:
+            continue
         seen["cells"][name] = _tried(name, options.seed, options.pictures)
         notice(f"{name}: {seen['cells'][name]}")
         write_whole(options.out, json.dumps(seen, indent=1) + "\n")
@@ -66,6 +71,13 @@ def _run(options: argparse.Namespace) -> int:
     write_whole(table, "\n".join(markdown(seen)) + "\n")
     print(f"{options.out}, {table}: {len(seen['cells'])} cells")
     return 0
+
+
+def _read(path: Path) -> dict[str, Seen]:
+    try:
+        return dict(json.loads(path.read_text(encoding="utf-8"))["cells"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise SurveyError(f"{path} holds no record of places: {error!r}") from error
 
 
 def targets_of(robots: Sequence[str]) -> list[tuple[float, float, float]]:
@@ -85,7 +97,7 @@ def _tried(name: str, seed: int, pictures: Path | None) -> Seen:
     preset = ring(robots, radius="auto")
     preset.validate()  # so that files are read, and not counted
     begun, worked = time.monotonic(), time.process_time()
-    found = search(robots, targets, seed=seed)
+    found = search(robots, targets, seed=seed, patience=PATIENCE)
     taken, worked = time.monotonic() - begun, time.process_time() - worked
     seen: Seen = {"robots": list(CELLS[name]), "seconds": round(taken, 1), "cpu": round(worked, 1)}
     for way, layout in (("ring", preset), ("search", found)):

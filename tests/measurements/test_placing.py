@@ -20,6 +20,12 @@ def test_a_cell_is_measured_in_both_ways(tmp_path, capsys):
     assert cell["search"]["shared"] > cell["ring"]["shared"]
     assert "| three small arms |" in out.with_suffix(".md").read_text()
     assert len(list(tmp_path.glob("three_small_arms_*.png"))) == 2
+    before = out.read_text()
+    assert main(words) == 0  # nothing is done twice
+    assert out.read_text() == before
+    out.write_text("[]")
+    assert main(words) == 1
+    assert "holds no record of places" in capsys.readouterr().err
 
 
 def test_targets_are_twelve_places_that_differ():
