@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from layouts.validation.findings import length_text, reach_text
 from layouts.validation.report import Report
 from robots import LayoutError, RobotDescriptor
 from robots.common.bounds import checked_number, checked_whole
+from robots.common.errors import MissingPackageError
 
 BEGINNINGS = 12  # random ones of the coarse search, for each place to begin at
 MORE = 3  # times as many begin where none of the best will do
@@ -47,6 +49,7 @@ def search(
     patience: float,
 ) -> Layout:
     """Look for places; see `layouts.search`."""
+    _require_scipy()
     check_robots(robots)
     if not robots:
         raise LayoutError("a search needs at least one robot")
@@ -243,6 +246,15 @@ class _Outcome:
             f" {'; '.join(self.unmet)}; raise tries, ask for less, or take the best with"
             " partial=True"
         )
+
+
+def _require_scipy() -> None:
+    try:
+        import_module("scipy")
+    except ImportError as error:
+        raise MissingPackageError(
+            "a search for places needs scipy and python-fcl: pip install 'robot-layouts[checks]'"
+        ) from error
 
 
 def _check_starts(robots: Mapping[str, RobotDescriptor], keyframe: str | None) -> None:

@@ -13,7 +13,7 @@ from layouts.layout import Layout
 from layouts.placing.coarse import grid_of_seats
 from layouts.placing.demands import demands_of
 from layouts.placing.sites import ground_of
-from robots import LayoutError, RobotLayoutsError, RobotRegistry
+from robots import LayoutError, MissingPackageError, RobotLayoutsError, RobotRegistry
 from tests.layouts.small_robots import robot
 
 PANDA = {"arm": "panda"}
@@ -214,6 +214,12 @@ class TestGround:
 def test_what_makes_no_sense_is_refused(robots, options, message):
     with pytest.raises(RobotLayoutsError, match=message):
         search(robots, **{"targets": CUBE, **QUICK, **options})
+
+
+def test_a_package_that_is_missing_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "scipy", None)
+    with pytest.raises(MissingPackageError, match=r"pip install 'robot-layouts\[checks\]'"):
+        search(PANDA, CUBE)
 
 
 def test_a_robot_that_touches_itself_is_refused(tmp_path):
