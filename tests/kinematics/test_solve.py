@@ -54,6 +54,28 @@ def test_a_pose_that_the_arm_can_have_is_reached(robot, turned):
     np.testing.assert_array_equal(found.qpos[:, still], starts_of(robot)[:, still])
 
 
+def test_each_start_may_have_a_goal_of_its_own():
+    tree, free = tree_of("panda"), arm_of("panda")
+    tip = tree.link(RobotRegistry.load("panda").tcp_link)
+    poses = tree.forward(starts_of("panda", 8)[4:])[:, tip]
+    starts = np.repeat(starts_of("panda", 4), 4, axis=0)  # four for each of four goals
+    goals = np.tile(poses, (4, 1, 1))
+    found = solve(tree, Goal(goals[:, :3, 3], [tip], goals[:, :3, :3], tip), starts, free)
+    assert found.solved.reshape(4, 4).any(axis=0).all()
+    reached = tree.forward(found.qpos)[:, tip]
+    missing = np.linalg.norm(reached[:, :3, 3] - goals[:, :3, 3], axis=1)
+    np.testing.assert_allclose(missing, found.missing, atol=1e-9)
+
+
+def test_few_iterations_do_not_get_there():
+    tree, free = tree_of("panda"), arm_of("panda")
+    tip = tree.link(RobotRegistry.load("panda").tcp_link)
+    far = starts_of("panda", 30)[29:]
+    goal = Goal(tree.forward(far)[0, tip, :3, 3], [tip])
+    assert not solve(tree, goal, starts_of("panda", 1), free, iterations=1).solved.any()
+    assert solve(tree, goal, starts_of("panda", 1), free).solved.any()
+
+
 def test_the_mean_of_links_is_brought_to_a_place():
     tree, free = tree_of("so100"), arm_of("so100")
     links = [tree.link(n) for n in RobotRegistry.load("so100").tcp_position_links]
