@@ -28,15 +28,20 @@ class Way(NamedTuple):
         most: Steps that may be taken for one of the recording, where one is too short.
         tries: How often to try.
         share: How much of what a try missed the next one adds.
+        shake: How far each try strays from what was learnt, at random (m, rad). Such a try ends
+            where the task is solved first, which may be before the recording ends.
     """
 
     most: int
     tries: int
     share: float
+    shake: float = 0.0
 
 
 # ManiSkill's replay_trajectory takes 4 steps. Where something slips, as what is pushed over a table
-# does, the least difference decides when, and each further try is a throw of the dice.
+# does, the least difference decides when, and each further try is a throw of the dice. Where tries
+# come to rest beside what was recorded, as with a ball that rolls on by itself, only straying from
+# that throws another.
 _WAYS = (
     Way(1, tries=8, share=1.0),
     Way(1, tries=12, share=0.3),
@@ -46,6 +51,7 @@ _WAYS = (
     Way(1, tries=20, share=0.5),
     Way(1, tries=20, share=0.15),
     Way(3, tries=8, share=0.3),
+    Way(3, tries=60, share=0.15, shake=3e-3),
 )
 _SETTLING = 10  # steps at the end, while the task is not solved
 
@@ -83,10 +89,12 @@ def converted(
     recorded = followed(source, seed, actions)
     drives = drives_of(source, task)
     found = Attempt([], False, [])
+    random = np.random.default_rng(seed)  # the same actions whenever the episode is converted
     for way in _WAYS if recorded.solved else _WAYS[:1]:
         courses = {drive: drive.course(recorded) for drive in drives}
         for _ in range(way.tries):
-            found = _attempt(courses, task, seed, len(actions), way.most)
+            tried = {d: d.strayed(course, random, way.shake) for d, course in courses.items()}
+            found = _attempt(tried, task, seed, len(actions), way)
             if found.solved:
                 return np.array(found.actions, np.float32)
             courses = {
@@ -110,7 +118,7 @@ def followed(task: MultiRobotTask, seed: int, actions: NDArray[np.float32]) -> R
 
 
 def _attempt(
-    courses: Mapping[Drive, Course], task: MultiRobotTask, seed: int, steps: int, most: int
+    courses: Mapping[Drive, Course], task: MultiRobotTask, seed: int, steps: int, way: Way
 ) -> Attempt:
     """Play a task along courses.
 
@@ -119,20 +127,20 @@ def _attempt(
         task: Is stepped.
         seed: The episode.
         steps: Of the recording.
-        most: Steps that may be taken for one of those, where a step of this mode is too short.
+        way: How it is tried.
     """
     task.reset(seed, options=REBUILT)
     actions: list[NDArray[np.float32]] = []
     states: list[State] = []
     solved = False
     for step in range(steps + _SETTLING):
-        if step >= steps and solved:
+        if solved and (step >= steps or way.shake):
             break
-        for _ in range(most):
+        for _ in range(way.most):
             action, enough = _action(courses, task, min(step, steps - 1))
             actions.append(action)
             solved = bool(task.advance(action[None])[-1]["success"][0])
-            if enough:
+            if enough or (solved and way.shake):
                 break
         if step < steps:
             states.append(task.simulation.read())

@@ -8,6 +8,7 @@ import shutil
 import numpy as np
 import pytest
 
+import tasks
 from layouts import Layout, Placement
 from rollouts.__main__ import main
 from rollouts.playing.replay import open_recording, replay, task_for
@@ -119,3 +120,24 @@ def test_experts_record_with_a_mode_for_each_arm(tmp_path):
         "panda_wristcam-0": "pd_ee_delta_pose",
         "panda_wristcam-1": "pd_joint_pos",
     }
+
+
+def test_a_layout_that_was_put_into_a_mode_is_recorded_in_it(recording, tmp_path):
+    layout = tasks.get_task_class(TASK).layout.in_control_mode(MODE)
+    assert record(TASK, [0], tmp_path / "poses", workers=0, layout=layout).played[0].success
+    with open_recording(tmp_path / "poses", None) as file:
+        assert file.control_mode == MODE
+    assert [(e.success, e.difference) for e in replays(tmp_path / "poses")] == [(True, None)]
+
+
+@pytest.mark.long
+def test_what_rolls_on_by_itself_is_tried_beside_what_was_learnt(tmp_path):
+    record("RollBall-v1", [2], tmp_path / "deltas", workers=0)
+    words = ["convert", str(tmp_path / "deltas"), "--to", "pd_ee_pose"]
+    assert main([*words, "--out", str(tmp_path / "poses")]) == 0
+    assert main([*words, "--out", str(tmp_path / "again")]) == 0
+    with (
+        open_recording(tmp_path / "poses", None) as first,
+        open_recording(tmp_path / "again", None) as second,
+    ):
+        np.testing.assert_array_equal(first[0].actions, second[0].actions)
