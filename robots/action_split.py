@@ -168,6 +168,10 @@ class JointGroup:
                 f"{self.joints} take {self.command!r}, which needs three joints: along x, along y,"
                 " about z"
             )
+        if self.delta and not (self.asks.positions or self.asks.tcp):
+            raise DescriptorError(
+                f"{self.joints} take {self.command!r}, which asks for speeds; these are no delta"
+            )
         if self.command == "tcp_position" and not self.delta:
             raise DescriptorError(f"{self.joints} take 'tcp_position', which is a delta only")
 
