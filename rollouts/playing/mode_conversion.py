@@ -9,12 +9,13 @@ Physics repeats itself to the last bit, so that this converges where the mode ca
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kinematics.rotations import inverse, multiply
 from rollouts.playing.courses import Course, Drive, Recorded, drives_of
 from simulation import State
 from tasks import MultiRobotTask
@@ -54,6 +55,7 @@ _WAYS = (
     Way(3, tries=60, share=0.15, shake=3e-3),
 )
 _SETTLING = 10  # steps at the end, while the task is not solved
+_TURNED = 1.0  # degrees; less than that is no turn on purpose
 
 
 class Attempt(NamedTuple):
@@ -90,7 +92,10 @@ def converted(
     drives = drives_of(source, task)
     found = Attempt([], False, [])
     random = np.random.default_rng(seed)  # the same actions whenever the episode is converted
-    for way in _WAYS if recorded.solved else _WAYS[:1]:
+    ways = _WAYS if recorded.solved else _WAYS[:1]
+    if _lost_turns(recorded, task):  # it may do without them, but learning does not bring them
+        ways = ways[:2]
+    for way in ways:
         courses = {drive: drive.course(recorded) for drive in drives}
         for _ in range(way.tries):
             tried = {d: d.strayed(course, random, way.shake) for d, course in courses.items()}
@@ -102,6 +107,37 @@ def converted(
                 for drive, course in courses.items()
             }
     return np.array(found.actions, np.float32)
+
+
+def why_lost(
+    source: MultiRobotTask, seed: int, actions: NDArray[np.float32], task: MultiRobotTask
+) -> str:
+    """Return in words why `converted` solves an episode in no way; its arguments are the same."""
+    recorded = followed(source, seed, actions)
+    if not recorded.solved:
+        return "in its own mode the task is not solved, either"
+    if turns := _lost_turns(recorded, task):
+        arms = " and ".join(f"{turn:.0f}° ({arm})" for arm, turn in turns.items())
+        by = arms if len(task.layout.arms) > 1 else f"{max(turns.values()):.0f}°"
+        return f"this mode moves the place of the TCP only; the recording turns it by {by}"
+    return f"none of {sum(way.tries for way in _WAYS)} tries solves the task"
+
+
+def turned(states: Sequence[State], arm: str) -> float:
+    """Return how far the TCP of an arm is turned from how it starts, at most (degrees)."""
+    ways = np.array([state.tcp_pose(arm)[0, 3:] for state in states], float)
+    part = np.abs(multiply(ways, inverse(ways[:1]))[:, 0])
+    return float(np.degrees(2 * np.arccos(np.clip(part, 0, 1))).max())
+
+
+def _lost_turns(recorded: Recorded, task: MultiRobotTask) -> dict[str, float]:
+    """Return how far TCPs turn whose mode says where they go, and not how they turn (degrees)."""
+    lost: dict[str, float] = {}
+    for (robot, name), arm in task.layout.arms_by_group.items():
+        asks = task.layout[robot].robot.action_split.groups[name].asks
+        if asks.tcp and not asks.turn and (turn := turned(recorded.states, arm)) >= _TURNED:
+            lost[arm] = turn
+    return lost
 
 
 def followed(task: MultiRobotTask, seed: int, actions: NDArray[np.float32]) -> Recorded:
