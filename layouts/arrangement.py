@@ -236,21 +236,56 @@ class Arrangement(Mapping[str, Placement]):
             for limb, mode in placement.own_modes.items()
         }
 
+    @property
+    def present_modes(self) -> dict[str, str | None]:
+        """The control modes that places say, and those that other robots were put into.
+
+        By robot or by the full name of a limb; robots as they were declared are left out. None is
+        one that was changed since, and is in none of its modes.
+        """
+        found: dict[str, str | None] = {}
+        for name, placement in self.items():
+            mode = placement.robot.control_mode
+            if isinstance(mode, Mapping):
+                found.update({f"{name}.{limb}": own for limb, own in mode.items()})
+            elif mode != CONTROL_MODES[0]:
+                found[name] = mode
+        return self._overruled(found, self.control_modes)
+
     def control_mode(self, asked: str | Mapping[str, str] | None = None) -> str | dict[str, str]:
         """Return the control mode of all robots, or those by arm.
 
         Args:
             asked: A mode for all of them, or by arm; what is left out is as the places say, and
-                where they do not, ``"pd_joint_delta_pos"``.
+                where they do not, as the robots are: in ``"pd_joint_delta_pos"``, or in what
+                `in_control_mode` put them into.
 
         Raises:
             UnknownNameError: If there is no such arm.
+            LayoutError: If a robot that is left out is in none of its modes.
         """
         if asked is not None and not isinstance(asked, Mapping):
             return asked  # whatever it is, the robots know whether it is a mode
-        named = {self.arm_name(arm): mode for arm, mode in (asked or {}).items()}
-        modes = {arm: mode for arm, mode in self.control_modes.items() if arm not in named}
-        return {**modes, **(asked or {})} or CONTROL_MODES[0]
+        modes: dict[str, str] = {}
+        for arm, mode in self._overruled(self.present_modes, asked or {}).items():
+            if mode is None:
+                raise LayoutError(
+                    f"{arm!r}: the joint groups of {self[arm].robot.name} were changed after"
+                    " in_control_mode, and are in none of its control modes; change them first"
+                )
+            modes[arm] = mode
+        alike = set(modes.values())
+        if not (asked or self.control_modes) and list(modes) == list(self) and len(alike) == 1:
+            return alike.pop()
+        return modes or CONTROL_MODES[0]
+
+    def _overruled(
+        self, modes: Mapping[str, str | None], others: Mapping[str, str]
+    ) -> dict[str, str | None]:
+        """Return control modes by arm with those of others in their place, and of their limbs."""
+        named = {self.arm_name(arm) for arm in others}
+        kept = {a: m for a, m in modes.items() if not {self.arm_name(a), self.owner(a)} & named}
+        return {**kept, **others}
 
     def replace_robots(self: _Self, **robots: RobotLike) -> _Self:
         """Return the layout with other robots in some places, facing the same way.
@@ -291,7 +326,7 @@ class Arrangement(Mapping[str, Placement]):
     def in_control_mode(self: _Self, mode: str | Mapping[str, str] | None = None) -> _Self:
         """Return the layout with robots that take the actions of a control mode.
 
-        Their places say no mode any more.
+        Their places say no mode any more; `control_mode` goes on telling it.
 
         Args:
             mode: Name of a mode, or one by arm: a robot, or a limb by its full name or its short

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from kinematics.quaternions import yaw_degrees
@@ -22,7 +22,7 @@ def describe(layout: Arrangement) -> str:
     on, where one hangs.
     """
     parts, split = layout.parts, layout.action_split
-    modes = layout.control_modes
+    modes = layout.present_modes
     hanging = any(placement.on is not None for placement in layout.values())
     rows = [
         (
@@ -35,12 +35,16 @@ def describe(layout: Arrangement) -> str:
             placement.start_keyframe,
             f"{placement.robot.reach:g}",
             *([layout[layout.owner(name)].on or "–"] if hanging else []),
-            *([modes.get(name) or modes.get(layout.owner(name), "–")] if modes else []),
+            *([_mode_text(name, layout.owner(name), modes)] if modes else []),
         )
         for number, (name, placement) in enumerate(parts.items(), start=1)
     ]
     columns = (*COLUMNS, *(["on"] if hanging else []), *(["control mode"] if modes else []))
     return "\n".join([headline(layout), *_aligned([columns, *rows])])
+
+
+def _mode_text(name: str, owner: str, modes: Mapping[str, str | None]) -> str:
+    return modes.get(name, modes.get(owner, "–")) or "none of its own"
 
 
 def headline(layout: Arrangement) -> str:

@@ -18,12 +18,11 @@ from typing import Any
 import numpy as np
 import torch
 
-from kinematics.rotations import inverse, multiply
 from measurements.robots.record import versions_of
 from robots import CONTROL_MODES, RecordingError, TaskError
 from robots.common.commands import exit_code, program, start
 from robots.common.writing import write_whole
-from rollouts.playing.mode_conversion import followed
+from rollouts.playing.mode_conversion import followed, turned
 from rollouts.playing.replay import open_recording, task_for
 from rollouts.progress import LiveLine
 from rollouts.recording.convert import convert
@@ -31,9 +30,11 @@ from rollouts.recording.record import FILE, record
 from tasks import get_task_class, list_clones
 
 RECORD = Path("docs/conversions.json")
-MODES = CONTROL_MODES[1:]
+PLACES = "pd_ee_delta_pos", "pd_ee_target_delta_pos"  # they move the TCP's place alone
+MODES = tuple(mode for mode in CONTROL_MODES[1:] if mode not in PLACES)
 SPARE = 5  # episodes more than are wanted, as experts may fail
-LOOKED_AT = 5  # episodes in which the TCP's turn is measured
+ALL = *MODES, *PLACES
+FEW = 5  # episodes in which the TCP's turn is measured, and which `PLACES` are tried with
 
 Seen = dict[str, Any]
 
@@ -47,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog=program("measurements.conversions"), description=__doc__)
     add = parser.add_argument
     add("--tasks", nargs="+", metavar="TASK", help="(all of ManiSkill's that there are)")
-    add("--modes", nargs="+", metavar="MODE", default=MODES, choices=MODES, help="(all)")
+    add("--modes", nargs="+", metavar="MODE", default=ALL, choices=ALL, help="(all)")
     add("--episodes", type=int, default=25, metavar="N", help="of each task (%(default)s)")
     add("--native", action="store_true", help="play what was kept in native ManiSkill, too")
     add("--work", type=Path, default=Path("runs/conversions"), metavar="DIR", help="(%(default)s)")
@@ -93,7 +94,8 @@ def _try(seen: Seen, task_id: str, mode: str, options: argparse.Namespace) -> No
     one = seen["modes"].setdefault(mode, {})
     if "kept" not in one:
         rmtree(folder / mode, ignore_errors=True)
-        one |= _converted(folder, mode, options.episodes)
+        few = min(options.episodes, FEW) if mode in PLACES else options.episodes
+        one |= _converted(folder, mode, few)
     if options.native and "native" not in one and one["kept"]:
         one |= _in_native(task_id, folder / mode / FILE)
 
@@ -132,12 +134,9 @@ def _turn(folder: Path) -> float:
     """Return how far a recording turns a TCP from how it starts, on the average (degrees)."""
     with open_recording(folder, None) as file, closing(task_for(file)) as task:
         turns: list[float] = []
-        for number in range(min(LOOKED_AT, len(file))):
+        for number in range(min(FEW, len(file))):
             states = followed(task, file[number].seed or 0, file[number].actions).states
-            for arm in task.layout.arms:
-                ways = np.array([state.tcp_pose(arm)[0, 3:] for state in states], float)
-                part = np.abs(multiply(ways, inverse(ways[:1]))[:, 0])
-                turns.append(float(np.degrees(2 * np.arccos(np.clip(part, 0, 1))).max()))
+            turns.extend(turned(states, arm) for arm in task.layout.arms)
     return round(float(np.mean(turns)), 1)
 
 
@@ -151,16 +150,27 @@ def markdown(found: Mapping[str, Any]) -> Iterator[str]:
     yield "as `rollouts convert` does; `python -m measurements.conversions` writes this page. In"
     yield "each cell: how many were kept of how many, as they succeed in the other mode, too; then"
     yield "in how many of those native ManiSkill succeeds. *turn* is how far the TCP turns, on the"
-    yield "average (°): modes that ask for its position alone cannot turn it on purpose. A dash is"
-    yield "where native's robot has no such mode."
+    yield "average (°). A dash is where native's robot has no such mode."
     yield f"Made with {versions}."
     yield ""
-    yield _row("task", "turn", *(f"`{mode.removeprefix('pd_')}`" for mode in MODES))
-    yield _row("---", "---:", *["---:"] * len(MODES))
+    yield from _table(tasks, MODES)
+    yield ""
+    yield "## Modes that move the TCP's place alone"
+    yield ""
+    yield "They cannot turn the TCP, so that a recording is kept only where the task can do without"
+    yield f"the turn; {FEW} of each task were tried. `rollouts convert` says of each that is not"
+    yield "kept how far it turns the TCP."
+    yield ""
+    yield from _table(tasks, PLACES)
+
+
+def _table(tasks: Mapping[str, Seen], modes: Sequence[str]) -> Iterator[str]:
+    yield _row("task", "turn", *(f"`{mode.removeprefix('pd_')}`" for mode in modes))
+    yield _row("---", "---:", *["---:"] * len(modes))
     for task_id, seen in tasks.items():
-        cells = (_cell(seen["modes"].get(mode, {})) for mode in MODES)
+        cells = (_cell(seen["modes"].get(mode, {})) for mode in modes)
         yield _row(f"`{task_id}`", f"{seen['turn']:.0f}", *cells)
-    yield _row("all", "", *(_total([s["modes"].get(m, {}) for s in tasks.values()]) for m in MODES))
+    yield _row("all", "", *(_total([s["modes"].get(m, {}) for s in tasks.values()]) for m in modes))
 
 
 def _cell(one: Seen) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NoReturn, Protocol, runtime_checkable
@@ -325,8 +325,34 @@ class RobotDescriptor:
         """The control modes that may be asked of it: ManiSkill's, then its own."""
         return (*CONTROL_MODES, *(name for name in self.control_modes if name not in MODES))
 
+    @property
+    def control_mode(self) -> str | dict[str, str] | None:
+        """The control mode that its action split is in, or those by limb.
+
+        It is ``"pd_joint_delta_pos"`` as declared, and None if joint groups were changed since
+        `in_control_mode`, so that it is in none.
+        """
+        if self.action_split.declared is self.action_split:
+            return CONTROL_MODES[0]
+        for mode in self.modes:
+            if self._is_in(mode, self.action_split.groups):
+                return mode
+        by_limb: dict[str, str] = {}
+        for limb, part in self.parts.items():
+            own = [m for m in self.modes if self._is_in({limb: m}, part.action_split.groups)]
+            by_limb.update(dict.fromkeys([limb], own[0]) if own else {})
+        return by_limb if by_limb and set(by_limb) == set(self.parts) else None
+
+    def _is_in(self, mode: str | Mapping[str, str], groups: Collection[str]) -> bool:
+        """Tell whether some of its joint groups are driven as a control mode drives them."""
+        try:
+            made = self._driven_in(mode).groups
+        except DescriptorError:  # it lacks what that mode needs
+            return False
+        return all(made[group] == self.action_split.groups[group] for group in groups)
+
     def in_control_mode(self, mode: str | Mapping[str, str]) -> RobotDescriptor:
-        """Return the robot with the actions of a control mode.
+        """Return the robot with the actions of a control mode, whichever it is in.
 
         ``pd_joint_delta_pos`` is the action split as declared. The other modes of joint positions
         change every group that is relative there, those of velocities all but grippers, and those
@@ -340,7 +366,21 @@ class RobotDescriptor:
             UnknownNameError: If there is no such control mode, or no such limb.
             DescriptorError: If the robot lacks what the mode needs: joint limits, or an arm.
         """
-        parts = self.parts or {self.name: self}
+        if self.control_mode is None:
+            raise DescriptorError(
+                f"{self.name} was put into a control mode, and its joint groups were changed then;"
+                " change them first"
+            )
+        split = self._driven_in(mode)
+        return self if split == self.action_split else replace(self, action_split=split)
+
+    def _driven_in(self, mode: str | Mapping[str, str]) -> ActionSplit:
+        """Return the action split of a control mode, made of the declared one."""
+        declared = self.action_split.declared
+        whole = self
+        if declared is not self.action_split:
+            whole = replace(self, action_split=declared)
+        parts = whole.parts or {self.name: whole}
         chosen = mode if isinstance(mode, Mapping) else dict.fromkeys(parts, mode)
         changed: dict[str, JointGroup] = {}
         for part, name in chosen.items():
@@ -351,14 +391,13 @@ class RobotDescriptor:
             split, own = parts[part].action_split, self.control_modes.get(name, {})
             if not split.size:  # all of it is held, and stays so
                 continue
+            changed.update(split.groups)
             try:
                 has_tcp = not self.limbs or part in self.limbs
                 changed.update(driven_in(name, split, own, has_tcp=has_tcp))
             except DescriptorError as error:
                 raise DescriptorError(f"{self.name}: {error}") from None
-        if all(self.action_split.groups[name] == group for name, group in changed.items()):
-            return self
-        return replace(self, action_split=self.action_split.replace(**changed))
+        return self.action_split.replace(**changed).made_of(declared)
 
     def describe_action(self) -> tuple[ActionNumber, ...]:
         """Return name, unit and range of every action number, in order."""

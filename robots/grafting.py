@@ -21,6 +21,7 @@ from robots.assets.assembled import AssembledUrdf, Part, carried_by
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
 from robots.bodies.overlaps import guess_allowed
 from robots.common.errors import DescriptorError, UnknownNameError
+from robots.control_modes import CONTROL_MODES
 from robots.descriptor import (
     IDENTITY,
     CameraMount,
@@ -89,6 +90,7 @@ def with_gripper(
         UnknownNameError: If there is no such link or robot.
         AssetError: If files cannot be found or make no sense.
     """
+    robot = _robot(robot)
     _refuse_limbs(robot, "take another gripper")
     lender = _robot(gripper)
     _refuse_limbs(lender, "lend a gripper")
@@ -299,7 +301,13 @@ def _modes_of(robot: RobotDescriptor, names: Mapping[str, str]) -> dict[str, dic
 
 
 def _robot(given: RobotLike) -> RobotDescriptor:
-    return given if isinstance(given, RobotDescriptor) else named_robot(given)
+    robot = given if isinstance(given, RobotDescriptor) else named_robot(given)
+    if robot.control_mode != CONTROL_MODES[0]:
+        raise DescriptorError(
+            f"{robot.name} was put into a control mode; take it as it was declared, and put the"
+            " robot that is made into one"
+        )
+    return robot
 
 
 def _model(source: UrdfSource) -> UrdfModel:

@@ -110,6 +110,16 @@ class Drive(Protocol):
         """
         ...
 
+    def strayed(self, course: Course, random: np.random.Generator, size: float) -> Course:
+        """Return a course that strays from one at every step.
+
+        Args:
+            course: The course.
+            random: Says where to.
+            size: How far, as a standard deviation of each number (m, rad).
+        """
+        ...
+
 
 def drives_of(source: MultiRobotTask, task: MultiRobotTask) -> list[Drive]:
     """Return what moves each joint group of a task.
@@ -169,6 +179,10 @@ class SameDrive:
         """See `Drive`."""
         return course
 
+    def strayed(self, course: Course, random: np.random.Generator, size: float) -> Course:
+        """See `Drive`."""
+        return course
+
 
 class JointDrive:
     """A group that is driven by positions of its joints, or by their velocities.
@@ -215,6 +229,10 @@ class JointDrive:
     def learnt(self, course: Course, came: Sequence[Floats], share: float) -> Course:
         """See `Drive`."""
         return Course(course.wanted + share * (course.passed - came), course.passed)
+
+    def strayed(self, course: Course, random: np.random.Generator, size: float) -> Course:
+        """See `Drive`."""
+        return _beside(course, random, size, course.wanted.shape[1])
 
 
 class TcpDrive:
@@ -265,6 +283,10 @@ class TcpDrive:
     def learnt(self, course: Course, came: Sequence[Floats], share: float) -> Course:
         """See `Drive`."""
         return Course(_further(course.wanted, course.passed, np.array(came), share), course.passed)
+
+    def strayed(self, course: Course, random: np.random.Generator, size: float) -> Course:
+        """See `Drive`."""
+        return _beside(course, random, size, 3)  # its place, not its turn
 
     # -- inside ------------------------------------------------------------------------------
 
@@ -352,6 +374,15 @@ def _normalised(group: JointGroup, values: Floats) -> tuple[Floats, bool]:
         numbers[3:] = turn / max(length, 1.0)
         return np.clip(numbers, -1, 1), length <= _NEARLY and bool((abs(numbers) <= _NEARLY).all())
     return np.clip(numbers, -1, 1), bool((abs(numbers) <= _NEARLY).all())
+
+
+def _beside(course: Course, random: np.random.Generator, size: float, count: int) -> Course:
+    """Return a course of which the first numbers of each step are others, at random."""
+    if not size:
+        return course
+    wanted = course.wanted.copy()
+    wanted[:, :count] += random.normal(0.0, size, (len(wanted), count))
+    return Course(wanted, course.passed)
 
 
 def _further(wanted: Floats, passed: Floats, own: Floats, share: float) -> Floats:

@@ -9,12 +9,13 @@ Physics repeats itself to the last bit, so that this converges where the mode ca
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kinematics.rotations import inverse, multiply
 from rollouts.playing.courses import Course, Drive, Recorded, drives_of
 from simulation import State
 from tasks import MultiRobotTask
@@ -28,15 +29,20 @@ class Way(NamedTuple):
         most: Steps that may be taken for one of the recording, where one is too short.
         tries: How often to try.
         share: How much of what a try missed the next one adds.
+        shake: How far each try strays from what was learnt, at random (m, rad). Such a try ends
+            where the task is solved first, which may be before the recording ends.
     """
 
     most: int
     tries: int
     share: float
+    shake: float = 0.0
 
 
 # ManiSkill's replay_trajectory takes 4 steps. Where something slips, as what is pushed over a table
-# does, the least difference decides when, and each further try is a throw of the dice.
+# does, the least difference decides when, and each further try is a throw of the dice. Where tries
+# come to rest beside what was recorded, as with a ball that rolls on by itself, only straying from
+# that throws another.
 _WAYS = (
     Way(1, tries=8, share=1.0),
     Way(1, tries=12, share=0.3),
@@ -46,8 +52,10 @@ _WAYS = (
     Way(1, tries=20, share=0.5),
     Way(1, tries=20, share=0.15),
     Way(3, tries=8, share=0.3),
+    Way(3, tries=60, share=0.15, shake=3e-3),
 )
 _SETTLING = 10  # steps at the end, while the task is not solved
+_TURNED = 1.0  # degrees; less than that is no turn on purpose
 
 
 class Attempt(NamedTuple):
@@ -83,10 +91,15 @@ def converted(
     recorded = followed(source, seed, actions)
     drives = drives_of(source, task)
     found = Attempt([], False, [])
-    for way in _WAYS if recorded.solved else _WAYS[:1]:
+    random = np.random.default_rng(seed)  # the same actions whenever the episode is converted
+    ways = _WAYS if recorded.solved else _WAYS[:1]
+    if _lost_turns(recorded, task):  # it may do without them, but learning does not bring them
+        ways = ways[:2]
+    for way in ways:
         courses = {drive: drive.course(recorded) for drive in drives}
         for _ in range(way.tries):
-            found = _attempt(courses, task, seed, len(actions), way.most)
+            tried = {d: d.strayed(course, random, way.shake) for d, course in courses.items()}
+            found = _attempt(tried, task, seed, len(actions), way)
             if found.solved:
                 return np.array(found.actions, np.float32)
             courses = {
@@ -94,6 +107,37 @@ def converted(
                 for drive, course in courses.items()
             }
     return np.array(found.actions, np.float32)
+
+
+def why_lost(
+    source: MultiRobotTask, seed: int, actions: NDArray[np.float32], task: MultiRobotTask
+) -> str:
+    """Return in words why `converted` solves an episode in no way; its arguments are the same."""
+    recorded = followed(source, seed, actions)
+    if not recorded.solved:
+        return "in its own mode the task is not solved, either"
+    if turns := _lost_turns(recorded, task):
+        arms = " and ".join(f"{turn:.0f}° ({arm})" for arm, turn in turns.items())
+        by = arms if len(task.layout.arms) > 1 else f"{max(turns.values()):.0f}°"
+        return f"this mode moves the place of the TCP only; the recording turns it by {by}"
+    return f"none of {sum(way.tries for way in _WAYS)} tries solves the task"
+
+
+def turned(states: Sequence[State], arm: str) -> float:
+    """Return how far the TCP of an arm is turned from how it starts, at most (degrees)."""
+    ways = np.array([state.tcp_pose(arm)[0, 3:] for state in states], float)
+    part = np.abs(multiply(ways, inverse(ways[:1]))[:, 0])
+    return float(np.degrees(2 * np.arccos(np.clip(part, 0, 1))).max())
+
+
+def _lost_turns(recorded: Recorded, task: MultiRobotTask) -> dict[str, float]:
+    """Return how far TCPs turn whose mode says where they go, and not how they turn (degrees)."""
+    lost: dict[str, float] = {}
+    for (robot, name), arm in task.layout.arms_by_group.items():
+        asks = task.layout[robot].robot.action_split.groups[name].asks
+        if asks.tcp and not asks.turn and (turn := turned(recorded.states, arm)) >= _TURNED:
+            lost[arm] = turn
+    return lost
 
 
 def followed(task: MultiRobotTask, seed: int, actions: NDArray[np.float32]) -> Recorded:
@@ -110,7 +154,7 @@ def followed(task: MultiRobotTask, seed: int, actions: NDArray[np.float32]) -> R
 
 
 def _attempt(
-    courses: Mapping[Drive, Course], task: MultiRobotTask, seed: int, steps: int, most: int
+    courses: Mapping[Drive, Course], task: MultiRobotTask, seed: int, steps: int, way: Way
 ) -> Attempt:
     """Play a task along courses.
 
@@ -119,20 +163,20 @@ def _attempt(
         task: Is stepped.
         seed: The episode.
         steps: Of the recording.
-        most: Steps that may be taken for one of those, where a step of this mode is too short.
+        way: How it is tried.
     """
     task.reset(seed, options=REBUILT)
     actions: list[NDArray[np.float32]] = []
     states: list[State] = []
     solved = False
     for step in range(steps + _SETTLING):
-        if step >= steps and solved:
+        if solved and (step >= steps or way.shake):
             break
-        for _ in range(most):
+        for _ in range(way.most):
             action, enough = _action(courses, task, min(step, steps - 1))
             actions.append(action)
             solved = bool(task.advance(action[None])[-1]["success"][0])
-            if enough:
+            if enough or (solved and way.shake):
                 break
         if step < steps:
             states.append(task.simulation.read())

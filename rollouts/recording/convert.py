@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from rollouts.playing.mode_conversion import converted
+from rollouts.playing.mode_conversion import converted, why_lost
 from rollouts.playing.replay import FILE, task_for
 from rollouts.reading.trajectory import TrajectoryFile
 from rollouts.recording.recorder import Recorder
@@ -24,12 +24,14 @@ class Conversion:
         kept: Seeds of the episodes that succeed in the other mode, too.
         lost: Seeds of those that do not.
         left_out: Numbers of the episodes that have no seed, or did not succeed in their own mode.
+        reasons: Why those that do not succeed do not, in words, by seed.
     """
 
     path: Path
     kept: list[int] = field(default_factory=list[int])
     lost: list[int] = field(default_factory=list[int])
     left_out: list[int] = field(default_factory=list[int])
+    reasons: dict[int, str] = field(default_factory=dict[int, str])
 
     @property
     def complete(self) -> bool:
@@ -45,7 +47,8 @@ class Conversion:
         if self.left_out:
             numbers = ", ".join(map(str, self.left_out))
             lines.append(f"left out, as they have no seed or no success: the episodes {numbers}")
-        return "; ".join(lines) + f": {self.path}"
+        reasons = [f"seed {seed}: {reason}" for seed, reason in self.reasons.items()]
+        return "\n".join(["; ".join(lines) + f": {self.path}", *reasons])
 
 
 def convert(
@@ -98,6 +101,11 @@ def convert(
                     played = play(task, episode.seed, actions)
                     if played.solved:
                         recorder.add(played)
-                    (found.kept if played.solved else found.lost).append(episode.seed)
+                        found.kept.append(episode.seed)
+                    else:
+                        found.lost.append(episode.seed)
+                        found.reasons[episode.seed] = why_lost(
+                            source, episode.seed, episode.actions, task
+                        )
                 on_episode()
     return found

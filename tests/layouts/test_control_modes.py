@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import pickle
 from contextlib import closing
+from dataclasses import replace
 
 import pytest
 
 import tasks
 from layouts import Layout, Placement, face_to_face
-from robots import CONTROL_MODES, LayoutError, UnknownNameError
+from robots import (
+    CONTROL_MODES,
+    DescriptorError,
+    LayoutError,
+    RobotRegistry,
+    UnknownNameError,
+)
 
 DELTAS, POSE = "pd_joint_delta_pos", "pd_ee_delta_pose"
 PAIR = face_to_face({"left": "panda_wristcam", "right": "panda_wristcam"}, spacing=1.5)
@@ -88,3 +96,49 @@ def test_a_wrong_one_in_yaml_has_its_line():
 
 def test_without_one_a_layout_is_in_deltas():
     assert PAIR.control_mode() == CONTROL_MODES[0]
+
+
+@pytest.mark.parametrize(
+    "mode", [*CONTROL_MODES, {"left": POSE}, {"left": POSE, "right": "pd_joint_vel"}]
+)
+def test_what_was_put_into_a_mode_tells_it(mode):
+    cell = pickle.loads(pickle.dumps(PAIR.in_control_mode(mode)))
+    assert cell.control_mode() == mode
+    assert cell.in_control_mode() == cell
+    assert cell.in_control_mode(DELTAS) == PAIR  # and back
+    assert cell.in_control_mode("pd_joint_pos") == PAIR.in_control_mode("pd_joint_pos")
+    assert ("control mode" in str(cell)) == (mode != DELTAS)
+
+
+def test_so_do_limbs():
+    cell = Layout({"cell": Placement("baxter")}).in_control_mode({"left": POSE})
+    assert cell.control_mode() == {"cell.left": POSE, "cell.right": DELTAS}
+    assert cell.control_mode({"cell": "pd_joint_pos"}) == {"cell": "pd_joint_pos"}
+    both = cell.in_control_mode({"right": POSE})
+    assert both == Layout({"cell": Placement("baxter")}).in_control_mode(POSE)
+    assert both.control_mode() == POSE
+
+
+def test_a_task_of_it_tells_it():
+    cell = PAIR.in_control_mode({"left": POSE})
+    with closing(tasks.make("TwoRobotPickCube-v1", layout=cell, obs_mode="none")) as task:
+        assert task.control_mode == {"left": POSE}
+        again = tasks.make("TwoRobotPickCube-v1", layout=task.layout, obs_mode="none")
+    with closing(again):
+        assert again.control_mode == {"left": POSE}
+        assert again.layout == task.layout
+
+
+def test_what_was_changed_since_is_refused():
+    panda = RobotRegistry.load("panda").in_control_mode(POSE)
+    arm = replace(panda.action_split.groups["arm"], damping=3.0)
+    odd = replace(panda, action_split=panda.action_split.replace(arm=arm))
+    assert odd.control_mode is None
+    cell = Layout({"arm": Placement(odd)})
+    assert "none of its own" in str(cell)
+    with pytest.raises(LayoutError, match=r"'arm': the joint groups of panda were changed after"):
+        tasks.make("PickCube-v1", layout=cell)
+    with pytest.raises(DescriptorError, match="its joint groups were changed then"):
+        odd.in_control_mode("pd_joint_pos")
+    with pytest.raises(DescriptorError, match="panda was put into a control mode; take it as it"):
+        panda.with_gripper("panda")

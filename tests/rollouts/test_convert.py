@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
+from contextlib import closing
 
 import numpy as np
 import pytest
 
+import tasks
 from layouts import Layout, Placement
 from rollouts.__main__ import main
+from rollouts.playing.mode_conversion import why_lost
 from rollouts.playing.replay import open_recording, replay, task_for
+from rollouts.recording.convert import Conversion
 from rollouts.recording.record import record
 from tests.rollouts.recordings import edited
 
@@ -119,3 +124,54 @@ def test_experts_record_with_a_mode_for_each_arm(tmp_path):
         "panda_wristcam-0": "pd_ee_delta_pose",
         "panda_wristcam-1": "pd_joint_pos",
     }
+
+
+def test_a_layout_that_was_put_into_a_mode_is_recorded_in_it(recording, tmp_path):
+    layout = tasks.get_task_class(TASK).layout.in_control_mode(MODE)
+    assert record(TASK, [0], tmp_path / "poses", workers=0, layout=layout).played[0].success
+    with open_recording(tmp_path / "poses", None) as file:
+        assert file.control_mode == MODE
+    assert [(e.success, e.difference) for e in replays(tmp_path / "poses")] == [(True, None)]
+
+
+@pytest.mark.parametrize(
+    ("mode", "share", "reason"),
+    [
+        (
+            "pd_ee_delta_pos",
+            1.0,
+            r"place of the TCP only; the recording turns it by \d+°$",
+        ),
+        ("pd_ee_delta_pose", 1.0, r"none of \d+ tries solves the task"),
+        ("pd_ee_delta_pos", 0.0, "in its own mode the task is not solved, either"),
+    ],
+)
+def test_why_one_is_not_kept(recording, mode, share, reason):
+    with open_recording(recording, None) as file, closing(task_for(file)) as source:
+        episode = file[0]
+        with closing(tasks.make(TASK, obs_mode="none", control_mode=mode)) as task:
+            why = why_lost(source, episode.seed, share * episode.actions, task)
+    assert re.search(reason, why)
+
+
+def test_each_that_is_not_kept_has_its_line(tmp_path):
+    found = Conversion(tmp_path, [0], [1, 2], [], {1: "so far", 2: "too far"})
+    assert str(found).splitlines() == [
+        f"1 of 3 successful episodes succeed in the other mode, too; not kept: the seeds 1, 2:"
+        f" {tmp_path}",
+        "seed 1: so far",
+        "seed 2: too far",
+    ]
+
+
+@pytest.mark.long
+def test_what_rolls_on_by_itself_is_tried_beside_what_was_learnt(tmp_path):
+    record("RollBall-v1", [2], tmp_path / "deltas", workers=0)
+    words = ["convert", str(tmp_path / "deltas"), "--to", "pd_ee_pose"]
+    assert main([*words, "--out", str(tmp_path / "poses")]) == 0
+    assert main([*words, "--out", str(tmp_path / "again")]) == 0
+    with (
+        open_recording(tmp_path / "poses", None) as first,
+        open_recording(tmp_path / "again", None) as second,
+    ):
+        np.testing.assert_array_equal(first[0].actions, second[0].actions)
