@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 
-from measurements.placing import CELLS, main, targets_of
+from measurements.placing import CELLS, main, markdown, targets_of
+
+RECORD = Path(__file__).parents[2] / "docs/placing.json"
 
 
 @pytest.mark.long
@@ -33,3 +36,17 @@ def test_targets_are_twelve_places_that_differ():
         targets = targets_of(robots)
         assert len(set(targets)) == 12
         assert all(z > 0 for _, _, z in targets)
+
+
+def test_the_page_is_the_records():
+    seen = json.loads(RECORD.read_text())
+    assert list(seen["cells"]) == list(CELLS)
+    assert RECORD.with_suffix(".md").read_text() == "\n".join(markdown(seen)) + "\n"
+
+
+def test_what_the_page_promises():
+    for name, cell in json.loads(RECORD.read_text())["cells"].items():
+        assert cell["search"]["clear"], name
+        assert cell["search"]["reached"] == 12, name
+        assert cell["search"]["shared"] >= 1.3 * cell["ring"]["shared"], name
+        assert cell["search"]["clearance"] >= 0.1, name
