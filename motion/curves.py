@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import cast
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -56,4 +54,4 @@ def _places(knots: Floats, times: ArrayLike) -> tuple[Floats, np.ndarray, Floats
     """Return times within the knots, the piece that each lies in, and how long that is (s)."""
     at = np.clip(np.asarray(times, float), knots[0], knots[-1])
     i = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 2)
-    return at, i, cast(Floats, knots[i + 1] - knots[i])
+    return at, i, knots[i + 1] - knots[i]

@@ -1,0 +1,162 @@
+"""The space that a search moves in: some coordinates of a cell, the others stay where they are."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinematics.rotations import Floats
+from motion.paths import Path
+from robots.common.console import notice
+from robots.common.errors import NoPlanError
+
+if TYPE_CHECKING:
+    from motion.cell import Cell
+    from motion.collisions import Checker, Contact
+
+PATIENCE = 2.0  # s; longer plans tell how far they are
+
+Resolution = tuple[float, float]  # how far links travel (m) and turn (rad) between two checks
+
+
+class Progress:
+    """Counts checks, says on stderr what is being done, and ends what takes too long.
+
+    Attributes:
+        checks: How many lines and postures were checked.
+    """
+
+    def __init__(self, patience: float) -> None:
+        """Start the clock; ``patience`` is how long planning may take (s)."""
+        self.checks, self._patience = 0, patience
+        self._begun = self._last = time.monotonic()
+
+    def tell(self, what: str) -> None:
+        """Count a check, and say what it is for once it has taken a while.
+
+        Raises:
+            NoPlanError: If the time given is over.
+        """
+        self.checks += 1
+        now = time.monotonic()
+        if now - self._begun > self._patience:
+            raise NoPlanError(
+                f"no motion was found in the {self._patience:g} s given, after {self.checks}"
+                f" checks; the last step was {what}. Give it more time by patience=…",
+                "not found",
+            )
+        if now - self._last > PATIENCE:
+            self._last = now
+            notice(f"planning: {what}, {self.checks} checks")
+
+
+@dataclass(eq=False)
+class Space:
+    """Some coordinates of a cell, and what tells whether the way between two places is free.
+
+    Attributes:
+        cell: The cell.
+        robots: The robots whose coordinates these are.
+        free: Indices of the coordinates among the cell's, (d,).
+        base: All coordinates of the cell; where those are that stay, (D,) (rad, m).
+        bounds: Lower and upper bound of each, (d, 2) (rad, m).
+        speeds: Largest speed of each, (d,) (rad/s, m/s).
+        checkers: All of them must agree that a place is free.
+        progress: What counts the checks.
+    """
+
+    cell: Cell
+    robots: tuple[str, ...]
+    free: NDArray[np.intp]
+    base: Floats
+    bounds: Floats
+    speeds: Floats
+    checkers: Sequence[Checker]
+    progress: Progress
+    purpose: str = field(default="searching")
+
+    def whole(self, places: Floats) -> Floats:
+        """Return all coordinates of the cell at some places, (…, D).
+
+        Args:
+            places: (…, d) (rad, m).
+        """
+        whole = np.empty((*places.shape[:-1], self.cell.size))
+        whole[...] = self.base
+        whole[..., self.free] = places
+        return whole
+
+    def are_free(self, places: Floats) -> NDArray[np.bool_]:
+        """Tell which places are free, (n,).
+
+        Args:
+            places: (n, d) (rad, m).
+        """
+        self.progress.tell(self.purpose)
+        whole, free = self.whole(places), np.ones(len(places), bool)
+        for checker in self.checkers:
+            left = np.flatnonzero(free)
+            if len(left):
+                free[left] = checker.free(whole[left])
+        return free
+
+    def edge_free(self, a: Floats, b: Floats, resolution: Resolution) -> bool:
+        """Tell whether the straight way between two places is free."""
+        self.progress.tell(self.purpose)
+        start, end = self.whole(a), self.whole(b)
+        return all(checker.edge_free(start, end, resolution) for checker in self.checkers)
+
+    def path_free(self, points: Floats, resolution: Resolution) -> bool:
+        """Tell whether the straight lines through points are free."""
+        return all(
+            self.edge_free(a, b, resolution) for a, b in zip(points[:-1], points[1:], strict=True)
+        )
+
+    def blend_free(self, path: Path, corner: int, resolution: Resolution, pieces: int = 6) -> bool:
+        """Tell whether the curve around one point of a path is free.
+
+        It is looked at in straight pieces between places on it.
+        """
+        middle, half = path.corners[corner], path.blends[corner]
+        return self.path_free(
+            path.at(np.linspace(middle - half, middle + half, pieces + 1)), resolution
+        )
+
+    def contact(self, place: Floats) -> Contact | None:
+        """Return which two bodies are too near at a place, (d,), or None."""
+        found = [checker.contact(self.whole(place)) for checker in self.checkers]
+        contacts = [contact for contact in found if contact is not None]
+        return min(contacts, key=lambda contact: contact.distance, default=None)
+
+    def part(self, robots: Iterable[str], checkers: Sequence[Checker], base: Floats) -> Space:
+        """Return the space of some of the robots.
+
+        Args:
+            robots: Their names.
+            checkers: What they must keep clear of.
+            base: Where everything else is, (D,) (rad, m).
+        """
+        robots = tuple(robots)
+        chosen = self.columns(robots)
+        return Space(
+            self.cell,
+            robots,
+            self.free[chosen],
+            base,
+            self.bounds[chosen],
+            self.speeds[chosen],
+            checkers,
+            self.progress,
+            f"planning {', '.join(robots)}",
+        )
+
+    def columns(self, robots: Iterable[str]) -> NDArray[np.intp]:
+        """Return which of the coordinates belong to some robots."""
+        slices = [self.cell.slices[name] for name in robots]
+        chosen = [any(s.start <= i < s.stop for s in slices) for i in self.free.tolist()]
+        return np.flatnonzero(chosen)
