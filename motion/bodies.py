@@ -1,0 +1,283 @@
+"""The convex bodies of a cell: robots, tables, obstacles and what is held; which pairs count."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kinematics.rotations import Floats, pose_matrix
+from layouts import Layout
+from layouts.placement import Placement
+from layouts.validation.arguments import Rectangle, table_tops
+from layouts.validation.check import TABLE_DEPTH
+from layouts.validation.slabs import slab_hull
+from motion.obstacles import Held, Obstacle, Track
+from robots import LayoutError
+from robots.action_split import is_gripper
+from robots.bodies.hulls import Hull, RobotModel, load_model
+from robots.urdf.tree import link_index
+
+WORLD = 0  # the part that never moves
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """What moves as one: a rigid body of a robot, with what it holds, or an obstacle.
+
+    Attributes:
+        robot: The robot's name; empty for the world and for obstacles.
+        link: Index in the robot's tree of the link whose pose is the part's.
+        track: How it moves, if it is an obstacle.
+    """
+
+    robot: str = ""
+    link: int = 0
+    track: Track | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A convex body of the cell.
+
+    Attributes:
+        name: For messages: ``left/panda_hand``, or the name of a table or an obstacle.
+        owner: The robot, table or obstacle that it belongs to.
+        mover: The robot that moves it; empty if none does.
+        part: Index of the part that carries it.
+        hull: Its corners in its own frame.
+        offset: Its own frame in that of the part, (4, 4) (m).
+    """
+
+    name: str
+    owner: str
+    mover: str
+    part: int
+    hull: Hull
+    offset: Floats
+
+
+class Bodies:
+    """All robots of a layout with all bodies that they may touch: the data of a `motion.cell.Cell`.
+
+    The coordinates of a cell are the joints of all robots: in the layout's order, each robot's in
+    its descriptor's order.
+
+    Attributes:
+        layout: The layout.
+        obstacles: What stands or moves in it.
+        held: What arms hold.
+        robots: The robots' names.
+        slices: For each robot its part of the coordinates.
+        size: How many coordinates there are (D).
+        limits: Lower and upper limit of each, (D, 2) (rad, m); infinite where there is none.
+        start: Where the layout starts its robots, (D,) (rad, m).
+        links: Robot and link of each pose that `poses` returns.
+        parts: What moves as one; the first is the world.
+        solids: The convex bodies.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        obstacles: Iterable[Obstacle] = (),
+        held: Iterable[Held] = (),
+        table: Rectangle | None = None,
+    ) -> None:
+        """Read the robots' files and gather all bodies.
+
+        Args:
+            layout: Which robots stand where. Its tables are in the cell, too.
+            obstacles: What else stands in the way, or moves in it.
+            held: What arms hold.
+            table: A table's top as x_min, y_min, x_max, y_max (m), at height 0.
+
+        Raises:
+            AssetError: If a robot's files cannot be found or make no sense.
+            LayoutError: If two bodies have one name.
+            MissingPackageError: If trimesh or python-fcl is not installed.
+            UnknownNameError: If there is no place that is said to hold something.
+        """
+        self.layout, self.obstacles, self.held = layout, tuple(obstacles), tuple(held)
+        self.robots = tuple(layout)
+        self.models: Mapping[str, RobotModel] = {
+            name: load_model(placement.robot) for name, placement in layout.items()
+        }
+        ends = np.cumsum([0, *(len(m.kinematics.coordinates) for m in self.models.values())])
+        self.slices = {
+            name: slice(int(a), int(b))
+            for name, a, b in zip(self.robots, ends[:-1], ends[1:], strict=True)
+        }
+        self.size = int(ends[-1])
+        self.limits = np.concatenate([m.kinematics.limits for m in self.models.values()])
+        self.start = np.concatenate([np.array(p.start_qpos, float) for p in layout.values()])
+        self.links = tuple(
+            (name, link) for name, m in self.models.items() for link in m.kinematics.links
+        )
+        self.tables = {
+            name: slab_hull(np.array(top), TABLE_DEPTH, name)
+            for name, top in table_tops(layout, table).items()
+        }
+        self._check_names()
+        self._part_of: dict[tuple[str, int], int] = {}
+        self.parts = self._gather_parts()
+        self.solids: tuple[Solid, ...] = tuple(self._gather_solids())
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What `checker` can make an exception of: robots, links, tables, obstacles."""
+        every = (name for solid in self.solids for name in (solid.owner, solid.name))
+        return tuple(dict.fromkeys(every))
+
+    def poses(self, qpos: ArrayLike) -> Floats:
+        """Return the world poses of all links of all robots, (n, links, 4, 4) (m).
+
+        Args:
+            qpos: Coordinates, (n, D) (rad, m).
+        """
+        qpos = np.asarray(qpos, float)
+        return np.concatenate(
+            [
+                self._bases[name] @ model.kinematics.forward(qpos[:, self.slices[name]])
+                for name, model in self.models.items()
+            ],
+            axis=1,
+        )
+
+    # -- gathering ---------------------------------------------------------------------------
+
+    def _check_names(self) -> None:
+        taken = dict.fromkeys(self.robots, "a robot") | dict.fromkeys(self.tables, "a table")
+        for body in (*self.obstacles, *(held.obstacle for held in self.held)):
+            if "/" in body.name:
+                raise LayoutError(
+                    f"obstacle {body.name!r} has a /, as links' names have; rename it"
+                )
+            if body.name in taken:
+                raise LayoutError(
+                    f"an obstacle is called {body.name!r}, as {taken[body.name]} is; rename it"
+                )
+            taken[body.name] = "another obstacle"
+
+    @cached_property
+    def _bases(self) -> dict[str, Floats]:
+        return {n: _base(placement) for n, placement in self.layout.items()}
+
+    def _gather_parts(self) -> tuple[Part, ...]:
+        parts = [Part()]
+        for name, model in self.models.items():
+            for body in dict.fromkeys(model.kinematics.bodies):
+                self._part_of[name, body] = len(parts) if body else WORLD
+                parts += [Part(name, body)] if body else []
+        tracks = [o.pose for o in self.obstacles if isinstance(o.pose, Track)]
+        return (*parts, *(Part(track=track) for track in tracks))
+
+    def _gather_solids(self) -> Iterator[Solid]:
+        for name, model in self.models.items():
+            for i, hull in enumerate(model.hulls):
+                part, offset = self._carried(name, hull.link)
+                yield Solid(f"{name}/{model.link_name(i)}", name, name, part, hull, offset)
+        for name, hull in self.tables.items():
+            yield Solid(name, name, "", WORLD, hull, np.eye(4))
+        tracked = len(self.parts) - sum(obstacle.moves for obstacle in self.obstacles)
+        for obstacle in self.obstacles:
+            part = tracked if obstacle.moves else WORLD
+            tracked += obstacle.moves
+            offset = np.eye(4) if obstacle.moves else obstacle.poses(None, 1)[0]
+            for hull in obstacle.hulls:
+                yield Solid(obstacle.name, obstacle.name, "", part, hull, offset)
+        for held in self.held:
+            robot, link = self.tcp(held.place)
+            part, offset = self._carried(robot, link)
+            pose = offset @ held.obstacle.poses(None, 1)[0]
+            for hull in held.obstacle.hulls:
+                yield Solid(held.obstacle.name, held.obstacle.name, robot, part, hull, pose)
+
+    def _carried(self, robot: str, link: int) -> tuple[int, Floats]:
+        """Return the part that carries a link, and the link's pose in its frame."""
+        tree = self.models[robot].kinematics
+        body, pose = tree.bodies[link], np.eye(4)
+        at = link
+        while at != body:
+            pose, at = tree.origins[at] @ pose, int(tree.parents[at])
+        part = self._part_of[robot, body]
+        return part, self._bases[robot] @ pose if part == WORLD else pose
+
+    def tcp(self, place: str) -> tuple[str, int]:
+        """Return the robot of a place, and the index of its TCP link in the robot's tree.
+
+        Raises:
+            UnknownNameError: If there is no such place, or no such link.
+        """
+        robot = self.layout.owner(place)
+        return robot, link_index(
+            self.models[robot].kinematics, self.layout.arm(place).robot.tcp_link
+        )
+
+    # -- pairs -------------------------------------------------------------------------------
+
+    @cached_property
+    def counted_pairs(self) -> tuple[tuple[int, int], ...]:
+        """The pairs of solids that may not touch, whoever moves."""
+        own = {name: 0 for name in self.robots}
+        first = 0
+        for name, model in self.models.items():
+            own[name] = first
+            first += len(model.hulls)
+        links, others = range(first), range(first, len(self.solids))
+        pairs = [
+            (own[name] + a, own[name] + b)
+            for name, model in self.models.items()
+            for a, b in model.self_pairs
+        ]
+        pairs += [
+            (a, b)
+            for a, b in combinations(links, 2)
+            if self.solids[a].owner != self.solids[b].owner
+        ]
+        pairs += [(a, b) for a in links for b in others if b not in self._touchable.get(a, ())]
+        pairs += [
+            (a, b)
+            for a, b in combinations(others, 2)
+            if self.solids[a].mover or self.solids[b].mover
+        ]
+        return tuple(pair for pair in pairs if self._apart(*pair))
+
+    def _apart(self, a: int, b: int) -> bool:
+        """Whether two solids move against each other."""
+        return self.solids[a].part != self.solids[b].part
+
+    @cached_property
+    def _touchable(self) -> dict[int, set[int]]:
+        """For the solids of hands, what they hold."""
+        touchable: dict[int, set[int]] = {}
+        for held in self.held:
+            robot = self.layout.owner(held.place)
+            hand = self._hand(held.place)
+            own = {i for i, s in enumerate(self.solids) if s.owner == held.obstacle.name}
+            for i, solid in enumerate(self.solids):
+                if solid.owner == robot and solid.part in hand:
+                    touchable.setdefault(i, set()).update(own)
+        return touchable
+
+    def _hand(self, place: str) -> set[int]:
+        """Return the parts of a place's hand: what its TCP link and its gripper's joints carry."""
+        robot, link = self.tcp(place)
+        tree, arm = self.models[robot].kinematics, self.layout.arm(place).robot
+        fingers = arm.fingers.links if arm.fingers else ()
+        groups = arm.action_split.groups.items()
+        gripping = {joint for name, group in groups if is_gripper(name) for joint in group.joints}
+        drivers = {tree.coordinates.index(joint) for joint in gripping}
+        hand = {tree.bodies[link], *(tree.bodies[link_index(tree, name)] for name in fingers)}
+        for body in dict.fromkeys(tree.bodies):
+            if tree.carrier(body) in hand or int(tree.drivers[body]) in drivers:
+                hand.add(body)
+        return {self._part_of[robot, body] for body in hand}
+
+
+def _base(placement: Placement) -> Floats:
+    return pose_matrix(placement.base_position, placement.base_quaternion)
