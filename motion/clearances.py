@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kinematics.rotations import Floats
 from motion.cell import Cell
-from motion.collisions import Checker, Contact
+from motion.collisions import Checker, Contact, Flags
 from robots.common.errors import NoPlanError
 
 
@@ -28,25 +28,20 @@ class Keeping:
             robots: Those that move.
             clearance: How far they keep from everything else (m).
         """
-        self.cell, self.clearance = cell, clearance
+        self.cell = cell
         self._whole = cell.checker(robots, 0.0)
         self._pairs = self._whole.pairs
         owners = np.array([solid.owner for solid in cell.solids])[self._pairs]
         self._movers = np.array([solid.mover for solid in cell.solids])[self._pairs]
-        self._close = (owners[:, 0] == owners[:, 1]) | (clearance <= 0.0)
+        self._apart = np.where(owners[:, 0] == owners[:, 1], 0.0, clearance)
 
-    def free(self, states: Floats) -> NDArray[np.bool_]:
+    def free(self, states: Floats) -> Flags:
         """Tell in which states nothing overlaps, (n,)."""
         return self._whole.free(states)
 
     def contact(self, state: Floats) -> Contact | None:
         """Return what overlaps most, or None."""
         return self._whole.contact(state)
-
-    def without(self, ignored: Collection[str]) -> Checker:
-        """Return what tells whether anything overlaps but some robots, which do not count."""
-        kept = ~np.isin(self._movers, list(ignored)).any(axis=1)
-        return Checker(self.cell, self._pairs[kept], 0.0)
 
     def expect_free_start(self, start: Floats) -> None:
         """Refuse to begin with an overlap.
@@ -60,40 +55,33 @@ class Keeping:
 
     def relax(self, state: Floats) -> None:
         """Let the pairs of bodies that are nearer than the clearance in a state be that near."""
-        far = np.flatnonzero(~self._close)
-        if not len(far) or self._checker(far, self.clearance).free(state[None])[0]:
+        far = np.flatnonzero(self._apart > 0.0)
+        if not len(far) or self._checker(far).free(state[None])[0]:
             return
         for pair in far.tolist():
-            near = not self._checker(np.array([pair]), self.clearance).free(state[None])[0]
-            self._close[pair] = near
+            if not self._checker(np.array([pair])).free(state[None])[0]:
+                self._apart[pair] = 0.0
 
-    def checkers(
-        self, moving: Collection[str] | None = None, ignored: Collection[str] = ()
-    ) -> list[Checker]:
-        """Return what must agree that a state is free.
+    def overlaps(self, ignored: Collection[str]) -> Checker:
+        """Return what tells whether anything overlaps but some robots, which do not count."""
+        kept = ~np.isin(self._movers, list(ignored)).any(axis=1)
+        return Checker(self.cell, self._pairs[kept], np.zeros(int(kept.sum())))
+
+    def checker(self, moving: Collection[str], ignored: Collection[str] = ()) -> Checker:
+        """Return what tells whether a state is free.
 
         Args:
-            moving: Robots one of which must take part; None is all that move.
+            moving: Robots one of which must take part.
             ignored: Robots that do not count.
         """
-        chosen = ~np.isin(self._movers, list(ignored)).any(axis=1)
-        if moving is not None:
-            chosen &= np.isin(self._movers, list(moving)).any(axis=1)
-        return self._chosen(chosen)
+        moved = np.isin(self._movers, list(moving)).any(axis=1)
+        left_out = np.isin(self._movers, list(ignored)).any(axis=1)
+        return self._checker(np.flatnonzero(moved & ~left_out))
 
-    def checkers_between(self, some: Collection[str], others: Collection[str]) -> list[Checker]:
-        """Return what must agree that two groups of robots keep clear of each other."""
+    def between(self, some: Collection[str], others: Collection[str]) -> Checker:
+        """Return what tells whether two groups of robots keep clear of each other."""
         one, other = np.isin(self._movers, list(some)), np.isin(self._movers, list(others))
-        chosen = np.asarray(one & other[:, ::-1]).any(axis=1)
-        return self._chosen(chosen)
+        return self._checker(np.flatnonzero((one & other[:, ::-1]).any(axis=1)))
 
-    def _chosen(self, chosen: NDArray[np.bool_]) -> list[Checker]:
-        parts = (chosen & self._close, 0.0), (chosen & ~self._close, self.clearance)
-        return [
-            self._checker(np.flatnonzero(pairs), clearance)
-            for pairs, clearance in parts
-            if pairs.any()
-        ]
-
-    def _checker(self, pairs: NDArray[np.intp], clearance: float) -> Checker:
-        return Checker(self.cell, self._pairs[pairs], clearance)
+    def _checker(self, chosen: NDArray[np.intp]) -> Checker:
+        return Checker(self.cell, self._pairs[chosen], self._apart[chosen])

@@ -150,7 +150,7 @@ class _Query:
             self.start,
             _bounds(self.cell.limits[moving], self.start[moving], ends[:, moving]),
             self.speeds[moving],
-            keeping.checkers(),
+            keeping.checker(robots),
             self.progress,
         )
         goals = [end[moving] for end in ends if space.are_free(end[None, moving])[0]]
@@ -205,7 +205,7 @@ class _Query:
 
     def _free_candidates(self, target: Target, keeping: Keeping) -> Floats:
         """Return the postures in which a robot touches nothing but what moves, too."""
-        alone = keeping.without([t.robot for t in self.targets if t.robot != target.robot])
+        alone = keeping.overlaps([t.robot for t in self.targets if t.robot != target.robot])
         states = np.tile(self.start, (len(target.candidates), 1))
         states[:, target.moving] = target.candidates
         free = alone.free(states)

@@ -124,7 +124,7 @@ class _Coordination:
         if len(robots) == len(self.space.robots) > 1:
             return None
         others = [name for name in self.space.robots if name not in robots]
-        part = self.space.part(robots, self.keeping.checkers(robots, others), self.space.base)
+        part = self.space.part(robots, self.keeping.checker(robots, others))
         columns = self.space.columns(robots)
         start, goal = self.start[columns], self.goal[columns]
         points = connect(part, start, [goal], self.seed, self.resolution, restarts=restarts)
@@ -180,8 +180,7 @@ class _Coordination:
     def _meeting(self, group: _Group, other: _Group) -> _Meeting:
         key = group.space.robots, other.space.robots
         if key not in self._meetings:
-            between = self.keeping.checkers_between(*key)
-            both = self.space.part((*key[0], *key[1]), between, self.space.base)
+            both = self.space.part((*key[0], *key[1]), self.keeping.between(*key))
             self._meetings[key] = _Meeting(both, group, other)
         return self._meetings[key]
 
