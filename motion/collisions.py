@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,12 +60,22 @@ class Checker:
         apart: How far each pair has to be apart, (m,) (m); 0 lets them touch.
     """
 
-    def __init__(self, cell: Bodies, pairs: NDArray[np.intp], apart: Floats) -> None:
-        """Prepare the pairs that count."""
-        self.cell, self.pairs, self.apart = cell, pairs, apart
+    def __init__(self, cell: Bodies, pairs: NDArray[np.intp], apart: Floats | float) -> None:
+        """Prepare the pairs that count.
+
+        Args:
+            cell: The cell.
+            pairs: Pairs of its solids, (m, 2).
+            apart: How far each has to be apart, (m,), or all of them (m).
+        """
+        self.cell, self.pairs = cell, pairs
+        self.apart = apart = np.broadcast_to(np.asarray(apart, float), (len(pairs),))
         self._sieve = Sieve(cell, pairs, apart)
         self._measure = Measure(cell, pairs, apart, self._sieve.chains)
-        self._travel = Travel(cell)
+
+    @cached_property
+    def _travel(self) -> Travel:
+        return Travel(self.cell)
 
     def free(self, qpos: ArrayLike, times: ArrayLike | None = None) -> Flags:
         """Tell for each state whether everything that counts is as far apart as it has to be, (n,).
@@ -93,15 +104,27 @@ class Checker:
         Raises:
             LayoutError: If a shape is wrong, or a number not finite.
         """
-        places = self._places(*self._one(qpos, time))
-        candidates = self._sieve.candidates(places)
-        best, most = None, np.inf
-        for i, (a, b) in enumerate(candidates.pairs.tolist()):
-            if self._measure.too_near(places, candidates.only(np.array([i])))[0]:
-                contact = self._contact(places, a, b)
-                missing = contact.distance - self._measure.apart(a, b)
-                best, most = (contact, missing) if missing < most else (best, most)
-        return best
+        places, pairs = self._close(qpos, time)
+        contacts = [self._contact(places, a, b) for a, b in pairs]
+        missing = [
+            contact.distance - self._measure.apart(*pair)
+            for contact, pair in zip(contacts, pairs, strict=True)
+        ]
+        return contacts[int(np.argmin(missing))] if contacts else None
+
+    def close(self, qpos: ArrayLike, time: float | None = None) -> Flags:
+        """Tell which of `pairs` are not as far apart as they have to be, (m,).
+
+        Args:
+            qpos: Coordinates, (D,) (rad, m).
+            time: Where obstacles that move are (s); None is 0.
+
+        Raises:
+            LayoutError: If a shape is wrong, or a number not finite.
+        """
+        _, pairs = self._close(qpos, time)
+        close = {frozenset(pair) for pair in pairs}
+        return np.array([frozenset(pair) in close for pair in self.pairs.tolist()], bool)
 
     def nearest(self, qpos: ArrayLike, time: float | None = None) -> Contact | None:
         """Return which two bodies that count are nearest or overlap most; None beyond `FAR`.
@@ -164,7 +187,18 @@ class Checker:
 
     def _free(self, states: Floats, moments: Floats | None) -> Flags:
         places = self._places(states, moments)
-        return ~self._measure.too_near(places, self._sieve.candidates(places))
+        candidates = self._sieve.candidates(places)
+        free = np.ones(len(states), bool)
+        near = self._measure.too_near(places, candidates, every=False)
+        free[candidates.states[near]] = False
+        return free
+
+    def _close(self, qpos: ArrayLike, time: float | None) -> tuple[Floats, list[tuple[int, int]]]:
+        """Return where the parts are, and the pairs of solids that are too near there."""
+        places = self._places(*self._one(qpos, time))
+        candidates = self._sieve.candidates(places)
+        near = self._measure.too_near(places, candidates, every=True)
+        return places, [(a, b) for a, b in candidates.pairs[near].tolist()]
 
     def _distances(self, places: Floats) -> tuple[Floats, list[tuple[int, int] | None]]:
         """Return the least distance in each state, and between which solids."""

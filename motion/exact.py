@@ -31,36 +31,40 @@ class Measure:
         self._rows = np.array([chains.rows.get(s.part, 0) for s in self._solids], np.intp)
         self._offsets = np.array([s.offset for s in self._solids]).reshape(-1, 4, 4)
         self._apart = dict(zip(map(tuple, pairs.tolist()), apart.tolist(), strict=True))
+        self._apart |= {(b, a): distance for (a, b), distance in self._apart.items()}
 
     def apart(self, a: int, b: int) -> float:
         """Return how far two solids have to be apart (m)."""
-        return self._apart[(a, b) if (a, b) in self._apart else (b, a)]
+        return self._apart[a, b]
 
-    def too_near(self, places: Floats, candidates: Candidates) -> NDArray[np.bool_]:
-        """Tell for each state whether any of the candidates are too near to each other, (n,).
+    def too_near(self, places: Floats, candidates: Candidates, *, every: bool) -> NDArray[np.bool_]:
+        """Tell which candidates are too near to each other, (k,).
 
         Args:
             places: Poses of the parts, (rows, n, 4, 4).
             candidates: Pairs of solids.
+            every: Whether to look at all of them, and not only at the first that are too near in
+                each state.
         """
         import fcl
 
-        hits = [False] * places.shape[1]
+        near, done = [False] * len(candidates.states), [False] * places.shape[1]
         asked, wanted = fcl.CollisionRequest(), fcl.DistanceRequest()
         turns, shifts = self._beside(places, candidates)
         rows = zip(candidates.states.tolist(), candidates.pairs.tolist(), strict=True)
         for i, (state, (a, b)) in enumerate(rows):
-            if hits[state]:
+            if done[state]:
                 continue
             one, other = self._stay[a], self._moved[b]
             other.setRotation(turns[i])
             other.setTranslation(shifts[i])
-            apart = self.apart(a, b)
+            apart = self._apart[a, b]
             if apart == 0.0:
-                hits[state] = fcl.collide(one, other, asked, fcl.CollisionResult()) > 0
+                near[i] = fcl.collide(one, other, asked, fcl.CollisionResult()) > 0
             else:
-                hits[state] = fcl.distance(one, other, wanted, fcl.DistanceResult()) < apart
-        return np.array(hits, bool)
+                near[i] = fcl.distance(one, other, wanted, fcl.DistanceResult()) < apart
+            done[state] = near[i] and not every
+        return np.array(near, bool)
 
     def update(
         self,

@@ -66,6 +66,7 @@ class _Clusters:
         features: x M of those within, (C, BALLS, 6).
         solids: The solid of each of those, (C, BALLS).
         whole: Whether these are all the same, (C,).
+        links: Numbers of the links, or other bodies, that they belong to, (C,).
     """
 
     rows: Indices
@@ -76,6 +77,7 @@ class _Clusters:
     features: Floats
     solids: Indices
     whole: NDArray[np.bool_]
+    links: Indices
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,9 +164,16 @@ class Sieve:
 
     def _prepare_clusters(self) -> None:
         """Say how far clusters have to be apart, and put those with the most pairs into rows."""
-        solids, radii = self._clusters.solids, self._clusters.radii
-        apart = self._apart[solids[:, None, :, None], solids[None, :, None, :]].max(axis=(2, 3))
-        count = len(solids)
+        links, radii = self._clusters.links, self._clusters.radii
+        count, most = len(links), int(links.max(initial=-1)) + 1
+        of_solid = np.zeros(len(self._apart), np.intp)
+        of_solid[self._clusters.solids] = links[:, None]
+        balls = np.zeros(len(self._apart), bool)
+        balls[self._clusters.solids] = True
+        a, b = np.nonzero((self._apart > -np.inf) & balls & balls[:, None])
+        between = np.full((most, most), -np.inf)
+        np.maximum.at(between, (of_solid[a], of_solid[b]), self._apart[a, b])
+        apart = between[np.ix_(links, links)]
         degrees = (apart > -np.inf).sum(axis=1)
         rank = np.empty(count, np.intp)
         rank[np.argsort(-degrees, kind="stable")] = np.arange(count)
@@ -313,28 +322,29 @@ def _gather(bodies: Bodies, solids: list[int], chains: Chains) -> _Clusters:
     for i in solids:
         links.setdefault((bodies.solids[i].name, bodies.solids[i].part), []).append(i)
     gathered = [
-        (chains.rows[part], _moved(cluster, bodies.solids[own[0]].offset), np.array(own))
-        for (_, part), own in links.items()
+        (chains.rows[part], _moved(cluster, bodies.solids[own[0]].offset), np.array(own), link)
+        for link, ((_, part), own) in enumerate(links.items())
         for cluster in clusters_of(tuple(bodies.solids[i].hull for i in own))
     ]
     count = len(gathered)
     around, balls = np.ones((count, 4, 1)), np.ones((count, 4, BALLS))
     features, solid = np.ones((count, BALLS, 6)), np.empty((count, BALLS), np.intp)
-    for i, (_, cluster, own) in enumerate(gathered):
+    for i, (_, cluster, own, _) in enumerate(gathered):
         around[i, :3, 0], balls[i, :3] = cluster.middle, cluster.middles.T
         features[i, :, :3], features[i, :, 3] = cluster.middles, cluster.radii
         squares = (cluster.middles**2).sum(axis=1)
         features[i, :, 4] = squares * (1 - _RELATIVE) - cluster.radii**2
         solid[i] = own[cluster.hulls]
     return _Clusters(
-        rows=np.array([row for row, _, _ in gathered], np.intp),
+        rows=np.array([row for row, *_ in gathered], np.intp),
         around=around,
-        radii=np.array([cluster.radius for _, cluster, _ in gathered]),
+        radii=np.array([cluster.radius for _, cluster, *_ in gathered]),
         balls=balls,
         inner=features[..., 3].copy(),
         features=features @ _PRODUCT,
         solids=solid,
         whole=(solid == solid[:, :1]).all(axis=1),
+        links=np.array([link for _, _, _, link in gathered], np.intp),
     )
 
 
