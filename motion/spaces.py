@@ -68,6 +68,8 @@ class Space:
         speeds: Largest speed of each, (d,) (rad/s, m/s).
         checker: Tells whether a place is free.
         progress: What counts the checks.
+        purpose: What is being done, in words.
+        when: The time at which obstacles that move are looked at (s).
     """
 
     cell: Cell
@@ -78,7 +80,8 @@ class Space:
     speeds: Floats
     checker: Checker
     progress: Progress
-    purpose: str = field(default="searching")
+    purpose: str = "searching"
+    when: float | None = None
     _known: dict[tuple[bytes, bytes, Resolution], bool] = field(default_factory=dict, repr=False)
 
     def whole(self, places: Floats) -> Floats:
@@ -99,14 +102,16 @@ class Space:
             places: (n, d) (rad, m).
         """
         self.progress.tell(self.purpose)
-        return self.checker.free(self.whole(places))
+        return self.checker.free(self.whole(places), self.when)
 
     def edge_free(self, a: Floats, b: Floats, resolution: Resolution) -> bool:
         """Tell whether the straight way between two places is free; asked twice, from memory."""
         key = a.tobytes(), b.tobytes(), resolution
         if key not in self._known:
             self.progress.tell(self.purpose)
-            self._known[key] = self.checker.edge_free(self.whole(a), self.whole(b), resolution)
+            times = None if self.when is None else (self.when, self.when)
+            ends = self.whole(a), self.whole(b)
+            self._known[key] = self.checker.edge_free(*ends, resolution, times)
         return self._known[key]
 
     def path_free(self, points: Floats, resolution: Resolution) -> bool:
@@ -144,6 +149,7 @@ class Space:
             checker,
             self.progress,
             f"planning {', '.join(robots)}",
+            self.when,
         )
 
     def columns(self, robots: Iterable[str]) -> NDArray[np.intp]:
