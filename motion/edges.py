@@ -91,7 +91,7 @@ class Edges:
             kept = np.isin(self._keys(known.parents[found.states], found.pairs), known.keys)
             found, keys = found.only(kept), keys[kept]
         rows = self._measure.rows[found.pairs]
-        slack, apart = more[rows[:, 0], rows[:, 1]], self._measure.distances_of(found.pairs)
+        slack, apart = more[rows[:, 0], rows[:, 1]], self._measure.wanted_of(found.pairs)
         asked = (found.bounds <= apart) | (slack < FINE)
         gaps = self._measure.gaps(places, found, asked)
         return None if gaps is None else keys[gaps <= apart + slack + ROUNDING]

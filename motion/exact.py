@@ -43,7 +43,7 @@ class Measure:
         """Return how far two solids have to be apart (m)."""
         return self._apart[a, b]
 
-    def distances_of(self, pairs: Indices) -> Floats:
+    def wanted_of(self, pairs: Indices) -> Floats:
         """Return how far pairs of solids have to be apart, (k,) (m)."""
         return np.array([self._apart[a, b] for a, b in pairs.tolist()], float)
 

@@ -13,6 +13,7 @@ from motion.collisions import Checker
 from motion.obstacles import Track, box
 from motion.travel import Travel
 from robots import LayoutError, UnknownNameError
+from tests.layouts.small_robots import joint, link, robot, urdf
 from tests.motion import cells
 
 UPTURNED = np.array([0.0, 0.0, 0.0, -0.1, 0.0, 2.0, 0.8, 0.04, 0.04])  # a Panda that reaches up
@@ -256,6 +257,21 @@ def test_no_distance_changes_more_than_its_bound(crowd, drive, name, seed):
     parts = [solid.part for solid in cell.solids]
     changes = np.abs(gaps - gaps[:1]) / np.maximum(shares[:, :, None], 1e-9)
     assert (changes.max(axis=0) <= most[np.ix_(parts, parts)] + 1e-9).all()
+
+
+def test_what_slides_out_travels_farther_when_it_is_turned(tmp_path):
+    text = urdf(
+        link("base"),
+        link("arm"),
+        link("top"),
+        joint("turn", "base", "arm"),
+        joint("slide", "arm", "top", kind="prismatic", axis="1 0 0"),
+    )
+    cell = Cell(Layout({"one": Placement(robot(tmp_path, text, ["turn", "slide"]))}))
+    for out, least in ((0.0, 0.05), (3.0, 3.0)):
+        ends = np.array([[0.0, out], [1.0, out]])
+        assert least <= Travel(cell).steps(*ends, (0.001, 10.0)) / 1000 <= least + 0.1
+        assert least <= Travel(cell).between(*ends)[WORLD].max() <= least + 0.1
 
 
 def test_what_moves_both_of_two_links_brings_them_no_nearer(crowd):
