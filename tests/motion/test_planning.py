@@ -19,7 +19,6 @@ from tests.motion.two_pandas import (
     aside,
     cell,
     in_the_middle,
-    there_and_back,
     turned,
 )
 
@@ -88,7 +87,7 @@ def test_a_held_body_is_carried_round_an_obstacle():
 def test_an_arm_waits_until_another_has_left():
     there = plan(cell(), aside(), {"left": in_the_middle()})
     back = plan(cell(), there.end, {"left": turned("left", 1.4)})
-    told = there_and_back(there, back, rest=1.0)
+    told = there.then(back, rest=1.0)
     motion = plan(cell(), aside(), {"right": in_the_middle()}, others={"left": told})
     assert motion.certify().ok
     assert motion.duration > there.duration + 1.0
@@ -134,6 +133,14 @@ def test_slower_and_gentler_motions_take_longer(mode):
     gentle = plan(cell(), aside(), goals, control_mode=mode, acceleration=0.5)
     assert min(slow.duration, gentle.duration) > 1.5 * usual.duration
     assert gentle.certify().acceleration == pytest.approx(1.0, abs=0.05)
+
+
+def test_who_is_there_already_stays():
+    goals = {"left": turned("left", 1.4), "right": turned("right", -1.4)}
+    motion = plan(cell(), aside(), goals)
+    assert motion.moving == ("right",)
+    still = plan(cell(), motion.end, goals)
+    assert (still.moving, still.certify().ok) == ((), True)
 
 
 # -- no plan -----------------------------------------------------------------------------------
