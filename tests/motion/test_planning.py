@@ -57,6 +57,15 @@ def test_a_tcp_goal_is_reached_past_a_post():
     assert motion.obstacles == (post,)
 
 
+def test_a_wider_berth_is_given_where_it_is_asked_for():
+    goals = {"left": TcpGoal((0.0, -0.1, 0.3), DOWN)}
+    start = {"left": turned("left", -2.2), "right": turned("right", 1.4)}
+    motion = plan(cell(), start, goals, obstacles=[a_post()], clearance=0.08)
+    near = motion.certify().clearance
+    assert near is not None
+    assert near.distance > 0.08 - 0.01
+
+
 def test_without_the_post_the_way_is_straight_and_goes_through_it():
     goals = {"left": TcpGoal((0.0, -0.1, 0.3), DOWN)}
     through = plan(cell(), {"left": turned("left", -1.4)}, goals)
