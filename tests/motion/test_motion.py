@@ -36,6 +36,8 @@ def test_the_knots_are_met_exactly():
     motion = waves()
     for name, qpos in motion.sample(motion.times).items():
         assert np.array_equal(qpos, motion.positions[name])
+    for name, speeds in motion.velocity(motion.times).items():
+        assert np.array_equal(speeds, motion.velocities[name])
 
 
 def test_beyond_its_ends_a_motion_stands_still():
