@@ -2,4 +2,4 @@
 
 from kinematics.own_rooms import expect_own
 
-expect_own("robots", "layouts", "simulation", "tasks", "experts", "rollouts")
+expect_own("robots", "layouts", "motion", "simulation", "tasks", "experts", "rollouts")

@@ -1,12 +1,14 @@
-"""``python -m measurements.motion``: benchmarks of planning motions."""
+"""``python -m measurements.motion``: benchmarks of planning motions and of collision checks."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
 
-from measurements.motion import queries
+from measurements.motion import checks, queries
 from robots.common.commands import exit_code, program, start
+
+BENCHMARKS = {"queries": queries, "checks": checks}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -17,10 +19,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     parser = argparse.ArgumentParser(prog=program("measurements.motion"), description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
-    asked = commands.add_parser("queries", description=queries.__doc__)
-    queries.add_arguments(asked)
+    for name, benchmark in BENCHMARKS.items():
+        benchmark.add_arguments(commands.add_parser(name, description=benchmark.__doc__))
     options = parser.parse_args(arguments)
-    return exit_code(lambda: queries.run(options))
+    return exit_code(lambda: BENCHMARKS[options.command].run(options))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""``python -m measurements.motion_checks``: what a check of collisions costs, per state and edge.
+"""What a check of collisions costs, per state and per straight way.
 
 All times are processor time of one core. Beside them stands FCL alone on the same states, with its
 `DynamicAABBTreeCollisionManager`.
@@ -21,7 +21,6 @@ from motion.bodies import WORLD
 from motion.cell import Cell
 from motion.chains import Chains
 from motion.obstacles import box
-from robots.common.commands import program
 
 BATCHES = (1, 16, 64)
 DEFAULT, FINE = (0.01, 0.05), (0.001, np.pi / 360)  # of edges (m, rad)
@@ -34,18 +33,15 @@ state for FCL in C++, 15 µs for VAMP-MR (AVX2, spheres instead of the robots' s
 machines and other states."""
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command.
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what the command takes."""
+    parser.add_argument("--states", type=int, default=1024, help="random states per cell (1024)")
+    parser.add_argument("--edges", type=int, default=20, help="free edges per cell (20)")
 
-    Returns:
-        0.
-    """
-    parser = argparse.ArgumentParser(prog=program("measurements.motion_checks"))
-    parser.description = (__doc__ or "").partition("\n")[2]
-    parser.add_argument("--states", type=int, default=1024, help="random states per cell")
-    parser.add_argument("--edges", type=int, default=20, help="free edges per cell")
-    args = parser.parse_args(argv)
-    for line in report(args.states, args.edges):
+
+def run(options: argparse.Namespace) -> int:
+    """Print both tables."""
+    for line in report(options.states, options.edges):
         print(line, flush=True)
     return 0
 
@@ -235,7 +231,3 @@ def _manager(bodies: Sequence[Any]) -> Any:
 
 def _row(*cells: str) -> str:
     return f"| {' | '.join(cells)} |"
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
