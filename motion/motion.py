@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,9 @@ from kinematics.rotations import Floats
 from layouts import Layout
 from motion.curves import hermite, hermite_slopes
 from robots.common.errors import MotionError, UnknownNameError
+
+if TYPE_CHECKING:
+    from motion.certificate import Certificate
 
 STILL: Mapping[str, Floats] = MappingProxyType({})
 
@@ -121,6 +124,41 @@ class Motion:
     def end(self) -> dict[str, Floats]:
         """Joint positions at the end by robot, (dof,) (rad, m)."""
         return {name: qpos[-1] for name, qpos in self.positions.items()}
+
+    def certify(self, *, step: float = 1e-3, turn: float = np.radians(0.5)) -> Certificate:
+        """Check the whole motion again, densely and exactly.
+
+        Between two moments that are looked at no point of any robot moves farther than ``step``
+        and no link turns farther than ``turn``. Checked are collisions of all robots with each
+        other, with themselves, with tables and with obstacles, joint limits, and limits of
+        velocity and acceleration; measured is the least clearance, with who and when.
+
+        Args:
+            step: In m.
+            turn: In rad.
+
+        Returns:
+            The certificate: ``ok``, what was found, and a readable ``str``.
+
+        Raises:
+            AssetError: If a robot's files cannot be found or make no sense.
+            MissingPackageError: If python-fcl is not installed.
+        """
+        from motion.certificate import certify
+
+        return certify(
+            self.layout,
+            self.times,
+            self.positions,
+            self.velocities,
+            obstacles=self.obstacles,
+            held=self.held,
+            table=self.table,
+            largest_velocities=self.largest_velocities,
+            largest_accelerations=self.largest_accelerations,
+            step=step,
+            turn=turn,
+        )
 
     def _by_robot(self, what: str, rows: tuple[int, ...], *, some: bool = False) -> Any:
         given = getattr(self, what)

@@ -95,7 +95,7 @@ class Path:
 
     def _rounded(self, s: Floats, lines: Floats, order: int) -> Floats:
         for i in np.flatnonzero(self.blends > 0.0).tolist():
-            half = self.blends[i]
+            half = float(self.blends[i])
             near = np.abs(s - self.corners[i]) < half
             if near.any():
                 u = (s[near] - self.corners[i] + half)[:, None] / (2 * half)

@@ -17,7 +17,12 @@ CHECKS = 1500  # lines per restart
 
 
 def connect(
-    space: Space, start: Floats, goals: Sequence[Floats], seed: int, restarts: int = 3
+    space: Space,
+    start: Floats,
+    goals: Sequence[Floats],
+    seed: int,
+    resolution: Resolution,
+    restarts: int = 3,
 ) -> Floats | None:
     """Return points of a free path from a start to one of some goals, or None if none was found.
 
@@ -28,6 +33,7 @@ def connect(
         start: (d,) (rad, m).
         goals: Each (d,); the first ones are tried first.
         seed: Of OMPL's random numbers.
+        resolution: Of the path that is returned; the search looks at places farther apart.
         restarts: How often to search, each time with another seed.
 
     Returns:
@@ -38,13 +44,15 @@ def connect(
         NoPlanError: If the time given is over.
     """
     for goal in goals:
-        if space.edge_free(start, goal, COARSE):
+        if space.edge_free(start, goal, COARSE) and space.edge_free(start, goal, resolution):
             return np.array([start, goal])
+    looked_at = COARSE
     for attempt in range(restarts):
         longest = RANGES[attempt % len(RANGES)] * np.sqrt(len(start))
-        points = _rrt_connect(space, start, goals, seed + 1000 * attempt, longest, CHECKS)
-        if points is not None:
+        points = _rrt_connect(space, start, goals, seed + 1000 * attempt, longest, looked_at)
+        if points is not None and space.path_free(points, resolution):
             return points
+        looked_at = COARSE if points is None else resolution
     return None
 
 
@@ -66,14 +74,19 @@ def import_ompl() -> tuple[Any, Any, Any]:
 
 
 def _rrt_connect(
-    space: Space, start: Floats, goals: Sequence[Floats], seed: int, longest: float, checks: int
+    space: Space,
+    start: Floats,
+    goals: Sequence[Floats],
+    seed: int,
+    longest: float,
+    resolution: Resolution,
 ) -> Floats | None:
     base, geometric, util = import_ompl()
     util.RNG.setSeed(seed + 1)  # 0 is none
     size = len(start)
     states = _state_space(base, space, [start, *goals])
     info = base.SpaceInformation(states)
-    left = [checks]
+    left = [CHECKS]
 
     def read(state: Any) -> Floats:
         return np.array([state[i] for i in range(size)])
@@ -84,7 +97,7 @@ def _rrt_connect(
     class Lines(base.MotionValidator):
         def checkMotion(self, a: Any, b: Any, *_: Any) -> bool:
             left[0] -= 1
-            return space.edge_free(read(a), read(b), COARSE)
+            return space.edge_free(read(a), read(b), resolution)
 
     def written(place: Floats) -> Any:
         state = states.allocState()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kinematics.rotations import Floats
 from motion.paths import Path
-from robots.common.console import notice
+from robots.common.commands import notice
 from robots.common.errors import NoPlanError
 
 if TYPE_CHECKING:
@@ -79,6 +79,7 @@ class Space:
     checkers: Sequence[Checker]
     progress: Progress
     purpose: str = field(default="searching")
+    _known: dict[tuple[bytes, bytes, Resolution], bool] = field(default_factory=dict, repr=False)
 
     def whole(self, places: Floats) -> Floats:
         """Return all coordinates of the cell at some places, (…, D).
@@ -106,10 +107,13 @@ class Space:
         return free
 
     def edge_free(self, a: Floats, b: Floats, resolution: Resolution) -> bool:
-        """Tell whether the straight way between two places is free."""
-        self.progress.tell(self.purpose)
-        start, end = self.whole(a), self.whole(b)
-        return all(checker.edge_free(start, end, resolution) for checker in self.checkers)
+        """Tell whether the straight way between two places is free; asked twice, from memory."""
+        key = a.tobytes(), b.tobytes(), resolution
+        if key not in self._known:
+            self.progress.tell(self.purpose)
+            ends = self.whole(a), self.whole(b)
+            self._known[key] = all(c.edge_free(*ends, resolution) for c in self.checkers)
+        return self._known[key]
 
     def path_free(self, points: Floats, resolution: Resolution) -> bool:
         """Tell whether the straight lines through points are free."""

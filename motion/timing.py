@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path as FilePath
@@ -144,9 +144,10 @@ def _profile(run: Path, accelerations: Floats) -> tuple[Floats, Floats]:
             JointAccelerationConstraint(np.stack([-limits, limits], axis=1)),
         ]
         with _quiet():
-            _, speed, _ = TOPPRA(
+            found: Any = TOPPRA(
                 constraints, _geometric(run), gridpoints=grid, solver_wrapper="seidel"
             ).compute_parameterization(0.0, 0.0)
+        speed = found[1]
         if speed is not None and np.isfinite(speed).all() and (speed[1:-1] > 0).all():
             return grid, np.asarray(speed, float)
     return _stopping(run, accelerations)
@@ -256,7 +257,7 @@ def import_toppra() -> None:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def _quiet() -> Generator[None]:
     """Keep toppra from logging; its handlers write to stderr."""
     log = logging.getLogger("toppra")
     before = log.disabled

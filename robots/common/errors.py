@@ -87,20 +87,21 @@ class MotionError(RobotLayoutsError, ValueError):
 class NoPlanError(RobotLayoutsError, RuntimeError):
     """A motion that was not found, with the reason."""
 
-    def __init__(self, message: str, reason: str) -> None:
+    def __init__(self, message: str, reason: str, missing: float = 0.0) -> None:
         """Compose the error.
 
         Args:
             message: What was asked, what stands in the way, and what would help.
             reason: ``"start in collision"``, ``"goal in collision"``, ``"unreachable"`` or
                 ``"not found"``.
+            missing: How far a goal that is unreachable stays away (m).
         """
         super().__init__(message)
-        self.reason = reason
+        self.reason, self.missing = reason, missing
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle by what it was composed of, so that worker processes can send it home."""
-        return (type(self), (self.args[0], self.reason))
+        return (type(self), (self.args[0], self.reason, self.missing))
 
 
 class SimulationError(RobotLayoutsError, RuntimeError):
