@@ -146,10 +146,9 @@ class Follower:
                         " along it in this control mode"
                     )
                 yield Constant(driven, 0.0)
-            elif driven.group.asks.tcp:
-                yield TcpDrive(driven, self._task, self._seconds)
             else:
-                yield JointDrive(driven, self._task, self._seconds)
+                kind = TcpDrive if driven.group.asks.tcp else JointDrive
+                yield kind(driven, self._task, self._seconds, moves=moving[driven.joints].any())
 
     def _towards(self, share: float, state: State) -> tuple[NDArray[np.float32], bool]:
         """Return the action of a share of a step of the clock, and whether it is within bounds."""

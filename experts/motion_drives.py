@@ -76,9 +76,18 @@ class Constant:
 class JointDrive:
     """A group that is driven by positions of its joints, or by their velocities."""
 
-    def __init__(self, driven: DrivenGroup, task: MultiRobotTask, seconds: float) -> None:
-        """Take the group."""
-        self.numbers, self._joints = driven.numbers, driven.joints
+    def __init__(
+        self, driven: DrivenGroup, task: MultiRobotTask, seconds: float, *, moves: bool
+    ) -> None:
+        """Take the group.
+
+        Args:
+            driven: The group.
+            task: Of which it is.
+            seconds: Of a control step (s).
+            moves: Whether the motion moves it.
+        """
+        self.numbers, self._joints, self._moves = driven.numbers, driven.joints, moves
         self._numbers, self._lag = JointNumbers(driven, task), _Lag(driven, task, seconds)
         self._seconds = seconds
         self._bounds = np.full((2, len(driven.group.joints)), [[-np.inf], [np.inf]])
@@ -91,9 +100,11 @@ class JointDrive:
         here, way, change = aim.of(self._joints)
         where = self._numbers.where(state)
         pull = self._lag.pulled(way + _CORRECTION * (here - where), change)
+        wanted = np.clip(where + pull, *self._bounds)
         if self._numbers.by_speed:
-            return self._numbers.towards(pull / self._seconds, state)
-        return self._numbers.towards(np.clip(where + pull, *self._bounds), state)
+            wanted = pull / self._seconds
+        numbers, within = self._numbers.towards(wanted, state)
+        return numbers, within or not self._moves
 
     def arrived(self, end: Floats, state: State) -> bool:
         """See `Drive`."""
@@ -103,9 +114,18 @@ class JointDrive:
 class TcpDrive:
     """A group that is driven by where its TCP is."""
 
-    def __init__(self, driven: DrivenGroup, task: MultiRobotTask, seconds: float) -> None:
-        """Take the group."""
-        self.numbers, self._joints = driven.numbers, driven.joints
+    def __init__(
+        self, driven: DrivenGroup, task: MultiRobotTask, seconds: float, *, moves: bool
+    ) -> None:
+        """Take the group.
+
+        Args:
+            driven: The group.
+            task: Of which it is.
+            seconds: Of a control step (s).
+            moves: Whether the motion moves it.
+        """
+        self.numbers, self._joints, self._moves = driven.numbers, driven.joints, moves
         self._turns = driven.group.asks.turn
         self._numbers, self._lag = TcpNumbers(driven, task), _Lag(driven, task, seconds)
         self._share = _CORRECTION * float(self._lag.pulls.mean()) - 1
@@ -118,7 +138,8 @@ class TcpDrive:
         ahead[self._joints] += self._lag.pulled(way, change)
         wanted, here = (self._numbers.pose(joints, state) for joints in (ahead, aim.here))
         pulled = further(wanted, here, self._numbers.where(state), self._share)
-        return self._numbers.towards(pulled, state)
+        numbers, within = self._numbers.towards(pulled, state)
+        return numbers, within or not self._moves
 
     def arrived(self, end: Floats, state: State) -> bool:
         """See `Drive`."""
