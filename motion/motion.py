@@ -165,20 +165,21 @@ class Motion:
     def picture(self, path: str | PathLike[str]) -> Path:
         """Save a picture of the motion from above, with distances and speeds over time below.
 
-        Robots stand where they start, faintly, and where they end; each one's TCP draws a line in
-        its colour, with a dot for equal parts of the time. A moving picture shows them on their
-        way. Needs the robots' files and matplotlib.
+        Robots stand where they start, pale, and where they end; the way of each TCP is a line in
+        the robot's colour, with dots at round times. A moving picture shows them on their way.
+        Below are the distance of what is nearest to each other, robots or obstacles, and the speed
+        of each robot's fastest joint. Needs the robots' files and matplotlib.
 
         Args:
             path: Where to save; the ending chooses the format: .png, .pdf or .svg, and for moving
-                pictures .webp, .gif or .mp4.
+                pictures .webp or .gif.
 
         Returns:
             The path of the picture.
 
         Raises:
             AssetError: If a robot's files cannot be found or make no sense.
-            MissingPackageError: If matplotlib, pillow, or imageio for an .mp4, is not installed.
+            MissingPackageError: If matplotlib is not installed.
             MotionError: If the ending names no supported format.
             UnwritableFileError: If it cannot be written (also an ``OSError``).
         """
