@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kinematics.rotations import Floats
 from motion.cell import Cell
-from motion.collisions import Checker, Contact
+from motion.collisions import Checker, Flags
 from robots.common.errors import NoPlanError
 
 
@@ -21,11 +20,7 @@ class Keeping:
     """
 
     def __init__(
-        self,
-        cell: Cell,
-        robots: Sequence[str],
-        clearance: float,
-        ignored: Sequence[str] = (),
+        self, cell: Cell, robots: Sequence[str], clearance: float, timed: Collection[str] = ()
     ) -> None:
         """Gather the pairs.
 
@@ -33,27 +28,18 @@ class Keeping:
             cell: The cell.
             robots: Those that move.
             clearance: How far they keep from everything else (m).
-            ignored: Other robots that do not count.
+            timed: Robots that move as they were told; obstacles that do are known.
         """
-        self.cell, self.robots, self.clearance = cell, tuple(robots), clearance
-        except_ = [(name, other) for name in robots for other in ignored]
-        self._whole = cell.checker(robots, 0.0, except_)
+        self.cell = cell
+        self._pairs = cell.checker(robots, 0.0).pairs
         solids = cell.solids
-        self._close: NDArray[np.bool_] = np.array(
-            [solids[a].owner == solids[b].owner for a, b in self._whole.pairs.tolist()], bool
-        ) | (clearance <= 0.0)
-
-    def free(self, states: Floats) -> NDArray[np.bool_]:
-        """Tell in which states nothing overlaps, (n,)."""
-        return self._whole.free(states)
-
-    def contact(self, state: Floats) -> Contact | None:
-        """Return what overlaps most, or None."""
-        return self._whole.contact(state)
-
-    def only(self, robot: str, others: Sequence[str]) -> Keeping:
-        """Return what one of the robots has to keep from, without some others."""
-        return Keeping(self.cell, (robot,), self.clearance, others)
+        self._movers = np.array([solid.mover for solid in solids])[self._pairs]
+        own = (self._movers[:, 0] == self._movers[:, 1]) & (self._movers[:, 0] != "")
+        self._apart = np.where(own, 0.0, clearance)
+        moved = [s.mover in timed or cell.parts[s.part].track is not None for s in solids]
+        self._overlaps: dict[tuple[str, ...], Checker] = {}
+        one, other = np.array(moved, bool)[self._pairs].T
+        self._timed = one | other
 
     def expect_free_start(self, start: Floats) -> None:
         """Refuse to begin with an overlap.
@@ -61,23 +47,43 @@ class Keeping:
         Raises:
             NoPlanError: If something overlaps.
         """
-        contact = self.contact(start)
+        contact = self.overlaps().contact(start)
         if contact is not None:
             raise NoPlanError(f"at the start {contact}", "start in collision")
 
-    def relax(self, state: Floats) -> None:
+    def relax(self, state: Floats, time: float = 0.0) -> None:
         """Let the pairs of bodies that are nearer than the clearance in a state be that near."""
-        far = np.flatnonzero(~self._close)
-        if not len(far) or self._checker(far, self.clearance).free(state[None])[0]:
-            return
-        for pair in far.tolist():
-            near = not self._checker(np.array([pair]), self.clearance).free(state[None])[0]
-            self._close[pair] = near
+        self._apart[Checker(self.cell, self._pairs, self._apart).close(state, time)] = 0.0
 
-    def checkers(self) -> list[Checker]:
-        """Return what must agree that a state is free."""
-        parts = (np.flatnonzero(self._close), 0.0), (np.flatnonzero(~self._close), self.clearance)
-        return [self._checker(pairs, clearance) for pairs, clearance in parts if len(pairs)]
+    def overlaps(self, ignored: Collection[str] = ()) -> Checker:
+        """Return what tells whether anything overlaps but some robots, which do not count."""
+        key = tuple(ignored)
+        if key not in self._overlaps:
+            kept = ~self._moved_by(ignored)
+            self._overlaps[key] = Checker(self.cell, self._pairs[kept], 0.0)
+        return self._overlaps[key]
 
-    def _checker(self, pairs: NDArray[np.intp], clearance: float) -> Checker:
-        return Checker(self.cell, self._whole.pairs[pairs], clearance)
+    def checker(
+        self, moving: Collection[str], ignored: Collection[str] = (), *, timed: bool = True
+    ) -> Checker:
+        """Return what tells whether a state is free.
+
+        Args:
+            moving: Robots one of which must take part.
+            ignored: Robots that do not count.
+            timed: Whether what moves as it was told counts.
+        """
+        chosen = self._moved_by(moving) & ~self._moved_by(ignored)
+        return self._checker(chosen if timed else chosen & ~self._timed)
+
+    def between(self, some: Collection[str], others: Collection[str]) -> Checker:
+        """Return what tells whether two groups of robots keep clear of each other."""
+        return self._checker(self._moved_by(some) & self._moved_by(others))
+
+    def _moved_by(self, robots: Collection[str]) -> Flags:
+        """Tell which pairs some robots take part in."""
+        moved = np.isin(self._movers, list(robots))
+        return moved[:, 0] | moved[:, 1]
+
+    def _checker(self, chosen: Flags) -> Checker:
+        return Checker(self.cell, self._pairs[chosen], self._apart[chosen])
