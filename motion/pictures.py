@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinematics.quaternions import forward
-from kinematics.rotations import Floats
+from kinematics.rotations import Floats, transform
 from layouts.description import headline
 from layouts.preview import COLOURS, FAINT, INK, SUPPORTED, TABLE, blank_figure
 from layouts.validation.findings import length_text
+from motion.bodies import Solid
 from motion.moving import Moving
 from motion.scenes import Scenes
 from robots import MissingPackageError
@@ -31,6 +32,7 @@ WIDTH = 8.0  # inches; 1200 pixels
 LEFT, RIGHT, ABOVE = 0.75, 0.25, 0.5  # around the plan (inches)
 PLAN_HEIGHTS = (4.0, 7.5)  # smallest and largest height of the plan (inches)
 STRIP, BETWEEN, BELOW = 0.95, 0.32, 0.55  # height of each strip, and the room around them (inches)
+OBSTACLE = "#BDBDBD"
 LIMIT: dict[str, Any] = {"color": "#B2182B", "linewidth": 1.0, "linestyle": "--"}
 MARGIN = 0.05  # free space around all that is drawn, in shares of the plan's larger side
 SAMPLES = 81  # moments of the strips
@@ -76,7 +78,7 @@ class _Picture:
 
     def __init__(self, motion: Moving, dots_per_inch: int = 150) -> None:
         self._motion, self._scenes = motion, Scenes(motion)
-        self._bodies = {time: self._scenes.corners(time) for time in (0.0, motion.duration)}
+        self._bodies = {time: self._scenes.moving(time) for time in (0.0, motion.duration)}
         self._ways = self._scenes.tcp_ways(np.linspace(0, motion.duration, SMOOTH))
         low, high = self._bounds()
         plan_width = WIDTH - LEFT - RIGHT
@@ -117,7 +119,7 @@ class _Picture:
         pictures: list[Any] = []
         for done, time in enumerate(moments.tolist(), start=1):
             canvas.restore_region(empty)
-            drawn = [self._draw_bodies(self._scenes.corners(time), 0.5, 3.0, edges=True)]
+            drawn = [self._draw_bodies(self._scenes.moving(time), 0.5, 3.0, edges=True)]
             lines = [strip.axvline(time, color=INK, linewidth=1.2) for strip in self._strips]
             for artist in (*drawn, *self._over, *lines):
                 artist.draw(canvas.get_renderer())
@@ -131,7 +133,12 @@ class _Picture:
 
     def _bounds(self) -> tuple[Floats, Floats]:
         """Return the least and greatest corner of everything that robots do, (2,) (m)."""
-        points = [c[:, :2] for bodies in self._bodies.values() for name, c in bodies if name]
+        points = [corners[:, :2] for bodies in self._bodies.values() for _, corners in bodies]
+        points += [
+            transform(solid.offset, solid.hull.corners)[:, :2]
+            for solid in self._scenes.standing()
+            if solid.owner not in self._scenes.cell.tables
+        ]
         points += [way[:, :2] for way in self._ways.values()]
         every = np.concatenate(points)
         low, high = every.min(axis=0), every.max(axis=0)
@@ -141,6 +148,11 @@ class _Picture:
     def _draw_around(self) -> None:
         """Draw what does not move, and what is over the robots: ways, marks and names."""
         plan, motion = self._plan, self._motion
+        standing = [
+            (solid, transform(solid.offset, solid.hull.corners))
+            for solid in self._scenes.standing()
+        ]
+        self._draw_bodies(standing, 0.0, 1.0, edges=True)
         self._draw_bodies(self._bodies[0.0], 0.84, 2.0, edges=False)
         for arm, way in self._ways.items():
             self._draw_way(way, self._colour(arm))
@@ -159,31 +171,35 @@ class _Picture:
         self._draw_speeds(self._strips[1])
 
     def _draw_bodies(
-        self, bodies: Sequence[tuple[str, Floats]], white: float, level: float, *, edges: bool
+        self, bodies: Sequence[tuple[Solid, Floats]], white: float, level: float, *, edges: bool
     ) -> Any:
         """Draw outlines from above, the highest last.
 
         Args:
-            bodies: See `Scenes.corners`.
-            white: How much white is in their colours.
+            bodies: With their corners (m, world).
+            white: How much white is in robots' colours.
             level: Over what else is drawn.
             edges: Whether their edges are drawn.
         """
         from matplotlib.collections import PolyCollection
 
         ordered = sorted(bodies, key=lambda body: float(body[1][:, 2].max()))
-        colours = [
-            _mixed(self._colour(name) if name else TABLE, white * bool(name)) for name, _ in ordered
-        ]
-        lines = [self._colour(name) if name else FAINT for name, _ in ordered]
+        inks = [self._ink(solid, white) for solid, _ in ordered]
         drawn = PolyCollection(
             [_outline(corners[:, :2]) for _, corners in ordered],
-            facecolors=colours,
-            edgecolors=lines if edges else colours,
+            facecolors=[face for face, _ in inks],
+            edgecolors=[edge if edges else face for face, edge in inks],
             linewidths=0.7,
             zorder=level,
         )
         return self._plan.add_collection(drawn, autolim=False)
+
+    def _ink(self, solid: Solid, white: float) -> tuple[Any, Any]:
+        """Return the colour of a body, and that of its edge."""
+        if solid.mover:
+            colour = self._colour(solid.mover)
+            return _mixed(colour if solid.owner == solid.mover else INK, white), colour
+        return (TABLE, "#C9B99B") if solid.owner in self._scenes.cell.tables else (OBSTACLE, FAINT)
 
     def _draw_way(self, way: Floats, colour: str) -> None:
         """Draw the way of a TCP, with dots at round times."""
@@ -212,7 +228,7 @@ class _Picture:
         ahead = np.array(forward(self._motion.layout[name].facing)[:2])
         length = float(np.linalg.norm(ahead))
         behind = -ahead / length if length > 0.1 else np.array([0.0, -1.0])
-        bodies = [c[:, :2] - base for owner, c in self._bodies[0.0] if owner == name]
+        bodies = [c[:, :2] - base for solid, c in self._bodies[0.0] if solid.owner == name]
         place = base + behind * max(0.0, float((np.concatenate(bodies) @ behind).max()))
         x, y = behind.tolist()
         self._over.append(
@@ -268,8 +284,10 @@ class _Picture:
                 100 * self._motion.clearance, color="#B2182B", linewidth=1, linestyle="--"
             )
         one, other = (name.replace("/", "'s ") for name in found.nearest)
-        text = f"least: {length_text(found.least[least])}, {one} and {other}"
-        strip.set_title(text, loc="right", color=INK, fontsize=9, pad=3)
+        near = found.least[least]
+        text = f"{'least' if near >= 0 else 'overlap'}: {length_text(abs(near))}, {one} and {other}"
+        ink = INK if near >= 0 else LIMIT["color"]
+        strip.set_title(text, loc="right", color=ink, fontsize=9, pad=3)
         strip.set_title("to what is nearest", loc="left", color=FAINT, fontsize=9, pad=3)
         strip.tick_params(labelbottom=False)
 

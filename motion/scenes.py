@@ -9,9 +9,11 @@ import numpy as np
 from kinematics.rotations import Floats, transform
 from layouts.layout import Layout
 from motion import timing
+from motion.bodies import Solid
 from motion.cell import Cell
 from motion.collisions import Checker
 from motion.moving import Moving
+from motion.obstacles import Held
 from robots.urdf.tcp import find_tcp
 
 
@@ -48,24 +50,31 @@ class Scenes:
         sampled = self.motion.sample(times)
         return np.concatenate([sampled[name] for name in self.cell.robots], axis=1)
 
-    def corners(self, time: float) -> list[tuple[str, Floats]]:
-        """Return each convex body at a time: who moves it, and its corners (m, world).
+    def standing(self) -> list[Solid]:
+        """Return tables, and obstacles that do not move."""
+        return [solid for solid in self.cell.solids if _stands(self.cell, solid)]
 
-        Robots move themselves and what they hold; tables and obstacles are moved by ``""``.
-        """
+    def moving(self, time: float) -> list[tuple[Solid, Floats]]:
+        """Return all other bodies at a time, with their corners, (n, 3) (m, world)."""
         cell, moments = self.cell, np.array([time])
         links = cell.poses(self.states(moments))[0]
         at = {link: links[i] for i, link in enumerate(cell.links)}
-        found: list[tuple[str, Floats]] = []
+        found: list[tuple[Solid, Floats]] = []
         for solid in cell.solids:
-            part = cell.parts[solid.part]
-            pose = np.eye(4)
+            part, pose = cell.parts[solid.part], np.eye(4)
             if part.track is not None:
                 pose = part.track.at(moments)[0]
             elif part.robot:
                 pose = at[part.robot, cell.models[part.robot].kinematics.links[part.link]]
-            found.append((solid.mover, transform(pose @ solid.offset, solid.hull.corners)))
+            if not _stands(cell, solid):
+                found.append((solid, transform(pose @ solid.offset, solid.hull.corners)))
         return found
+
+    def held_poses(self, held: Held, times: Floats) -> Floats:
+        """Return where a body that an arm carries is at some times, (n, 4, 4) (m, world)."""
+        robot, link = self.cell.tcp(held.place)
+        at = self.cell.links.index((robot, self.cell.models[robot].kinematics.links[link]))
+        return self.cell.poses(self.states(times))[:, at] @ held.obstacle.poses(None, len(times))
 
     def tcp_ways(self, times: Floats) -> dict[str, Floats]:
         """Return where the TCP of each arm is at some times, (n, 3) (m, world)."""
@@ -100,6 +109,10 @@ class Scenes:
             name: (np.abs(rows) / fastest[name]).max(axis=1)
             for name, rows in self.motion.velocity(times).items()
         }
+
+
+def _stands(cell: Cell, solid: Solid) -> bool:
+    return not solid.mover and cell.parts[solid.part].track is None
 
 
 def largest_velocities(motion: Moving, layout: Layout) -> dict[str, Floats]:

@@ -12,30 +12,10 @@ import yaml
 
 from layouts import face_to_face
 from motion import Motion, MotionError
-from motion.obstacles import Held, Track, box, sphere
 from robots import LayoutError
 from robots.common.errors import UnwritableFileError
 from tests.experts.free_motions import swing
-
-LAYOUT = face_to_face({"left": "panda", "right": "so100"}, spacing=0.9)
-
-
-def busy_motion() -> Motion:
-    motion = swing(LAYOUT)
-    track = Track([0.0, 1.0], [np.eye(4), np.diag([-1.0, -1.0, 1.0, 1.0])])
-    ball = sphere("ball", 0.05).moved(track)
-    return Motion(
-        LAYOUT,
-        motion.times,
-        motion.positions,
-        motion.velocities,
-        obstacles=(box("wall", (0.1, 0.2, 0.3), (0.0, 1.0, 0.15)), ball),
-        held=(Held("left", box("cube", (0.04, 0.04, 0.04), (0.0, 0.0, 0.1))),),
-        table=(-1.0, -0.5, 1.0, 0.5),
-        clearance=0.02,
-        largest_velocities={"left": [2.0] * 8 + [np.inf]},
-        largest_accelerations={"right": [5.0] * 6},
-    )
+from tests.motion.motions import LAYOUT, busy_motion
 
 
 def alike(one, other) -> bool:
