@@ -6,19 +6,21 @@ from collections.abc import Callable, Sequence
 from itertools import count
 from os import PathLike
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kinematics.quaternions import forward
 from kinematics.rotations import Floats, transform
-from layouts.description import headline
+from layouts.description import decimal
 from layouts.preview import COLOURS, FAINT, INK, SUPPORTED, TABLE, blank_figure
 from layouts.validation.findings import length_text
 from motion.bodies import Solid
 from motion.moving import Moving
 from motion.scenes import Scenes
 from robots import MissingPackageError
+from robots.common.commands import notice
 from robots.common.errors import MotionError
 from robots.common.writing import written_whole
 
@@ -39,6 +41,7 @@ SAMPLES = 81  # moments of the strips
 SMOOTH = 241  # moments of a way
 MOST_MARKS = 10  # on a way, besides its ends
 FRAMES = 20  # per second, of a moving picture
+PATIENCE = 2.0  # s without a word of how far it is
 REST = 1.0  # s, for which a moving picture shows its end
 MOVING_DOTS = 75  # per inch, of a moving picture
 
@@ -46,14 +49,15 @@ Progress = Callable[[int, int], None]
 
 
 def save_picture(
-    motion: Moving, path: str | PathLike[str], progress: Progress = lambda done, total: None
+    motion: Moving, path: str | PathLike[str], progress: Progress | None = None
 ) -> Path:
     """Save a picture, whole or not at all; see `motion.Motion.picture`.
 
     Args:
         motion: What to draw.
         path: Where.
-        progress: Called with the number of pictures that are drawn, and that of all.
+        progress: Called with the number of pictures that are drawn, and that of all; by default
+            stderr says so every two seconds.
     """
     target = Path(path)
     kind = target.suffix.lower()
@@ -62,7 +66,7 @@ def save_picture(
         with written_whole(target) as unfinished:
             figure.savefig(unfinished, format=kind[1:])
     elif kind in MOVING:
-        frames = _Picture(motion, MOVING_DOTS).frames(progress)
+        frames = _Picture(motion, MOVING_DOTS).frames(progress or _on_stderr())
         with written_whole(target) as unfinished:
             _write_frames(frames, unfinished, kind[1:])
     else:
@@ -158,7 +162,9 @@ class _Picture:
             self._draw_way(way, self._colour(arm))
         for name in motion.layout:
             self._write_name(name)
-        plan.set_title(headline(motion.layout), loc="left", color=INK, fontsize=13, weight="bold")
+        count = len(motion.layout)
+        title = f"Motion of {decimal(count)} robot{'s' * (count != 1)}"
+        plan.set_title(title, loc="left", color=INK, fontsize=13, weight="bold")
         plan.set_title(f"{motion.duration:.2f} s", loc="right", color=INK, fontsize=13)
         plan.set_xlabel("x (m)", color=INK, loc="left")
         self._write_legend()
@@ -250,9 +256,9 @@ class _Picture:
     def _write_legend(self) -> None:
         """Say what the marks mean, below the plan."""
         marks = _marks(self._motion.duration)
-        text = "pale and ●: where they start;  ★: where their tool centre points end"
-        if marks:
-            text += f";  ○: every {marks[0]:g} s"
+        text = (
+            f"pale, ●: start    full, ★: end    lines: tool centre points, ○ every {marks[0]:g} s"
+        )
         self._plan.text(
             1.0, -0.055, text, transform=self._plan.transAxes, color=FAINT, fontsize=9,
             ha="right", va="top",
@@ -288,7 +294,7 @@ class _Picture:
         text = f"{'least' if near >= 0 else 'overlap'}: {length_text(abs(near))}, {one} and {other}"
         ink = INK if near >= 0 else LIMIT["color"]
         strip.set_title(text, loc="right", color=ink, fontsize=9, pad=3)
-        strip.set_title("to what is nearest", loc="left", color=FAINT, fontsize=9, pad=3)
+        strip.set_title("what is nearest", loc="left", color=FAINT, fontsize=9, pad=3)
         strip.tick_params(labelbottom=False)
 
     def _draw_speeds(self, strip: Axes) -> None:
@@ -310,6 +316,19 @@ class _Picture:
         strip.set_ylabel(what, color=INK, fontsize=9)
         strip.grid(color="#DDDDDD", linewidth=0.6)
         _plain(strip)
+
+
+def _on_stderr() -> Progress:
+    """Return what says every two seconds how far a picture is."""
+    last = monotonic()
+
+    def tell(done: int, total: int) -> None:
+        nonlocal last
+        if monotonic() - last > PATIENCE:
+            last = monotonic()
+            notice(f"drawing: {done} of {total} pictures")
+
+    return tell
 
 
 def _write_frames(frames: Sequence[Any], path: Path, kind: str) -> None:

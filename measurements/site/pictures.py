@@ -1,6 +1,6 @@
-"""``python -m measurements.site.pictures``: draws the documentation's moving picture anew.
+"""``python -m measurements.site.pictures``: draws pictures of the documentation anew.
 
-It is committed, so that nobody needs a Vulkan driver to see it.
+They are committed, so that nobody needs a Vulkan driver or a planner to see them.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ from PIL import Image
 
 import tasks
 from experts import find_expert
+from layouts import Layout, ring
+from motion import TcpGoal, plan
 from robots import RecordingError
 from robots.common.commands import exit_code, program, start
 from robots.common.writing import written_whole
@@ -73,6 +75,22 @@ def film(task_id: str, seed: int, path: Path) -> None:
     _save(frames, path, FRAME)
 
 
+def crossing(path: Path) -> None:
+    """Draw four arms in a ring that all reach from their right to their left at the same time."""
+    cell = ring(dict.fromkeys(("south", "east", "north", "west"), "panda"), radius=0.75)
+    ready = plan(cell, goals=_beside(cell, 1))
+    plan(cell, ready.end, _beside(cell, -1), velocity=0.5).picture(path)
+
+
+def _beside(cell: Layout, step: int) -> dict[str, TcpGoal]:
+    """Return goals before the bases that stand some places further in a ring."""
+    bases = [placement.base_position for placement in cell.values()]
+    before = [bases[(i + step) % len(bases)] for i in range(len(bases))]
+    return {
+        name: TcpGoal((0.4 * x, 0.4 * y, 0.3)) for name, (x, y, _) in zip(cell, before, strict=True)
+    }
+
+
 def _save(frames: Sequence[Image.Image], path: Path, duration: int) -> None:
     durations = [duration] * (len(frames) - 1) + [LAST]
     with written_whole(path, RecordingError) as partial:
@@ -88,7 +106,10 @@ def _save(frames: Sequence[Image.Image], path: Path, duration: int) -> None:
         )
 
 
-PICTURES: dict[str, Callable[[Path], None]] = {"hand_over.webp": hand_over}
+PICTURES: dict[str, Callable[[Path], None]] = {
+    "hand_over.webp": hand_over,
+    "crossing.png": crossing,
+}
 
 
 if __name__ == "__main__":
