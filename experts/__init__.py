@@ -14,7 +14,7 @@ Writing one, which is a function of a task and a seed:
     ArmDriver: Turns joints to go to into action numbers.
 
 Carrying out a planned `motion.Motion`, in any control mode:
-    follow: Steps a task until its robots have; says how near they stayed.
+    follow: Steps a task until its robots have; `Followed` says how near they stayed.
     Follower: The action of one step after the other.
 
 ``examples/two_arm_tray.ipynb`` writes one from the first line to the last.
