@@ -14,9 +14,9 @@ from motion.collisions import Checker
 from motion.curves import hermite, hermite_slopes
 from motion.obstacles import Track
 from motion.spaces import Progress, Resolution
+from motion.timing import STEP
 
-STEP = 0.02  # s; between moments that are looked at first
-LATER = 0.2  # s; how much later a motion is tried next
+LATER = 10 * STEP  # s; how much later a motion is tried next
 SPARE = 2.0  # s; how long after everything else stands still a motion may set out
 
 
@@ -85,12 +85,12 @@ class Traffic:
         return speeds
 
     def knots(self) -> Floats:
-        """Return times from 0 to the end, at most `STEP` apart, with all knots, (T,) (s)."""
-        every = np.linspace(0.0, self.end, max(int(np.ceil(self.end / STEP - 1e-6)), 1) + 1)
-        own = np.unique(np.concatenate([[0.0, self.end], *(c.times for c in self.courses)]))
-        far = np.abs(every[:, None] - own).min(axis=1) > STEP / 2 if len(own) > 2 else every >= 0
-        merged = np.unique(np.concatenate([own, every[far]]))
-        return merged[np.concatenate([[True], np.diff(merged) > 1e-9])]
+        """Return times from 0 to the end or a little later, `STEP` apart, (T,) (s).
+
+        What was planned has its knots there, too.
+        """
+        count = max(int(np.ceil(self.end / STEP - 1e-6)), 1)
+        return np.arange(count + 1.0) * STEP
 
 
 def first_free(
@@ -117,7 +117,7 @@ def first_free(
 
 
 def _is_free(traffic: Traffic, checker: Checker, resolution: Resolution) -> bool:
-    times = np.linspace(0.0, traffic.end, max(int(np.ceil(traffic.end / STEP)), 1) + 1)
+    times = traffic.knots()
     states = traffic.positions(times)
     if not checker.free(states, times).all():
         return False
