@@ -13,14 +13,16 @@ from kinematics.rotations import Floats
 from layouts.validation.collisions import FAR
 from layouts.validation.findings import length_text
 from motion.bodies import Bodies
+from motion.edges import Edges
 from motion.exact import Measure
-from motion.sieve import Sieve
-from motion.travel import Travel, in_halves
+from motion.sieve import Candidates, Sieve
+from motion.travel import Travel
 from robots import LayoutError
 
 Flags = NDArray[np.bool_]
 
-MOST_STATES = 256  # that are looked at together
+MOST_STATES = 64  # that are looked at together; what more need no longer fits into the caches
+RESOLUTION = (0.01, 0.05)  # of edges: how far points travel (m) and links turn (rad) in a step
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,10 @@ class Checker:
         self.apart = apart = np.broadcast_to(np.asarray(apart, float), (len(pairs),))
         self._sieve = Sieve(cell, pairs, apart)
         self._measure = Measure(cell, pairs, apart, self._sieve.chains)
+
+    @cached_property
+    def _edges(self) -> Edges:
+        return Edges(self._sieve, self._measure, self._travel)
 
     @cached_property
     def _travel(self) -> Travel:
@@ -160,7 +166,7 @@ class Checker:
         self,
         start: ArrayLike,
         end: ArrayLike,
-        resolution: tuple[float, float] = (0.01, 0.05),
+        resolution: tuple[float, float] = RESOLUTION,
         times: tuple[float, float] | None = None,
     ) -> bool:
         """Tell whether all states on the straight way between two states are free, ends included.
@@ -176,12 +182,29 @@ class Checker:
             LayoutError: If a shape is wrong, or a number not finite.
         """
         (a, b), _ = self._states(np.stack([np.asarray(start, float), np.asarray(end, float)]), None)
-        steps = self._travel.steps(a, b, resolution, times)
-        for shares in in_halves(steps):
-            moments = None if times is None else times[0] + shares * (times[1] - times[0])
-            if not self._free(a + shares[:, None] * (b - a), moments).all():
-                return False
-        return True
+        return self._edges.free(a, b, self.steps(a, b, resolution, times), times)
+
+    def steps(
+        self,
+        start: Floats,
+        end: Floats,
+        resolution: tuple[float, float] = RESOLUTION,
+        times: tuple[float, float] | None = None,
+    ) -> int:
+        """Return into how many steps `edge_free` cuts a way; see there."""
+        return self._travel.steps(start, end, resolution, times)
+
+    def candidates(self, qpos: ArrayLike, times: ArrayLike | None = None) -> Candidates:
+        """Return the pairs of solids that bounds alone do not show to be far enough apart.
+
+        Args:
+            qpos: Coordinates, (n, D) (rad, m).
+            times: Where obstacles that move are, (n,) (s); None is 0.
+
+        Raises:
+            LayoutError: If a shape is wrong, or a number not finite.
+        """
+        return self._sieve.candidates(self._places(*self._states(qpos, times)))
 
     # -- one batch ---------------------------------------------------------------------------
 
