@@ -79,7 +79,7 @@ def crossing(path: Path) -> None:
     """Draw four arms in a ring that all reach from their right to their left at the same time."""
     cell = ring(dict.fromkeys(("south", "east", "north", "west"), "panda"), radius=0.75)
     ready = plan(cell, goals=_beside(cell, 1))
-    plan(cell, ready.end, _beside(cell, -1), velocity=0.5).picture(path)
+    plan(cell, ready.end, _beside(cell, -1)).picture(path)
 
 
 def _beside(cell: Layout, step: int) -> dict[str, TcpGoal]:

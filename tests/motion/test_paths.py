@@ -89,7 +89,7 @@ def test_the_mode_of_the_layout_counts_unless_another_is_asked_for():
 
 
 def test_velocities_are_scaled_and_accelerations_follow_them():
-    half = largest_velocities(cell(), factor=0.5)
+    half = largest_velocities(cell(), "pd_joint_target_delta_pos", factor=0.5)
     assert half["left"][0] == 1.0
     assert largest_accelerations(cell(), half)["left"][0] == pytest.approx(2.5)
     given = largest_accelerations(cell(), half, {"right": 3.0})
