@@ -286,9 +286,12 @@ class _Picture:
         strip.plot(times[least], centimetres[least], "o", color=INK, markersize=5)
         strip.set_ylim(min(0.0, 1.1 * centimetres[least]), 1.15 * float(np.nanmax(centimetres)))
         if self._motion.clearance:
-            strip.axhline(
-                100 * self._motion.clearance, color="#B2182B", linewidth=1, linestyle="--"
-            )
+            asked = 100 * self._motion.clearance
+            strip.axhline(asked, **LIMIT)
+            strip.annotate(
+                "asked for", (self._motion.duration, asked), (-3, 2), textcoords="offset points",
+                color=LIMIT["color"], fontsize=7.5, ha="right",
+            )  # fmt: skip
         one, other = (name.replace("/", "'s ") for name in found.nearest)
         near = found.least[least]
         text = f"{'least' if near >= 0 else 'overlap'}: {length_text(abs(near))}, {one} and {other}"
