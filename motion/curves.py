@@ -37,7 +37,8 @@ def hermite_slopes(knots: Floats, values: Floats, slopes: Floats, times: ArrayLi
     bend = 2.0 * (3.0 * rise - 2.0 * leave - arrive)
     twist = 3.0 * (leave + arrive - 2.0 * rise)
     inside = (np.asarray(times) >= knots[0]) & (np.asarray(times) <= knots[-1])
-    return np.where(inside[..., None], leave + s * (bend + s * twist), 0.0)
+    within = np.where(s < 1.0, leave + s * (bend + s * twist), arrive)
+    return np.where(inside[..., None], within, 0.0)
 
 
 def hermite_bends(knots: Floats, values: Floats, slopes: Floats) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
@@ -15,11 +15,13 @@ from numpy.typing import ArrayLike
 from kinematics.rotations import Floats
 from layouts import Layout
 from motion.curves import hermite, hermite_slopes
+from robots.common.bounds import FAR, checked_number
 from robots.common.errors import MotionError, UnknownNameError
 
 if TYPE_CHECKING:
     from motion.certificate import Certificate
 
+SAME = 1e-6  # rad, m: so far apart is the same place
 STILL: Mapping[str, Floats] = MappingProxyType({})
 
 
@@ -160,6 +162,43 @@ class Motion:
             largest_accelerations=self.largest_accelerations,
             step=step,
             turn=turn,
+        )
+
+    def then(self, other: Motion, rest: float = 0.0) -> Motion:
+        """Return this motion and another one after it, with what was said of this one.
+
+        Args:
+            other: Of the same layout; begins where this one ends, both at rest.
+            rest: How long everything stands still in between (s).
+
+        Raises:
+            MotionError: If it does not, or the rest is negative.
+        """
+        if other.layout != self.layout:
+            raise MotionError(f"{other!r} is of another layout than {self!r}")
+        rest = checked_number("rest", rest, 0.0, FAR, MotionError, "s")
+        for name, end in self.end.items():
+            if self.velocities[name][-1].any() or other.velocities[name][0].any():
+                raise MotionError(f"{name} does not stand still between the two motions")
+            away = float(np.abs(other.start[name] - end).max(initial=0.0))
+            if away > SAME:
+                raise MotionError(
+                    f"{name} begins {away:.3g} from where it ended; plan the second motion from"
+                    " the end of the first"
+                )
+        first = 1 if rest == 0.0 else 0  # the knot that both have
+        later = self.duration + rest + other.times[first:]
+        return replace(
+            self,
+            times=np.concatenate([self.times, later]),
+            positions={
+                name: np.concatenate([qpos, other.positions[name][first:]])
+                for name, qpos in self.positions.items()
+            },
+            velocities={
+                name: np.concatenate([speeds, other.velocities[name][first:]])
+                for name, speeds in self.velocities.items()
+            },
         )
 
     def picture(self, path: str | PathLike[str]) -> Path:

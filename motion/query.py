@@ -25,7 +25,7 @@ FEW = 4  # robots that plan together at first
 RESTARTS = 4  # searches of all robots together
 COMBINATIONS = 512  # of postures of all places that are tried as goals
 ENDS = 4  # of them that a search may choose from
-FINEST = 2e-3  # m; how near places are that are looked at, where no clearance is asked
+FINEST, COARSEST = 2e-3, 0.01  # m; between places that are looked at: the clearance, if within
 RADIANS_PER_METRE = 5.0  # how far links may turn between two of them, beside how far they travel
 
 
@@ -64,7 +64,7 @@ class Query:
     @property
     def resolution(self) -> Resolution:
         """How dense checks make sure that nothing comes nearer than 0 in between."""
-        step = max(self.clearance, FINEST)
+        step = min(max(self.clearance, FINEST), COARSEST)
         return step, RADIANS_PER_METRE * step
 
     def ends(self) -> Floats:

@@ -86,8 +86,8 @@ class _Flats:
 
     Attributes:
         solids: Which, (F,).
-        normals: Of their sides, outwards, the first repeated, (F, MOST_SIDES, 3).
-        offsets: Distances of the sides from the origin, (F, MOST_SIDES) (m).
+        normals: Of their sides, outwards, the first repeated, (F, sides, 3).
+        offsets: Distances of the sides from the origin, (F, sides) (m).
     """
 
     solids: Indices
@@ -370,7 +370,8 @@ def _moved(cluster: Cluster, pose: Floats) -> Cluster:
 
 
 def _gather_flats(flats: Mapping[int, Floats]) -> _Flats:
-    sides = np.zeros((len(flats), MOST_SIDES, 4))
+    most = max(map(len, flats.values()), default=0)
+    sides = np.zeros((len(flats), most, 4))
     for row, own in zip(sides, flats.values(), strict=True):
         row[:] = own[0]
         row[: len(own)] = own

@@ -119,6 +119,9 @@ def timed(path: Path, accelerations: Floats) -> tuple[Floats, Floats, Floats]:
     Raises:
         MissingPackageError: If toppra is not installed.
     """
+    if len(path.points) < 2:  # already there
+        still = np.repeat(path.points, 2, axis=0)
+        return np.array([0.0, STEP]), still, np.zeros_like(still)
     parts: list[tuple[Floats, Floats, Floats]] = []
     for run in path.runs():
         at, speed = _profile(run, accelerations)

@@ -32,6 +32,7 @@ RECORD = Path("runs/motion_queries.jsonl")
 CLEARANCE = 0.01  # m
 PATIENCE = {2: 5.0, 3: 5.0, 4: 5.0}  # s of processor time within which a plan counts as solved
 LONGEST = 30.0  # s, the same for more arms
+ALONE = "even if the other robots that move were not there"  # in the planner's message
 WAIT = 120.0  # s; wall time after which a query is given up, whatever else the machine does
 
 Seen = dict[str, Any]
@@ -172,9 +173,10 @@ def markdown(record: Sequence[Seen]) -> Iterator[str]:
     """Yield the lines of the table: a row per number of arms."""
     yield (
         "| arms | queries | solved | in time | median s | 90 % s | 99 % s | slowest s | certified"
-        " | collisions | least clearance mm | recognised infeasible |"
+        " | collisions | least clearance mm | an arm finds no way even alone"
+        " | recognised infeasible |"
     )
-    yield "|" + " ---: |" * 12
+    yield "|" + " ---: |" * 13
     for arms in sorted({seen["arms"] for seen in record}):
         yield _row(arms, [seen for seen in record if seen["arms"] == arms])
 
@@ -196,6 +198,7 @@ def _row(arms: int, seen: Sequence[Seen]) -> str:
         _share(sum(s["certified"] for s in checked), len(checked)),
         sum(s["collisions"] for s in checked),
         f"{1e3 * min(clearances):.1f}" if clearances else "",
+        sum(ALONE in s.get("message", "") for s in asked),
         len(seen) - len(asked),
     ]
     return "| " + " | ".join(map(str, numbers)) + " |"

@@ -283,6 +283,29 @@ def test_what_moves_both_of_two_links_brings_them_no_nearer(crowd):
     assert (between[own[0], WORLD], between[WORLD, own[-1]]) > (0.0, 0.3)
 
 
+def test_nothing_in_the_way_is_missed(tmp_path):
+    """A slide comes nearer by exactly its bound; a pole stands everywhere on its way in turn."""
+    text = urdf(
+        link("base", shape=""),
+        link("top"),
+        joint("slide", "base", "top", kind="prismatic", axis="1 0 0"),
+    )
+    layout = Layout({"one": Placement(robot(tmp_path, text, ["slide"]))})
+    for i, x in enumerate(np.linspace(-0.05, 2.05, 22)):
+        pole = box("pole", (0.004, 0.02, 0.02), (x, 0.0, 0.0))
+        still = pole.moved(Track(np.zeros(1), pole.pose[None]))
+        cell = Cell(layout, [still if i % 2 else pole])
+        assert not cell.checker().edge_free([0.0], [2.0], (0.002, 1.0))
+        assert not cell.checker(clearance=0.01).edge_free([2.0], [0.0], (0.002, 1.0))
+    last = Cell(layout, [box("pole", (0.004, 0.5, 0.5), (2.0515, 0.0, 0.0))]).checker()
+    for steps in range(1, 60):
+        assert not last.edge_free([0.0], [2.0], (2.0 / steps, 1.0))
+    for x in (-0.07, 2.07):
+        cell = Cell(layout, [box("pole", (0.004, 0.5, 0.5), (x, 0.0, 0.0))])
+        assert cell.checker(clearance=0.015).edge_free([0.0], [2.0], (0.002, 1.0))
+        assert not cell.checker(clearance=0.02).edge_free([0.0], [2.0], (0.002, 1.0))
+
+
 @pytest.mark.parametrize("resolution", [(0.05, 0.2), (0.003, 0.02)])
 def test_an_edge_is_as_free_as_its_states(crowd, resolution):
     checker = crowd.checker(clearance=0.01)

@@ -36,6 +36,8 @@ def test_the_knots_are_met_exactly():
     motion = waves()
     for name, qpos in motion.sample(motion.times).items():
         assert np.array_equal(qpos, motion.positions[name])
+    for name, speeds in motion.velocity(motion.times).items():
+        assert np.array_equal(speeds, motion.velocities[name])
 
 
 def test_beyond_its_ends_a_motion_stands_still():
@@ -90,6 +92,34 @@ def test_arrays_that_do_not_fit_are_refused(changes, message):
 def test_a_robot_that_is_not_there_is_refused_by_name():
     with pytest.raises(UnknownNameError, match="Did you mean 'left'"):
         waves(positions={"lef": np.zeros((21, 9))})
+
+
+def swing(start, end):
+    """From one position of all joints to another and to rest there, in 2 s."""
+    share = (1 - np.cos(np.pi * TIMES / 2)) / 2
+    speed = np.pi / 4 * np.sin(np.pi * TIMES / 2)
+    speed[[0, -1]] = 0.0
+    positions = {n: np.tile(start + (end - start) * share[:, None], 9) for n in cell()}
+    velocities = {n: np.tile((end - start) * speed[:, None], 9) for n in cell()}
+    return waves(positions=positions, velocities=velocities)
+
+
+def test_one_motion_follows_another():
+    there, back = swing(0.0, 1.0), swing(1.0, 0.0)
+    whole = there.then(back, rest=0.5).then(there)
+    assert whole.duration == 6.5
+    assert np.allclose(whole.sample(2.5 + 0.7)["left"], back.sample(0.7)["left"])
+    assert np.allclose(whole.sample(2.2)["left"], 1.0)
+    assert np.allclose(whole.sample(6.0)["right"], there.sample(1.5)["right"])
+
+
+def test_motions_that_do_not_meet_at_rest_do_not_follow_each_other():
+    with pytest.raises(MotionError, match="left begins 1 from where it ended"):
+        swing(0.0, 1.0).then(swing(0.0, 1.0))
+    with pytest.raises(MotionError, match="left does not stand still"):
+        waves().then(waves())
+    with pytest.raises(MotionError, match="rest is -1"):
+        swing(0.0, 1.0).then(swing(1.0, 0.0), rest=-1)
 
 
 def test_slopes_and_bends_are_the_derivatives_of_the_curve():

@@ -19,7 +19,6 @@ from tests.motion.two_pandas import (
     aside,
     cell,
     in_the_middle,
-    there_and_back,
     turned,
 )
 
@@ -58,6 +57,15 @@ def test_a_tcp_goal_is_reached_past_a_post():
     assert motion.obstacles == (post,)
 
 
+def test_a_wider_berth_is_given_where_it_is_asked_for():
+    goals = {"left": TcpGoal((0.0, -0.1, 0.3), DOWN)}
+    start = {"left": turned("left", -2.2), "right": turned("right", 1.4)}
+    motion = plan(cell(), start, goals, obstacles=[a_post()], clearance=0.08)
+    near = motion.certify().clearance
+    assert near is not None
+    assert near.distance > 0.08 - 0.01
+
+
 def test_without_the_post_the_way_is_straight_and_goes_through_it():
     goals = {"left": TcpGoal((0.0, -0.1, 0.3), DOWN)}
     through = plan(cell(), {"left": turned("left", -1.4)}, goals)
@@ -88,7 +96,7 @@ def test_a_held_body_is_carried_round_an_obstacle():
 def test_an_arm_waits_until_another_has_left():
     there = plan(cell(), aside(), {"left": in_the_middle()})
     back = plan(cell(), there.end, {"left": turned("left", 1.4)})
-    told = there_and_back(there, back, rest=1.0)
+    told = there.then(back, rest=1.0)
     motion = plan(cell(), aside(), {"right": in_the_middle()}, others={"left": told})
     assert motion.certify().ok
     assert motion.duration > there.duration + 1.0
@@ -135,6 +143,14 @@ def test_slower_and_gentler_motions_take_longer(mode):
     gentle = plan(cell(), aside(), goals, control_mode=mode, acceleration=0.2)
     assert min(slow.duration, gentle.duration) > 1.5 * usual.duration
     assert gentle.certify().acceleration == pytest.approx(1.0, abs=0.05)
+
+
+def test_who_is_there_already_stays():
+    goals = {"left": turned("left", 1.4), "right": turned("right", -1.4)}
+    motion = plan(cell(), aside(), goals)
+    assert motion.moving == ("right",)
+    still = plan(cell(), motion.end, goals)
+    assert (still.moving, still.certify().ok) == ((), True)
 
 
 # -- no plan -----------------------------------------------------------------------------------

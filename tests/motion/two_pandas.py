@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from layouts import Layout, face_to_face
-from motion import Motion, TcpGoal
+from motion import TcpGoal
 
 DOWN = (0.0, 1.0, 0.0, 0.0)  # wxyz; a gripper that points down
 
@@ -30,13 +30,3 @@ def aside():
 def in_the_middle():
     """Where only one of the arms can be."""
     return TcpGoal((0.0, 0.0, 0.3), DOWN)
-
-
-def there_and_back(there: Motion, back: Motion, rest: float) -> Motion:
-    """Two motions, with a rest between them (s)."""
-    return Motion(
-        there.layout,
-        np.concatenate([there.times, there.duration + rest + back.times]),
-        {n: np.concatenate([there.positions[n], back.positions[n]]) for n in there.layout},
-        {n: np.concatenate([there.velocities[n], back.velocities[n]]) for n in there.layout},
-    )
