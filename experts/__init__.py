@@ -13,15 +13,20 @@ Writing one, which is a function of a task and a seed:
     Rehearsal, search, Attempt, Plan: What these are made of, for plans that are made on the way.
     ArmDriver: Turns joints to go to into action numbers.
 
+Carrying out a planned `motion.Motion`, in any control mode:
+    follow: Steps a task until its robots have; `Followed` says how near they stayed.
+    Follower: The action of one step after the other.
+
 ``examples/two_arm_tray.ipynb`` writes one from the first line to the last.
 """
 
 from kinematics.own_rooms import expect_own
 
-expect_own("robots", "layouts", "simulation", "tasks")
+expect_own("robots", "layouts", "motion", "simulation", "tasks")
 
 from experts.closed_loop import rehearse
 from experts.driver import ArmDriver
+from experts.following import Followed, Follower, follow
 from experts.geometry import (
     backed_off,
     gripper_facing,
@@ -49,6 +54,8 @@ __all__ = [
     "ArmDriver",
     "Attempt",
     "Expert",
+    "Followed",
+    "Follower",
     "Plan",
     "Pose",
     "Rehearsal",
@@ -60,6 +67,7 @@ __all__ = [
     "cube_grips",
     "find_expert",
     "first_success",
+    "follow",
     "gripper_facing",
     "heading",
     "held_at",

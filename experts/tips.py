@@ -43,7 +43,7 @@ class TipSolver:
             turned: See `gripper_turn`.
         """
         self._robot, self._reach, self._turn = robot, reach, turned
-        self._tree = _tree(robot)
+        self._tree = link_tree(robot)
         places = [robot.joints.index(joint) for joint in reach.joints]
         self._low, self._high = self._tree.limits[places].T
 
@@ -107,7 +107,7 @@ def gripper_turn(robot: RobotDescriptor) -> Floats | None:
     """
     if not robot.tcp_position_links:
         return None
-    tree, qpos = _tree(robot), np.array(robot.keyframe(robot.home.keyframe), float)
+    tree, qpos = link_tree(robot), np.array(robot.keyframe(robot.home.keyframe), float)
     places = [
         robot.joints.index(joint)
         for name, group in robot.action_split.groups.items()
@@ -128,7 +128,12 @@ def gripper_turn(robot: RobotDescriptor) -> Floats | None:
 
 
 @lru_cache(maxsize=64)
-def _tree(robot: RobotDescriptor) -> Tree:
+def link_tree(robot: RobotDescriptor) -> Tree:
+    """Return the tree of a robot's links; its coordinates are the descriptor's joints.
+
+    Raises:
+        AssetError: If its files cannot be found.
+    """
     urdf = robot.urdf.locate()
     return kinematic_tree(read_model(read_urdf(urdf), urdf.as_posix()), robot.joints)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from os import PathLike
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -198,6 +200,101 @@ class Motion:
                 for name, speeds in self.velocities.items()
             },
         )
+
+    def picture(self, path: str | PathLike[str]) -> Path:
+        """Save a picture of the motion from above, with distances and speeds over time below.
+
+        Robots stand where they start, pale, and where they end; the way of each TCP is a line in
+        the robot's colour, with dots at round times. A moving picture shows them on their way.
+        Below are the distance of what is nearest to each other, robots or obstacles, and the speed
+        of each robot's fastest joint. Needs the robots' files and matplotlib.
+
+        Args:
+            path: Where to save; the ending chooses the format: .png, .pdf or .svg, and for moving
+                pictures .webp or .gif.
+
+        Returns:
+            The path of the picture.
+
+        Raises:
+            AssetError: If a robot's files cannot be found or make no sense.
+            MissingPackageError: If matplotlib is not installed.
+            MotionError: If the ending names no supported format.
+            UnwritableFileError: If it cannot be written (also an ``OSError``).
+        """
+        from motion.pictures import save_picture
+
+        return save_picture(self, path)
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the motion to a file, whole or not at all, and return its path.
+
+        The file is JSON, and says all there is to know: the layout, every robot's joints, knots,
+        obstacles and what is held. `load` gives the same motion, to the last bit.
+
+        Args:
+            path: Where to save; must end in ``.json``.
+
+        Raises:
+            LayoutError: If a robot is not registered, or not as it is here.
+            MotionError: If the path ends otherwise.
+            UnwritableFileError: If it cannot be written (also an ``OSError``).
+        """
+        from motion.files import save_motion
+
+        return save_motion(self, path)
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Motion:
+        """Return the motion in a file that `save` wrote.
+
+        Raises:
+            MotionError: If the file cannot be read, is damaged, or its robots are not as here; the
+                message names the file.
+        """
+        from motion.files import load_motion
+
+        return load_motion(path, cls)
+
+    def to_csv(self, folder: str | PathLike[str], *, frequency: float | None = None) -> list[Path]:
+        """Write a table for each robot, ``NAME.csv``: time, joint positions, joint velocities.
+
+        Args:
+            folder: Where; nothing that is there is overwritten.
+            frequency: Rows per second, besides one at the end; None takes the knots (Hz).
+
+        Returns:
+            The files.
+
+        Raises:
+            MotionError: If the frequency makes no sense.
+            UnwritableFileError: If a file is there already, or cannot be written.
+        """
+        from motion.exporting import to_csv
+
+        return to_csv(self, folder, frequency)
+
+    def to_ros2(self, folder: str | PathLike[str], *, frequency: float | None = None) -> list[Path]:
+        """Write a trajectory for each controller of the ROS 2 package of `Layout.to_ros2`.
+
+        ``left_arm_controller.yaml`` is a ``trajectory_msgs/msg/JointTrajectory``, with the joints'
+        names of that package.
+
+        Args:
+            folder: Where; nothing that is there is overwritten.
+            frequency: Points per second, besides one at the end; None takes the knots (Hz).
+
+        Returns:
+            The files.
+
+        Raises:
+            AssetError: If a robot's files cannot be found or make no sense.
+            MotionError: If the frequency makes no sense.
+            UnwritableFileError: If a file is there already, or cannot be written.
+        """
+        from motion.exporting import to_ros2
+
+        return to_ros2(self, folder, frequency)
 
     def _by_robot(self, what: str, rows: tuple[int, ...], *, some: bool = False) -> Any:
         given = getattr(self, what)

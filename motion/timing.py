@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
@@ -40,9 +41,9 @@ def largest_velocities(
     """Return how fast each joint may move by robot, (dof,) (rad/s, m/s).
 
     That is the least of what its URDF says and what the control mode can ask for: where joints
-    are driven relative to where they are, as in ``pd_joint_delta_pos``, its bound in each control
-    step; where velocities are asked for, theirs. Joints for which neither says anything move at
-    most 2 rad/s or 0.5 m/s.
+    are driven relative to where they are, as in ``pd_joint_delta_pos``, as much of its bound as
+    their drives follow in a control step; where velocities are asked for, theirs. Joints for which
+    neither says anything move at most 2 rad/s or 0.5 m/s.
 
     Args:
         layout: The robots.
@@ -223,8 +224,16 @@ def _group_speeds(group: JointGroup, frequency: float) -> list[float]:
         if not group.delta:
             return [np.inf] * count
         reaches = reaches * count if group.mimic else reaches
-        return [reach * frequency for reach in reaches[:count]]
+        shares = [1.0] * count if group.target else _followed_shares(group, frequency)
+        return [
+            share * reach * frequency for share, reach in zip(shares, reaches[:count], strict=True)
+        ]
     return reaches[-count:]
+
+
+def _followed_shares(group: JointGroup, frequency: float) -> list[float]:
+    """Return the share of the way to its target that each joint's drive goes in a control step."""
+    return [1 - math.exp(-k / (d * frequency)) if d else 1.0 for k, d, _ in group.drives]
 
 
 @lru_cache(maxsize=64)

@@ -78,5 +78,15 @@ def deepest(overlaps: Iterable[Overlap], than: float = DEPTH) -> list[Overlap]:
     return sorted(deep, key=lambda overlap: -overlap.depth)
 
 
+def between_robots(overlaps: Iterable[Overlap]) -> list[Overlap]:
+    """Return the overlaps of a robot with another one."""
+    return [
+        overlap
+        for overlap in overlaps
+        if None not in (overlap.one.robot, overlap.other.robot)
+        and overlap.one.robot != overlap.other.robot
+    ]
+
+
 def empty(world: World, number: int) -> None:
     """Add nothing to a world."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 
@@ -39,11 +39,13 @@ class Motion:
         qpos: By robot, joint positions in the descriptor's order, (T + 1, dof) (rad, m).
         poses: By thing, position (m, world) and quaternion (wxyz), (T + 1, 7); what is left out
             does not move.
+        name: What a page calls it.
     """
 
     step_seconds: float
     qpos: Mapping[str, Floats]
     poses: Mapping[str, Floats] = field(default_factory=dict[str, Floats])
+    name: str = "Demonstration"
 
     def __len__(self) -> int:
         """Return the number of moments, T + 1."""
@@ -75,6 +77,8 @@ class Cell:
         motion: What they do, or None.
         start: By robot, the joint positions to begin with, in the descriptor's order (rad, m).
         models: By robot, its links and hulls.
+        ways: By robot, lines in its colour, such as the way of its TCP, each (n, 3) (m, world).
+        hidden: Overlays of `layouts.viewer.scene` that are not shown at first.
         visuals: By robot and link, what it looks like; empty where its files lack that.
         notes: Remarks on the robots' files, for a person.
     """
@@ -86,6 +90,8 @@ class Cell:
         things: Mapping[str, Thing] | None = None,
         motion: Motion | None = None,
         start: Mapping[str, Floats] | None = None,
+        ways: Mapping[str, Sequence[Floats]] | None = None,
+        hidden: Sequence[str] = (),
     ) -> None:
         """Load the robots' collision shapes.
 
@@ -96,6 +102,8 @@ class Cell:
             motion: What they do.
             start: By robot, joint positions to begin with; by default those of the motion's first
                 moment, else of the keyframe.
+            ways: By robot, lines in its colour, each (n, 3) (m, world).
+            hidden: Overlays of `layouts.viewer.scene` that are not shown at first.
 
         Raises:
             LayoutError: If the motion is of other robots, or of no moments.
@@ -106,6 +114,8 @@ class Cell:
         self.title, self.layout = printable(title), layout
         self.things = dict(things or {})
         self.motion = motion
+        self.ways = {name: tuple(lines) for name, lines in (ways or {}).items()}
+        self.hidden = tuple(hidden)
         self.models: dict[str, RobotModel] = {n: load_model(p.robot) for n, p in layout.items()}
         self.visuals: dict[str, Mapping[str, tuple[Part, ...]]] = {}
         self.notes: list[str] = []

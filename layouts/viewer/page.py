@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinematics.rotations import Floats
-from layouts.viewer.cell import Cell, Contact
+from layouts.viewer.cell import Cell, Contact, Motion
 from layouts.viewer.guard import is_loopback
 from layouts.viewer.scene import OVERLAYS, Scene
 from layouts.viewer.server import serving
@@ -115,21 +115,25 @@ class Page:
         for note in self._cell.notes:
             Text(gui, note)
         if self._cell.motion is not None:
-            self._build_timeline(gui, len(self._cell.motion))
+            self._build_timeline(gui, self._cell.motion)
         with gui.add_folder("Collisions"):
             self._verdict = Text(gui, "…")
         with gui.add_folder("Show"):
             for overlay, visible in OVERLAYS.items():
-                box = gui.add_checkbox(LABELS[overlay], visible)
+                shown = visible and overlay not in self._cell.hidden
+                box = gui.add_checkbox(LABELS[overlay], shown)
                 box.on_update(
                     lambda event, overlay=overlay: self.scene.show(overlay, event.target.value)
                 )
+            if self._cell.ways:
+                box = gui.add_checkbox("Ways", True)
+                box.on_update(lambda event: self.scene.show_ways(event.target.value))
         for name in self._cell.layout:
             self._build_robot(gui, name)
 
-    def _build_timeline(self, gui: Any, moments: int) -> None:
-        with gui.add_folder("Demonstration"):
-            self._timeline = gui.add_slider("Step", 0, max(moments - 1, 1), 1, 0)
+    def _build_timeline(self, gui: Any, motion: Motion) -> None:
+        with gui.add_folder(printable(motion.name)):
+            self._timeline = gui.add_slider("Step", 0, max(len(motion) - 1, 1), 1, 0)
             self._clock = Text(gui, "")
             self._playing = gui.add_checkbox("Play", False)
             self._speed = gui.add_dropdown("Speed", SPEEDS, initial_value="1 ×")

@@ -35,8 +35,8 @@ LIFT = 0.002  # m, of what lies on the floor
 class Scene:
     """A cell drawn on a viser server.
 
-    Nodes are called ``/ROBOT/OVERLAY/…``, ``/(things)/NAME`` and ``/(tables)/NAME``: no robot's
-    name has brackets.
+    Nodes are called ``/ROBOT/OVERLAY/…``, ``/(things)/NAME``, ``/(tables)/NAME`` and
+    ``/(ways)/ROBOT/…``: no robot's name has brackets.
     """
 
     def __init__(self, api: Any, cell: Cell) -> None:
@@ -51,10 +51,12 @@ class Scene:
         self._moving: dict[str, list[tuple[int, Any]]] = {name: [] for name in cell.layout}
         self._touching: dict[tuple[str, str], Any] = {}
         self._things: dict[str, Any] = {}
+        self._ways = api.add_frame(node("(ways)"), show_axes=False)
         self._draw_floor()
         for number, name in enumerate(cell.layout):
             colour = _rgb(COLOURS[number % len(COLOURS)])
             self._draw_robot(name, colour)
+            self._draw_ways(name, colour)
             self.pose(name, cell.start[name])
         for name, thing in cell.things.items():
             self._things[name] = _add_parts(api, node("(things)", name), thing.parts)
@@ -82,6 +84,10 @@ class Scene:
         for name in self._cell.layout if names is None else names:
             self._overlays[name][overlay].visible = visible
 
+    def show_ways(self, visible: bool) -> None:
+        """Show or hide the lines of the cell."""
+        self._ways.visible = visible
+
     def mark(self, contacts: Sequence[Contact]) -> None:
         """Show the links that overlap in red, and only those."""
         red = {end for c in contacts for end in zip(c.robots, c.links, strict=True)}
@@ -108,7 +114,8 @@ class Scene:
         pose = placement.base_pose
         api.add_frame(f"/{name}", show_axes=False, position=pose.position, wxyz=pose.quaternion)
         for overlay, at_first in OVERLAYS.items():
-            visible = at_first or (overlay == "collision" and not self._cell.visuals[name])
+            visible = at_first and overlay not in self._cell.hidden
+            visible |= overlay == "collision" and not self._cell.visuals[name]
             self._overlays[name][overlay] = api.add_frame(
                 f"/{name}/{overlay}", show_axes=False, visible=visible
             )
@@ -182,6 +189,16 @@ class Scene:
             thickness=3.0,
             thickness_units="screen",
         )
+
+    def _draw_ways(self, name: str, colour: tuple[int, int, int]) -> None:
+        for number, line in enumerate(self._cell.ways.get(name, ())):
+            self._api.add_line_segments(
+                node("(ways)", name, str(number)),
+                points=np.stack([line[:-1], line[1:]], 1).astype(np.float32),
+                colors=colour,
+                thickness=3.0,
+                thickness_units="screen",
+            )
 
     def _draw_floor(self) -> None:
         """Draw a grid below the lowest base, and the tables of the layout's frames."""

@@ -1,6 +1,6 @@
 """``python -m measurements.site.pictures``: draws the documentation's pictures anew.
 
-They are committed, so that nobody needs a Vulkan driver to see them.
+They are committed, so that nobody needs a Vulkan driver or a planner to see them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from PIL import Image
 
 import tasks
 from experts import find_expert
-from layouts import search, table
+from layouts import Layout, ring, search, table
+from motion import TcpGoal, plan
 from robots import RecordingError
 from robots.common.commands import exit_code, program, start
 from robots.common.writing import written_whole
@@ -88,6 +89,22 @@ def film(task_id: str, seed: int, path: Path) -> None:
     _save(frames, path, FRAME)
 
 
+def crossing(path: Path) -> None:
+    """Draw four arms in a ring that all reach from their right to their left at the same time."""
+    cell = ring(dict.fromkeys(("south", "east", "north", "west"), "panda"), radius=0.75)
+    ready = plan(cell, goals=_beside(cell, 1))
+    plan(cell, ready.end, _beside(cell, -1)).picture(path)
+
+
+def _beside(cell: Layout, step: int) -> dict[str, TcpGoal]:
+    """Return goals before the bases that stand some places further in a ring."""
+    bases = [placement.base_position for placement in cell.values()]
+    before = [bases[(i + step) % len(bases)] for i in range(len(bases))]
+    return {
+        name: TcpGoal((0.4 * x, 0.4 * y, 0.3)) for name, (x, y, _) in zip(cell, before, strict=True)
+    }
+
+
 def _save(frames: Sequence[Image.Image], path: Path, duration: int) -> None:
     durations = [duration] * (len(frames) - 1) + [LAST]
     with written_whole(path, RecordingError) as partial:
@@ -106,6 +123,7 @@ def _save(frames: Sequence[Image.Image], path: Path, duration: int) -> None:
 PICTURES: dict[str, Callable[[Path], None]] = {
     "hand_over.webp": hand_over,
     "placement_search.png": placement_search,
+    "crossing.png": crossing,
 }
 
 

@@ -51,6 +51,7 @@ COMMANDS: Mapping[str, Command] = {
     ),
     "tasks": Command("tasks.__main__", "list tasks, describe one, or look at it"),
     "layouts": Command("layouts.__main__", "show, validate, export or look at a layout"),
+    "motion": Command("motion.__main__", "plan motions that do not collide, and look at them"),
     "robots inspect": Command("robots.inspect", "joints, action numbers and files of robots"),
     "robots fetch": Command("robots.fetch_assets", "bring the files of robots here, or check them"),
     "robots guess": Command("robots.from_urdf", "guess a robot from its URDF"),

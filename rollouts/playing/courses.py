@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinematics.rotations import inverse, multiply, rotate, rotation_of
 from robots import JointGroup
 from simulation import State
 from tasks import MultiRobotTask
+from tasks.driving import DrivenGroup, JointNumbers, TcpNumbers, driven_groups, further
 
 Floats = NDArray[np.float64]
-
-_NEARLY = 1.0 + 1e-4  # of a normalised number that is just at its bound
 
 
 @dataclass(frozen=True)
@@ -54,24 +52,14 @@ class Part:
     """A joint group of the task that is written for, and the same group in the mode that is read.
 
     Attributes:
-        robot: Name of its robot in the layout.
-        name: Its own.
-        arm: The robot or limb that it belongs to; None if that has no TCP.
-        group: What is driven, and how.
-        before: How the other mode does it.
-        numbers: Where its numbers stand in an action.
-        read: Where they stand in an action of the other mode.
-        joints: Where its joints are among those of all robots.
+        driven: The group.
+        before: How the other mode drives it.
+        read: Where its numbers stand in an action of the other mode.
     """
 
-    robot: str
-    name: str
-    arm: str | None
-    group: JointGroup
+    driven: DrivenGroup
     before: JointGroup
-    numbers: slice
     read: slice
-    joints: slice
 
 
 class Drive(Protocol):
@@ -128,19 +116,19 @@ def drives_of(source: MultiRobotTask, task: MultiRobotTask) -> list[Drive]:
         source: The same task in the mode that is read.
         task: That in the mode that is written.
     """
-    parts = [part for part in _parts(source, task) if part.group.size]
+    parts = [part for part in _parts(source, task) if part.driven.group.size]
     alike = all(_alike(part) for part in parts)  # so every step is the same to the last bit
     return [
         SameDrive(part)
-        if _alike(part) and (alike or not part.group.delta)
-        else (TcpDrive if part.group.asks.tcp else JointDrive)(part, task)
+        if _alike(part) and (alike or not part.driven.group.delta)
+        else (TcpDrive if part.driven.group.asks.tcp else JointDrive)(part, task)
         for part in parts
     ]
 
 
 def _alike(part: Part) -> bool:
     """Tell whether both modes drive a group alike, but for velocities of zero besides."""
-    group, before = part.group, part.before
+    group, before = part.driven.group, part.before
     if group.asks.positions and before.command == "position":
         size = before.size
         group = replace(
@@ -158,7 +146,7 @@ class SameDrive:
 
     def __init__(self, part: Part) -> None:
         """Take the group."""
-        self.numbers, self._read = part.numbers, part.read
+        self.numbers, self._read = part.driven.numbers, part.read
 
     def course(self, recorded: Recorded) -> Course:
         """See `Drive`."""
@@ -194,37 +182,28 @@ class JointDrive:
 
     def __init__(self, part: Part, task: MultiRobotTask) -> None:
         """Take the group."""
-        self.numbers, self._part, self._task = part.numbers, part, task
-        self._by_speed = part.group.asks.velocities and not part.group.asks.positions
+        self.numbers, self._part = part.driven.numbers, part
+        self._numbers = JointNumbers(part.driven, task)
         self._rate = _rates(part, task.scenario.control_frequency)
 
     def course(self, recorded: Recorded) -> Course:
         """See `Drive`."""
-        part = self._part
         joints = np.array([self.where(state) for state in recorded.states])
-        wanted = _pulled_to(part, recorded, joints, self._rate)
-        if self._by_speed:
+        wanted = _pulled_to(self._part, recorded, joints, self._rate)
+        if self._numbers.by_speed:
             wanted = wanted - np.diff(joints, axis=0) / 2
         return Course(wanted, joints[1:])
 
     def words(self, course: Course, step: int, state: State) -> tuple[Floats, bool]:
         """See `Drive`."""
-        group, wanted = self._part.group, course.wanted[step]
-        if self._by_speed:
-            return _normalised(group, (wanted - self.where(state)) * self._rate)
-        if group.delta:
-            kept = group.target and _remembered(self._task, self._part, "target_qpos")
-            wanted = wanted - (kept if group.target else self.where(state))
-        if group.mimic:
-            multiplier, offset = group.followers[0]
-            wanted = (wanted[:1] - (0.0 if group.delta else offset)) / multiplier
-        if group.asks.velocities:  # a drive to positions brakes by itself
-            wanted = np.concatenate([wanted, np.zeros(len(group.joints))])
-        return _normalised(group, wanted)
+        wanted = course.wanted[step]
+        if self._numbers.by_speed:
+            wanted = (wanted - self.where(state)) * self._rate
+        return self._numbers.towards(wanted, state)
 
     def where(self, state: State) -> Floats:
         """See `Drive`."""
-        return state.joint_positions[0, self._part.joints].astype(float)
+        return self._numbers.where(state)
 
     def learnt(self, course: Course, came: Sequence[Floats], share: float) -> Course:
         """See `Drive`."""
@@ -240,96 +219,46 @@ class TcpDrive:
 
     def __init__(self, part: Part, task: MultiRobotTask) -> None:
         """Take the group."""
-        assert part.arm is not None
-        self.numbers, self._part, self._task, self._arm = part.numbers, part, task, part.arm
-        self._robot = task.layout.arm(part.arm).robot
-        self._forward = task.simulation.point_reach(part.arm).forward
+        self.numbers, self._part = part.driven.numbers, part
+        self._numbers = TcpNumbers(part.driven, task)
+        self._rate = _rates(part, task.scenario.control_frequency)
 
     def course(self, recorded: Recorded) -> Course:
         """See `Drive`."""
-        part = self._part
+        own = self._part.driven.joints
         joints = np.array([s.joint_positions[0].astype(float) for s in recorded.states])
         targets = recorded.targets.copy()
-        rate = _rates(part, self._task.scenario.control_frequency)
-        targets[:, part.joints] = _pulled_to(part, recorded, joints[:, part.joints], rate)
+        targets[:, own] = _pulled_to(self._part, recorded, joints[:, own], self._rate)
         after = recorded.states[1:]
-        wanted = [self._pose(row, state) for row, state in zip(targets, after, strict=True)]
+        wanted = [self._numbers.pose(row, s) for row, s in zip(targets, after, strict=True)]
         return Course(np.array(wanted), np.array([self.where(state) for state in after]))
 
     def words(self, course: Course, step: int, state: State) -> tuple[Floats, bool]:
         """See `Drive`."""
-        group, root = self._part.group, self._root(state)
-        place, turn = _seen_from(root, course.wanted[step])
-        if not group.delta:
-            return _normalised(group, np.concatenate([place, _angles(turn)]))
-        if group.target:
-            before = _remembered(self._task, self._part, "target_pose")
-            before, ways = before[:3], before[3:]
-        else:
-            before, ways = _seen_from(root, self.where(state))
-        moves, turns = group.frame.split(":")
-        way = place - before
-        way = way if moves.startswith("root") else rotate(inverse(ways), way)
-        if not group.asks.turn:
-            return _normalised(group, way)
-        back = inverse(ways)
-        rest = multiply(turn, back) if turns.startswith("root") else multiply(back, turn)
-        return _normalised(group, np.concatenate([way, _angles(rest)]))
+        return self._numbers.towards(course.wanted[step], state)
 
     def where(self, state: State) -> Floats:
         """See `Drive`."""
-        return state.tcp_pose(self._arm)[0].astype(float)
+        return self._numbers.where(state)
 
     def learnt(self, course: Course, came: Sequence[Floats], share: float) -> Course:
         """See `Drive`."""
-        return Course(_further(course.wanted, course.passed, np.array(came), share), course.passed)
+        return Course(further(course.wanted, course.passed, np.array(came), share), course.passed)
 
     def strayed(self, course: Course, random: np.random.Generator, size: float) -> Course:
         """See `Drive`."""
         return _beside(course, random, size, 3)  # its place, not its turn
 
-    # -- inside ------------------------------------------------------------------------------
-
-    def _pose(self, targets: Floats, state: State) -> Floats:
-        """Return the TCP pose that joint targets stand for, (7,)."""
-        robot = self._robot
-        places = self._task.simulation.index.joints[self._arm]
-        own = dict(zip(robot.joints, targets[places], strict=True))
-        place, turn = self._forward(np.array([own[joint] for joint in robot.arm_joints]))
-        link = state.link_pose(self._part.robot, robot.tcp_link)[0].astype(float)
-        beside = self.where(state)[:3] - link[:3]
-        return np.concatenate([place + rotate(turn, rotate(inverse(link[3:]), beside)), turn])
-
-    def _root(self, state: State) -> Floats:
-        robot, link = self._part.robot, self._part.group.root_link
-        pose = state.base_pose(robot) if link is None else state.link_pose(robot, link)
-        return pose[0].astype(float)
-
 
 def _parts(source: MultiRobotTask, task: MultiRobotTask) -> Iterator[Part]:
-    arms = task.layout.arms_by_group
-    number = read = joint = 0
-    for robot, placement in task.layout.items():
-        earlier: Mapping[str, JointGroup] = source.layout[robot].robot.action_split.groups
-        for name, group in placement.robot.action_split.groups.items():
-            before = earlier[name]
-            yield Part(
-                robot,
-                name,
-                arms.get((robot, name)),
-                group,
-                before,
-                slice(number, number + group.size),
-                slice(read, read + before.size),
-                slice(joint, joint + len(group.joints)),
-            )
-            number, read = number + group.size, read + before.size
-            joint += len(group.joints)
+    groups = zip(driven_groups(task.layout), driven_groups(source.layout), strict=True)
+    for driven, before in groups:
+        yield Part(driven, before.group, before.numbers)
 
 
 def _rates(part: Part, frequency: float) -> Floats:
     """Return stiffness / damping of each joint (1/s), of the mode that has a stiffness."""
-    before, after = part.before.drives, part.group.drives
+    before, after = part.before.drives, part.driven.group.drives
     pairs = [a[:2] if a[0] else b[:2] for a, b in zip(after, before, strict=True)]
     return np.array([k / d if k and d else frequency for k, d in pairs])
 
@@ -344,7 +273,7 @@ def _pulled_to(part: Part, recorded: Recorded, joints: Floats, rate: Floats) -> 
         rate: See `_rates`.
     """
     asks = part.before.asks
-    wanted = recorded.targets[:, part.joints]
+    wanted = recorded.targets[:, part.driven.joints]
     if not asks.velocities:
         return wanted
     numbers = recorded.numbers[:, part.read][:, -len(part.before.joints) :]
@@ -355,27 +284,6 @@ def _pulled_to(part: Part, recorded: Recorded, joints: Floats, rate: Floats) -> 
     return middle + numbers / rate
 
 
-def _remembered(task: MultiRobotTask, part: Part, kind: str) -> Floats:
-    modes = task.simulation.modes
-    assert modes is not None
-    names = [(kept.robot, kept.group, kept.kind) for kept in modes.remembered]
-    return modes.recall()[names.index((part.robot, part.name, kind))][0].astype(float)
-
-
-def _normalised(group: JointGroup, values: Floats) -> tuple[Floats, bool]:
-    """Return what a group is to be asked for as its numbers, and whether none had to be cut."""
-    if not group.normalised:
-        return values, True
-    low, high = np.array(group.ranges).T
-    numbers = (values - (high + low) / 2) / ((high - low) / 2)
-    if group.asks.turn:
-        turn = values[3:] / low[-1]  # ManiSkill scales a turn by its lower bound
-        length = float(np.linalg.norm(turn))
-        numbers[3:] = turn / max(length, 1.0)
-        return np.clip(numbers, -1, 1), length <= _NEARLY and bool((abs(numbers) <= _NEARLY).all())
-    return np.clip(numbers, -1, 1), bool((abs(numbers) <= _NEARLY).all())
-
-
 def _beside(course: Course, random: np.random.Generator, size: float, count: int) -> Course:
     """Return a course of which the first numbers of each step are others, at random."""
     if not size:
@@ -383,31 +291,3 @@ def _beside(course: Course, random: np.random.Generator, size: float, count: int
     wanted = course.wanted.copy()
     wanted[:, :count] += random.normal(0.0, size, (len(wanted), count))
     return Course(wanted, course.passed)
-
-
-def _further(wanted: Floats, passed: Floats, own: Floats, share: float) -> Floats:
-    """Return poses further by a share of what some miss of others, (..., 7)."""
-    places = wanted[..., :3] + share * (passed[..., :3] - own[..., :3])
-    missed = multiply(passed[..., 3:], inverse(own[..., 3:]))
-    missed = missed * np.where(missed[..., :1] < 0, -share, share)
-    missed[..., 0] += 1 - share
-    missed /= np.linalg.norm(missed, axis=-1, keepdims=True)
-    return np.concatenate([places, multiply(missed, wanted[..., 3:])], -1)
-
-
-def _seen_from(root: Floats, pose: Floats) -> tuple[Floats, Floats]:
-    """Return place and turn of a pose of the world in the frame of another."""
-    back = inverse(root[3:])
-    return rotate(back, pose[:3] - root[:3]), multiply(back, pose[3:])
-
-
-def _angles(quaternion: Floats) -> Floats:
-    """Return the turns about x, then the turned y, then the turned z (rad), (3,)."""
-    matrix = rotation_of(quaternion)
-    return np.array(
-        [
-            np.arctan2(-matrix[1, 2], matrix[2, 2]),
-            np.arcsin(np.clip(matrix[0, 2], -1, 1)),
-            np.arctan2(-matrix[0, 1], matrix[0, 0]),
-        ]
-    )

@@ -77,8 +77,10 @@ def test_the_control_mode_limits_velocities():
         mode: largest_velocities(cell(), mode)["left"][0]
         for mode in ("pd_joint_delta_pos", "pd_joint_pos", "pd_joint_vel")
     }
-    # 0.1 rad per step at 20 Hz; the URDF's limit; 1 rad/s
-    assert by_mode == {"pd_joint_delta_pos": 2.0, "pd_joint_pos": 2.175, "pd_joint_vel": 1.0}
+    # 39 % of 0.1 rad per step at 20 Hz, as a drive of 1000/100 follows; the URDF's limit; 1 rad/s
+    relative = pytest.approx(2.0 * (1 - np.exp(-0.5)))
+    assert by_mode == {"pd_joint_delta_pos": relative, "pd_joint_pos": 2.175, "pd_joint_vel": 1.0}
+    assert largest_velocities(cell(), "pd_joint_target_delta_pos")["left"][0] == 2.0
 
 
 def test_the_mode_of_the_layout_counts_unless_another_is_asked_for():
@@ -87,7 +89,7 @@ def test_the_mode_of_the_layout_counts_unless_another_is_asked_for():
 
 
 def test_velocities_are_scaled_and_accelerations_follow_them():
-    half = largest_velocities(cell(), factor=0.5)
+    half = largest_velocities(cell(), "pd_joint_target_delta_pos", factor=0.5)
     assert half["left"][0] == 1.0
     assert largest_accelerations(cell(), half)["left"][0] == pytest.approx(2.5)
     given = largest_accelerations(cell(), half, {"right": 3.0})
