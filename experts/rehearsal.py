@@ -73,6 +73,9 @@ class Rehearsal:
             check_layout=False,  # it was checked when the task was made
         )
         self.task = type(task)(scenario)
+        self._many = len(self.task.layout.arms) > 1
+        if self._many:
+            self.task.simulation.watch_arms()
         self._alone = RobotsAlone(self.task.layout, scenario.physics)
 
     def begin(self, seed: int) -> Scene:
@@ -84,8 +87,20 @@ class Rehearsal:
         """Return what the episode looks like now."""
         return Scene(self.task)
 
+    def step(self, action: NDArray[np.float32]) -> tuple[bool, str]:
+        """Take a control step.
+
+        Returns:
+            Whether the task is solved then, and which arms touched in it, in words.
+        """
+        *_, info = self.task.step(action)
+        touching = self.task.simulation.arms_touching(0) if self._many else []
+        return bool(info["success"][0]), ", ".join(f"{a} touches {b}" for a, b in touching[:1])
+
     def play(self, script: Script) -> Attempt:
         """Play a script from the present state until success or the end of the episode.
+
+        It fails as soon as two arms touch: robots, or limbs of one robot.
 
         Args:
             script: Waypoints by robot; robots left out keep still.
@@ -105,9 +120,11 @@ class Rehearsal:
             except _StuckError as error:
                 return Attempt(_stack(actions, task), False, str(error))
             actions.append(np.concatenate(parts).astype(np.float32))
-            *_, info = task.step(actions[-1])
+            solved, touching = self.step(actions[-1])
             scene = self.scene()
-            if bool(info["success"][0]):
+            if touching:
+                return Attempt(_stack(actions, task), False, touching)
+            if solved:
                 return Attempt(_stack(actions, task), True)
         places = ", ".join(player.place for player in players)
         return Attempt(_stack(actions, task), False, f"the episode ended at {places}")
