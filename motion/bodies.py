@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
 
@@ -32,11 +32,15 @@ class Part:
     Attributes:
         robot: The robot's name; empty for the world and for obstacles.
         link: Index in the robot's tree of the link whose pose is the part's.
+        parent: Index of the part that carries it; -1 for the world's own and for obstacles.
+        joint: Pose of its joint in the frame of that part, (4, 4) (m).
         track: How it moves, if it is an obstacle.
     """
 
     robot: str = ""
     link: int = 0
+    parent: int = -1
+    joint: Floats = field(default_factory=lambda: np.eye(4))
     track: Track | None = None
 
 
@@ -170,9 +174,13 @@ class Bodies:
     def _gather_parts(self) -> tuple[Part, ...]:
         parts = [Part()]
         for name, model in self.models.items():
-            for body in dict.fromkeys(model.kinematics.bodies):
-                self._part_of[name, body] = len(parts) if body else WORLD
-                parts += [Part(name, body)] if body else []
+            tree = model.kinematics
+            self._part_of[name, 0] = WORLD
+            for body in dict.fromkeys(tree.bodies[1:]):
+                if body:
+                    parent, pose = self._carried(name, int(tree.parents[body]))
+                    self._part_of[name, body] = len(parts)
+                    parts.append(Part(name, body, parent, pose @ tree.origins[body]))
         tracks = [o.pose for o in self.obstacles if isinstance(o.pose, Track)]
         return (*parts, *(Part(track=track) for track in tracks))
 

@@ -24,6 +24,7 @@ class Cell(Bodies):
         self,
         moving: Iterable[str] | None = None,
         clearance: float = 0.0,
+        own: float | None = 0.0,
         except_: Iterable[tuple[str, str]] = (),
     ) -> Checker:
         """Return what tells whether robots touch each other or anything else.
@@ -36,23 +37,29 @@ class Cell(Bodies):
         Args:
             moving: The robots that move; only pairs in which one of them, or what it holds, takes
                 part are looked at. None is all of them.
-            clearance: How near bodies may come (m).
+            clearance: How far bodies have to be apart (m).
+            own: How far links of one robot, and what it holds, have to be apart from each other
+                (m), which many a robot is built to be by a few millimetres only; None leaves these
+                pairs out.
             except_: Pairs that may touch; each a pair of names of `names`.
 
         Raises:
-            LayoutError: If the clearance makes no sense.
+            LayoutError: If a distance makes no sense.
             UnknownNameError: If there is no such robot or body.
         """
-        clearance = checked_number("clearance", clearance, 0.0, LARGEST_CLEARANCE, LayoutError, "m")
+        clearance = _distance("clearance", clearance)
+        own = None if own is None else _distance("own", own)
         movers = {self.layout.owner(name) for name in (self.robots if moving is None else moving)}
         excepted = [tuple(self._named(name) for name in pair) for pair in except_]
-        pairs = [
-            pair
-            for pair in self.counted_pairs
-            if not movers.isdisjoint(self.solids[i].mover for i in pair)
-            and not any(self._is(pair, names) for names in excepted)
-        ]
-        return Checker(self, np.array(pairs, np.intp).reshape(-1, 2), clearance)
+        apart = {
+            (a, b): own if self._is_own(a, b) else clearance
+            for a, b in self.counted_pairs
+            if not movers.isdisjoint((self.solids[a].mover, self.solids[b].mover))
+            and not any(self._is((a, b), names) for names in excepted)
+        }
+        counted = {pair: distance for pair, distance in apart.items() if distance is not None}
+        pairs = np.array([*counted], np.intp).reshape(-1, 2)
+        return Checker(self, pairs, np.array([*counted.values()], float))
 
     def grasped(self, place: str, obstacle: Obstacle, qpos: ArrayLike | None = None) -> Held:
         """Return a body as it is held by an arm that grasps it where it is.
@@ -73,6 +80,10 @@ class Cell(Bodies):
             return Held(place, obstacle)  # says what is wrong
         return Held(place, obstacle.moved(inverse_pose(tcp) @ obstacle.poses(None, 1)[0]))
 
+    def _is_own(self, a: int, b: int) -> bool:
+        """Whether one robot moves two solids."""
+        return self.solids[a].mover == self.solids[b].mover
+
     def _named(self, name: str) -> str:
         if name not in self.names:
             raise UnknownNameError("body of this cell", name, self.names)
@@ -83,3 +94,7 @@ class Cell(Bodies):
         one, other = ({self.solids[i].owner, self.solids[i].name} for i in pair)
         first, second = names
         return (first in one and second in other) or (second in one and first in other)
+
+
+def _distance(what: str, value: float) -> float:
+    return checked_number(what, value, 0.0, LARGEST_CLEARANCE, LayoutError, "m")

@@ -1,0 +1,121 @@
+"""Random valid layouts of mixed arms whose workspaces overlap, and random postures in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kinematics.rotations import Floats
+from layouts import Layout, face_to_face, grid, ring, side_by_side
+from layouts.validation.arguments import Rectangle
+from motion.cell import Cell
+from motion.goals import arm_joints
+from robots import RobotDescriptor, RobotLayoutsError, RobotRegistry
+
+LARGE = (
+    "panda",
+    "panda_stick",
+    "panda_wristcam",
+    "panda_pinch",
+    "franka_panda",
+    "ur3",
+    "ur5",
+    "ur10",
+    "xarm7",
+    "jaco2",
+    "z1",
+    "ur5_gripper",
+    "talos_left_arm",
+)
+SMALL = ("so100", "so101", "koch")
+SHARE_OF_SMALL = 0.15  # of the cells; arms of both sizes seldom share space
+CLOSENESS = 0.75, 1.05  # of distances that presets choose by themselves
+FLOOR: Rectangle = (-6.0, -6.0, 6.0, 6.0)  # m; robots stand on it
+TRIES = 400  # postures per robot
+
+
+def random_cell(seed: int, arms: int, extra: Sequence[RobotDescriptor] = ()) -> Layout:
+    """Return a valid layout of some arms, the same for the same seed.
+
+    Args:
+        seed: Of everything random.
+        arms: How many.
+        extra: Robots to draw from, besides those of the catalogue.
+    """
+    random = np.random.default_rng([seed, arms])
+    while True:
+        small = random.random() < SHARE_OF_SMALL
+        pool = [RobotRegistry.load(name) for name in (SMALL if small else LARGE)]
+        pool += [] if small else list(extra)
+        robots = {f"arm{i}": pool[int(random.integers(len(pool)))] for i in range(arms)}
+        closeness = float(random.uniform(*CLOSENESS))
+        try:
+            layout = _arranged(robots, int(random.integers(3)), closeness)
+            if layout.validate(table=FLOOR, samples=0, workspaces=False).ok:
+                return layout
+        except RobotLayoutsError:
+            continue
+
+
+def _arranged(robots: dict[str, RobotDescriptor], kind: int, closeness: float) -> Layout:
+    presets = (face_to_face if len(robots) == 2 else ring, side_by_side, grid)
+    layout = presets[kind](robots, **({} if kind == 2 else _distance(presets[kind])))
+    scale = np.array([closeness, closeness, 1.0])
+    return Layout(
+        {
+            name: replace(p, position=tuple((scale * p.base_position).tolist()))
+            for name, p in layout.items()
+        }
+    )
+
+
+def _distance(preset: object) -> dict[str, str]:
+    return {"radius": "auto"} if preset is ring else {"spacing": "auto"}
+
+
+def random_postures(cell: Cell, seed: Sequence[int], clearance: float) -> Iterator[Floats]:
+    """Yield postures of all arms in which nothing comes near anything, (D,) (rad, m).
+
+    One arm after the other is drawn until it keeps clear of those before.
+
+    Args:
+        cell: The cell.
+        seed: Of everything random.
+        clearance: How near robots may come to each other (m).
+    """
+    random = np.random.default_rng(list(seed))
+    limits = np.clip(cell.limits, -np.pi, np.pi)
+    while True:
+        state: Floats | None = cell.start.copy()
+        for i, name in enumerate(cell.robots):
+            state = _with_arm(cell, state, i, name, limits, random, clearance)
+            if state is None:
+                break
+        if state is not None and cell.checker().free(state[None])[0]:
+            yield state
+
+
+def _with_arm(
+    cell: Cell,
+    state: Floats,
+    number: int,
+    name: str,
+    limits: Floats,
+    random: np.random.Generator,
+    clearance: float,
+) -> Floats | None:
+    robot = cell.layout[name].robot
+    columns = [cell.slices[name].start + robot.joints.index(j) for j in arm_joints(robot)]
+    later = [(name, other) for other in cell.robots[number + 1 :]]
+    itself = cell.checker([name], 0.0, later)
+    others = cell.checker([name], clearance, [*later, (name, name)])
+    for _ in range(TRIES // 20):
+        states = np.tile(state, (20, 1))
+        states[:, columns] = random.uniform(*limits[columns].T, (20, len(columns)))
+        free = itself.free(states)
+        free[free] = others.free(states[free])
+        if free.any():
+            return states[np.argmax(free)]
+    return None

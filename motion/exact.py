@@ -1,0 +1,142 @@
+"""How far pairs of a cell's solids are apart, by FCL."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinematics.rotations import Floats, transform
+from motion.bodies import Bodies
+from motion.chains import Chains
+from motion.sieve import Candidates, Indices, seen_from
+from robots.bodies.depth import overlap
+
+
+class Measure:
+    """FCL's bodies of a cell, two of each solid: one that stays, and one that is put beside it."""
+
+    def __init__(self, bodies: Bodies, pairs: Indices, apart: Floats, chains: Chains) -> None:
+        """Prepare some pairs.
+
+        Args:
+            bodies: The cell.
+            pairs: Pairs of its solids, (m, 2).
+            apart: How far they have to be apart, (m,) (m).
+            chains: Where the parts are.
+        """
+        self._solids = bodies.solids
+        self._rows = np.array([chains.rows.get(s.part, 0) for s in self._solids], np.intp)
+        self._offsets = np.array([s.offset for s in self._solids]).reshape(-1, 4, 4)
+        self._apart = dict(zip(map(tuple, pairs.tolist()), apart.tolist(), strict=True))
+
+    def apart(self, a: int, b: int) -> float:
+        """Return how far two solids have to be apart (m)."""
+        return self._apart[(a, b) if (a, b) in self._apart else (b, a)]
+
+    def too_near(self, places: Floats, candidates: Candidates) -> NDArray[np.bool_]:
+        """Tell for each state whether any of the candidates are too near to each other, (n,).
+
+        Args:
+            places: Poses of the parts, (rows, n, 4, 4).
+            candidates: Pairs of solids.
+        """
+        import fcl
+
+        hits = [False] * places.shape[1]
+        asked, wanted = fcl.CollisionRequest(), fcl.DistanceRequest()
+        turns, shifts = self._beside(places, candidates)
+        rows = zip(candidates.states.tolist(), candidates.pairs.tolist(), strict=True)
+        for i, (state, (a, b)) in enumerate(rows):
+            if hits[state]:
+                continue
+            one, other = self._stay[a], self._moved[b]
+            other.setRotation(turns[i])
+            other.setTranslation(shifts[i])
+            apart = self.apart(a, b)
+            if apart == 0.0:
+                hits[state] = fcl.collide(one, other, asked, fcl.CollisionResult()) > 0
+            else:
+                hits[state] = fcl.distance(one, other, wanted, fcl.DistanceResult()) < apart
+        return np.array(hits, bool)
+
+    def update(
+        self,
+        places: Floats,
+        candidates: Candidates,
+        best: Floats,
+        pairs: list[tuple[int, int] | None],
+    ) -> None:
+        """Write down for each state which candidates are nearer than the best known so far.
+
+        Args:
+            places: Poses of the parts, (rows, n, 4, 4).
+            candidates: Pairs of solids.
+            best: The least distance known in each state, (n,) (m).
+            pairs: Between which solids.
+        """
+        import fcl
+
+        request = fcl.DistanceRequest()
+        turns, shifts = self._beside(places, candidates)
+        rows = zip(candidates.states.tolist(), candidates.pairs.tolist(), strict=True)
+        for i, (state, (a, b)) in enumerate(rows):
+            if candidates.bounds[i] > max(best[state], 0.0):
+                continue
+            one, other = self._stay[a], self._moved[b]
+            other.setRotation(turns[i])
+            other.setTranslation(shifts[i])
+            distance = float(fcl.distance(one, other, request, fcl.DistanceResult()))
+            if distance <= 0.0:
+                distance = self.between(places[:, state], a, b)[0]
+            if distance < best[state]:
+                best[state], pairs[state] = distance, (a, b)
+
+    def between(self, places: Floats, a: int, b: int) -> tuple[float, Floats]:
+        """Return the distance of two solids, negative if they overlap, and their nearest points.
+
+        Args:
+            places: Poses of the parts, (rows, 4, 4).
+            a: One solid.
+            b: The other.
+        """
+        import fcl
+
+        poses = [places[self._rows[i]] @ self._offsets[i] for i in (a, b)]
+        one, other = (
+            fcl.CollisionObject(self._solids[i].hull.geometry, fcl.Transform(p[:3, :3], p[:3, 3]))
+            for i, p in zip((a, b), poses, strict=True)
+        )
+        request, result = fcl.DistanceRequest(enable_nearest_points=True), fcl.DistanceResult()
+        distance = float(fcl.distance(one, other, request, result))
+        if distance > 0.0:
+            return distance, np.array(result.nearest_points)
+        corners = [
+            transform(pose, self._solids[i].hull.corners)
+            for i, pose in zip((a, b), poses, strict=True)
+        ]
+        depth, points = overlap(*corners)
+        return -depth, points
+
+    def _beside(self, places: Floats, candidates: Candidates) -> tuple[Floats, Floats]:
+        """Return where the second of each pair is, seen from the first: (k, 3, 3) and (k, 3)."""
+        (a, b), states = candidates.pairs.T, candidates.states
+        one = places[self._rows[a], states] @ self._offsets[a]
+        other = places[self._rows[b], states] @ self._offsets[b]
+        relative = seen_from(one, other)
+        return relative[:, :, :3].copy(), relative[:, :, 3].copy()
+
+    @cached_property
+    def _stay(self) -> list[Any]:
+        return self._objects()
+
+    @cached_property
+    def _moved(self) -> list[Any]:
+        return self._objects()
+
+    def _objects(self) -> list[Any]:
+        import fcl
+
+        return [fcl.CollisionObject(solid.hull.geometry) for solid in self._solids]
