@@ -35,9 +35,10 @@ class Goal:
     """Where a point of a tree is to be, and how a link is to be turned, in the root's frame.
 
     Attributes:
-        position: Of the point, (3,) (m).
+        position: Of the point, (3,) (m); or one for each start, (n, 3).
         links: Indices of the links whose mean origin is the point, or lies beside it.
-        rotation: Of the link ``turned``, (3, 3); None if any will do.
+        rotation: Of the link ``turned``, (3, 3), or one for each start, (n, 3, 3); None if any
+            will do.
         turned: Index of the link that has the orientation.
         offset: From the mean origin to the point, in the frame of ``turned``, (3,) (m); None if
             that is the point.
@@ -79,7 +80,9 @@ class Solutions:
         return solved or [int(np.argmin(self.missing + self.turn_missing))]
 
 
-def solve(tree: Tree, goal: Goal, starts: Floats, free: Sequence[int]) -> Solutions:
+def solve(
+    tree: Tree, goal: Goal, starts: Floats, free: Sequence[int], iterations: int = ITERATIONS
+) -> Solutions:
     """Bring a tree to a goal by damped least squares, from every start at once.
 
     Args:
@@ -87,12 +90,13 @@ def solve(tree: Tree, goal: Goal, starts: Floats, free: Sequence[int]) -> Soluti
         goal: What is asked for.
         starts: Coordinates, (n, coordinates) (rad, m).
         free: Indices of the coordinates that may move, within their limits.
+        iterations: How many steps it takes at most.
     """
     needed = tree.towards([*goal.links, goal.turned])
     links = [needed.link(tree.links[link]) for link in goal.links]
     turned = needed.link(tree.links[goal.turned])
     goal = replace(goal, links=links, turned=turned)
-    qpos = _descend(needed, goal, starts.copy(), free)
+    qpos = _descend(needed, goal, starts.copy(), free, iterations)
     errors, _ = _errors(needed, goal, qpos, free)
     missing = np.linalg.norm(errors[:, :3], axis=1)
     turn_missing = np.linalg.norm(errors[:, 3:], axis=1)
@@ -100,11 +104,11 @@ def solve(tree: Tree, goal: Goal, starts: Floats, free: Sequence[int]) -> Soluti
     return Solutions(qpos, missing, turn_missing, solved)
 
 
-def _descend(tree: Tree, goal: Goal, qpos: Floats, free: Sequence[int]) -> Floats:
+def _descend(tree: Tree, goal: Goal, qpos: Floats, free: Sequence[int], iterations: int) -> Floats:
     limits = tree.limits[free]
     rows = 3 if goal.rotation is None else 6
     damping = DAMPING**2 * np.eye(rows)
-    for _ in range(ITERATIONS):
+    for _ in range(iterations):
         errors, slopes = _errors(tree, goal, qpos, free)
         if (np.abs(errors).max(axis=1) < NEAR_ENOUGH[0] / 10).all():
             break

@@ -9,6 +9,7 @@ from layouts.frames import Frame, Pose, ceiling, table, wall
 from layouts.layout import Layout
 from layouts.maniskill import from_maniskill
 from layouts.placement import Placement
+from layouts.placing import search
 from layouts.presets import around_table, face_to_face, grid, ring, side_by_side, single
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "grid",
     "ring",
     "rpy_quaternion",
+    "search",
     "side_by_side",
     "single",
     "table",

@@ -13,6 +13,7 @@ from layouts.frames import EDGES
 from layouts.layout import Layout
 from layouts.maniskill import TASKS, from_maniskill
 from layouts.presets import FACING, PRESETS
+from layouts.search_command import add_search_options
 from layouts.validate_command import add_check_options
 from layouts.view_command import add_view_options
 from robots import LayoutError, RobotRegistry, UnknownNameError
@@ -116,13 +117,18 @@ def build(preset: str, robots: Sequence[str], **options: Any) -> Layout:
     for name, parameter in parameters.items():
         if parameter.default is parameter.empty and name not in given:
             raise LayoutError(f"{preset} needs --{name}")
-    layout = place(_named_robots(robots), **given)
+    layout = place(named_robots(robots), **given)
     if not isinstance(layout, Layout):
         raise LayoutError(f"the preset {preset} returned {shown(layout)}; a Layout is needed")
     return layout
 
 
-def _named_robots(words: Sequence[str]) -> dict[str, str]:
+def named_robots(words: Sequence[str]) -> dict[str, str]:
+    """Return robots by name from words ``name=robot``.
+
+    Raises:
+        LayoutError: If a word is malformed, or a name is given twice.
+    """
     robots: dict[str, str] = {}
     for word in words:
         name, equals, robot = word.partition("=")
@@ -169,6 +175,8 @@ def _parser() -> argparse.ArgumentParser:
     check = commands.add_parser("validate", help="check a layout for collisions and reach")
     add_layout_words(check)
     add_check_options(check, chosen_layout)
+    search = commands.add_parser("search", help="look for places from which robots reach targets")
+    add_search_options(search, named_robots)
     view = commands.add_parser("view", help="look at a layout in a browser, and move its joints")
     add_layout_words(view)
     add_view_options(view, chosen_layout)

@@ -18,14 +18,7 @@ def add_check_options(
         parser: A parser that has the words which say what layout is meant.
         chosen_layout: Returns that layout.
     """
-    parser.add_argument(
-        "--target",
-        action="append",
-        default=[],
-        metavar="[NAME=]X,Y,Z",
-        help="a place that some robot must reach (m); with four more numbers, the wxyz orientation"
-        " of its TCP; may be given several times",
-    )
+    add_target_option(parser)
     parser.add_argument(
         "--tabletop",
         type=float,
@@ -41,10 +34,22 @@ def add_check_options(
     parser.set_defaults(run=lambda options: _run(options, chosen_layout(options)))
 
 
+def add_target_option(parser: argparse.ArgumentParser) -> None:
+    """Add ``--target``, which `read_targets` reads."""
+    parser.add_argument(
+        "--target",
+        action="append",
+        default=[],
+        metavar="[NAME=]X,Y,Z",
+        help="a place that some robot must reach (m); with four more numbers, the wxyz orientation"
+        " of its TCP; may be given several times",
+    )
+
+
 def _run(options: argparse.Namespace, layout: Layout) -> int:
     """Print the report; return 0 if the layout is ok, else 1."""
     report = layout.validate(
-        targets=_targets(options.target),
+        targets=read_targets(options.target),
         samples=options.samples,
         table=None if options.tabletop is None else tuple(options.tabletop),
         seed=options.seed,
@@ -55,7 +60,12 @@ def _run(options: argparse.Namespace, layout: Layout) -> int:
     return 0 if report.ok else 1
 
 
-def _targets(words: list[str]) -> dict[str, tuple[float, ...]]:
+def read_targets(words: list[str]) -> dict[str, tuple[float, ...]]:
+    """Return targets by name from the words of ``--target``.
+
+    Raises:
+        LayoutError: If a word is malformed, or a name is given twice.
+    """
     targets: dict[str, tuple[float, ...]] = {}
     for number, word in enumerate(words, start=1):
         name, _, place = word.rpartition("=")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 
@@ -12,6 +11,7 @@ import numpy as np
 from kinematics.rotations import Floats
 from layouts.arrangement import Arrangement
 from layouts.placement import Placement
+from layouts.progress import Progress
 from layouts.validation.advice import (
     NARROW,
     to_be_reached,
@@ -51,12 +51,10 @@ from robots import (
     UnknownNameError,
 )
 from robots.bodies.hulls import RobotModel, load_model
-from robots.common.commands import notice
 
 TABLE_DEPTH = 0.9  # m; tables are solid, from their tops down
 SHALLOW = 0.005  # m; a folded arm's hulls overlap by less where its links do not
 LIMIT_TOLERANCE = 1e-4  # rad or m; limits and keyframes are written with four digits
-PATIENCE = 2.0  # s; longer checks tell how far they are
 
 
 def validate(
@@ -91,7 +89,7 @@ class _Check:
     ) -> None:
         self._layout, self._targets, self._draws = layout, targets, samples
         self._tops = table_tops(layout, table)
-        self._progress = _Progress()
+        self._progress = Progress("checking the layout")
         self._unread: dict[str, RobotLayoutsError] = {}
         self._models = dict(self._load())
         if self._unread and not self._models:
@@ -99,7 +97,7 @@ class _Check:
         self._checked = {name: layout[name] for name in self._models}
         random = np.random.default_rng(seed)
         self._robots = {
-            name: stand(name, p, self._models[name], _noisy(p, samples, random))
+            name: stand(name, p, self._models[name], noisy_postures(p, samples, random))
             for name, p in self._checked.items()
         }
         self._surfaces = {
@@ -212,7 +210,7 @@ class _Check:
             yield one, other, None
         for name, robot in self._robots.items():
             for surface in self._surfaces.values():
-                yield robot, surface, _moving_hulls(self._models[name])
+                yield robot, surface, moving_hulls(self._models[name])
 
     def _compare(
         self, one: Postures, other: Postures, pairs: Sequence[tuple[int, int]] | None
@@ -309,7 +307,7 @@ class _Check:
             if obstacle == name:
                 touches = touching(robot, robot, model.self_pairs)
             else:
-                pairs = _moving_hulls(model) if obstacle in self._surfaces else None
+                pairs = moving_hulls(model) if obstacle in self._surfaces else None
                 touches = touching(robot, body.first, pairs)
             if touches:
                 yield obstacle
@@ -349,20 +347,7 @@ class _Check:
         return Reach(self._layout[robot], self._models[robot], self._layout.arm(name).robot)
 
 
-class _Progress:
-    """Tells on stderr what is being looked at, once a check takes longer than `PATIENCE`."""
-
-    def __init__(self) -> None:
-        self._told = time.monotonic()
-
-    def tell(self, what: str) -> None:
-        now = time.monotonic()
-        if now - self._told > PATIENCE:
-            self._told = now
-            notice(f"checking the layout: {what}")
-
-
-def _noisy(placement: Placement, draws: int, random: np.random.Generator) -> Floats:
+def noisy_postures(placement: Placement, draws: int, random: np.random.Generator) -> Floats:
     """Return the keyframe, then draws with joint noise as at a reset, (1 + draws, dof)."""
     groups = placement.robot.action_split.groups.values()
     noisy = [group.reset_noise for group in groups for _ in group.joints]
@@ -370,7 +355,7 @@ def _noisy(placement: Placement, draws: int, random: np.random.Generator) -> Flo
     return np.array(placement.start_qpos) + np.concatenate([np.zeros((1, len(noisy))), noise])
 
 
-def _moving_hulls(model: RobotModel) -> list[tuple[int, int]]:
+def moving_hulls(model: RobotModel) -> list[tuple[int, int]]:
     """Pair with the table's one hull all hulls of links that move; the base stands on it."""
     bodies = model.kinematics.bodies
     return [(i, 0) for i, hull in enumerate(model.hulls) if bodies[hull.link] != 0]

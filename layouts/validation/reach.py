@@ -64,7 +64,7 @@ class Reach:
         self._start = np.array(placement.start_qpos)
         self._arm = [robot.joints.index(joint) for joint in arm.arm_joints]
         self._tcp = find_tcp(arm, model.kinematics)
-        self._starts = _starts(robot, placement, model, self._arm)
+        self._starts = arm_starts(robot, placement, model, self._arm)
 
     def solve(self, position: Floats, quaternion: Floats | None = None) -> list[Solution]:
         """Return the solutions for a target, the nearest to the keyframe first.
@@ -111,7 +111,7 @@ class Workspace:
     ) -> None:
         """Sample the workspace of a placed robot; see `Reach`."""
         base = pose_matrix(placement.base_position, placement.base_quaternion)
-        points = _workspace_points(placement.robot, model, arm or placement.robot)
+        points, _ = sampled_poses(placement.robot, model, arm or placement.robot)
         cells = np.floor((points @ base[:3, :3].T + base[:3, 3]) / VOXEL).astype(np.int64)
         self.cells = np.unique(cells @ np.array([1 << 40, 1 << 20, 1]))
         self.volume = len(self.cells) * VOXEL**3
@@ -123,18 +123,39 @@ class Workspace:
 
 
 @lru_cache(maxsize=64)
-def _workspace_points(robot: RobotDescriptor, model: RobotModel, own: RobotDescriptor) -> Floats:
+def sampled_poses(
+    robot: RobotDescriptor, model: RobotModel, own: RobotDescriptor
+) -> tuple[Floats, Floats]:
+    """Return where random joint positions bring a tool centre point, in the base's frame.
+
+    Args:
+        robot: The robot.
+        model: Its links.
+        own: The robot again, or a limb of it, described like a robot.
+
+    Returns:
+        Places, (`WORKSPACE_SAMPLES`, 3) (m), and the TCP link's orientations, (…, 3, 3).
+    """
     arm = [robot.joints.index(joint) for joint in own.arm_joints]
     start = np.array(robot.keyframe(robot.home.keyframe))
     qpos = np.tile(start, (WORKSPACE_SAMPLES, 1))
     qpos[:, arm] = scattered(model.kinematics.limits[arm], WORKSPACE_SAMPLES)
     tree = model.kinematics.towards(find_tcp(own, model.kinematics).needed)
-    return find_tcp(own, tree).places(tree.forward(qpos))
+    tcp, poses = find_tcp(own, tree), tree.forward(qpos)
+    return tcp.places(poses), poses[:, tcp.turned, :3, :3].copy()
 
 
-def _starts(
+def arm_starts(
     robot: RobotDescriptor, placement: Placement, model: RobotModel, arm: list[int]
 ) -> Floats:
+    """Return the joint positions that inverse kinematics starts from, (n, dof) (rad, m).
+
+    Args:
+        robot: The robot.
+        placement: From whose keyframe the joints outside the arm are.
+        model: Its links.
+        arm: Indices of the arm's joints.
+    """
     keyframes = [placement.start_qpos, *robot.keyframes.values()]
     qpos = np.tile(np.array(placement.start_qpos), (len(keyframes) + STARTS, 1))
     qpos[: len(keyframes), arm] = np.array(keyframes)[:, arm]

@@ -1,0 +1,87 @@
+"""Where robots best stand: a search for base poses from which they reach what they must."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from layouts.frames import Frame
+from layouts.layout import Layout
+from layouts.placement import RobotLike
+from layouts.placing.demands import ReachedBy
+
+__all__ = ["ReachedBy", "search"]
+
+
+def search(
+    robots: Mapping[str, RobotLike],
+    targets: Mapping[str, Sequence[float]] | Sequence[Sequence[float]] = (),
+    *,
+    around: Mapping[str, Frame] | Frame | Sequence[float] | None = None,
+    within: tuple[float, float, float, float] | None = None,
+    heights: float | Mapping[str, float] = 0.0,
+    reached_by: ReachedBy = "any",
+    keyframe: str | None = None,
+    clearance: float = 0.1,
+    partial: bool = False,
+    seed: int = 0,
+    tries: int = 4,
+    patience: float = 300.0,
+) -> Layout:
+    """Look for places from which robots reach targets, clear of each other, and share most space.
+
+    A target counts as reached as in `Layout.validate`: without touching anything, the others at
+    their keyframes. Of all places that meet the demands, those are best that share most workspace
+    and leave most clearance, at the keyframes and where targets are reached, up to a third of the
+    smaller reach. The layout that is returned has passed `Layout.validate`. The same arguments
+    give the same layout. Needs the robots' files; takes seconds to a minute, and tells on stderr
+    how far it is.
+
+    Args:
+        robots: Robot by name, in action order.
+        targets: What must be reached, by name or in order: x, y, z of a tool centre point in the
+            world (m), or these and the wxyz quaternion of the TCP link.
+        around: Where bases may stand. Frames as from ``table(1.2, 0.8)`` put them along the edges
+            of the table; other frames, such as ``{"roof": ceiling(1.8)}``, anywhere in their x-y
+            plane; each robot takes whichever frame suits. x_min, y_min, x_max, y_max (m) is an
+            area on the ground that bases keep out of, by 0.1 m. None is the ground at z = 0,
+            wherever targets are in reach.
+        within: Rectangle that all bases stand in, as x_min, y_min, x_max, y_max (m): in the world,
+            or in the frames of ``around`` that are no tables.
+        heights: Of the bases above what they stand on (m), for all, or by name.
+        reached_by: Who must reach a target: ``"any"`` robot or limb, ``"all"`` of them, one of
+            them by its name, or each of several; or a mapping from targets to these, ``"any"``
+            for targets that are left out.
+        keyframe: Keyframe every robot starts from; None is each one's home.
+        clearance: Least distance between robots (m), at the keyframes with joint noise, and of a
+            robot that reaches a target to the others at their keyframes.
+        partial: Whether to return the best places where not all targets can be reached, instead
+            of raising.
+        seed: Of what is random in the search.
+        tries: How many of the best places on a grid to better by small steps; more take longer
+            and find better ones.
+        patience: After how long to give up (s). It never changes the layout that is returned.
+
+    Raises:
+        LayoutError: If an argument makes no sense; if no robot gets to some target wherever it
+            stands, with how much is missing; if no places were found from which all are reached;
+            or after ``patience``.
+        UnknownNameError: If a robot, keyframe, target or limb of that name does not exist.
+        AssetError: If a robot's files cannot be found or make no sense.
+        MissingPackageError: If python-fcl or scipy is not installed.
+    """
+    from layouts.placing.searching import search
+
+    return search(
+        robots,
+        targets,
+        around=around,
+        within=within,
+        heights=heights,
+        reached_by=reached_by,
+        keyframe=keyframe,
+        clearance=clearance,
+        partial=partial,
+        seed=seed,
+        tries=tries,
+        patience=patience,
+    )

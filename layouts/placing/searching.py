@@ -1,0 +1,216 @@
+"""A search for places: a coarse one over grids, then steps from its best, checked exactly."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from layouts.layout import Layout
+from layouts.placement import Placement, RobotLike, check_robots, load_robot
+from layouts.placing.coarse import Coarse
+from layouts.placing.demands import Demand, ReachedBy, demands_of
+from layouts.placing.feasible import Obstacle, obstacles
+from layouts.placing.scene import Scene
+from layouts.placing.sites import Around, Rectangle, ground_of
+from layouts.placing.trials import Trial, Trials
+from layouts.progress import Progress
+from layouts.validation.arguments import Targets, named_targets
+from layouts.validation.findings import Finding, TargetReach, reach_text
+from layouts.validation.report import Report
+from robots import LayoutError, RobotDescriptor
+from robots.common.bounds import checked_number, checked_whole
+
+BEGINNINGS = 12  # random ones of the coarse search, for each place to begin at
+STEPS = (0.2, 0.1, 0.05, 0.02)  # of a base, as shares of the largest reach
+TURN = 4.0  # rad per m of the largest reach, of the same steps
+SWEEPS = 3  # over all robots at most, for one length of step
+STRIDES = 4  # the same step again, while it makes things better
+
+
+def search(
+    robots: Mapping[str, RobotLike],
+    targets: Targets,
+    *,
+    around: Around | None,
+    within: Rectangle | None,
+    heights: float | Mapping[str, float],
+    reached_by: ReachedBy,
+    keyframe: str | None,
+    clearance: float,
+    partial: bool,
+    seed: int,
+    tries: int,
+    patience: float,
+) -> Layout:
+    """Look for places; see `layouts.search`."""
+    check_robots(robots)
+    if not robots:
+        raise LayoutError("a search needs at least one robot")
+    loaded = {name: load_robot(robot) for name, robot in robots.items()}
+    seed = checked_whole("seed", seed, 0, None, LayoutError)
+    tries = checked_whole("tries", tries, 1, None, LayoutError)
+    clearance = checked_number("clearance", clearance, 0.0, 10.0, LayoutError, "m")
+    patience = checked_number("patience", patience, 0.0, 1e9, LayoutError, "s")
+    named = named_targets(targets)
+    alone = Layout({name: Placement(robot, keyframe=keyframe) for name, robot in loaded.items()})
+    demands = demands_of(named, reached_by, alone)
+    ground = ground_of(around, within, heights, loaded, list(named.values()))
+    _check_starts(loaded, keyframe)
+    scene = Scene(loaded, keyframe, ground, demands)
+    clock = _Clock(patience)
+    return _Search(scene, named, demands, clearance, clock).run(partial, seed, tries)
+
+
+class _Clock:
+    """Tells how far a search is, and ends one that takes too long."""
+
+    def __init__(self, patience: float) -> None:
+        self._patience, self._begun = patience, time.monotonic()
+        self.progress = Progress("looking for places")
+
+    def tell(self, what: str) -> None:
+        if time.monotonic() - self._begun > self._patience:
+            raise LayoutError(
+                f"no layout after {self._patience:g} s, while looking for places: {what}; raise"
+                " patience, lower tries, or ask for less"
+            )
+        self.progress.tell(what)
+
+
+class _Search:
+    """One search, with everything loaded."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        targets: Mapping[str, tuple[float, ...]],
+        demands: Sequence[Demand],
+        clearance: float,
+        clock: _Clock,
+    ) -> None:
+        self._scene, self._targets, self._clock = scene, targets, clock
+        self._demands, self._clearance = tuple(demands), clearance
+
+    def run(self, partial: bool, seed: int, tries: int) -> Layout:
+        self._clock.tell("sampling where robots get to")
+        coarse = Coarse(self._scene, self._demands, self._clearance)
+        hopeless = obstacles(self._scene, coarse.robots, self._demands, self._clock.progress)
+        if hopeless:
+            if not partial:
+                raise LayoutError(_hopeless_text(list(hopeless.values())))
+            self._demands = tuple(
+                demand for number, demand in enumerate(self._demands) if number not in hopeless
+            )
+            coarse = Coarse(self._scene, self._demands, self._clearance)
+        random = np.random.default_rng(seed)
+        trials = Trials(self._scene, self._demands, self._clearance)
+        self._clock.tell("trying places on a grid")
+        begun = coarse.best(BEGINNINGS * tries, tries, random)
+        bettered: list[Trial] = []
+        for number, seats in enumerate(begun, start=1):
+            what = f"{number} of {len(begun)} beginnings"
+            bettered.append(self._bettered(trials, trials.afresh(seats), random, what))
+        return self._chosen(sorted(bettered, key=lambda trial: trial.loss), partial)
+
+    def _bettered(
+        self, trials: Trials, trial: Trial, random: np.random.Generator, what: str
+    ) -> Trial:
+        """Step to better seats until no step of any length makes a robot's better."""
+        reach = max(robot.reach for robot in self._scene.robots.values())
+        for length in STEPS:
+            for _ in range(SWEEPS):
+                before = trial
+                for name in random.permutation(list(self._scene.robots)).tolist():
+                    self._clock.tell(f"{what}, {trials.count} places tried")
+                    trial = self._stepped(trials, trial, name, length * reach, length * TURN)
+                if trial is before:
+                    break
+        return trial
+
+    def _stepped(self, trials: Trials, trial: Trial, name: str, step: float, turn: float) -> Trial:
+        """Step with one robot in every direction in which that makes things better."""
+        for dx, dy, dyaw in np.vstack([np.eye(3), -np.eye(3)]) * (step, step, turn):
+            for _ in range(STRIDES):
+                at = trial.seats[name]
+                site = self._scene.ground.sites[at.site]
+                seat = site.seat(at.site, at.x + dx, at.y + dy, at.yaw + dyaw)
+                if seat is None or seat == at:
+                    break
+                better = trials.moved(trial, name, seat)
+                if better is None:
+                    break
+                trial = better
+        return trial
+
+    def _chosen(self, ranked: Sequence[Trial], partial: bool) -> Layout:
+        """Return the best layout that a check finds sound, and in which every demand is met."""
+        best: tuple[int, Layout, Report] | None = None
+        for trial in ranked:
+            self._clock.tell("checking what was found")
+            layout = self._scene.layout(trial.seats)
+            report = layout.validate(targets=self._asked(), workspaces=False)
+            lacking = len(self._unmet(report)) + 1000 * len(_wrong(report))
+            if lacking == 0:
+                return layout
+            if best is None or lacking < best[0]:
+                best = lacking, layout, report
+        assert best is not None  # there is at least one beginning
+        _, layout, report = best
+        if _wrong(report):
+            raise LayoutError(
+                f"found no places that are clear: {_wrong(report)[0].what}; give the robots more"
+                " room, fewer targets, or another keyframe"
+            )
+        if partial:
+            return layout
+        raise LayoutError(
+            "found no places from which all targets are reached; from the best ones"
+            f" {_unmet_text(self._unmet(report))}; raise tries, ask for less, or take the best"
+            " with partial=True"
+        )
+
+    def _asked(self) -> dict[str, tuple[float, ...]]:
+        names = {demand.target for demand in self._demands}
+        return {name: numbers for name, numbers in self._targets.items() if name in names}
+
+    def _unmet(self, report: Report) -> list[tuple[Demand, TargetReach]]:
+        """Return the demands that are not met, each with the arm that comes nearest."""
+        unmet: list[tuple[Demand, TargetReach]] = []
+        for demand in self._demands:
+            own = [
+                r for r in report.reaches if r.target == demand.target and r.robot in demand.arms
+            ]
+            if not any(reach.reached for reach in own):
+                unmet.append((demand, min(own, key=lambda r: (not r.blocked, r.missing))))
+        return unmet
+
+
+def _check_starts(robots: Mapping[str, RobotDescriptor], keyframe: str | None) -> None:
+    """Refuse robots that are not sound at their keyframe, wherever they stand.
+
+    Raises:
+        LayoutError: If one is not.
+    """
+    for name, robot in robots.items():
+        report = Layout({name: Placement(robot, keyframe=keyframe)}).validate(workspaces=False)
+        if not report.ok:
+            finding = report.findings[0]
+            raise LayoutError(f"{finding.what}, wherever it stands; {finding.advice}")
+
+
+def _wrong(report: Report) -> list[Finding]:
+    return [f for f in report.findings if f.serious and f.kind != "target"]
+
+
+def _hopeless_text(hopeless: Sequence[Obstacle]) -> str:
+    return (
+        "no robot that may reach these gets there, wherever it stands:"
+        f" {'; '.join(map(str, hopeless))}. Move them, change around, within or heights, or leave"
+        " them out with partial=True"
+    )
+
+
+def _unmet_text(unmet: Sequence[tuple[Demand, TargetReach]]) -> str:
+    return "; ".join(f"{demand.target}: {reach_text(reach)}" for demand, reach in unmet)
