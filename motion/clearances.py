@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,28 +20,20 @@ class Keeping:
     where a motion begins or ends.
     """
 
-    def __init__(
-        self,
-        cell: Cell,
-        robots: Sequence[str],
-        clearance: float,
-        ignored: Sequence[str] = (),
-    ) -> None:
+    def __init__(self, cell: Cell, robots: Sequence[str], clearance: float) -> None:
         """Gather the pairs.
 
         Args:
             cell: The cell.
             robots: Those that move.
             clearance: How far they keep from everything else (m).
-            ignored: Other robots that do not count.
         """
-        self.cell, self.robots, self.clearance = cell, tuple(robots), clearance
-        except_ = [(name, other) for name in robots for other in ignored]
-        self._whole = cell.checker(robots, 0.0, except_)
-        solids = cell.solids
-        self._close: NDArray[np.bool_] = np.array(
-            [solids[a].owner == solids[b].owner for a, b in self._whole.pairs.tolist()], bool
-        ) | (clearance <= 0.0)
+        self.cell, self.clearance = cell, clearance
+        self._whole = cell.checker(robots, 0.0)
+        self._pairs = self._whole.pairs
+        owners = np.array([solid.owner for solid in cell.solids])[self._pairs]
+        self._movers = np.array([solid.mover for solid in cell.solids])[self._pairs]
+        self._close = (owners[:, 0] == owners[:, 1]) | (clearance <= 0.0)
 
     def free(self, states: Floats) -> NDArray[np.bool_]:
         """Tell in which states nothing overlaps, (n,)."""
@@ -51,9 +43,10 @@ class Keeping:
         """Return what overlaps most, or None."""
         return self._whole.contact(state)
 
-    def only(self, robot: str, others: Sequence[str]) -> Keeping:
-        """Return what one of the robots has to keep from, without some others."""
-        return Keeping(self.cell, (robot,), self.clearance, others)
+    def without(self, ignored: Collection[str]) -> Checker:
+        """Return what tells whether anything overlaps but some robots, which do not count."""
+        kept = ~np.isin(self._movers, list(ignored)).any(axis=1)
+        return Checker(self.cell, self._pairs[kept], 0.0)
 
     def expect_free_start(self, start: Floats) -> None:
         """Refuse to begin with an overlap.
@@ -74,10 +67,33 @@ class Keeping:
             near = not self._checker(np.array([pair]), self.clearance).free(state[None])[0]
             self._close[pair] = near
 
-    def checkers(self) -> list[Checker]:
-        """Return what must agree that a state is free."""
-        parts = (np.flatnonzero(self._close), 0.0), (np.flatnonzero(~self._close), self.clearance)
-        return [self._checker(pairs, clearance) for pairs, clearance in parts if len(pairs)]
+    def checkers(
+        self, moving: Collection[str] | None = None, ignored: Collection[str] = ()
+    ) -> list[Checker]:
+        """Return what must agree that a state is free.
+
+        Args:
+            moving: Robots one of which must take part; None is all that move.
+            ignored: Robots that do not count.
+        """
+        chosen = ~np.isin(self._movers, list(ignored)).any(axis=1)
+        if moving is not None:
+            chosen &= np.isin(self._movers, list(moving)).any(axis=1)
+        return self._chosen(chosen)
+
+    def checkers_between(self, some: Collection[str], others: Collection[str]) -> list[Checker]:
+        """Return what must agree that two groups of robots keep clear of each other."""
+        one, other = np.isin(self._movers, list(some)), np.isin(self._movers, list(others))
+        chosen = np.asarray(one & other[:, ::-1]).any(axis=1)
+        return self._chosen(chosen)
+
+    def _chosen(self, chosen: NDArray[np.bool_]) -> list[Checker]:
+        parts = (chosen & self._close, 0.0), (chosen & ~self._close, self.clearance)
+        return [
+            self._checker(np.flatnonzero(pairs), clearance)
+            for pairs, clearance in parts
+            if pairs.any()
+        ]
 
     def _checker(self, pairs: NDArray[np.intp], clearance: float) -> Checker:
-        return Checker(self.cell, self._whole.pairs[pairs], clearance)
+        return Checker(self.cell, self._pairs[pairs], clearance)

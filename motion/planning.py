@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import product
 from typing import Any
 
@@ -20,6 +20,7 @@ from motion.goals import CANDIDATES, Goal, Target, read_targets
 from motion.motion import Motion
 from motion.obstacles import Held, Obstacle
 from motion.paths import Path
+from motion.priorities import coordinated
 from motion.search import connect
 from motion.shorten import rounded, shortened
 from motion.spaces import Progress, Resolution, Space
@@ -28,6 +29,8 @@ from robots.common.bounds import checked_number, checked_whole
 from robots.common.errors import MotionError, NoPlanError
 
 COMBINATIONS = 512  # of postures of all places that are tried as goals
+FEW = 4  # robots that plan together at first
+RESTARTS = 4  # searches of all robots together
 ENDS = 4  # of them that a search may choose from
 FINEST = 2e-3  # m; how near places are that are looked at, where no clearance is asked
 RADIANS_PER_METRE = 5.0  # how far links may turn between two of them, beside how far they travel
@@ -152,12 +155,24 @@ class _Query:
         )
         goals = [end[moving] for end in ends if space.are_free(end[None, moving])[0]]
         resolution = self._fine()
-        points = connect(space, self.start[moving], goals, self.seed, resolution)
+        points = self._points(space, keeping, goals, resolution)
         if points is None:
             raise self._not_found()
         space.purpose = "shortening"
         points = shortened(space, points, self.seed, resolution)
         return space, rounded(space, points, resolution)
+
+    def _points(
+        self, space: Space, keeping: Keeping, goals: Sequence[Floats], resolution: Resolution
+    ) -> Floats | None:
+        """Return points of a free path: few robots plan together, many alone at first."""
+        start = self.start[space.free]
+        together = partial(connect, space, start, goals, self.seed, resolution)
+        few = len(space.robots) <= FEW
+        points = together(restarts=int(few))
+        if points is None and len(space.robots) > 1:
+            points = coordinated(space, keeping, start, goals[0], self.seed, resolution)
+        return together(first=int(few), restarts=RESTARTS) if points is None else points
 
     def _fine(self) -> Resolution:
         """Return how dense checks make sure that nothing comes nearer than 0 in between."""
@@ -190,8 +205,7 @@ class _Query:
 
     def _free_candidates(self, target: Target, keeping: Keeping) -> Floats:
         """Return the postures in which a robot touches nothing but what moves, too."""
-        others = [t.robot for t in self.targets if t.robot != target.robot]
-        alone = keeping.only(target.robot, others)
+        alone = keeping.without([t.robot for t in self.targets if t.robot != target.robot])
         states = np.tile(self.start, (len(target.candidates), 1))
         states[:, target.moving] = target.candidates
         free = alone.free(states)

@@ -22,6 +22,7 @@ def connect(
     goals: Sequence[Floats],
     seed: int,
     resolution: Resolution,
+    first: int = 0,
     restarts: int = 3,
 ) -> Floats | None:
     """Return points of a free path from a start to one of some goals, or None if none was found.
@@ -34,7 +35,8 @@ def connect(
         goals: Each (d,); the first ones are tried first.
         seed: Of OMPL's random numbers.
         resolution: Of the path that is returned; the search looks at places farther apart.
-        restarts: How often to search, each time with another seed.
+        first: The number of the first search; 0 if there was none before.
+        restarts: The number that the searches end before, each of which has another seed.
 
     Returns:
         The points, start and goal included, (n, d).
@@ -47,7 +49,7 @@ def connect(
         if space.edge_free(start, goal, COARSE) and space.edge_free(start, goal, resolution):
             return np.array([start, goal])
     looked_at = COARSE
-    for attempt in range(restarts):
+    for attempt in range(first, restarts):
         longest = RANGES[attempt % len(RANGES)] * np.sqrt(len(start))
         points = _rrt_connect(space, start, goals, seed + 1000 * attempt, longest, looked_at)
         if points is not None and space.path_free(points, resolution):

@@ -60,8 +60,13 @@ def random_cell(seed: int, arms: int, extra: Sequence[RobotDescriptor] = ()) -> 
 
 
 def _arranged(robots: dict[str, RobotDescriptor], kind: int, closeness: float) -> Layout:
-    presets = (face_to_face if len(robots) == 2 else ring, side_by_side, grid)
-    layout = presets[kind](robots, **({} if kind == 2 else _distance(presets[kind])))
+    if kind == 0:
+        across = len(robots) == 2
+        layout = face_to_face(robots, spacing="auto") if across else ring(robots)
+    elif kind == 1:
+        layout = side_by_side(robots, spacing="auto")
+    else:
+        layout = grid(robots)
     scale = np.array([closeness, closeness, 1.0])
     return Layout(
         {
@@ -71,14 +76,12 @@ def _arranged(robots: dict[str, RobotDescriptor], kind: int, closeness: float) -
     )
 
 
-def _distance(preset: object) -> dict[str, str]:
-    return {"radius": "auto"} if preset is ring else {"spacing": "auto"}
-
-
 def random_postures(cell: Cell, seed: Sequence[int], clearance: float) -> Iterator[Floats]:
     """Yield postures of all arms in which nothing comes near anything, (D,) (rad, m).
 
-    One arm after the other is drawn until it keeps clear of those before.
+    One arm after the other is drawn until it keeps clear of those before: joints anywhere within
+    their limits, but not more than half a turn from where the layout starts them, as arms that
+    stand on a floor cannot turn all the way round.
 
     Args:
         cell: The cell.
@@ -86,13 +89,12 @@ def random_postures(cell: Cell, seed: Sequence[int], clearance: float) -> Iterat
         clearance: How near robots may come to each other (m).
     """
     random = np.random.default_rng(list(seed))
-    limits = np.clip(cell.limits, -np.pi, np.pi)
+    limits = np.clip(cell.limits, cell.start[:, None] - np.pi, cell.start[:, None] + np.pi)
     while True:
         state: Floats | None = cell.start.copy()
         for i, name in enumerate(cell.robots):
-            state = _with_arm(cell, state, i, name, limits, random, clearance)
-            if state is None:
-                break
+            if state is not None:
+                state = _with_arm(cell, state, i, name, limits, random, clearance)
         if state is not None and cell.checker().free(state[None])[0]:
             yield state
 
@@ -113,7 +115,8 @@ def _with_arm(
     others = cell.checker([name], clearance, [*later, (name, name)])
     for _ in range(TRIES // 20):
         states = np.tile(state, (20, 1))
-        states[:, columns] = random.uniform(*limits[columns].T, (20, len(columns)))
+        low, high = limits[columns].T
+        states[:, columns] = random.uniform(low, high, (20, len(columns)))
         free = itself.free(states)
         free[free] = others.free(states[free])
         if free.any():
