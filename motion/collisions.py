@@ -93,15 +93,26 @@ class Checker:
         Raises:
             LayoutError: If a shape is wrong, or a number not finite.
         """
+        return next(iter(self.contacts(qpos, time)), None)
+
+    def contacts(self, qpos: ArrayLike, time: float | None = None) -> list[Contact]:
+        """Return all bodies that are too near, those first that miss most of what they have to be.
+
+        Args:
+            qpos: Coordinates, (D,) (rad, m).
+            time: Where obstacles that move are (s); None is 0.
+
+        Raises:
+            LayoutError: If a shape is wrong, or a number not finite.
+        """
         places = self._places(*self._one(qpos, time))
         candidates = self._sieve.candidates(places)
-        best, most = None, np.inf
+        found: list[tuple[float, Contact]] = []
         for i, (a, b) in enumerate(candidates.pairs.tolist()):
             if self._measure.too_near(places, candidates.only(np.array([i])))[0]:
                 contact = self._contact(places, a, b)
-                missing = contact.distance - self._measure.apart(a, b)
-                best, most = (contact, missing) if missing < most else (best, most)
-        return best
+                found.append((contact.distance - self._measure.apart(a, b), contact))
+        return [contact for _, contact in sorted(found, key=lambda entry: entry[0])]
 
     def nearest(self, qpos: ArrayLike, time: float | None = None) -> Contact | None:
         """Return which two bodies that count are nearest or overlap most; None beyond `FAR`.
