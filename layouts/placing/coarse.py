@@ -18,7 +18,7 @@ from layouts.placing.arms import corners_of, unique_points
 from layouts.placing.demands import Demand
 from layouts.placing.scene import Scene
 from layouts.placing.sites import Seat, Site
-from layouts.placing.trials import CRAMPED, FACING, HELP, ROOM, UNREACHED, Seats
+from layouts.placing.trials import AWKWARD, CRAMPED, FARTHEST, HELP, ROOM, UNREACHED, Seats
 
 MOST_SEATS = 1500  # of one robot
 TURNS = 8  # in which a base may face, of a whole turn
@@ -36,7 +36,8 @@ class Candidates:
     Attributes:
         seats: The seats, (n).
         bases: Poses of the base, (n, 4, 4).
-        beyond: How far each demand is beyond its reach (m), (n, demands).
+        beyond: How far each demand is beyond its reach (m), (n, demands); infinite where it may
+            not meet it.
         spaces: Cells of its workspace, (n, points).
         bodies: Cells of its body where it starts, (n, corners).
     """
@@ -100,17 +101,18 @@ class Coarse:
         beyond = own.beyond
         for other, at in others.items():
             beyond = np.minimum(beyond, self.robots[other].beyond[at])
-        losses = UNREACHED * beyond.sum(axis=1)
+        losses = UNREACHED * np.minimum(beyond, FARTHEST).sum(axis=1)
         bases = [self.robots[other].bases[at] for other, at in others.items()]
-        away = self._scene.turned_away(name, own.bases, bases)
+        awkward = self._scene.awkward(name, own.bases, bases)
         near = self._near(own)
-        losses += FACING * away / len(chosen) - HELP * near
+        losses += AWKWARD * awkward / len(chosen) - HELP * near
         if not others:
             return losses
         field, bodies = self._grid.empty(), self._grid.empty()
         for other, at in others.items():
             field[np.unique(self.robots[other].spaces[at])] += 1.0
             bodies[self.robots[other].bodies[at]] = 1.0
+        field[-1] = 0.0  # what lies outside is not shared
         share = field[own.spaces].mean(axis=1) / len(others)
         gaps = self._grid.distances(bodies)[own.bodies].min(axis=1)
         enough = min(self._scene.enough(name, other) for other in others)
@@ -148,7 +150,7 @@ class Coarse:
         return Candidates(
             seats,
             bases,
-            np.minimum(beyond, 1e3),
+            beyond,
             self._grid.cells(bases, _some(points, POINTS)),
             self._grid.cells(bases, _some(unique_points(corners, self._grid.size), CORNERS)),
         )

@@ -68,7 +68,7 @@ def _arms(who: object, robots: Arrangement) -> list[tuple[str, ...]]:
 
 
 def _stands_for(name: str, robots: Arrangement) -> tuple[str, ...]:
-    choices = [*robots, *robots.arms, *robots.short_names, ANY, ALL]
+    choices = list(dict.fromkeys([*robots, *robots.arms, *robots.short_names, ANY, ALL]))
     if name not in choices:
         raise UnknownNameError("robot that is to reach a target", name, choices)
     full = robots.arm_name(name)

@@ -32,6 +32,7 @@ from layouts.validation.slabs import slab_hull
 from robots import RobotDescriptor
 from robots.bodies.hulls import RobotModel, load_model
 
+HANDY = 0.65  # of its reach; how far from its targets a base stands best
 DRAWS = 20  # of joint noise, as many as `Layout.validate` takes
 
 
@@ -93,7 +94,7 @@ class Scene:
             )
             for name, part in alone.arms.items()
         }
-        self._work = {name: self._middle_of(name, demands) for name in robots}
+        self._work = {name: self._work_of(name, demands) for name in robots}
         random = np.random.default_rng(0)
         self._starts = {n: noisy_postures(p, DRAWS, random) for n, p in homes.items()}
         outlines = table_outlines(Layout(homes, ground.frames).frame_poses)
@@ -129,14 +130,16 @@ class Scene:
         """Return the distance of two robots (m) above which more is no better."""
         return min(self.robots[one].reach, self.robots[other].reach) / 3
 
-    def _middle_of(self, name: str, demands: Sequence[Demand]) -> Floats | None:
-        """Return the middle of what a robot may reach, of all if that is nothing."""
+    def _work_of(self, name: str, demands: Sequence[Demand]) -> Floats:
+        """Return the places that a robot may have to reach, of all if those are none, (n, 3)."""
         own = [d for d in demands if any(self.arms[arm].owner == name for arm in d.arms)]
         places = [demand.numbers[:3] for demand in own or demands]
-        return np.mean(places, axis=0) if places else None
+        return np.array(places, float).reshape(-1, 3)
 
-    def turned_away(self, name: str, bases: Floats, others: Sequence[Floats]) -> Floats:
-        """Return how far a robot looks away from its targets, or from the others if it has none.
+    def awkward(self, name: str, bases: Floats, others: Sequence[Floats]) -> Floats:
+        """Return how badly a robot stands for its work: its targets, or the others' bases.
+
+        It stands well where it faces the middle of them, and is `HANDY` of its reach from each.
 
         Args:
             name: The robot.
@@ -144,17 +147,20 @@ class Scene:
             others: Poses of the others' bases, (4, 4).
 
         Returns:
-            For each pose 0 where it looks there, to 1 where it looks away, (n,).
+            For each pose 0 where it stands well, and 1 where it looks away, (n,).
         """
-        middle = self._work[name]
-        if middle is None:
-            if not others:
-                return np.zeros(len(bases))
-            middle = np.mean([base[:3, 3] for base in others], axis=0)
-        ahead = np.array(rotated(inverted(self.robots[name].home.quaternion), (1.0, 0.0, 0.0)))
-        ways = middle - bases[:, :3, 3]
+        work, robot = self._work[name], self.robots[name]
+        towards = work if len(work) else np.array([base[:3, 3] for base in others]).reshape(-1, 3)
+        if not len(towards):
+            return np.zeros(len(bases))
+        ahead = np.array(rotated(inverted(robot.home.quaternion), (1.0, 0.0, 0.0)))
+        ways = towards.mean(axis=0) - bases[:, :3, 3]
         lengths = np.maximum(np.linalg.norm(ways, axis=1), 0.1)
-        return (1 - np.einsum("nij,j,ni->n", bases[:, :3, :3], ahead, ways) / lengths) / 2
+        away = 1 - np.einsum("nij,j,ni->n", bases[:, :3, :3], ahead, ways) / lengths
+        if not len(work):
+            return away / 2
+        far = np.linalg.norm(work - bases[:, None, :3, 3], axis=-1) / robot.reach
+        return away / 2 + np.abs(far - HANDY).mean(axis=1)
 
     def start(self, name: str) -> Floats:
         """Return the joint positions that a robot starts from, (dof,) (rad, m)."""
@@ -233,9 +239,9 @@ class Scene:
             self.ground.frames,
         )
 
-    def forget(self, kept: Sequence[tuple[str, Seat]]) -> None:
-        """Drop what is known of all seats but some."""
-        self._stood = {key: self._stood[key] for key in kept if key in self._stood}
+    def forget(self) -> None:
+        """Drop what is known of seats; it takes memory, and few of them are tried again."""
+        self._stood.clear()
         self._gaps.clear()
         self._shared.clear()
 

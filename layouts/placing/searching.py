@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,15 +18,16 @@ from layouts.placing.sites import Around, Rectangle, ground_of
 from layouts.placing.trials import Trial, Trials
 from layouts.progress import Progress
 from layouts.validation.arguments import Targets, named_targets
-from layouts.validation.findings import Finding, TargetReach, reach_text
+from layouts.validation.findings import length_text, reach_text
 from layouts.validation.report import Report
 from robots import LayoutError, RobotDescriptor
 from robots.common.bounds import checked_number, checked_whole
 
 BEGINNINGS = 12  # random ones of the coarse search, for each place to begin at
-STEPS = (0.2, 0.1, 0.05, 0.02)  # of a base, as shares of the largest reach
+MORE = 3  # times as many begin where none of the best will do
+STEPS = (0.15, 0.06, 0.02)  # of a base, as shares of the largest reach
 TURN = 4.0  # rad per m of the largest reach, of the same steps
-SWEEPS = 3  # over all robots at most, for one length of step
+SWEEPS = 2  # over all robots at most, for one length of step
 STRIDES = 4  # the same step again, while it makes things better
 
 
@@ -60,7 +62,26 @@ def search(
     _check_starts(loaded, keyframe)
     scene = Scene(loaded, keyframe, ground, demands)
     clock = _Clock(patience)
-    return _Search(scene, named, demands, clearance, clock).run(partial, seed, tries)
+    layout = _Search(scene, named, demands, clearance, clock).run(partial, seed, tries)
+    return layout if named or around is not None or within is not None else _centred(layout)
+
+
+def _centred(layout: Layout) -> Layout:
+    """Return the layout with the middle of its bases above the origin, to a mm."""
+    x, y, _ = np.mean([placement.base_position for placement in layout.values()], axis=0).tolist()
+    return Layout(
+        {
+            name: replace(
+                p,
+                position=(
+                    round(p.base_position[0] - x, 3) + 0.0,
+                    round(p.base_position[1] - y, 3) + 0.0,
+                    p.base_position[2],
+                ),
+            )
+            for name, p in layout.items()
+        }
+    )
 
 
 class _Clock:
@@ -107,18 +128,28 @@ class _Search:
         random = np.random.default_rng(seed)
         trials = Trials(self._scene, self._demands, self._clearance)
         self._clock.tell("trying places on a grid")
-        begun = coarse.best(BEGINNINGS * tries, tries, random)
-        bettered: list[Trial] = []
-        for number, seats in enumerate(begun, start=1):
-            what = f"{number} of {len(begun)} beginnings"
-            bettered.append(self._bettered(trials, trials.afresh(seats), random, what))
-        return self._chosen(sorted(bettered, key=lambda trial: trial.loss), partial)
+        begun = coarse.best(BEGINNINGS * tries, MORE * tries, random)
+        outcomes: list[_Outcome] = []
+        for first in range(0, len(begun), tries):  # more only where none of the best will do
+            bettered = [
+                self._bettered(trials, trials.afresh(seats), random, f"beginning {number}")
+                for number, seats in enumerate(begun[first : first + tries], start=first + 1)
+            ]
+            for trial in sorted(bettered, key=lambda trial: trial.loss):
+                outcomes.append(self._outcome(trial))
+                if not outcomes[-1].wrong and not outcomes[-1].unmet:
+                    return outcomes[-1].layout
+        best = min(outcomes, key=lambda outcome: (bool(outcome.wrong), len(outcome.unmet)))
+        if best.wrong or not partial:
+            raise LayoutError(best.reason)
+        return best.layout
 
     def _bettered(
         self, trials: Trials, trial: Trial, random: np.random.Generator, what: str
     ) -> Trial:
         """Step to better seats until no step of any length makes a robot's better."""
         reach = max(robot.reach for robot in self._scene.robots.values())
+        self._scene.forget()
         for length in STEPS:
             for _ in range(SWEEPS):
                 before = trial
@@ -144,47 +175,74 @@ class _Search:
                 trial = better
         return trial
 
-    def _chosen(self, ranked: Sequence[Trial], partial: bool) -> Layout:
-        """Return the best layout that a check finds sound, and in which every demand is met."""
-        best: tuple[int, Layout, Report] | None = None
-        for trial in ranked:
-            self._clock.tell("checking what was found")
-            layout = self._scene.layout(trial.seats)
-            report = layout.validate(targets=self._asked(), workspaces=False)
-            lacking = len(self._unmet(report)) + 1000 * len(_wrong(report))
-            if lacking == 0:
-                return layout
-            if best is None or lacking < best[0]:
-                best = lacking, layout, report
-        assert best is not None  # there is at least one beginning
-        _, layout, report = best
-        if _wrong(report):
-            raise LayoutError(
-                f"found no places that are clear: {_wrong(report)[0].what}; give the robots more"
-                " room, fewer targets, or another keyframe"
-            )
-        if partial:
-            return layout
-        raise LayoutError(
-            "found no places from which all targets are reached; from the best ones"
-            f" {_unmet_text(self._unmet(report))}; raise tries, ask for less, or take the best"
-            " with partial=True"
+    def _outcome(self, trial: Trial) -> _Outcome:
+        """Check a layout as a user would."""
+        self._clock.tell("checking what was found")
+        layout = self._scene.layout(trial.seats)
+        report = layout.validate(targets=self._asked(), workspaces=False)
+        return _Outcome(layout, self._in_the_way(report), self._unmet(report, trial))
+
+    def _in_the_way(self, report: Report) -> str:
+        """Say what is wrong with places, targets aside; nothing if that is nothing."""
+        for finding in report.findings:
+            if finding.serious and finding.kind != "target":
+                return finding.what
+        near = [clear for clear in report.clearances if not clear.table]
+        least = min(near, key=lambda clear: clear.noisy_distance, default=None)
+        if least is None or least.noisy_distance >= self._clearance:
+            return ""
+        return (
+            f"{' and '.join(least.between)} come within {length_text(least.noisy_distance)},"
+            f" less than the clearance of {length_text(self._clearance)}"
         )
 
     def _asked(self) -> dict[str, tuple[float, ...]]:
         names = {demand.target for demand in self._demands}
         return {name: numbers for name, numbers in self._targets.items() if name in names}
 
-    def _unmet(self, report: Report) -> list[tuple[Demand, TargetReach]]:
-        """Return the demands that are not met, each with the arm that comes nearest."""
-        unmet: list[tuple[Demand, TargetReach]] = []
-        for demand in self._demands:
+    def _unmet(self, report: Report, trial: Trial) -> list[str]:
+        """Say which demands are not met, each with what keeps the arm that comes nearest."""
+        unmet: list[str] = []
+        for demand, service in zip(self._demands, trial.services, strict=True):
             own = [
                 r for r in report.reaches if r.target == demand.target and r.robot in demand.arms
             ]
             if not any(reach.reached for reach in own):
-                unmet.append((demand, min(own, key=lambda r: (not r.blocked, r.missing))))
+                nearest = min(own, key=lambda reach: (not reach.blocked, reach.missing))
+                unmet.append(f"{demand.target}: {reach_text(nearest)}")
+            elif service.missing > 0:
+                clear = length_text(self._clearance)
+                unmet.append(f"{demand.target}: {service.arm} is less than {clear} clear there")
         return unmet
+
+
+@dataclass(frozen=True, eq=False)
+class _Outcome:
+    """A layout, and what it lacks.
+
+    Attributes:
+        layout: The layout.
+        wrong: What is in the way, in words; empty if nothing is.
+        unmet: Demands that are not met, in words.
+    """
+
+    layout: Layout
+    wrong: str
+    unmet: Sequence[str]
+
+    @property
+    def reason(self) -> str:
+        """Why it is not what was asked for."""
+        if self.wrong:
+            return (
+                f"found no places that are clear of each other; in the best ones {self.wrong}; give"
+                " the robots more room, lower clearance, or choose another keyframe"
+            )
+        return (
+            "found no places from which all targets are reached; from the best ones"
+            f" {'; '.join(self.unmet)}; raise tries, ask for less, or take the best with"
+            " partial=True"
+        )
 
 
 def _check_starts(robots: Mapping[str, RobotDescriptor], keyframe: str | None) -> None:
@@ -200,17 +258,9 @@ def _check_starts(robots: Mapping[str, RobotDescriptor], keyframe: str | None) -
             raise LayoutError(f"{finding.what}, wherever it stands; {finding.advice}")
 
 
-def _wrong(report: Report) -> list[Finding]:
-    return [f for f in report.findings if f.serious and f.kind != "target"]
-
-
 def _hopeless_text(hopeless: Sequence[Obstacle]) -> str:
     return (
         "no robot that may reach these gets there, wherever it stands:"
         f" {'; '.join(map(str, hopeless))}. Move them, change around, within or heights, or leave"
         " them out with partial=True"
     )
-
-
-def _unmet_text(unmet: Sequence[tuple[Demand, TargetReach]]) -> str:
-    return "; ".join(f"{demand.target}: {reach_text(reach)}" for demand, reach in unmet)

@@ -13,7 +13,7 @@ from kinematics.rotations import pose_matrix
 from layouts.frames import EDGES, Frame, Pose, resolve, table_outlines
 from layouts.placement import Placement, faced
 from robots import LayoutError, RobotDescriptor, UnknownNameError
-from robots.common.bounds import FAR, checked_numbers, shown
+from robots.common.bounds import FAR, checked_number, checked_numbers, shown
 from robots.descriptor import IDENTITY, Vector3
 
 Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)
@@ -140,6 +140,8 @@ def ground_of(
     if isinstance(around, Mapping):
         sites = tuple(_on_frames(around, bounds, targets, reach))
         return Ground(sites, dict(around), high)
+    if not hasattr(around, "__len__") or isinstance(around, str) or len(around) != 4:
+        raise _no_ground(around)
     x_min, y_min, x_max, y_max = rectangle("around", around)
     out = (x_min - EDGE, y_min - EDGE, x_max + EDGE, y_max + EDGE)
     low, top = (x_min - reach, y_min - reach), (x_max + reach, y_max + reach)
@@ -160,6 +162,13 @@ def rectangle(what: str, value: object) -> Rectangle:
     if x_min >= x_max or y_min >= y_max:
         raise LayoutError(f"{what} is {shown(value)}; it must be x_min, y_min, x_max, y_max (m)")
     return x_min, y_min, x_max, y_max
+
+
+def _no_ground(around: object) -> LayoutError:
+    return LayoutError(
+        f"around is {shown(around)}; it takes frames by name, as layouts.table(1.2, 0.8) makes"
+        " them, one Frame, or x_min, y_min, x_max, y_max (m)"
+    )
 
 
 def _on_the_ground(
@@ -191,10 +200,7 @@ def _on_frames(
 ) -> list[Site]:
     """Return the edges of tables, and the planes of all other frames."""
     if not frames or not all(isinstance(frame, Frame) for frame in frames.values()):
-        raise LayoutError(
-            f"around is {shown(frames)}; it takes frames by name, as layouts.table(1.2, 0.8) makes"
-            " them, one Frame, or x_min, y_min, x_max, y_max (m)"
-        )
+        raise _no_ground(frames)
     poses = resolve({name: (frame.on, frame.local_pose) for name, frame in frames.items()})
     tables = table_outlines(poses)
     edges = {f"{table}.{edge}" for table in tables for edge in EDGES}
@@ -240,6 +246,6 @@ def _heights(
         if name not in robots:
             raise UnknownNameError("robot to stand at a height", name, robots)
     return {
-        name: checked_numbers("heights", (given.get(name, 0.0),), 1, FAR, LayoutError)[0]
+        name: checked_number("heights", given.get(name, 0.0), -FAR, FAR, LayoutError, "m")
         for name in robots
     }

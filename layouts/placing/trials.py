@@ -14,13 +14,14 @@ from layouts.placing.scene import Scene
 from layouts.placing.sites import Seat
 
 UNREACHED = 100.0  # loss per m that is missing to a target
+FARTHEST = 0.3  # m; being farther from a target is no worse
 BLOCKED = 0.05  # m; a target that only a collision keeps from being reached counts as this far
 CRAMPED = 20.0  # loss where a clearance that is asked for is missing altogether
 ROOM = 1.0  # what full clearance is worth, beside all workspace that can be shared
-FACING = 0.3  # loss where all robots look away from their work
+AWKWARD = 0.3  # loss where all robots look away from their work
 HELP = 0.5  # what it is worth that all robots that may reach a target are near enough
 HOPELESS = 0.15  # m; what is so far from every sampled posture is not tried
-FEW_STARTS, FEW_STEPS = 8, 30  # of inverse kinematics, where a robot is only moved a little
+FEW_STARTS, FEW_STEPS = 8, 15  # of inverse kinematics, where a robot is only moved a little
 ALL_STEPS = 80
 
 Seats = Mapping[str, Seat]
@@ -111,7 +112,7 @@ class Trials:
         share = self.shared(seats) / scene.most_shared if scene.most_shared else 0.0
         wrong = UNREACHED * missing + CRAMPED * (sunk + cramped)
         worth = share + ROOM * room + HELP * self._help(seats)
-        return wrong + FACING * self._turned_away(seats) - worth
+        return wrong + AWKWARD * self._awkward(seats) - worth
 
     def _help(self, seats: Seats) -> float:
         """Return the share of all arms that may reach targets which are near enough to them."""
@@ -128,16 +129,14 @@ class Trials:
             self._nears[key] = sum(float(arm.beyond(base, n)[0]) == 0 for n in own)
         return self._nears[key]
 
-    def _turned_away(self, seats: Seats) -> float:
-        """Return how far robots look away from their work; 0 where they face it, 1 at most."""
+    def _awkward(self, seats: Seats) -> float:
+        """Return how badly robots stand for their work, on the average."""
         scene = self._scene
         bases = {name: scene.stood(name, seat).base for name, seat in seats.items()}
         return float(
             np.mean(
                 [
-                    scene.turned_away(name, base[None], [b for n, b in bases.items() if n != name])[
-                        0
-                    ]
+                    scene.awkward(name, base[None], [b for n, b in bases.items() if n != name])[0]
                     for name, base in bases.items()
                 ]
             )
@@ -242,7 +241,7 @@ class Trials:
 
     def _by(self, arm: Arm, demand: Demand, seats: Seats, far: float, *, quick: bool) -> Service:
         if far > HOPELESS:
-            return Service(arm.name, self._scene.start(arm.owner), far, {})
+            return Service(arm.name, self._scene.start(arm.owner), min(far, FARTHEST), {})
         base = self._scene.stood(arm.owner, seats[arm.owner]).base
         starts = arm.starts[:FEW_STARTS] if quick else arm.starts
         steps = FEW_STEPS if quick else ALL_STEPS
@@ -251,7 +250,9 @@ class Trials:
         if not found.solved[ranked[0]]:
             missing = found.missing + RADIAN * found.turn_missing
             nearest = int(np.argmin(missing))
-            return Service(arm.name, found.qpos[nearest], float(missing[nearest]), {})
+            return Service(
+                arm.name, found.qpos[nearest], min(float(missing[nearest]), FARTHEST), {}
+            )
         for row in ranked:
             if service := self._checked(arm.name, seats, found.qpos[row]):
                 return service

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from layouts.arrangement import Arrangement
 from layouts.frames import table_outlines
 from layouts.validation.findings import Point
 from robots import LayoutError
+from robots.common.bounds import shown
 
 Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)
 Targets = Mapping[str, Sequence[float]] | Sequence[Sequence[float]]
@@ -34,8 +35,13 @@ def named_targets(targets: Targets) -> dict[str, tuple[float, ...]]:
     """Return targets by name; those in a list are called by their number.
 
     Raises:
-        LayoutError: If one is no place.
+        LayoutError: If one is no place, or they come neither by name nor in order.
     """
+    if isinstance(targets, str) or not isinstance(targets, Iterable):
+        raise LayoutError(
+            f"targets is {shown(targets)}; it takes places by name or in order:"
+            " {'cube': (0.4, 0.0, 0.1)}, in m"
+        )
     named = (
         dict(targets)
         if isinstance(targets, Mapping)

@@ -1,6 +1,6 @@
-"""``python -m measurements.site.pictures``: draws the documentation's moving picture anew.
+"""``python -m measurements.site.pictures``: draws the documentation's pictures anew.
 
-It is committed, so that nobody needs a Vulkan driver to see it.
+They are committed, so that nobody needs a Vulkan driver to see them.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from PIL import Image
 
 import tasks
 from experts import find_expert
+from layouts import search, table
 from robots import RecordingError
 from robots.common.commands import exit_code, program, start
 from robots.common.writing import written_whole
@@ -24,6 +25,7 @@ from tasks.episode import play
 FOLDER = Path("docs/images")
 WIDTH, HEIGHT = 640, 340  # of rendered pictures (pixels)
 FRAME, LAST = 60, 1500  # how long a frame stays, and the last one (ms)
+COLOURS = 64  # of a drawing
 VIEW = Camera((1.2, 0.0, 1.05), (-0.05, 0.0, 0.2), "view", WIDTH, HEIGHT, 0.82)  # m, rad
 
 
@@ -50,6 +52,19 @@ def _draw(names: Sequence[str], folder: Path) -> None:
 def hand_over(path: Path) -> None:
     """Film two arms that hand a cube over."""
     film("TwoRobotPickCube-v1", 3, path)
+
+
+def placement_search(path: Path) -> None:
+    """Draw the layout that the page about placement search looks for."""
+    targets = {"feeder": (-0.35, 0.1, 0.15), "fixture": (0.0, 0.0, 0.2), "tray": (0.35, 0.1, 0.1)}
+    cell = search(
+        {"left": "panda", "right": "ur5_gripper"},
+        targets,
+        around=table(1.4, 0.9),
+        reached_by={"feeder": "left", "fixture": "all", "tray": "right"},
+    )
+    picture = Image.open(cell.validate(targets=targets).picture(path))
+    picture.resize((picture.width // 2, picture.height // 2)).quantize(COLOURS).save(path)
 
 
 def film(task_id: str, seed: int, path: Path) -> None:
@@ -88,7 +103,10 @@ def _save(frames: Sequence[Image.Image], path: Path, duration: int) -> None:
         )
 
 
-PICTURES: dict[str, Callable[[Path], None]] = {"hand_over.webp": hand_over}
+PICTURES: dict[str, Callable[[Path], None]] = {
+    "hand_over.webp": hand_over,
+    "placement_search.png": placement_search,
+}
 
 
 if __name__ == "__main__":
