@@ -227,7 +227,8 @@ def _clearance(cell: Cell, curve: _Curve) -> Nearest | None:
     """Return the nearest approach of different bodies: at the knots, then around the least."""
     solids, whole = cell.solids, cell.checker()
     apart = [solids[a].owner != solids[b].owner for a, b in whole.pairs.tolist()]
-    checker = Checker(cell, whole.pairs[np.array(apart, bool)], 0.0)
+    kept = whole.pairs[np.array(apart, bool)]
+    checker = Checker(cell, kept, np.zeros(len(kept)))
     if not len(checker.pairs):
         return None
     moments = curve.times

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kinematics.rotations import Floats
 from motion.cell import Cell
-from motion.collisions import Checker, Contact
+from motion.collisions import Checker, Flags
 from robots.common.errors import NoPlanError
 
 
@@ -20,33 +19,27 @@ class Keeping:
     where a motion begins or ends.
     """
 
-    def __init__(self, cell: Cell, robots: Sequence[str], clearance: float) -> None:
+    def __init__(
+        self, cell: Cell, robots: Sequence[str], clearance: float, timed: Collection[str] = ()
+    ) -> None:
         """Gather the pairs.
 
         Args:
             cell: The cell.
             robots: Those that move.
             clearance: How far they keep from everything else (m).
+            timed: Robots that move as they were told; obstacles that do are known.
         """
-        self.cell, self.clearance = cell, clearance
-        self._whole = cell.checker(robots, 0.0)
-        self._pairs = self._whole.pairs
-        owners = np.array([solid.owner for solid in cell.solids])[self._pairs]
-        self._movers = np.array([solid.mover for solid in cell.solids])[self._pairs]
-        self._close = (owners[:, 0] == owners[:, 1]) | (clearance <= 0.0)
-
-    def free(self, states: Floats) -> NDArray[np.bool_]:
-        """Tell in which states nothing overlaps, (n,)."""
-        return self._whole.free(states)
-
-    def contact(self, state: Floats) -> Contact | None:
-        """Return what overlaps most, or None."""
-        return self._whole.contact(state)
-
-    def without(self, ignored: Collection[str]) -> Checker:
-        """Return what tells whether anything overlaps but some robots, which do not count."""
-        kept = ~np.isin(self._movers, list(ignored)).any(axis=1)
-        return Checker(self.cell, self._pairs[kept], 0.0)
+        self.cell = cell
+        self._pairs = cell.checker(robots, 0.0).pairs
+        solids = cell.solids
+        self._movers = np.array([solid.mover for solid in solids])[self._pairs]
+        own = (self._movers[:, 0] == self._movers[:, 1]) & (self._movers[:, 0] != "")
+        self._apart = np.where(own, 0.0, clearance)
+        moved = [s.mover in timed or cell.parts[s.part].track is not None for s in solids]
+        self._overlaps: dict[tuple[str, ...], Checker] = {}
+        one, other = np.array(moved, bool)[self._pairs].T
+        self._timed = one | other
 
     def expect_free_start(self, start: Floats) -> None:
         """Refuse to begin with an overlap.
@@ -54,46 +47,43 @@ class Keeping:
         Raises:
             NoPlanError: If something overlaps.
         """
-        contact = self.contact(start)
+        contact = self.overlaps().contact(start)
         if contact is not None:
             raise NoPlanError(f"at the start {contact}", "start in collision")
 
-    def relax(self, state: Floats) -> None:
+    def relax(self, state: Floats, time: float = 0.0) -> None:
         """Let the pairs of bodies that are nearer than the clearance in a state be that near."""
-        far = np.flatnonzero(~self._close)
-        if not len(far) or self._checker(far, self.clearance).free(state[None])[0]:
-            return
-        for pair in far.tolist():
-            near = not self._checker(np.array([pair]), self.clearance).free(state[None])[0]
-            self._close[pair] = near
+        self._apart[Checker(self.cell, self._pairs, self._apart).close(state, time)] = 0.0
 
-    def checkers(
-        self, moving: Collection[str] | None = None, ignored: Collection[str] = ()
-    ) -> list[Checker]:
-        """Return what must agree that a state is free.
+    def overlaps(self, ignored: Collection[str] = ()) -> Checker:
+        """Return what tells whether anything overlaps but some robots, which do not count."""
+        key = tuple(ignored)
+        if key not in self._overlaps:
+            kept = ~self._moved_by(ignored)
+            self._overlaps[key] = Checker(self.cell, self._pairs[kept], 0.0)
+        return self._overlaps[key]
+
+    def checker(
+        self, moving: Collection[str], ignored: Collection[str] = (), *, timed: bool = True
+    ) -> Checker:
+        """Return what tells whether a state is free.
 
         Args:
-            moving: Robots one of which must take part; None is all that move.
+            moving: Robots one of which must take part.
             ignored: Robots that do not count.
+            timed: Whether what moves as it was told counts.
         """
-        chosen = ~np.isin(self._movers, list(ignored)).any(axis=1)
-        if moving is not None:
-            chosen &= np.isin(self._movers, list(moving)).any(axis=1)
-        return self._chosen(chosen)
+        chosen = self._moved_by(moving) & ~self._moved_by(ignored)
+        return self._checker(chosen if timed else chosen & ~self._timed)
 
-    def checkers_between(self, some: Collection[str], others: Collection[str]) -> list[Checker]:
-        """Return what must agree that two groups of robots keep clear of each other."""
-        one, other = np.isin(self._movers, list(some)), np.isin(self._movers, list(others))
-        chosen = np.asarray(one & other[:, ::-1]).any(axis=1)
-        return self._chosen(chosen)
+    def between(self, some: Collection[str], others: Collection[str]) -> Checker:
+        """Return what tells whether two groups of robots keep clear of each other."""
+        return self._checker(self._moved_by(some) & self._moved_by(others))
 
-    def _chosen(self, chosen: NDArray[np.bool_]) -> list[Checker]:
-        parts = (chosen & self._close, 0.0), (chosen & ~self._close, self.clearance)
-        return [
-            self._checker(np.flatnonzero(pairs), clearance)
-            for pairs, clearance in parts
-            if pairs.any()
-        ]
+    def _moved_by(self, robots: Collection[str]) -> Flags:
+        """Tell which pairs some robots take part in."""
+        moved = np.isin(self._movers, list(robots))
+        return moved[:, 0] | moved[:, 1]
 
-    def _checker(self, pairs: NDArray[np.intp], clearance: float) -> Checker:
-        return Checker(self.cell, self._pairs[pairs], clearance)
+    def _checker(self, chosen: Flags) -> Checker:
+        return Checker(self.cell, self._pairs[chosen], self._apart[chosen])

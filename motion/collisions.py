@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,14 +13,16 @@ from kinematics.rotations import Floats
 from layouts.validation.collisions import FAR
 from layouts.validation.findings import length_text
 from motion.bodies import Bodies
+from motion.edges import Edges
 from motion.exact import Measure
-from motion.sieve import Sieve
-from motion.travel import Travel, in_halves
+from motion.sieve import Candidates, Sieve
+from motion.travel import Travel
 from robots import LayoutError
 
 Flags = NDArray[np.bool_]
 
-MOST_STATES = 256  # that are looked at together
+MOST_STATES = 64  # that are looked at together; what more need no longer fits into the caches
+RESOLUTION = (0.01, 0.05)  # of edges: how far points travel (m) and links turn (rad) in a step
 
 
 @dataclass(frozen=True)
@@ -59,12 +62,26 @@ class Checker:
         apart: How far each pair has to be apart, (m,) (m); 0 lets them touch.
     """
 
-    def __init__(self, cell: Bodies, pairs: NDArray[np.intp], apart: Floats) -> None:
-        """Prepare the pairs that count."""
-        self.cell, self.pairs, self.apart = cell, pairs, apart
+    def __init__(self, cell: Bodies, pairs: NDArray[np.intp], apart: Floats | float) -> None:
+        """Prepare the pairs that count.
+
+        Args:
+            cell: The cell.
+            pairs: Pairs of its solids, (m, 2).
+            apart: How far each has to be apart, (m,), or all of them (m).
+        """
+        self.cell, self.pairs = cell, pairs
+        self.apart = apart = np.broadcast_to(np.asarray(apart, float), (len(pairs),))
         self._sieve = Sieve(cell, pairs, apart)
         self._measure = Measure(cell, pairs, apart, self._sieve.chains)
-        self._travel = Travel(cell)
+
+    @cached_property
+    def _edges(self) -> Edges:
+        return Edges(self._sieve, self._measure, self._travel)
+
+    @cached_property
+    def _travel(self) -> Travel:
+        return Travel(self.cell)
 
     def free(self, qpos: ArrayLike, times: ArrayLike | None = None) -> Flags:
         """Tell for each state whether everything that counts is as far apart as it has to be, (n,).
@@ -105,14 +122,27 @@ class Checker:
         Raises:
             LayoutError: If a shape is wrong, or a number not finite.
         """
-        places = self._places(*self._one(qpos, time))
-        candidates = self._sieve.candidates(places)
-        found: list[tuple[float, Contact]] = []
-        for i, (a, b) in enumerate(candidates.pairs.tolist()):
-            if self._measure.too_near(places, candidates.only(np.array([i])))[0]:
-                contact = self._contact(places, a, b)
-                found.append((contact.distance - self._measure.apart(a, b), contact))
-        return [contact for _, contact in sorted(found, key=lambda entry: entry[0])]
+        places, pairs = self._close(qpos, time)
+        contacts = [self._contact(places, a, b) for a, b in pairs]
+        missing = [
+            contact.distance - self._measure.apart(*pair)
+            for contact, pair in zip(contacts, pairs, strict=True)
+        ]
+        return [contacts[i] for i in np.argsort(missing, kind="stable")]
+
+    def close(self, qpos: ArrayLike, time: float | None = None) -> Flags:
+        """Tell which of `pairs` are not as far apart as they have to be, (m,).
+
+        Args:
+            qpos: Coordinates, (D,) (rad, m).
+            time: Where obstacles that move are (s); None is 0.
+
+        Raises:
+            LayoutError: If a shape is wrong, or a number not finite.
+        """
+        _, pairs = self._close(qpos, time)
+        close = {frozenset(pair) for pair in pairs}
+        return np.array([frozenset(pair) in close for pair in self.pairs.tolist()], bool)
 
     def nearest(self, qpos: ArrayLike, time: float | None = None) -> Contact | None:
         """Return which two bodies that count are nearest or overlap most; None beyond `FAR`.
@@ -148,7 +178,7 @@ class Checker:
         self,
         start: ArrayLike,
         end: ArrayLike,
-        resolution: tuple[float, float] = (0.01, 0.05),
+        resolution: tuple[float, float] = RESOLUTION,
         times: tuple[float, float] | None = None,
     ) -> bool:
         """Tell whether all states on the straight way between two states are free, ends included.
@@ -164,18 +194,46 @@ class Checker:
             LayoutError: If a shape is wrong, or a number not finite.
         """
         (a, b), _ = self._states(np.stack([np.asarray(start, float), np.asarray(end, float)]), None)
-        steps = self._travel.steps(a, b, resolution, times)
-        for shares in in_halves(steps):
-            moments = None if times is None else times[0] + shares * (times[1] - times[0])
-            if not self._free(a + shares[:, None] * (b - a), moments).all():
-                return False
-        return True
+        return self._edges.free(a, b, self.steps(a, b, resolution, times), times)
+
+    def steps(
+        self,
+        start: Floats,
+        end: Floats,
+        resolution: tuple[float, float] = RESOLUTION,
+        times: tuple[float, float] | None = None,
+    ) -> int:
+        """Return into how many steps `edge_free` cuts a way; see there."""
+        return self._travel.steps(start, end, resolution, times)
+
+    def candidates(self, qpos: ArrayLike, times: ArrayLike | None = None) -> Candidates:
+        """Return the pairs of solids that bounds alone do not show to be far enough apart.
+
+        Args:
+            qpos: Coordinates, (n, D) (rad, m).
+            times: Where obstacles that move are, (n,) (s); None is 0.
+
+        Raises:
+            LayoutError: If a shape is wrong, or a number not finite.
+        """
+        return self._sieve.candidates(self._places(*self._states(qpos, times)))
 
     # -- one batch ---------------------------------------------------------------------------
 
     def _free(self, states: Floats, moments: Floats | None) -> Flags:
         places = self._places(states, moments)
-        return ~self._measure.too_near(places, self._sieve.candidates(places))
+        candidates = self._sieve.candidates(places)
+        free = np.ones(len(states), bool)
+        near = self._measure.too_near(places, candidates, every=False)
+        free[candidates.states[near]] = False
+        return free
+
+    def _close(self, qpos: ArrayLike, time: float | None) -> tuple[Floats, list[tuple[int, int]]]:
+        """Return where the parts are, and the pairs of solids that are too near there."""
+        places = self._places(*self._one(qpos, time))
+        candidates = self._sieve.candidates(places)
+        near = self._measure.too_near(places, candidates, every=True)
+        return places, [(a, b) for a, b in candidates.pairs[near].tolist()]
 
     def _distances(self, places: Floats) -> tuple[Floats, list[tuple[int, int] | None]]:
         """Return the least distance in each state, and between which solids."""

@@ -14,9 +14,15 @@ from motion.chains import Chains
 from motion.sieve import Candidates, Indices, seen_from
 from robots.bodies.depth import overlap
 
+TOUCHING = 1e-5  # m; nearer bodies are asked whether they overlap, as everywhere else
+
 
 class Measure:
-    """FCL's bodies of a cell, two of each solid: one that stays, and one that is put beside it."""
+    """FCL's bodies of a cell, two of each solid: one that stays, and one that is put beside it.
+
+    Attributes:
+        rows: The row of each solid's part, (solids,).
+    """
 
     def __init__(self, bodies: Bodies, pairs: Indices, apart: Floats, chains: Chains) -> None:
         """Prepare some pairs.
@@ -28,39 +34,77 @@ class Measure:
             chains: Where the parts are.
         """
         self._solids = bodies.solids
-        self._rows = np.array([chains.rows.get(s.part, 0) for s in self._solids], np.intp)
+        self.rows = np.array([chains.rows.get(s.part, 0) for s in self._solids], np.intp)
         self._offsets = np.array([s.offset for s in self._solids]).reshape(-1, 4, 4)
         self._apart = dict(zip(map(tuple, pairs.tolist()), apart.tolist(), strict=True))
+        self._apart |= {(b, a): distance for (a, b), distance in self._apart.items()}
 
     def apart(self, a: int, b: int) -> float:
         """Return how far two solids have to be apart (m)."""
-        return self._apart[(a, b) if (a, b) in self._apart else (b, a)]
+        return self._apart[a, b]
 
-    def too_near(self, places: Floats, candidates: Candidates) -> NDArray[np.bool_]:
-        """Tell for each state whether any of the candidates are too near to each other, (n,).
+    def distances_of(self, pairs: Indices) -> Floats:
+        """Return how far pairs of solids have to be apart, (k,) (m)."""
+        return np.array([self._apart[a, b] for a, b in pairs.tolist()], float)
+
+    def too_near(self, places: Floats, candidates: Candidates, *, every: bool) -> NDArray[np.bool_]:
+        """Tell which candidates are too near to each other, (k,).
 
         Args:
             places: Poses of the parts, (rows, n, 4, 4).
             candidates: Pairs of solids.
+            every: Whether to look at all of them, and not only at the first that are too near in
+                each state.
         """
         import fcl
 
-        hits = [False] * places.shape[1]
+        near, done = [False] * len(candidates.states), [False] * places.shape[1]
         asked, wanted = fcl.CollisionRequest(), fcl.DistanceRequest()
         turns, shifts = self._beside(places, candidates)
         rows = zip(candidates.states.tolist(), candidates.pairs.tolist(), strict=True)
         for i, (state, (a, b)) in enumerate(rows):
-            if hits[state]:
+            if done[state]:
                 continue
             one, other = self._stay[a], self._moved[b]
             other.setRotation(turns[i])
             other.setTranslation(shifts[i])
-            apart = self.apart(a, b)
+            apart = self._apart[a, b]
             if apart == 0.0:
-                hits[state] = fcl.collide(one, other, asked, fcl.CollisionResult()) > 0
+                near[i] = fcl.collide(one, other, asked, fcl.CollisionResult()) > 0
             else:
-                hits[state] = fcl.distance(one, other, wanted, fcl.DistanceResult()) < apart
-        return np.array(hits, bool)
+                near[i] = fcl.distance(one, other, wanted, fcl.DistanceResult()) < apart
+            done[state] = near[i] and not every
+        return np.array(near, bool)
+
+    def gaps(
+        self, places: Floats, candidates: Candidates, wanted: NDArray[np.bool_]
+    ) -> Floats | None:
+        """Return how far some candidates are apart, (k,) (m); 0 for those that are not asked for.
+
+        None if one of them is too near.
+
+        Args:
+            places: Poses of the parts, (rows, n, 4, 4).
+            candidates: Pairs of solids.
+            wanted: Which are asked for, (k,).
+        """
+        import fcl
+
+        gaps, request = np.zeros(len(wanted)), fcl.DistanceRequest()
+        asked = fcl.CollisionRequest()
+        turns, shifts = self._beside(places, candidates)
+        pairs = candidates.pairs.tolist()
+        for i in np.flatnonzero(wanted).tolist():
+            a, b = pairs[i]
+            one, other = self._stay[a], self._moved[b]
+            other.setRotation(turns[i])
+            other.setTranslation(shifts[i])
+            gaps[i] = fcl.distance(one, other, request, fcl.DistanceResult())
+            if gaps[i] < self._apart[a, b]:
+                return None
+            if gaps[i] < TOUCHING and fcl.collide(one, other, asked, fcl.CollisionResult()):
+                return None
+        return gaps
 
     def update(
         self,
@@ -104,7 +148,7 @@ class Measure:
         """
         import fcl
 
-        poses = [places[self._rows[i]] @ self._offsets[i] for i in (a, b)]
+        poses = [places[self.rows[i]] @ self._offsets[i] for i in (a, b)]
         one, other = (
             fcl.CollisionObject(self._solids[i].hull.geometry, fcl.Transform(p[:3, :3], p[:3, 3]))
             for i, p in zip((a, b), poses, strict=True)
@@ -123,8 +167,8 @@ class Measure:
     def _beside(self, places: Floats, candidates: Candidates) -> tuple[Floats, Floats]:
         """Return where the second of each pair is, seen from the first: (k, 3, 3) and (k, 3)."""
         (a, b), states = candidates.pairs.T, candidates.states
-        one = places[self._rows[a], states] @ self._offsets[a]
-        other = places[self._rows[b], states] @ self._offsets[b]
+        one = places[self.rows[a], states] @ self._offsets[a]
+        other = places[self.rows[b], states] @ self._offsets[b]
         relative = seen_from(one, other)
         return relative[:, :, :3].copy(), relative[:, :, 3].copy()
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from motion.cell import Cell
 
 STARTS = 24  # places that inverse kinematics starts from, besides the posture now and keyframes
+STARTS_IN_REGION = 6  # the same for each point of a region
 POINTS = 12  # of a region that are tried
 CANDIDATES = 8  # postures per place that a search may choose from
 ALIKE = 0.05  # rad, m: postures nearer than that are one
@@ -206,7 +207,9 @@ def _postures(
     cell: Cell, place: str, goal: TcpGoal | RegionGoal, start: Floats, columns: NDArray[np.intp]
 ) -> Floats:
     """Return what brings a TCP to its goal, the shortest joint way first, (n, d)."""
-    solver = _Solver(cell.layout, place, cell.models[cell.layout.owner(place)], start, columns)
+    count = STARTS_IN_REGION if isinstance(goal, RegionGoal) else STARTS
+    model = cell.models[cell.layout.owner(place)]
+    solver = _Solver(cell.layout, place, model, start, columns, count)
     found: list[Floats] = []
     nearest = np.inf, np.inf
     for position, quaternion in goal.poses():
@@ -216,8 +219,6 @@ def _postures(
             nearest, (float(solutions.missing[best]), float(solutions.turn_missing[best]))
         )
         found += list(solutions.qpos[solutions.solved][:, columns])
-        if len(found) >= 4 * STARTS:
-            break
     if not found:
         missing, turn = nearest
         turned = "" if turn < 1e-2 else f" and {np.degrees(turn):.0f}° from its orientation"
@@ -242,6 +243,7 @@ class _Solver:
         model: RobotModel,
         start: Floats,
         columns: NDArray[np.intp],
+        count: int,
     ) -> None:
         placement = layout[layout.owner(place)]
         self._tree, self._columns = model.kinematics, columns
@@ -249,9 +251,9 @@ class _Solver:
         self._tcp = find_tcp(layout.arm(place).robot, model.kinematics)
         keyframes = np.array(list(placement.robot.keyframes.values()))
         limits = model.kinematics.limits[columns]
-        starts = np.tile(start, (1 + len(keyframes) + STARTS, 1))
+        starts = np.tile(start, (1 + len(keyframes) + count, 1))
         starts[1 : 1 + len(keyframes), columns] = keyframes[:, columns]
-        starts[1 + len(keyframes) :, columns] = inverse.scattered(limits, STARTS)
+        starts[1 + len(keyframes) :, columns] = inverse.scattered(limits, count)
         starts[:, columns] = np.clip(starts[:, columns], limits[:, 0], limits[:, 1])
         self._starts = starts
 
@@ -285,7 +287,7 @@ def _different(postures: Floats) -> Floats:
     for posture in postures:
         if all(np.abs(posture - other).max() > ALIKE for other in kept):
             kept.append(posture)
-    return np.array(list(islice(kept, 4 * CANDIDATES)))
+    return np.array(list(islice(kept, 8 * CANDIDATES)))
 
 
 def _position(what: str, values: Sequence[float]) -> tuple[float, ...]:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import lru_cache, partial
-from itertools import product
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,24 +14,16 @@ from layouts import Layout
 from layouts.validation.arguments import Rectangle
 from motion.cell import Cell
 from motion.clearances import Keeping
-from motion.goals import CANDIDATES, Goal, Target, read_targets
+from motion.goals import Goal, Target, read_targets
 from motion.motion import Motion
 from motion.obstacles import Held, Obstacle
-from motion.paths import Path
-from motion.priorities import coordinated
-from motion.search import connect
-from motion.shorten import rounded, shortened
-from motion.spaces import Progress, Resolution, Space
-from motion.timing import Accelerations, largest_accelerations, largest_velocities, timed
+from motion.pace import carried_out
+from motion.query import Query
+from motion.spaces import Progress
+from motion.timing import Accelerations, largest_accelerations, largest_velocities
+from motion.traffic import Course, Traffic, columns_of
 from robots.common.bounds import checked_number, checked_whole
-from robots.common.errors import MotionError, NoPlanError
-
-COMBINATIONS = 512  # of postures of all places that are tried as goals
-FEW = 4  # robots that plan together at first
-RESTARTS = 4  # searches of all robots together
-ENDS = 4  # of them that a search may choose from
-FINEST = 2e-3  # m; how near places are that are looked at, where no clearance is asked
-RADIANS_PER_METRE = 5.0  # how far links may turn between two of them, beside how far they travel
+from robots.common.errors import MotionError
 
 
 def plan(
@@ -44,9 +34,11 @@ def plan(
     obstacles: Iterable[Obstacle] = (),
     held: Iterable[Held] = (),
     table: Rectangle | None = None,
+    others: Mapping[str, Motion] | None = None,
     clearance: float = 0.01,
     seed: int = 0,
     patience: float = 30.0,
+    synchronised: bool = True,
     control_mode: str | Mapping[str, str] | None = None,
     velocity: float = 1.0,
     acceleration: Accelerations | None = None,
@@ -66,12 +58,17 @@ def plan(
         held: What arms hold, and carry along.
         table: Outline of a table whose top is at z = 0, as x_min, y_min, x_max, y_max (m), besides
             those of the layout.
+        others: Motions of some robots by name, which move as they are told there; the plan waits
+            for them, or finds a way round.
         clearance: How far robots stay from each other and from everything else (m). Bodies that
             are nearer at the start or at the goal only have to stay apart, and so do links of one
             robot.
         seed: Of everything random.
         patience: How long planning may take (s). It never changes a motion, only whether there is
             one.
+        synchronised: Whether all robots set out and arrive together, at the pace of the slowest.
+            If not, each goes at its own pace, and some set out later where that keeps them apart;
+            where that does not, either, they go together.
         control_mode: In which the motion will be executed; None for that of the layout. See
             `motion.timing.largest_velocities`.
         velocity: Share of the largest velocities to use, over 0, at most 1.
@@ -96,23 +93,26 @@ def plan(
     here = _start(cell, start)
     velocities = largest_velocities(layout, control_mode, velocity)
     accelerations = largest_accelerations(layout, velocities, acceleration)
-    query = _Query(
+    traffic = _traffic(cell, here, others or {})
+    targets = read_targets(cell, goals or {}, here)
+    query = Query(
         cell,
         here,
-        read_targets(cell, goals or {}, here),
-        np.concatenate([velocities[name] for name in cell.robots]),
+        targets,
+        traffic,
+        Keeping(cell, _robots(targets, others or {}), clearance, others or {}),
+        _all(cell, velocities),
         clearance,
         seed,
         Progress(patience),
     )
-    space, path = query.path()
-    limits = np.concatenate([accelerations[name] for name in cell.robots])
-    times, positions, speeds = timed(path, limits[space.free])
+    result = carried_out(query, _all(cell, accelerations), synchronised=synchronised)
+    times = result.knots()
     return Motion(
         layout=layout,
         times=times,
-        positions=_by_robot(cell, space.whole(positions)),
-        velocities=_by_robot(cell, _spread(space, speeds)),
+        positions=_by_robot(cell, result.positions(times)),
+        velocities=_by_robot(cell, result.velocities(times)),
         obstacles=cell.obstacles,
         held=cell.held,
         table=table,
@@ -122,107 +122,39 @@ def plan(
     )
 
 
-@dataclass(eq=False)
-class _Query:
-    """One question, with everything that it takes to answer it."""
+def _robots(targets: Sequence[Target], others: Mapping[str, Motion]) -> tuple[str, ...]:
+    """Return the robots that a plan moves.
 
-    cell: Cell
-    start: Floats
-    targets: tuple[Target, ...]
-    speeds: Floats
-    clearance: float
-    seed: int
-    progress: Progress
+    Raises:
+        MotionError: If one of them moves as it was told.
+    """
+    robots = tuple(dict.fromkeys(target.robot for target in targets))
+    for name in robots:
+        if name in others:
+            raise MotionError(f"{name} has a goal and a motion among others; it takes one of them")
+    return robots
 
-    def path(self) -> tuple[Space, Path]:
-        """Return the space of all moving coordinates, and the way through it."""
-        robots = tuple(dict.fromkeys(target.robot for target in self.targets))
-        keeping = Keeping(self.cell, robots, self.clearance)
-        keeping.expect_free_start(self.start)
-        keeping.relax(self.start)
-        ends = self._ends(keeping)
-        keeping.relax(ends[0])
-        moving = np.sort(np.concatenate([target.moving for target in self.targets]))
-        space = Space(
-            self.cell,
-            robots,
-            moving,
-            self.start,
-            _bounds(self.cell.limits[moving], self.start[moving], ends[:, moving]),
-            self.speeds[moving],
-            keeping.checkers(),
-            self.progress,
+
+def _traffic(cell: Cell, start: Floats, others: Mapping[str, Motion]) -> Traffic:
+    """Return what moves as it was told.
+
+    Raises:
+        MotionError: If a motion is of another robot.
+    """
+    traffic = Traffic(cell, start)
+    for name, motion in others.items():
+        robot = cell.layout[name].robot
+        if name not in motion.positions or motion.layout[name].robot != robot:
+            raise MotionError(f"others[{name!r}] is {motion!r}; it has no {name} that is {robot!r}")
+        course = Course(
+            columns_of(cell, [name]),
+            motion.times,
+            motion.positions[name],
+            motion.velocities[name],
         )
-        goals = [end[moving] for end in ends if space.are_free(end[None, moving])[0]]
-        resolution = self._fine()
-        points = self._points(space, keeping, goals, resolution)
-        if points is None:
-            raise self._not_found()
-        space.purpose = "shortening"
-        points = shortened(space, points, self.seed, resolution)
-        return space, rounded(space, points, resolution)
-
-    def _points(
-        self, space: Space, keeping: Keeping, goals: Sequence[Floats], resolution: Resolution
-    ) -> Floats | None:
-        """Return points of a free path: few robots plan together, many alone at first."""
-        start = self.start[space.free]
-        together = partial(connect, space, start, goals, self.seed, resolution)
-        few = len(space.robots) <= FEW
-        points = together(restarts=int(few))
-        if points is None and len(space.robots) > 1:
-            points = coordinated(space, keeping, start, goals[0], self.seed, resolution)
-        return together(first=int(few), restarts=RESTARTS) if points is None else points
-
-    def _fine(self) -> Resolution:
-        """Return how dense checks make sure that nothing comes nearer than 0 in between."""
-        step = max(self.clearance, FINEST)
-        return step, RADIANS_PER_METRE * step
-
-    def _ends(self, keeping: Keeping) -> Floats:
-        """Return all coordinates at some combinations of goals, best first, (n, D)."""
-        lone = [t for t in self.targets if sum(o.robot == t.robot for o in self.targets) == 1]
-        kept = {
-            target.place: self._free_candidates(target, keeping)
-            if target in lone
-            else target.candidates[:CANDIDATES]
-            for target in self.targets
-        }
-        counts = [range(len(kept[target.place])) for target in self.targets]
-        chosen = sorted(product(*counts), key=lambda choice: (sum(choice), choice))[:COMBINATIONS]
-        states = np.tile(self.start, (len(chosen), 1))
-        for i, target in enumerate(self.targets):
-            postures = kept[target.place][[choice[i] for choice in chosen]]
-            states[:, target.moving] = postures
-        free = keeping.free(states)
-        if not free.any():
-            contact = keeping.contact(states[0])
-            who = " and ".join(target.place for target in self.targets)
-            raise NoPlanError(
-                f"the goals of {who} exclude each other: there {contact}", "goal in collision"
-            )
-        return states[free][:ENDS]
-
-    def _free_candidates(self, target: Target, keeping: Keeping) -> Floats:
-        """Return the postures in which a robot touches nothing but what moves, too."""
-        alone = keeping.without([t.robot for t in self.targets if t.robot != target.robot])
-        states = np.tile(self.start, (len(target.candidates), 1))
-        states[:, target.moving] = target.candidates
-        free = alone.free(states)
-        if not free.any():
-            raise NoPlanError(
-                f"at the goal of {target.place}, {target.goal}, {alone.contact(states[0])}",
-                "goal in collision",
-            )
-        return target.candidates[free][:CANDIDATES]
-
-    def _not_found(self) -> NoPlanError:
-        who = ", ".join(target.place for target in self.targets)
-        return NoPlanError(
-            f"no motion of {who} was found in {self.progress.checks} checks; another seed, a"
-            " smaller clearance or another posture at the goal may help",
-            "not found",
-        )
+        traffic = traffic.with_course(course)
+        start[course.columns] = motion.positions[name][0]
+    return traffic
 
 
 def _cell(
@@ -271,20 +203,9 @@ def _numbers(what: str, values: Any, count: int) -> Floats:
     return array
 
 
-def _bounds(limits: Floats, start: Floats, ends: Floats) -> Floats:
-    """Return where a search may go: the limits, or around start and goals where there are none."""
-    around = np.concatenate([start[None], ends])
-    low = np.where(np.isfinite(limits[:, 0]), limits[:, 0], around.min(axis=0) - np.pi)
-    high = np.where(np.isfinite(limits[:, 1]), limits[:, 1], around.max(axis=0) + np.pi)
-    return np.stack([low, high], axis=1)
-
-
 def _by_robot(cell: Cell, states: Floats) -> dict[str, Floats]:
     return {name: states[:, part] for name, part in cell.slices.items()}
 
 
-def _spread(space: Space, speeds: Floats) -> Floats:
-    """Return the velocities of all coordinates; those that stay have 0."""
-    whole = np.zeros((len(speeds), space.cell.size))
-    whole[:, space.free] = speeds
-    return whole
+def _all(cell: Cell, by_robot: Mapping[str, Floats]) -> Floats:
+    return np.concatenate([by_robot[name] for name in cell.robots])

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from kinematics.rotations import Floats
 from motion.clearances import Keeping
+from motion.collisions import Checker
 from motion.paths import way, without_straight_points
 from motion.search import COARSE, connect
 from motion.shorten import shortened
@@ -124,7 +125,7 @@ class _Coordination:
         if len(robots) == len(self.space.robots) > 1:
             return None
         others = [name for name in self.space.robots if name not in robots]
-        part = self.space.part(robots, self.keeping.checkers(robots, others), self.space.base)
+        part = self.space.part(robots, self._checker(robots, others))
         columns = self.space.columns(robots)
         start, goal = self.start[columns], self.goal[columns]
         points = connect(part, start, [goal], self.seed, self.resolution, restarts=restarts)
@@ -133,6 +134,9 @@ class _Coordination:
         if len(points) > 2:
             points = shortened(part, points, self.seed, self.resolution)
         return _Group(part, columns, _places(points, part.speeds))
+
+    def _checker(self, robots: Sequence[str], others: Sequence[str]) -> Checker:
+        return self.keeping.checker(robots, others, timed=self.space.when is not None)
 
     # -- schedules -----------------------------------------------------------------------------
 
@@ -180,8 +184,7 @@ class _Coordination:
     def _meeting(self, group: _Group, other: _Group) -> _Meeting:
         key = group.space.robots, other.space.robots
         if key not in self._meetings:
-            between = self.keeping.checkers_between(*key)
-            both = self.space.part((*key[0], *key[1]), between, self.space.base)
+            both = self.space.part((*key[0], *key[1]), self.keeping.between(*key))
             self._meetings[key] = _Meeting(both, group, other)
         return self._meetings[key]
 

@@ -66,6 +66,7 @@ class _Clusters:
         features: x M of those within, (C, BALLS, 6).
         solids: The solid of each of those, (C, BALLS).
         whole: Whether these are all the same, (C,).
+        links: Numbers of the links, or other bodies, that they belong to, (C,).
     """
 
     rows: Indices
@@ -76,6 +77,7 @@ class _Clusters:
     features: Floats
     solids: Indices
     whole: NDArray[np.bool_]
+    links: Indices
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,18 +122,20 @@ class Sieve:
         self._prepare_clusters()
         self._prepare_flats()
 
-    def candidates(self, places: Floats, within: Floats | None = None) -> Candidates:
+    def candidates(
+        self, places: Floats, within: Floats | None = None, more: Floats | None = None
+    ) -> Candidates:
         """Return the pairs that may be too near, by state, the nearest first.
 
         Args:
             places: Poses of the parts, (rows, n, 4, 4).
             within: How near, for each state, (n,) (m); None is what each pair has to be apart.
+            more: How much farther apart two parts have to be, (rows, rows) (m).
         """
         middles = self._middles(places)
-        found = [
-            self._from_clusters(places, middles, within),
-            *([self._from_flats(places, middles, within)] if len(self._flats.solids) else []),
-        ]
+        found = [self._from_clusters(places, middles, within, more)]
+        if len(self._flats.solids):
+            found.append(self._from_flats(places, middles, within, more))
         columns = [np.concatenate(column) for column in zip(*found, strict=True)]
         return self._in_order(*columns)
 
@@ -162,9 +166,16 @@ class Sieve:
 
     def _prepare_clusters(self) -> None:
         """Say how far clusters have to be apart, and put those with the most pairs into rows."""
-        solids, radii = self._clusters.solids, self._clusters.radii
-        apart = self._apart[solids[:, None, :, None], solids[None, :, None, :]].max(axis=(2, 3))
-        count = len(solids)
+        links, radii = self._clusters.links, self._clusters.radii
+        count, most = len(links), int(links.max(initial=-1)) + 1
+        of_solid = np.zeros(len(self._apart), np.intp)
+        of_solid[self._clusters.solids] = links[:, None]
+        balls = np.zeros(len(self._apart), bool)
+        balls[self._clusters.solids] = True
+        a, b = np.nonzero((self._apart > -np.inf) & balls & balls[:, None])
+        between = np.full((most, most), -np.inf)
+        np.maximum.at(between, (of_solid[a], of_solid[b]), self._apart[a, b])
+        apart = between[np.ix_(links, links)]
         degrees = (apart > -np.inf).sum(axis=1)
         rank = np.empty(count, np.intp)
         rank[np.argsort(-degrees, kind="stable")] = np.arange(count)
@@ -211,14 +222,20 @@ class Sieve:
         features[..., 5] = 1.0
         return (features[:, self._left] @ _PRODUCT) @ features[:, self._right].transpose(0, 2, 1)
 
-    def _from_clusters(self, places: Floats, middles: Floats, within: Floats | None) -> _Found:
+    def _from_clusters(
+        self, places: Floats, middles: Floats, within: Floats | None, more: Floats | None
+    ) -> _Found:
         values = self._values(places, middles)
-        limits = self._limits
+        wanted, limits = self._pair_apart, self._limits
         if within is not None:
-            apart = np.where(self._pair_apart > -np.inf, within[:, None, None], -np.inf)
-            limits = self._limit(apart)
+            wanted = np.where(wanted > -np.inf, within[:, None, None], -np.inf)
+            limits = self._limit(wanted)
+        elif more is not None:
+            rows = self._clusters.rows
+            wanted = wanted + more[np.ix_(rows[self._left], rows[self._right])]
+            limits = self._limit(wanted)
         states, a, b = np.unravel_index(np.flatnonzero(values <= limits), values.shape)
-        apart = self._pair_apart[a, b] if within is None else within[states]
+        apart = wanted[a, b] if within is None else within[states]
         return self._within_clusters(places, states, self._left[a], self._right[b], apart)
 
     def _within_clusters(
@@ -258,18 +275,22 @@ class Sieve:
 
     # -- half-spaces -------------------------------------------------------------------------
 
-    def _from_flats(self, places: Floats, middles: Floats, within: Floats | None) -> _Found:
+    def _from_flats(
+        self, places: Floats, middles: Floats, within: Floats | None, more: Floats | None
+    ) -> _Found:
         flats, clusters = self._flats, self._clusters
         heights = middles[self._beside] @ flats.normals.reshape(-1, 3).T  # (B, n, F * sides)
         heights = heights.reshape(*heights.shape[:2], *flats.offsets.shape) - flats.offsets
         gaps = heights.max(axis=-1)
-        limits = self._flat_limits[:, None]
+        wanted, limits = self._flat_apart, self._flat_limits[:, None]
         if within is not None:
-            radii = clusters.radii[self._beside, None, None] + ROUNDING
-            apart = np.where(self._flat_apart[:, None] > -np.inf, within[:, None], -np.inf)
-            limits = apart + radii
+            wanted = np.where(wanted[:, None] > -np.inf, within[:, None], -np.inf)
+            limits = wanted + clusters.radii[self._beside, None, None] + ROUNDING
+        elif more is not None:
+            wanted = wanted + more[clusters.rows[self._beside], WORLD, None]
+            limits = (wanted + clusters.radii[self._beside, None] + ROUNDING)[:, None]
         at, states, flat = np.unravel_index(np.flatnonzero(gaps <= limits), gaps.shape)
-        apart = self._flat_apart[at, flat] if within is None else within[states]
+        apart = wanted[at, flat] if within is None else within[states]
         cluster = self._beside[at]
         balls = places[clusters.rows[cluster], states, :3] @ clusters.balls[cluster]
         heights = flats.normals[flat] @ balls - flats.offsets[flat, :, None]
@@ -283,7 +304,8 @@ class Sieve:
         if not len(states):
             return Candidates(states, np.zeros((0, 2), np.intp), bounds)
         counts = np.flatnonzero(self._apart[a, b] > -np.inf)
-        states, a, b, bounds = states[counts], a[counts], b[counts], bounds[counts]
+        states, bounds = states[counts], bounds[counts]
+        a, b = np.minimum(a[counts], b[counts]), np.maximum(a[counts], b[counts])
         size = len(self._apart)
         keys = (states * size + a) * size + b
         order = np.lexsort((bounds, keys))
@@ -313,28 +335,29 @@ def _gather(bodies: Bodies, solids: list[int], chains: Chains) -> _Clusters:
     for i in solids:
         links.setdefault((bodies.solids[i].name, bodies.solids[i].part), []).append(i)
     gathered = [
-        (chains.rows[part], _moved(cluster, bodies.solids[own[0]].offset), np.array(own))
-        for (_, part), own in links.items()
+        (chains.rows[part], _moved(cluster, bodies.solids[own[0]].offset), np.array(own), link)
+        for link, ((_, part), own) in enumerate(links.items())
         for cluster in clusters_of(tuple(bodies.solids[i].hull for i in own))
     ]
     count = len(gathered)
     around, balls = np.ones((count, 4, 1)), np.ones((count, 4, BALLS))
     features, solid = np.ones((count, BALLS, 6)), np.empty((count, BALLS), np.intp)
-    for i, (_, cluster, own) in enumerate(gathered):
+    for i, (_, cluster, own, _) in enumerate(gathered):
         around[i, :3, 0], balls[i, :3] = cluster.middle, cluster.middles.T
         features[i, :, :3], features[i, :, 3] = cluster.middles, cluster.radii
         squares = (cluster.middles**2).sum(axis=1)
         features[i, :, 4] = squares * (1 - _RELATIVE) - cluster.radii**2
         solid[i] = own[cluster.hulls]
     return _Clusters(
-        rows=np.array([row for row, _, _ in gathered], np.intp),
+        rows=np.array([row for row, *_ in gathered], np.intp),
         around=around,
-        radii=np.array([cluster.radius for _, cluster, _ in gathered]),
+        radii=np.array([cluster.radius for _, cluster, *_ in gathered]),
         balls=balls,
         inner=features[..., 3].copy(),
         features=features @ _PRODUCT,
         solids=solid,
         whole=(solid == solid[:, :1]).all(axis=1),
+        links=np.array([link for _, _, _, link in gathered], np.intp),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,7 @@ from robots.common.errors import NoPlanError
 
 if TYPE_CHECKING:
     from motion.cell import Cell
-    from motion.collisions import Checker, Contact
+    from motion.collisions import Checker
 
 PATIENCE = 2.0  # s; longer plans tell how far they are
 
@@ -66,8 +66,10 @@ class Space:
         base: All coordinates of the cell; where those are that stay, (D,) (rad, m).
         bounds: Lower and upper bound of each, (d, 2) (rad, m).
         speeds: Largest speed of each, (d,) (rad/s, m/s).
-        checkers: All of them must agree that a place is free.
+        checker: Tells whether a place is free.
         progress: What counts the checks.
+        purpose: What is being done, in words.
+        when: The time at which obstacles that move are looked at (s).
     """
 
     cell: Cell
@@ -76,9 +78,10 @@ class Space:
     base: Floats
     bounds: Floats
     speeds: Floats
-    checkers: Sequence[Checker]
+    checker: Checker
     progress: Progress
-    purpose: str = field(default="searching")
+    purpose: str = "searching"
+    when: float | None = None
     _known: dict[tuple[bytes, bytes, Resolution], bool] = field(default_factory=dict, repr=False)
 
     def whole(self, places: Floats) -> Floats:
@@ -99,20 +102,16 @@ class Space:
             places: (n, d) (rad, m).
         """
         self.progress.tell(self.purpose)
-        whole, free = self.whole(places), np.ones(len(places), bool)
-        for checker in self.checkers:
-            left = np.flatnonzero(free)
-            if len(left):
-                free[left] = checker.free(whole[left])
-        return free
+        return self.checker.free(self.whole(places), self.when)
 
     def edge_free(self, a: Floats, b: Floats, resolution: Resolution) -> bool:
         """Tell whether the straight way between two places is free; asked twice, from memory."""
         key = a.tobytes(), b.tobytes(), resolution
         if key not in self._known:
             self.progress.tell(self.purpose)
+            times = None if self.when is None else (self.when, self.when)
             ends = self.whole(a), self.whole(b)
-            self._known[key] = all(c.edge_free(*ends, resolution) for c in self.checkers)
+            self._known[key] = self.checker.edge_free(*ends, resolution, times)
         return self._known[key]
 
     def path_free(self, points: Floats, resolution: Resolution) -> bool:
@@ -131,19 +130,12 @@ class Space:
             path.at(np.linspace(middle - half, middle + half, pieces + 1)), resolution
         )
 
-    def contact(self, place: Floats) -> Contact | None:
-        """Return which two bodies are too near at a place, (d,), or None."""
-        found = [checker.contact(self.whole(place)) for checker in self.checkers]
-        contacts = [contact for contact in found if contact is not None]
-        return min(contacts, key=lambda contact: contact.distance, default=None)
-
-    def part(self, robots: Iterable[str], checkers: Sequence[Checker], base: Floats) -> Space:
+    def part(self, robots: Iterable[str], checker: Checker) -> Space:
         """Return the space of some of the robots.
 
         Args:
             robots: Their names.
-            checkers: What they must keep clear of.
-            base: Where everything else is, (D,) (rad, m).
+            checker: What tells whether a place is free.
         """
         robots = tuple(robots)
         chosen = self.columns(robots)
@@ -151,12 +143,13 @@ class Space:
             self.cell,
             robots,
             self.free[chosen],
-            base,
+            self.base,
             self.bounds[chosen],
             self.speeds[chosen],
-            checkers,
+            checker,
             self.progress,
             f"planning {', '.join(robots)}",
+            self.when,
         )
 
     def columns(self, robots: Iterable[str]) -> NDArray[np.intp]:

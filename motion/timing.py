@@ -24,7 +24,7 @@ from robots.urdf.summary import read_urdf
 CONTROL_FREQUENCY = 20.0  # Hz; what tasks use unless they say otherwise
 FASTEST = {"rad": 2.0, "m": 0.5}  # per s; of joints for which nobody says so
 TO_FULL_SPEED = 0.4  # s; how long a joint takes to it, unless accelerations are given
-LONGEST_STEP = 0.02  # s; between knots
+STEP = 0.02  # s; between knots
 
 _MARGIN = 0.995  # of a limit; what is left to rounding and to curves between the knots
 
@@ -113,7 +113,7 @@ def timed(path: Path, accelerations: Floats) -> tuple[Floats, Floats, Floats]:
         accelerations: Largest ones of each coordinate, (coordinates,) (rad/s², m/s²).
 
     Returns:
-        Times from 0, at most 0.02 s apart, (T,) (s); positions (T, coordinates) and velocities.
+        Times from 0, 0.02 s apart, (T,) (s); positions (T, coordinates) and velocities.
 
     Raises:
         MissingPackageError: If toppra is not installed.
@@ -173,13 +173,19 @@ def _stopping(run: Path, accelerations: Floats) -> tuple[Floats, Floats]:
 
 
 def _knots(run: Path, grid: Floats, speed: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return dense knots of a path followed at some speeds, which change evenly between places."""
+    """Return knots `STEP` apart of a path followed at some speeds, which change evenly between.
+
+    All of it is slowed down a little, so that it takes a whole number of steps.
+    """
     steps = 2 * np.diff(grid) / (speed[:-1] + speed[1:])
+    count = max(1, int(np.ceil(steps.sum() / STEP - 1e-9)))
+    slower = count * STEP / steps.sum()
+    steps, speed = slower * steps, speed / slower
     clock = np.concatenate([[0.0], np.cumsum(steps)])
     change = np.diff(speed) / steps
-    times = np.linspace(0.0, clock[-1], int(np.ceil(clock[-1] / LONGEST_STEP)) + 1)
+    times = np.arange(count + 1.0) * STEP
     i = np.clip(np.searchsorted(clock, times, side="right") - 1, 0, len(steps) - 1)
-    since = times - clock[i]
+    since = np.minimum(times, clock[-1]) - clock[i]
     at = np.clip(grid[i] + since * (speed[i] + change[i] * since / 2), 0.0, run.length)
     rate = np.maximum(speed[i] + change[i] * since, 0.0)
     rate[[0, -1]], at[[0, -1]] = 0.0, (0.0, run.length)

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import lru_cache
+from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinematics.rotations import Floats, rotation_vector, transform
+from kinematics.tree import FIXED
 from motion.bodies import Bodies
 from motion.obstacles import Track
 from robots import LayoutError
 from robots.common.bounds import FAR, checked_number
-
-FIRST = 8  # states that are looked at together at first; then always twice as many
-MOST = 64
 
 
 class Travel:
@@ -30,15 +29,17 @@ class Travel:
         count, radii = len(bodies.parts), _radii(bodies)
         self._turns = np.zeros((count, bodies.size))  # of each part, per unit of each coordinate
         self._ways = np.zeros((count, bodies.size))
-        self._slides = np.zeros((count, bodies.size, bodies.size))  # and per length of a slide
+        self._sliding = _sliding(bodies)
+        self._slides = np.zeros((count, bodies.size, len(self._sliding)))  # and of each slide
         self._stretch = np.zeros(bodies.size)
         for part, radius in enumerate(radii):
             self._follow(part, radius)
-        self._tracks = [
-            _Way.of(part.track, radius)
-            for part, radius in zip(bodies.parts, radii, strict=True)
+        self._tracks = {
+            i: _Way.of(part.track, radius)
+            for i, (part, radius) in enumerate(zip(bodies.parts, radii, strict=True))
             if part.track is not None
-        ]
+        }
+        self._common = list(self._gather_common())
 
     def steps(
         self,
@@ -61,14 +62,62 @@ class Travel:
         way, turn = (
             checked_number("resolution", value, 1e-9, FAR, LayoutError) for value in resolution
         )
-        moved = np.abs(end - start)
-        out = np.maximum(np.abs(start), np.abs(end)) + self._stretch
-        ways, turns = (self._ways + self._slides @ out) @ moved, self._turns @ moved
+        ways = self._shares(start, end).sum(axis=1)
+        turns = self._turns @ np.abs(end - start)
         most = max(ways.max(initial=0.0) / way, turns.max(initial=0.0) / turn)
-        for track in self._tracks if times is not None else ():
-            travelled, turned = track.between(*times) if times else (0.0, 0.0)
+        for track in self._tracks.values() if times is not None else ():
+            travelled, turned = track.fastest(*times) if times else (0.0, 0.0)
             most = max(most, travelled / way, turned / turn)
         return max(1, int(np.ceil(most - 1e-9)))
+
+    def between(
+        self, start: Floats, end: Floats, times: tuple[float, float] | None = None
+    ) -> Floats:
+        """Return how much the distance between two parts changes at most, (parts, parts) (m).
+
+        What moves both of them does not count.
+
+        Args:
+            start: Coordinates, (D,) (rad, m).
+            end: Coordinates, (D,) (rad, m).
+            times: When the way begins and ends (s), for obstacles that move.
+        """
+        shares = self._shares(start, end)
+        ways = shares.sum(axis=1)
+        for part, track in self._tracks.items() if times is not None else ():
+            ways[part] = track.fastest(*times)[0] if times else 0.0
+        changes = ways[:, None] + ways
+        for parts, columns, common in self._common:
+            moved = shares[parts, columns]
+            both = (common * (moved[:, None] + moved)).sum(axis=-1)
+            changes[np.ix_(parts, parts)] -= both
+        return changes
+
+    def _shares(self, start: Floats, end: Floats) -> Floats:
+        """Return how far each coordinate takes the points of each part at most, (parts, D) (m)."""
+        out = np.maximum(np.abs(start), np.abs(end)) + self._stretch
+        return (self._ways + self._slides @ out[self._sliding]) * np.abs(end - start)
+
+    def _gather_common(self) -> Iterator[tuple[NDArray[np.intp], slice, Floats]]:
+        """Yield for each robot its parts, its coordinates, and which of these move two parts alike.
+
+        A coordinate does where all joints that follow it carry both parts, or neither.
+        """
+        parts = self._bodies.parts
+        for robot, columns in self._bodies.slices.items():
+            own = [i for i, part in enumerate(parts) if part.robot == robot]
+            paths = [set(self._path(i)) for i in own]
+            tree = self._bodies.models[robot].kinematics
+            common = np.ones((len(own), len(own), columns.stop - columns.start))
+            for i, j in product(range(len(own)), repeat=2):
+                for part in paths[i] ^ paths[j]:
+                    common[i, j, int(tree.drivers[parts[part].link])] = 0.0
+            yield np.array(own, np.intp), columns, common
+
+    def _path(self, part: int) -> Iterator[int]:
+        while self._bodies.parts[part].parent >= 0:
+            yield part
+            part = self._bodies.parts[part].parent
 
     def _follow(self, part: int, radius: float) -> None:
         """Write down for one part all joints that carry it."""
@@ -89,7 +138,7 @@ class Travel:
             else:
                 self._turns[part, driver] += factor
                 self._ways[part, driver] += factor * length
-                self._slides[part, driver] += factor * slides
+                self._slides[part, driver] += factor * slides[self._sliding]
             length += float(np.linalg.norm(here.joint[:3, 3]))
             at = here.parent
 
@@ -110,38 +159,32 @@ class _Way:
         sums = (np.concatenate([[0.0], np.cumsum(values)]) for values in (ways, turns))
         return cls(track.times, *sums)
 
-    def between(self, start: float, end: float) -> tuple[float, float]:
-        """Return how far it leads (m) and turns (rad) between two times (s)."""
-        ways, turns = (
-            np.interp([start, end], self._times, values) for values in (self._ways, self._turns)
+    def fastest(self, start: float, end: float) -> tuple[float, float]:
+        """Return how far it would lead (m) and turn (rad) between two times at full speed.
+
+        Full is the greatest speed that there is between them.
+        """
+        start, end = min(start, end), max(start, end)
+        inner = self._times[(self._times > start) & (self._times < end)]
+        moments = np.unique([start, *inner, end])
+        way, turn = (
+            float(
+                (np.diff(np.interp(moments, self._times, sums)) / np.diff(moments)).max(initial=0.0)
+            )
+            for sums in (self._ways, self._turns)
         )
-        return float(abs(ways[1] - ways[0])), float(abs(turns[1] - turns[0]))
+        return way * (end - start), turn * (end - start)
 
 
-@lru_cache(maxsize=256)
-def _order(steps: int) -> Floats:
-    """Return 0, 1, a half, a quarter, three quarters, … of the way, (steps + 1,)."""
-    bits = max(1, int(np.ceil(np.log2(steps + 1))))
-    every = np.arange(2**bits)
-    mirrored = np.zeros_like(every)
-    for _ in range(bits):
-        mirrored, every = mirrored * 2 + every % 2, every // 2
-    inner = mirrored[(mirrored > 0) & (mirrored < steps)]
-    order = np.concatenate([[0, steps], inner]) / steps
-    order.setflags(write=False)
-    return order
-
-
-def in_halves(steps: int) -> Iterator[Floats]:
-    """Yield which shares of a way to look at together: both ends and its middle first.
-
-    Args:
-        steps: Into how many steps the way is cut.
-    """
-    order, first, size = _order(steps), 0, FIRST
-    while first < len(order):
-        yield order[first : first + size]
-        first, size = first + size, min(2 * size, MOST)
+def _sliding(bodies: Bodies) -> NDArray[np.intp]:
+    """Return the coordinates that move a slide."""
+    coordinates = {
+        int(tree.drivers[i]) + bodies.slices[name].start
+        for name, model in bodies.models.items()
+        for tree in (model.kinematics,)
+        for i in np.flatnonzero(tree.slides & (tree.drivers != FIXED)).tolist()
+    }
+    return np.array(sorted(coordinates), np.intp)
 
 
 def _radii(bodies: Bodies) -> list[float]:

@@ -111,14 +111,12 @@ def _with_arm(
     robot = cell.layout[name].robot
     columns = [cell.slices[name].start + robot.joints.index(j) for j in arm_joints(robot)]
     later = [(name, other) for other in cell.robots[number + 1 :]]
-    itself = cell.checker([name], 0.0, later)
-    others = cell.checker([name], clearance, [*later, (name, name)])
+    checker = cell.checker([name], clearance, except_=later)
     for _ in range(TRIES // 20):
         states = np.tile(state, (20, 1))
         low, high = limits[columns].T
         states[:, columns] = random.uniform(low, high, (20, len(columns)))
-        free = itself.free(states)
-        free[free] = others.free(states[free])
+        free = checker.free(states)
         if free.any():
             return states[np.argmax(free)]
     return None

@@ -1,0 +1,49 @@
+"""All parts of a cell at once are where each robot's own tree has them."""
+
+import numpy as np
+import pytest
+
+from layouts import Layout, Placement
+from motion.cell import Cell
+from motion.chains import Chains
+from tests.catalogue import every_robot
+from tests.layouts.cells import mixed_cell
+from tests.motion import cells
+
+
+def differences(cell: Cell, chains: Chains, qpos: np.ndarray) -> dict[str, float]:
+    places, links = chains.places(qpos), cell.poses(qpos)
+    names = {
+        row: (part.robot, cell.models[part.robot].kinematics.links[part.link])
+        for i, row in chains.rows.items()
+        if (part := cell.parts[i]).robot
+    }
+    return {
+        "/".join(name): float(np.abs(places[row] - links[:, cell.links.index(name)]).max())
+        for row, name in names.items()
+    }
+
+
+@pytest.mark.parametrize("robot", every_robot(quick=("fetch", "xarm7_ability")))
+def test_parts_of_every_robot_are_where_its_tree_has_them(robot):
+    cell = Cell(Layout({"arm": Placement(robot, (0.3, -0.2, 0.1), rpy=(0.1, 0.2, 0.3))}))
+    qpos, _ = cells.states(cell, 6)
+    found = differences(cell, Chains(cell, range(len(cell.parts))), qpos)
+    assert len(found) == len(cell.parts) - 1
+    assert max(found.values(), default=0.0) < 1e-12
+
+
+def test_parts_of_several_robots_are_there_at_once():
+    cell = Cell(mixed_cell())
+    qpos, _ = cells.states(cell, 5)
+    assert max(differences(cell, Chains(cell, range(len(cell.parts))), qpos).values()) < 1e-12
+
+
+def test_only_what_is_asked_for_and_what_carries_it_is_computed():
+    cell = Cell(mixed_cell())
+    qpos, _ = cells.states(cell, 3)
+    wanted = next(i for i, part in enumerate(cell.parts) if part.robot == "up" and part.parent > 0)
+    chains = Chains(cell, [wanted])
+    assert list(chains.rows) == [0, cell.parts[wanted].parent, wanted]
+    assert max(differences(cell, chains, qpos).values()) < 1e-12
+    assert Chains(cell, []).places(qpos).shape == (1, 3, 4, 4)

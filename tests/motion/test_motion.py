@@ -1,0 +1,107 @@
+"""Motions: between the knots, beyond the ends, and what is refused."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+from motion import Motion, MotionError
+from motion.curves import hermite, hermite_bends, hermite_slopes
+from robots import UnknownNameError
+from tests.motion.two_pandas import cell
+
+TIMES = np.linspace(0.0, 2.0, 21)
+
+
+def waves(times=TIMES, **changes):
+    layout = cell()
+    phases = np.arange(9) / 9
+    positions = {name: np.sin(times[:, None] + phases) for name in layout}
+    velocities = {name: np.cos(times[:, None] + phases) for name in layout}
+    return Motion(
+        **{"layout": layout, "times": times, "positions": positions, "velocities": velocities}
+        | changes
+    )
+
+
+def test_a_motion_follows_its_curve_between_the_knots():
+    motion, fine = waves(), np.linspace(0.0, 2.0, 501)
+    expected = np.sin(fine[:, None] + np.arange(9) / 9)
+    assert np.allclose(motion.sample(fine)["left"], expected, atol=1e-6)
+    expected = np.cos(fine[:, None] + np.arange(9) / 9)
+    assert np.allclose(motion.velocity(fine)["right"], expected, atol=1e-4)
+
+
+def test_the_knots_are_met_exactly():
+    motion = waves()
+    for name, qpos in motion.sample(motion.times).items():
+        assert np.array_equal(qpos, motion.positions[name])
+
+
+def test_beyond_its_ends_a_motion_stands_still():
+    motion = waves()
+    assert np.array_equal(motion.sample(5.0)["left"], motion.end["left"])
+    assert np.array_equal(motion.sample(-1.0)["left"], motion.start["left"])
+    assert not motion.velocity([-1.0, 5.0])["left"].any()
+
+
+def test_one_time_gives_one_posture():
+    motion = waves()
+    assert motion.sample(0.5)["left"].shape == (9,)
+    assert motion.sample([0.5])["left"].shape == (1, 9)
+    assert motion.duration == 2.0
+
+
+def test_who_moves_is_known():
+    still = {"left": waves().positions["left"], "right": np.zeros((21, 9))}
+    rest = {"left": waves().velocities["left"], "right": np.zeros((21, 9))}
+    assert waves(positions=still, velocities=rest).moving == ("left",)
+
+
+def test_a_motion_cannot_be_changed_and_pickles():
+    motion = waves()
+    with pytest.raises(ValueError, match="read-only"):
+        motion.positions["left"][0] = 0.0
+    copy = pickle.loads(pickle.dumps(motion))
+    assert copy.layout == motion.layout
+    assert np.array_equal(copy.sample(0.3)["left"], motion.sample(0.3)["left"])
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"times": TIMES + 1.0}, "begin with 0"),
+        ({"times": np.zeros(21)}, "increase"),
+        (
+            {"positions": {n: np.zeros((20, 9)) for n in ("left", "right")}},
+            r"\(20, 9\); it must be \(21, 9\)",
+        ),
+        ({"positions": {"left": np.zeros((21, 9))}}, "positions lacks right"),
+        ({"velocities": 3.0}, "takes a mapping"),
+        ({"velocities": {n: np.full((21, 9), np.nan) for n in ("left", "right")}}, "not finite"),
+        ({"largest_velocities": {"left": np.ones(3)}}, r"\(3,\); it must be \(9,\)"),
+    ],
+)
+def test_arrays_that_do_not_fit_are_refused(changes, message):
+    with pytest.raises(MotionError, match=message):
+        waves(**changes)
+
+
+def test_a_robot_that_is_not_there_is_refused_by_name():
+    with pytest.raises(UnknownNameError, match="Did you mean 'left'"):
+        waves(positions={"lef": np.zeros((21, 9))})
+
+
+def test_slopes_and_bends_are_the_derivatives_of_the_curve():
+    random = np.random.default_rng(0)
+    knots, values, slopes = np.array([0.0, 0.4, 1.0]), *random.normal(size=(2, 3, 2))
+    times, step = np.array([0.1, 0.3, 0.5, 0.9]), 1e-5
+
+    def at(t):
+        return hermite(knots, values, slopes, t)
+
+    numeric = (at(times + step) - at(times - step)) / (2 * step)
+    assert np.allclose(hermite_slopes(knots, values, slopes, times), numeric, atol=1e-8)
+    bends = hermite_bends(knots, values, slopes)
+    second = (at(0.4 + 2 * step) - 2 * at(0.4 + step) + at(0.4)) / step**2
+    assert np.allclose(bends[1, 0], second, rtol=1e-3, atol=1e-2)
