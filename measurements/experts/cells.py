@@ -16,9 +16,9 @@ from tasks import get_task_class, make
 Area = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]  # x, y, z (m)
 
 DOWN = (0.0, 1.0, 0.0, 0.0)  # a gripper that points straight down, wxyz
-GRIPPERS = ("panda", "panda_wristcam", "xarm7_gripper", "panda")  # in turn, place by place
+GRIPPERS = ("panda", "panda_wristcam", "franka_panda", "panda")  # in turn, place by place
 STICKS = ("panda_stick", "panda")
-RELAY = ("panda", "panda_stick", "panda_wristcam", "xarm7_gripper")
+RELAY = ("panda", "panda_stick", "panda_wristcam", "franka_panda")
 
 
 @dataclass(frozen=True)
