@@ -251,7 +251,7 @@ class _Place:
             query.everywhere[0],
             _bounds(query.cell.limits[query.columns], ends),
             np.ones(len(goal)),
-            (self._checker,),
+            self._checker,
             _Budget(),
         )
         self._only_straight = at_body and bool(np.abs(goal - self._start).max() < SHORT)
@@ -298,7 +298,7 @@ class _AmongMoving(Checker):
         states = np.tile(self._everywhere, (len(places), 1, 1))
         states[..., self._columns] = places
         free = super().free(states.reshape(-1, states.shape[-1]), times)
-        return free.reshape(states.shape[:2]).all(axis=1)
+        return np.asarray(free.reshape(states.shape[:2]).all(axis=1))
 
     def edge_free(
         self,
@@ -310,9 +310,9 @@ class _AmongMoving(Checker):
         """Tell whether a straight way of the arm is free wherever the others are."""
         ends = np.array([start, end])[:, self._columns]
         for state in self._everywhere:
-            states = np.tile(state, (2, 1))
-            states[:, self._columns] = ends
-            if not super().edge_free(*states, resolution, times):
+            a, b = state.copy(), state.copy()
+            a[self._columns], b[self._columns] = ends
+            if not super().edge_free(a, b, resolution, times):
                 return False
         return True
 
