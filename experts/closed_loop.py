@@ -17,6 +17,8 @@ from tasks.engine.actions import ActionReader
 def rehearse(task: MultiRobotTask, seed: int, act: Callable[[Scene], Any]) -> Plan:
     """Let a function act in a private copy of a task until it succeeds or the episode ends.
 
+    It also ends, and has failed, when two arms touch: robots, or limbs of one robot.
+
     Args:
         task: Says layout and physics; left alone.
         seed: The episode.
@@ -39,10 +41,11 @@ def rehearse(task: MultiRobotTask, seed: int, act: Callable[[Scene], Any]) -> Pl
 def _attempt(rehearsal: Rehearsal, seed: int, act: Callable[[Scene], Any]) -> Attempt:
     copy, scene = rehearsal.task, rehearsal.begin(seed)
     reader, actions = ActionReader(copy.layout, 1), list[NDArray[np.float32]]()
-    success = False
-    while not success and len(actions) < copy.max_episode_steps:
+    success, touching = False, ""
+    while not (success or touching) and len(actions) < copy.max_episode_steps:
         actions.append(reader.read(act(scene))[0].copy())
-        *_, info = copy.step(actions[-1])
-        scene, success = rehearsal.scene(), bool(info["success"][0])
-    reason = "" if success else f"no success within {len(actions)} steps"
+        success, touching = rehearsal.step(actions[-1])
+        scene = rehearsal.scene()
+    success = success and not touching
+    reason = "" if success else touching or f"no success within {len(actions)} steps"
     return Attempt(np.stack(actions), success, reason)

@@ -10,6 +10,7 @@ import numpy as np
 
 from experts.geometry import backed_off, gripper_facing, heading, squared, turn, yaw_of
 from experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
+from experts.tips import pose_solver
 from kinematics.rotations import Floats, inverse, multiply, rotate
 from robots import TaskError
 from tasks import MultiRobotTask
@@ -20,6 +21,10 @@ QUARTERS = (0, 1, 2, 3)
 
 # How a gripper may turn about the vertical on its way to a place; the quickest is taken (rad).
 YAWS = tuple(0.3 * i for i in range(-4, 5))
+PLACE_YAWS = sorted((*YAWS, -pi / 2, pi / 2, pi), key=abs)
+
+# How far a gripper may lean forward from straight down, the best first (rad).
+TILTS = tuple(np.radians((20, 10, 0, 30, 40, 50, 60, -15)))
 
 
 def need_fingers(task: MultiRobotTask, plan: str, *robots: str) -> None:
@@ -66,6 +71,76 @@ def cube_grip_from(cube: Pose, base: Floats, tilt: float) -> Pose:
     position, quaternion = cube
     direction = squared(heading(base, position), yaw_of(quaternion))
     return position, gripper_facing(direction, tilt)
+
+
+def grips_to(
+    task: MultiRobotTask,
+    robot: str,
+    body: str,
+    place: Callable[[Scene], Floats],
+    above: float,
+    tilts: Sequence[float] = TILTS,
+) -> Callable[[Scene], list[Pose]]:
+    """Return the grips of a cube with which an arm can bring it to a place, however it leans.
+
+    Args:
+        task: Says where the arm stands.
+        robot: The arm.
+        body: The cube.
+        place: Where the cube's origin is to be, (3,) (m), given the scene.
+        above: How far above the cube and its place the gripper has to get as well (m).
+        tilts: Angles of the gripper from straight down, forward (rad); the first counts with which
+            there is a grip.
+    """
+    solver = pose_solver(task, robot)
+
+    def reachable(pose: Pose, qpos: Floats) -> bool:
+        position, quaternion = pose
+        poses = [(position, quaternion), (position + (0.0, 0.0, above), quaternion)]
+        return all(solver.solve(*each, qpos) is not None for each in poses)
+
+    def brings(scene: Scene, grip: Pose) -> bool:
+        qpos, (start, _) = scene.qpos(robot), scene.body(body)
+        if not reachable(grip, qpos):
+            return False
+        turned = (turn("z", yaw) for yaw in PLACE_YAWS)
+        arm, end = grip[0] - start, place(scene)
+        return any(
+            reachable((end + rotate(yaw, arm), multiply(yaw, grip[1])), qpos) for yaw in turned
+        )
+
+    def grips(scene: Scene) -> list[Pose]:
+        for tilt in tilts:
+            some = [grip for grip in cube_grips(scene.body(body), tilt=tilt) if brings(scene, grip)]
+            if some:
+                return some
+        return []
+
+    return grips
+
+
+def lowerable(
+    task: MultiRobotTask, robot: str, poses: Callable[[Scene], Sequence[Pose]], way: float
+) -> Callable[[Scene], list[Pose]]:
+    """Return those of some poses of a gripper from which it can be lowered.
+
+    Args:
+        task: Says where the arm stands.
+        robot: The arm.
+        poses: The poses, given the scene.
+        way: How far (m).
+    """
+    solver = pose_solver(task, robot)
+
+    def kept(scene: Scene) -> list[Pose]:
+        qpos, below = scene.qpos(robot), np.array([0.0, 0.0, way])
+        return [
+            (position, quaternion)
+            for position, quaternion in poses(scene)
+            if solver.solve(position - below, quaternion, qpos) is not None
+        ]
+
+    return kept
 
 
 def pick(

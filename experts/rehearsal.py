@@ -4,26 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import pi, remainder
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.driver import ArmDriver
-from experts.geometry import heading
-from experts.script import OPEN, Pose, Scene, Script, Waypoint
-from experts.tips import pose_solver
-from kinematics.rotations import Floats, inverse, rotate
-from kinematics.solve import by_way
-from layouts import Layout
+from experts.player import BlockedError, Player, StuckError
+from experts.script import Scene, Script
+from experts.ways import Ways, without_planner
 from robots import TaskError, UnknownNameError
 from simulation.overlaps import RobotsAlone
 from tasks import MultiRobotTask
 from tasks.episode import REBUILT
-
-PATIENCE = 40  # control steps without progress after which an arm counts as blocked
-PROGRESS = 1e-3  # rad
 
 
 @dataclass(frozen=True)
@@ -34,11 +26,13 @@ class Attempt:
         actions: Shape (T, A).
         success: Whether the task's own success was reached, at the last action.
         reason: Why not, in words.
+        obstructed: Whether it failed because something was in an arm's way.
     """
 
     actions: NDArray[np.float32]
     success: bool
     reason: str = ""
+    obstructed: bool = False
 
 
 class Plan(NDArray[np.float32] if TYPE_CHECKING else np.ndarray):
@@ -73,6 +67,9 @@ class Rehearsal:
             check_layout=False,  # it was checked when the task was made
         )
         self.task = type(task)(scenario)
+        self._many = len(self.task.layout.arms) > 1
+        if self._many:
+            self.task.simulation.watch_arms()
         self._alone = RobotsAlone(self.task.layout, scenario.physics)
 
     def begin(self, seed: int) -> Scene:
@@ -84,178 +81,65 @@ class Rehearsal:
         """Return what the episode looks like now."""
         return Scene(self.task)
 
-    def play(self, script: Script) -> Attempt:
+    def step(self, action: NDArray[np.float32]) -> tuple[bool, str]:
+        """Take a control step.
+
+        Returns:
+            Whether the task is solved then, and which arms touched in it, in words.
+        """
+        *_, info = self.task.step(action)
+        touching = self.task.simulation.arms_touching(0) if self._many else []
+        return bool(info["success"][0]), ", ".join(f"{a} touches {b}" for a, b in touching[:1])
+
+    def play(self, script: Script, *, around: bool = False) -> Attempt:
         """Play a script from the present state until success or the end of the episode.
+
+        It fails as soon as two arms touch: robots, or limbs of one robot.
 
         Args:
             script: Waypoints by robot; robots left out keep still.
+            around: Whether arms go round what is in their way, or wait until it is gone. Otherwise
+                their joints go straight to each waypoint.
 
         Raises:
+            MissingPackageError: If that takes the extra ``motion``, which is not installed.
             UnknownNameError: If the layout has no such robot, or the script no such waypoint.
             TaskError: If two waypoints of a robot have the same name.
         """
         task, scene = self.task, self.scene()
         _check_names(script, task)
         players = _players(task, script, scene, self._alone)
+        if around:
+            ways = Ways(task)
+            for player in players:
+                player.look_around(ways, players)
         done: set[str] = set()
         actions: list[NDArray[np.float32]] = []
         while len(actions) < task.max_episode_steps:
             try:
                 parts = [player.act(scene, done) for player in players]
-            except _StuckError as error:
-                return Attempt(_stack(actions, task), False, str(error))
+            except StuckError as error:
+                blocked = isinstance(error, BlockedError)
+                return Attempt(_stack(actions, task), False, str(error), blocked)
             actions.append(np.concatenate(parts).astype(np.float32))
-            *_, info = task.step(actions[-1])
+            solved, touching = self.step(actions[-1])
             scene = self.scene()
-            if bool(info["success"][0]):
+            if touching:
+                return Attempt(_stack(actions, task), False, touching, True)
+            if solved:
                 return Attempt(_stack(actions, task), True)
         places = ", ".join(player.place for player in players)
         return Attempt(_stack(actions, task), False, f"the episode ended at {places}")
 
 
-class _StuckError(Exception):
-    """A robot cannot go on with its script."""
-
-
-class _Player:
-    """Takes one robot through its waypoints."""
-
-    def __init__(
-        self,
-        task: MultiRobotTask,
-        robot: str,
-        waypoints: Sequence[Waypoint],
-        scene: Scene,
-        alone: RobotsAlone,
-    ) -> None:
-        self._robot, self._waypoints = robot, list(waypoints)
-        self._driver = ArmDriver(task.layout.arm(robot).robot)
-        if any(waypoint.to is not None for waypoint in waypoints):
-            self._kinematics = pose_solver(task, robot)
-            self._posture = _Posture(alone, task.layout, robot)
-        if any(waypoint.at is not None for waypoint in waypoints):
-            self._reach = task.simulation.point_reach(robot)
-            self._base = np.array(task.layout.arm(robot).base_position)
-        self._goal = self._driver.arm(scene.qpos(robot))
-        self._gripper = OPEN
-        self._current: Waypoint | None = None
-        self._begun = self._elapsed = 0  # waypoints begun; steps taken in the current one
-
-    @property
-    def place(self) -> str:
-        """Where it is in its script, as ``robot.waypoint``."""
-        return f"{self._robot}.{self._current.name if self._current else 'start'}"
-
-    def act(self, scene: Scene, done: set[str]) -> Floats:
-        """Return the next action numbers; adds what is done to ``done``.
-
-        Raises:
-            _StuckError: If the next waypoint cannot be reached, or the present one takes too long.
-        """
-        if self._current is not None and self._is_done(self._current, scene):
-            done.add(self.place)
-        self._check_time(done)
-        if self._may_begin(done):
-            self._begin(self._waypoints[self._begun], scene)
-        self._elapsed += 1
-        return self._driver.action(self._goal, self._gripper, scene.qpos(self._robot))
-
-    def _check_progress(self, away: float) -> None:
-        """Give up if the arm is kept from its goal: for `PATIENCE` steps it came no nearer."""
-        if away < self._nearest_yet - PROGRESS:
-            self._nearest_yet, self._waited = away, 0
-        self._waited += 1
-        if self._waited > PATIENCE:
-            raise _StuckError(f"{self.place} is blocked {away:.2f} rad before its end")
-
-    def _check_time(self, done: set[str]) -> None:
-        most = self._current and self._current.most
-        if most is not None and self._elapsed >= most and self.place not in done:
-            raise _StuckError(f"{self.place} took more than {most} steps")
-
-    def _is_done(self, waypoint: Waypoint, scene: Scene) -> bool:
-        if self._elapsed < waypoint.steps:
-            return False
-        if (waypoint.to, waypoint.turn, waypoint.at) != (None, None, None):
-            away = np.abs(self._driver.arm(scene.qpos(self._robot)) - self._goal).max()
-            if away > waypoint.near:
-                self._check_progress(float(away))
-                return False
-        return waypoint.until is None or waypoint.until(scene)
-
-    def _may_begin(self, done: set[str]) -> bool:
-        if self._begun == len(self._waypoints):
-            return False
-        if self._current is not None and self.place not in done:
-            return False
-        return all(name in done for name in self._waypoints[self._begun].after)
-
-    def _begin(self, waypoint: Waypoint, scene: Scene) -> None:
-        self._current, self._gripper = waypoint, waypoint.gripper
-        self._begun, self._elapsed = self._begun + 1, 0
-        self._nearest_yet, self._waited = np.inf, 0
-        if waypoint.to is not None:
-            self._goal = self._nearest(waypoint.to(scene), scene)
-        elif waypoint.turn is not None:
-            arm = self._driver.arm(scene.qpos(self._robot))
-            self._goal = arm + waypoint.turn(arm)
-        elif waypoint.at is not None:
-            self._goal = self._reaching(waypoint.at(scene), scene)
-
-    def _nearest(self, poses: Sequence[Pose], scene: Scene) -> Floats:
-        """Return the arm joints with the shortest way to one of the poses.
-
-        Those at which the robot is inside itself are passed over, if there are others.
-        """
-        qpos = scene.qpos(self._robot)
-        goals = [goal for pose in poses for goal in self._kinematics.solutions(*pose, qpos)]
-        if not goals:
-            raise _StuckError(f"{self.place} is out of reach")
-        goals = by_way(goals, self._driver.arm(qpos))
-        return next((goal for goal in goals if self._posture.is_free(goal, scene)), goals[0])
-
-    def _reaching(self, place: Floats, scene: Scene) -> Floats:
-        """Return arm joints that bring the TCP to a place.
-
-        They are sought from the present ones, and from those turned towards the place by the
-        first joint, which turns an arm about its base.
-        """
-        arm, tip = self._reach.arm(scene.qpos(self._robot)), scene.tcp(self._robot)[0]
-        origin, turned = self._reach.forward(arm)
-        point = rotate(inverse(turned), tip - origin)
-        about = remainder(heading(self._base, place) - heading(self._base, tip), 2 * pi)
-        starts = [arm + about * side * (np.arange(len(arm)) == 0) for side in (0, 1, -1)]
-        goals = [self._reach.solve(point, place, start) for start in starts]
-        reachable = [goal for goal in goals if goal is not None]
-        if not reachable:
-            raise _StuckError(f"{self.place} is out of reach")
-        return min(reachable, key=lambda goal: float(np.abs(goal - arm).max()))
-
-
-class _Posture:
-    """Tells whether a robot is inside itself with one of its arms somewhere."""
-
-    def __init__(self, alone: RobotsAlone, layout: Layout, arm: str) -> None:
-        self._alone, self._owner = alone, layout.owner(arm)
-        joints = layout[self._owner].robot.joints
-        self._places = [joints.index(joint) for joint in layout.arm(arm).robot.arm_joints]
-
-    def is_free(self, arm: Floats, scene: Scene) -> bool:
-        """Return whether that is so at some arm joints (rad), other joints being as they are."""
-        qpos = scene.qpos(self._owner)
-        qpos[self._places] = arm
-        overlaps = self._alone.overlaps({self._owner: qpos})
-        return not any(o.one.robot == o.other.robot == self._owner for o in overlaps)
-
-
 def _players(
     task: MultiRobotTask, script: Script, scene: Scene, alone: RobotsAlone
-) -> list[_Player]:
+) -> list[Player]:
     """Return who takes the action numbers, in their order, by the names that the script uses."""
     short = task.layout.short_names
     names = {short.get(name, name): name for name in script}
     return [
-        _Player(task, name, script.get(name, ()), scene, alone)
+        Player(task, name, script.get(name, ()), scene, alone)
         for name in (names.get(part, part) for part in task.layout.action_split)
     ]
 
@@ -264,6 +148,9 @@ def first_success(
     task: MultiRobotTask, seed: int, scripts: Callable[[Scene], Sequence[Script]]
 ) -> Plan:
     """Try scripts one after the other and return the actions of the first that succeeds.
+
+    If none does, those in which arms touched, or something blocked one, are tried once more, with
+    ways round what is in the way; that needs the extra ``motion``.
 
     Args:
         task: Says layout and physics; left alone.
@@ -278,10 +165,19 @@ def first_success(
     """
 
     def attempts(rehearsal: Rehearsal) -> Iterator[Attempt]:
+        obstructed: list[Script] = []
         for i, script in enumerate(scripts(rehearsal.begin(seed))):
             if i > 0:
                 rehearsal.begin(seed)
-            yield rehearsal.play(script)
+            attempt = rehearsal.play(script)
+            if attempt.obstructed:
+                obstructed.append(script)
+                attempt = replace(attempt, reason=attempt.reason + without_planner())
+            yield attempt
+        if not without_planner():
+            for script in obstructed:
+                rehearsal.begin(seed)
+                yield rehearsal.play(script, around=True)
 
     return search(task, seed, attempts)
 

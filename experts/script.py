@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from experts.tips import gripper_turn
 from kinematics.rotations import Floats, multiply
 from simulation import State
+from simulation.world import Body
 from tasks import MultiRobotTask
 
 OPEN, CLOSED = 1.0, -1.0
@@ -24,13 +25,16 @@ class Scene:
 
     Attributes:
         design: Geometry that the task drew for this episode, if it draws any.
+        bodies: What the task put into the world, as declared.
     """
 
     def __init__(self, task: MultiRobotTask) -> None:
         """Look at the first world of a task as it is now."""
         self._state: State = task.simulation.read()
         self._layout = task.layout
-        self.design: Any = task.simulation.worlds[0].design
+        world = task.simulation.worlds[0]
+        self.design: Any = world.design
+        self.bodies: tuple[Body, ...] = tuple(world.bodies.values())
 
     def body(self, name: str) -> Pose:
         """Return the pose of a body."""

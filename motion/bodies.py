@@ -265,15 +265,19 @@ class Bodies:
         touchable: dict[int, set[int]] = {}
         for held in self.held:
             robot = self.layout.owner(held.place)
-            hand = self._hand(held.place)
+            hand = self.hand(held.place)
             own = {i for i, s in enumerate(self.solids) if s.owner == held.obstacle.name}
             for i, solid in enumerate(self.solids):
                 if solid.owner == robot and solid.part in hand:
                     touchable.setdefault(i, set()).update(own)
         return touchable
 
-    def _hand(self, place: str) -> set[int]:
-        """Return the parts of a place's hand: what its TCP link and its gripper's joints carry."""
+    def hand(self, place: str) -> set[int]:
+        """Return the parts of a place's hand: what its TCP link and its gripper's joints carry.
+
+        Raises:
+            UnknownNameError: If there is no such place, or no such link.
+        """
         robot, link = self.tcp(place)
         tree, arm = self.models[robot].kinematics, self.layout.arm(place).robot
         fingers = arm.fingers.links if arm.fingers else ()

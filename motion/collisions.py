@@ -110,13 +110,25 @@ class Checker:
         Raises:
             LayoutError: If a shape is wrong, or a number not finite.
         """
+        return next(iter(self.contacts(qpos, time)), None)
+
+    def contacts(self, qpos: ArrayLike, time: float | None = None) -> list[Contact]:
+        """Return all bodies that are too near, those first that miss most of what they have to be.
+
+        Args:
+            qpos: Coordinates, (D,) (rad, m).
+            time: Where obstacles that move are (s); None is 0.
+
+        Raises:
+            LayoutError: If a shape is wrong, or a number not finite.
+        """
         places, pairs = self._close(qpos, time)
         contacts = [self._contact(places, a, b) for a, b in pairs]
         missing = [
             contact.distance - self._measure.apart(*pair)
             for contact, pair in zip(contacts, pairs, strict=True)
         ]
-        return contacts[int(np.argmin(missing))] if contacts else None
+        return [contacts[i] for i in np.argsort(missing, kind="stable")]
 
     def close(self, qpos: ArrayLike, time: float | None = None) -> Flags:
         """Tell which of `pairs` are not as far apart as they have to be, (m,).

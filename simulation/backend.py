@@ -313,6 +313,18 @@ class Backend(Protocol):
         """Return which parts of a world were inside each other in the last step of physics."""
         ...
 
+    def watch_arms(self) -> None:
+        """Look from now on, in every step of physics, at which arms touch each other."""
+        ...
+
+    def arms_touching(self, env: int) -> list[tuple[Part, Part]]:
+        """Return which links of different arms touched since it was last asked.
+
+        Raises:
+            SimulationError: If nobody looks at that; see `watch_arms`.
+        """
+        ...
+
     def touching(self) -> Flags:
         """Tell where a link pressed on a dynamic body in the last step of physics, (N,)."""
         ...

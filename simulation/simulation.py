@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from layouts import Layout
 from robots import RobotDescriptor, SimulationError
 from robots.descriptor import IDENTITY, Quaternion
-from simulation.backend import Backend, Overlap, PointSolver, PoseSolver, Rows
+from simulation.backend import Backend, Overlap, Part, PointSolver, PoseSolver, Rows
 from simulation.cameras import AnyCamera, View
 from simulation.control.modes import ModeController
 from simulation.controller import JointPositionController
@@ -220,6 +220,23 @@ class Simulation:
     def overlaps(self, env: int) -> list[Overlap]:
         """Return which parts of a world were inside each other in the last step of physics."""
         return self._backend.overlaps(env)
+
+    def watch_arms(self) -> None:
+        """Look from now on, in every step of physics, at which arms touch each other.
+
+        Arms are robots, or limbs of one robot.
+        """
+        self._backend.watch_arms()
+
+    def arms_touching(self, env: int) -> list[tuple[Part, Part]]:
+        """Return which links of different arms touched in a world.
+
+        It tells of all steps of physics since it was last asked, or the world was built.
+
+        Raises:
+            SimulationError: If nobody looks at that; see `watch_arms`.
+        """
+        return self._backend.arms_touching(env)
 
     def touching(self) -> Flags:
         """Tell where a robot pressed on a movable object in the last step of physics, (N,)."""

@@ -12,11 +12,14 @@ from numpy.typing import NDArray
 
 from experts.geometry import backed_off
 from experts.grasps import (
+    PLACE_YAWS,
     YAWS,
     cube_grip_from,
     cube_grips,
+    grips_to,
     held_at,
     is_near,
+    lowerable,
     need_fingers,
     pick,
 )
@@ -39,13 +42,15 @@ class Style:
 
     Attributes:
         tilt: Angle of the right gripper from straight down, forward, because the target is
-            farther away than the arm reaches straight down (rad).
+            farther away than the arm reaches straight down (rad). None is any angle, and any side
+            of the cube, with which it can be brought there; likewise for the left gripper, which
+            else points straight down.
         short: How far before the target's middle it is laid down; the target's radius is
             0.06 m (m).
         clearance: How high above its place it is before it is lowered (m).
     """
 
-    tilt: float = radians(20)
+    tilt: float | None = radians(20)
     short: float = 0.05
     clearance: float = 0.02
 
@@ -57,6 +62,8 @@ STYLES = (
     Style(short=0.04),
     Style(tilt=radians(30), short=0.04, clearance=0.04),
     Style(tilt=radians(10)),
+    Style(tilt=None),
+    Style(tilt=None, clearance=0.04),
 )
 
 
@@ -75,20 +82,23 @@ def stack_for_two(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
     return first_success(
         task,
         seed,
-        lambda scene: [{LAYER: _lay(style, base), STACKER: _stack()} for style in STYLES],
+        lambda scene: [
+            {LAYER: _lay(task, style, base), STACKER: _stack(task, style, base)} for style in STYLES
+        ],
     )
 
 
-def _lay(style: Style, base: Floats) -> tuple[Waypoint, ...]:
+def _lay(task: MultiRobotTask, style: Style, base: Floats) -> tuple[Waypoint, ...]:
     """The right arm brings the green cube and makes room."""
+    at_target = partial(_at_target, style=style, base=base)
 
     def grips(scene: Scene) -> list[Pose]:
+        if style.tilt is None:
+            return grips_to(task, LAYER, BASE, at_target, style.clearance)(scene)
         return [cube_grip_from(scene.body(BASE), base, style.tilt)]
 
     def place(scene: Scene, up: float, yaws: Sequence[float] = (0.0,)) -> list[Pose]:
-        target, _ = scene.body(TARGET)
-        x, y, _ = target - style.short * _level(target - base)
-        return held_at(scene, LAYER, BASE, np.array([x, y, CUBE_HALF_SIZE + up]), yaws)
+        return held_at(scene, LAYER, BASE, at_target(scene) + (0.0, 0.0, up), yaws)
 
     def rise(scene: Scene) -> list[Pose]:
         return [backed_off(scene.tcp(LAYER), 0.08)]
@@ -97,9 +107,13 @@ def _lay(style: Style, base: Floats) -> tuple[Waypoint, ...]:
         position, quaternion = backed_off(scene.tcp(LAYER), 0.1)
         return [(position - 0.15 * _level(position - base), quaternion)]
 
+    over = partial(place, up=style.clearance, yaws=YAWS)
+    if style.tilt is None:
+        over = partial(place, up=style.clearance, yaws=PLACE_YAWS)
+        over = lowerable(task, LAYER, over, style.clearance)
     return (
         *pick(LAYER, BASE, grips),
-        Waypoint("over", partial(place, up=style.clearance, yaws=YAWS), CLOSED),
+        Waypoint("over", over, CLOSED),
         Waypoint("lower", partial(place, up=0.001), CLOSED, near=0.03),
         Waypoint("release", None, OPEN, steps=2),
         Waypoint("rise", rise, OPEN, near=0.1),
@@ -107,10 +121,15 @@ def _lay(style: Style, base: Floats) -> tuple[Waypoint, ...]:
     )
 
 
-def _stack() -> tuple[Waypoint, ...]:
+def _stack(task: MultiRobotTask, style: Style, base: Floats) -> tuple[Waypoint, ...]:
     """The left arm picks the blue cube, waits, and lays it on the green one."""
 
+    def on_top(scene: Scene) -> Floats:
+        return _at_target(scene, style, base) + ON_TOP
+
     def grips(scene: Scene) -> list[Pose]:
+        if style.tilt is None:
+            return grips_to(task, STACKER, TOP, on_top, CLEARANCE)(scene)
         return cube_grips(scene.body(TOP))
 
     def lift(scene: Scene) -> list[Pose]:
@@ -122,6 +141,8 @@ def _stack() -> tuple[Waypoint, ...]:
         return held_at(scene, STACKER, TOP, top, yaws)
 
     over = partial(place, up=CLEARANCE, yaws=YAWS)
+    if style.tilt is None:
+        over = lowerable(task, STACKER, partial(place, up=CLEARANCE, yaws=PLACE_YAWS), CLEARANCE)
     in_place = partial(is_near, body=TOP, other=BASE, offset=ON_TOP, limit=IN_PLACE)
     return (
         *pick(STACKER, TOP, grips),
@@ -130,6 +151,13 @@ def _stack() -> tuple[Waypoint, ...]:
         Waypoint("lower", partial(place, up=0.001), CLOSED, near=0.03, until=in_place),
         Waypoint("release", None, OPEN),
     )
+
+
+def _at_target(scene: Scene, style: Style, base: Floats) -> Floats:
+    """Return where the green cube is to lie, (3,) (m)."""
+    target, _ = scene.body(TARGET)
+    x, y, _ = target - style.short * _level(target - base)
+    return np.array([x, y, CUBE_HALF_SIZE])
 
 
 def _level(vector: Floats) -> Floats:

@@ -11,7 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experts.geometry import backed_off
-from experts.grasps import YAWS, cube_grip_from, held_at, need_fingers, pick
+from experts.grasps import (
+    PLACE_YAWS,
+    YAWS,
+    cube_grip_from,
+    grips_to,
+    held_at,
+    lowerable,
+    need_fingers,
+    pick,
+)
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
 from kinematics.rotations import Floats
@@ -26,12 +35,13 @@ class Style:
     """How the cubes are stacked.
 
     Attributes:
-        tilt: Angle of the grippers from straight down, forward (rad).
+        tilt: Angle of the grippers from straight down, forward (rad); None is any angle, and any
+            side of the cube, with which it can be brought to its place.
         waiting: How high a cube is held until its turn comes (m).
         clearance: How high above its place it is before it is lowered (m).
     """
 
-    tilt: float = radians(20)
+    tilt: float | None = radians(20)
     waiting: float = 0.12
     clearance: float = 0.05
 
@@ -41,6 +51,8 @@ STYLES = (
     Style(tilt=radians(30)),
     Style(tilt=radians(10)),
     Style(tilt=radians(25), clearance=0.07, waiting=0.16),
+    Style(tilt=None),
+    Style(tilt=None, clearance=0.07, waiting=0.16),
 )
 
 
@@ -56,26 +68,23 @@ def stack_for_four(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
     """
     need_fingers(task, "stacking cubes", *ORDER)
     bases = {place: np.array(task.layout.arm(place).base_position) for place in ORDER}
-    return first_success(task, seed, lambda scene: [_script(style, bases) for style in STYLES])
+    return first_success(task, seed, lambda scene: [_script(task, s, bases) for s in STYLES])
 
 
-def _script(style: Style, bases: dict[str, Floats]) -> Script:
+def _script(task: MultiRobotTask, style: Style, bases: dict[str, Floats]) -> Script:
     places = list(ORDER)
     return {
-        place: _stack(style, place, level, bases[place], places[level - 1] if level else None)
+        place: _stack(task, style, place, level, bases[place], places[level - 1] if level else None)
         for level, place in enumerate(places)
     }
 
 
 def _stack(
-    style: Style, robot: str, level: int, base: Floats, before: str | None
+    task: MultiRobotTask, style: Style, robot: str, level: int, base: Floats, before: str | None
 ) -> tuple[Waypoint, ...]:
     """One arm picks its cube, waits for the one before it, and lays its own on top."""
     cube = f"cube_{robot}"
     goal = np.array([0.0, 0.0, (2 * level + 1) * CUBE_HALF_SIZE])
-
-    def grips(scene: Scene) -> list[Pose]:
-        return [cube_grip_from(scene.body(cube), base, style.tilt)]
 
     def lift(scene: Scene) -> list[Pose]:
         x, y, _ = scene.body(cube)[0]
@@ -95,13 +104,24 @@ def _stack(
         outward = (base - position) * (1.0, 1.0, 0.0)
         return [(position + 0.25 * outward / np.linalg.norm(outward), quaternion)]
 
+    if style.tilt is None:
+        grips = grips_to(task, robot, cube, lambda scene: goal, style.clearance)
+        over = partial(place, up=style.clearance, yaws=PLACE_YAWS)
+        over = lowerable(task, robot, over, style.clearance)
+    else:
+        grips = partial(_grip, cube=cube, base=base, tilt=style.tilt)
+        over = partial(place, up=style.clearance, yaws=YAWS)
     turn = () if before is None else (f"{before}.rise",)
     return (
         *pick(robot, cube, grips),
         Waypoint("lift", lift, CLOSED),
-        Waypoint("over", partial(place, up=style.clearance, yaws=YAWS), CLOSED, after=turn),
+        Waypoint("over", over, CLOSED, after=turn),
         Waypoint("lower", partial(place, up=0.001), CLOSED, near=0.03, until=in_place),
         Waypoint("release", None, OPEN, steps=2),
         Waypoint("rise", rise, OPEN, near=0.1),
         Waypoint("retreat", retreat, OPEN),
     )
+
+
+def _grip(scene: Scene, cube: str, base: Floats, tilt: float) -> list[Pose]:
+    return [cube_grip_from(scene.body(cube), base, tilt)]

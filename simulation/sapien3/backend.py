@@ -8,12 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulation.backend import Built, BuiltRobot, Overlap, Pair, Readout, Rows, Velocity
+from robots import SimulationError
+from simulation.backend import Built, BuiltRobot, Overlap, Pair, Part, Readout, Rows, Velocity
 from simulation.cameras import AnyCamera, View
 from simulation.maths import Flags, Floats
 from simulation.sapien3.blueprint import Blueprint
 from simulation.sapien3.collision import described_shapes
-from simulation.sapien3.contacts import PairForces, overlaps_in, presses_on_object
+from simulation.sapien3.contacts import (
+    ArmContacts,
+    PairForces,
+    overlaps_in,
+    presses_on_object,
+)
 from simulation.sapien3.inverse_kinematics import InverseKinematics
 from simulation.sapien3.point_reach import PointReach
 from simulation.sapien3.pose_follower import JOINTS_OF_A_POSE, NearestFollower, PoseFollower
@@ -34,6 +40,7 @@ class SapienBackend:
         """Begin without worlds."""
         self.worlds: list[BuiltWorld] = []
         self._blueprints: dict[str, Blueprint] = {}
+        self._arms: dict[BuiltWorld, ArmContacts] | None = None
 
     def build(self, worlds: Mapping[int, World]) -> Built:
         """Build worlds; see `Backend`."""
@@ -57,6 +64,8 @@ class SapienBackend:
         ]
         self._packers = [world.scene.pack_poses for world in self.worlds]
         self._steps = [world.stepper() for world in self.worlds]
+        if self._arms is not None:
+            self.watch_arms()
         self._places = _pose_places(len(self.worlds), len(self.worlds[0].scene.entities))
         self._order = _declared_order(self.worlds[0])
         self._forces: dict[tuple[Pair, ...], PairForces] = {}
@@ -171,6 +180,18 @@ class SapienBackend:
     def overlaps(self, env: int) -> list[Overlap]:
         """Return which parts are inside each other; see `Backend`."""
         return overlaps_in(self.worlds[env])
+
+    def watch_arms(self) -> None:
+        """Look at which arms touch from now on; see `Backend`."""
+        known = self._arms or {}
+        self._arms = {w: known.get(w) or ArmContacts(w) for w in self.worlds}
+        self._steps = [arms.step for arms in self._arms.values()]
+
+    def arms_touching(self, env: int) -> list[tuple[Part, Part]]:
+        """Return which links of different arms touched since it was last asked; see `Backend`."""
+        if self._arms is None:
+            raise SimulationError("nobody looks at which arms touch; call watch_arms() before")
+        return self._arms[self.worlds[env]].take()
 
     def touching(self) -> Flags:
         """Tell where a link pressed on a dynamic body; see `Backend`."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from simulation.backend import Overlap, Pair, Part
 from simulation.maths import Floats
+from simulation.sapien3.robot import SimulatedRobot
 from simulation.sapien3.world import BuiltWorld
 
 _Table = dict[tuple[int, int], tuple[int, int]]
@@ -61,6 +62,58 @@ def _impulses(contacts: Sequence[Any], table: _Table) -> dict[int, Any]:
             total = np.sum([point.impulse for point in contact.points], axis=0) * sign
             impulses[pair] = impulses.get(pair, np.zeros(3)) + total
     return impulses
+
+
+class ArmContacts:
+    """Steps the physics of a world and remembers which links of different arms touch."""
+
+    def __init__(self, world: BuiltWorld) -> None:
+        """Look up whose each link is."""
+        self._advance, self._contacts = world.stepper(), world.system.get_contacts
+        self._links = {
+            id(link): (arm, Part(robot.name, link.name))
+            for robot in world.robots.values()
+            for arm, link in _links_of_arms(robot)
+        }
+        self._seen: dict[tuple[Part, Part], None] = {}
+
+    def step(self) -> None:
+        """Advance by one step of physics."""
+        self._advance()
+        links = self._links
+        for contact in self._contacts():
+            one, other = (links.get(id(body)) for body in contact.bodies)
+            if one and other and one[0] != other[0] and _touch(contact):
+                self._seen[one[1], other[1]] = None
+
+    def take(self) -> list[tuple[Part, Part]]:
+        """Return what touched since it was last asked."""
+        seen, self._seen = list(self._seen), {}
+        return seen
+
+
+def _touch(contact: Any) -> bool:
+    """Tell whether two bodies that are near each other touch."""
+    return any(point.separation <= 0 or np.any(point.impulse) for point in contact.points)
+
+
+def _links_of_arms(robot: SimulatedRobot) -> Iterator[tuple[tuple[str, str], Any]]:
+    """Yield the links of a robot, each with its arm: the robot and, if it has limbs, the limb.
+
+    A link is of the limb that has the last joint on the way to it; what is of no limb is left out
+    if there are limbs.
+    """
+    descriptor = robot.descriptor
+    if not descriptor.limbs:
+        yield from (((robot.name, ""), link) for link in robot.links.values())
+        return
+    limbs = {joint: part for part in descriptor.limbs for joint in descriptor.parts[part].joints}
+    for link in robot.links.values():
+        at = link
+        while at is not None and (at.joint is None or at.joint.name not in limbs):
+            at = at.parent
+        if at is not None:
+            yield (robot.name, limbs[at.joint.name]), link
 
 
 def overlaps_in(world: BuiltWorld) -> list[Overlap]:

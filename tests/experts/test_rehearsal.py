@@ -1,5 +1,6 @@
 """Scripts are played as they are written, for one arm as for two."""
 
+import re
 from collections.abc import Iterator
 from functools import partial
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 import tasks
+from experts.closed_loop import rehearse
 from experts.geometry import gripper_facing, nearest_quarter_turn, turn, yaw_of
 from experts.rehearsal import Attempt, Rehearsal, first_success, search
 from experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
@@ -151,6 +153,22 @@ def test_where_an_attempt_ended_is_told(two_arms):
     assert not attempt.success
     assert attempt.reason == "the episode ended at left.idle, right.start"
     assert len(attempt.actions) == 100
+
+
+def both_to_the_middle(scene: Scene) -> list[Pose]:
+    return [(np.array([0.0, 0.0, 0.3]), scene.tcp("left")[1])]
+
+
+def test_arms_that_touch_have_failed(two_arms):
+    """The attempt ends there and says who; so does a closed loop."""
+    crash = {name: (Waypoint("middle", both_to_the_middle),) for name in ("left", "right")}
+    two_arms.begin(0)
+    attempt = two_arms.play(crash)
+    assert not attempt.success
+    assert re.fullmatch(r"(left|right)\.panda_\w+ touches (left|right)\.panda_\w+", attempt.reason)
+    assert len(attempt.actions) < 60
+    actions = iter(attempt.actions)
+    assert rehearse(two_arms.task, 0, lambda scene: next(actions)).reason == attempt.reason
 
 
 def test_waiting_for_an_unknown_waypoint_is_refused(two_arms):

@@ -1,0 +1,348 @@
+"""Ways of an arm that touch nothing on their way: no other arm, not itself, no body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from experts.obstacles import obstacles
+from experts.script import Scene
+from kinematics.rotations import Floats
+from motion.cell import Cell
+from motion.collisions import Checker, Contact
+from motion.obstacles import Held, Obstacle
+from motion.search import connect, import_ompl
+from motion.shorten import shortened
+from motion.spaces import Progress, Resolution, Space
+from robots.bodies.hulls import require_packages
+from robots.common.errors import MissingPackageError, NoPlanError
+from tasks import MultiRobotTask
+
+CLEARANCE = 0.02  # m
+RESOLUTION: Resolution = (0.02, 0.1)  # m and rad
+SHARES = np.linspace(0.0, 1.0, 5)  # of their ways, where arms that move too are looked at
+STANDING = 0.02  # rad: an arm that has less to go stands
+SHORT = 0.4  # rad: a way that long at most, from or to a body, is only made straight
+CANDIDATES = 8  # postures at the goal that are looked at
+SOUGHT = 2  # postures at the goal to which a way round is sought
+CHECKS = 600  # lines and postures that a search may look at
+
+
+def without_planner() -> str:
+    """Return what to add to a reason where no way round can be sought; nothing if it can."""
+    try:
+        require_packages()
+        import_ompl()
+    except MissingPackageError as error:
+        return f"; no way round was sought: {error}"
+    return ""
+
+
+class NoWayError(Exception):
+    """There is no way now; says what is in the way."""
+
+
+class Ways:
+    """Finds ways for the arms of a task, given where the others are and go."""
+
+    def __init__(self, task: MultiRobotTask) -> None:
+        """Take a task: its layout, and its bodies as scenes show them."""
+        self._layout = task.layout
+        self._alone = Cell(task.layout)
+        self._columns = {arm: self._columns_of(arm) for arm in task.layout.arms}
+        self._graspers = [
+            arm for arm, place in task.layout.arms.items() if place.robot.fingers is not None
+        ]
+
+    def known(self, arm: str) -> str | None:
+        """Return the full name of an arm; None if it is none."""
+        name = self._layout.arm_name(arm)
+        return name if name in self._columns else None
+
+    def find(
+        self, arm: str, goals: Sequence[Floats], scene: Scene, ahead: Mapping[str, Floats]
+    ) -> Floats:
+        """Return the points of a way that touches nothing, its start left out, (n, arm joints).
+
+        It is the straight way to the first goal that has a free one, else a way round (rad).
+
+        Args:
+            arm: Its name in the layout.
+            goals: Postures of the arm, each (arm joints,) (rad), the best first.
+            scene: As it is now.
+            ahead: What lies before the other arms, by name, (n, arm joints) (rad), beginning where
+                they are.
+
+        Raises:
+            MissingPackageError: If a way round is needed and the extra ``motion`` not installed.
+            NoWayError: If there is none now.
+        """
+        query = self._query(self._layout.arm_name(arm), scene, ahead)
+        places = [place for goal in goals[:CANDIDATES] if (place := query.at(goal)) is not None]
+        if not places:
+            raise NoWayError(f"{query.trouble} at its end")
+        for place in places:
+            if place.is_straight_free:
+                return place.goal[None]
+        for place in places[:SOUGHT]:
+            points = place.way_round()
+            if points is not None:
+                return points
+        raise NoWayError("all ways there are blocked")
+
+    def _query(self, arm: str, scene: Scene, ahead: Mapping[str, Floats]) -> _Query:
+        here = np.concatenate([scene.qpos(robot) for robot in self._alone.robots])
+        cell = self._cell(scene, here)
+        everywhere = np.tile(here, (len(SHARES), 1))
+        moves = False
+        for other, points in ahead.items():
+            if other != arm and np.abs(points - points[0]).max() > STANDING:
+                everywhere[:, self._columns[other]] = _along(points, SHARES)
+                moves = True
+        rows = everywhere if moves else here[None]
+        return _Query(
+            cell, arm, self._columns[arm], rows, {f"the {name}" for name in _movable(scene)}
+        )
+
+    def _cell(self, scene: Scene, here: Floats) -> Cell:
+        """Return the robots with all bodies of the scene; those that two arms hold do not count."""
+        held: list[Held] = []
+        standing: list[Obstacle] = []
+        movable = _movable(scene)
+        for name, obstacle in obstacles(scene).items():
+            grasping = (arm for arm in self._graspers if scene.grasps(arm, name))
+            match list(grasping) if name in movable else []:
+                case []:
+                    standing.append(obstacle)
+                case [arm]:
+                    held.append(self._alone.grasped(arm, obstacle, here))
+                case _:
+                    pass
+        return Cell(self._layout, standing, held)
+
+    def _columns_of(self, arm: str) -> NDArray[np.intp]:
+        robot = self._layout.owner(arm)
+        own, first = self._layout[robot].robot.joints, self._alone.slices[robot].start
+        joints = self._layout.arm(arm).robot.arm_joints
+        return np.array([first + own.index(joint) for joint in joints], np.intp)
+
+
+class _Query:
+    """Where one arm may go: what it has to keep clear of, and what its hand is at already."""
+
+    def __init__(
+        self,
+        cell: Cell,
+        arm: str,
+        columns: NDArray[np.intp],
+        everywhere: Floats,
+        movable: set[str],
+    ) -> None:
+        """Look at where the arm is.
+
+        Args:
+            cell: All robots and bodies.
+            arm: The arm.
+            columns: Of its joints among the cell's coordinates.
+            everywhere: All coordinates now, and as the other arms go on, (k, D) (rad, m).
+            movable: Obstacles that physics moves.
+        """
+        self.cell, self.columns, self._movable = cell, columns, movable
+        self.robot = cell.layout.owner(arm)
+        hand = cell.hand(arm)
+        held = {held.obstacle.name for held in cell.held if held.place == arm}
+        links = {s.name for s in cell.solids if s.mover == self.robot and s.part in hand}
+        self._hand = held | links
+        self._whole = cell.checker((self.robot,), CLEARANCE)
+        self.start = everywhere[0, columns]
+        self._allowed = _Allowed(cell, self._whole)
+        self.at_body = self._look(self._allowed, everywhere[0], leaving=True)
+        checker = self._allowed.checker()
+        free = checker.free(everywhere)
+        free[0] = True
+        self.everywhere = everywhere[free]
+        self.trouble = ""
+
+    def at(self, goal: Floats) -> _Place | None:
+        """Return what is to know about a posture at the goal; None if something is in the way."""
+        allowed = self._allowed.copy()
+        states = self.everywhere.copy()
+        states[:, self.columns] = goal
+        at_body = self._look(allowed, states[0], leaving=False)
+        self._look(allowed, states[-1], leaving=False)
+        place = _Place(self, goal, allowed, self.at_body or at_body)
+        contact = next((c for state in states if (c := place.contact(state)) is not None), None)
+        self.trouble = str(contact or "")
+        return place if contact is None else None
+
+    def _look(self, allowed: _Allowed, state: Floats, *, leaving: bool) -> bool:
+        """Allow what may be nearer than usual in a state; return whether the hand is at a body.
+
+        What is nearer than the clearance already may be so on the way. What physics moves may be
+        touched by the hand that is there; so may what it overlaps, which is by rounding, and what
+        the arm is to get away from.
+        """
+        at_body = False
+        for contact in self._whole.contacts(state):
+            bodies = [name for name in contact.names if name not in self._hand]
+            of_hand = len(bodies) == 1 and bodies[0] in contact.owners
+            at_body |= of_hand
+            touches = of_hand and bodies[0] in self._movable
+            if touches or (contact.distance <= 0 and (of_hand or leaving)):
+                allowed.touch(contact)
+            elif contact.distance > 0:
+                allowed.near(contact)
+        return at_body
+
+
+class _Allowed:
+    """How far bodies have to be apart, by pairs."""
+
+    def __init__(self, cell: Cell, whole: Checker, apart: Floats | None = None) -> None:
+        """Begin with what a checker asks."""
+        self._cell, self._whole = cell, whole
+        self.apart = whole.apart.copy() if apart is None else apart
+        names = [solid.name for solid in cell.solids]
+        self._names = [frozenset((names[a], names[b])) for a, b in whole.pairs.tolist()]
+
+    def copy(self) -> _Allowed:
+        """Return a copy, to allow more."""
+        return _Allowed(self._cell, self._whole, self.apart.copy())
+
+    def touch(self, contact: Contact) -> None:
+        """Leave out the pairs of two bodies."""
+        self._set(contact, -np.inf)
+
+    def near(self, contact: Contact) -> None:
+        """Let two bodies be as near as they like, as long as they do not overlap."""
+        self._set(contact, 0.0)
+
+    def checker(self) -> Checker:
+        """Return what tells whether all else is apart."""
+        return Checker(self._cell, *self.counted())
+
+    def counted(self) -> tuple[NDArray[np.intp], Floats]:
+        """Return the pairs that count, and how far each has to be apart."""
+        counts = self.apart > -np.inf
+        return self._whole.pairs[counts], self.apart[counts]
+
+    def _set(self, contact: Contact, apart: float) -> None:
+        names = frozenset(contact.names)
+        for i, pair in enumerate(self._names):
+            if pair == names:
+                self.apart[i] = min(self.apart[i], apart)
+
+
+class _Place:
+    """A posture at the goal, and the ways there."""
+
+    def __init__(self, query: _Query, goal: Floats, allowed: _Allowed, at_body: bool) -> None:
+        self.goal, self._start = goal, query.start
+        ends = np.stack([self._start, goal])
+        self._checker = _AmongMoving(
+            query.cell, *allowed.counted(), query.columns, query.everywhere
+        )
+        self._space = Space(
+            query.cell,
+            (query.robot,),
+            query.columns,
+            query.everywhere[0],
+            _bounds(query.cell.limits[query.columns], ends),
+            np.ones(len(goal)),
+            self._checker,
+            _Budget(),
+        )
+        self._only_straight = at_body and bool(np.abs(goal - self._start).max() < SHORT)
+
+    def contact(self, state: Floats) -> Contact | None:
+        """Return which two bodies are too near in a state of the whole cell, or None."""
+        return self._checker.contact(state)
+
+    @property
+    def is_straight_free(self) -> bool:
+        """Whether the straight way touches nothing."""
+        return self._space.edge_free(self._start, self.goal, RESOLUTION)
+
+    def way_round(self) -> Floats | None:
+        """Return the points of another way, without its start; None if none was found."""
+        if self._only_straight:
+            return None
+        try:
+            points = connect(self._space, self._start, [self.goal], 0, RESOLUTION, restarts=1)
+            if points is None:
+                return None
+            return shortened(self._space, points, 0, RESOLUTION)[1:]
+        except NoPlanError:
+            return None
+
+
+class _AmongMoving(Checker):
+    """A checker for an arm among others that are in several postures at once."""
+
+    def __init__(
+        self,
+        cell: Cell,
+        pairs: NDArray[np.intp],
+        apart: Floats,
+        columns: NDArray[np.intp],
+        everywhere: Floats,
+    ) -> None:
+        super().__init__(cell, pairs, apart)
+        self._columns, self._everywhere = columns, everywhere
+
+    def free(self, qpos: ArrayLike, times: ArrayLike | None = None) -> NDArray[np.bool_]:
+        """Tell for each posture of the arm whether it is free wherever the others are, (n,)."""
+        places = np.asarray(qpos, float)[:, None, self._columns]
+        states = np.tile(self._everywhere, (len(places), 1, 1))
+        states[..., self._columns] = places
+        free = super().free(states.reshape(-1, states.shape[-1]), times)
+        return np.asarray(free.reshape(states.shape[:2]).all(axis=1))
+
+    def edge_free(
+        self,
+        start: ArrayLike,
+        end: ArrayLike,
+        resolution: tuple[float, float] = RESOLUTION,
+        times: tuple[float, float] | None = None,
+    ) -> bool:
+        """Tell whether a straight way of the arm is free wherever the others are."""
+        ends = np.array([start, end])[:, self._columns]
+        for state in self._everywhere:
+            a, b = state.copy(), state.copy()
+            a[self._columns], b[self._columns] = ends
+            if not super().edge_free(a, b, resolution, times):
+                return False
+        return True
+
+
+class _Budget(Progress):
+    """Ends a search that takes too many checks, however long they take."""
+
+    def __init__(self) -> None:
+        super().__init__(np.inf)
+
+    def tell(self, what: str) -> None:
+        """Count a check."""
+        self.checks += 1
+        if self.checks > CHECKS:
+            raise NoPlanError(f"no way was found in {CHECKS} checks", "not found")
+
+
+def _bounds(limits: Floats, ends: Floats) -> Floats:
+    """Return where a search may go: the limits, or around its ends where there are none, (d, 2)."""
+    around = np.stack([ends.min(axis=0) - np.pi, ends.max(axis=0) + np.pi], axis=1)
+    return np.where(np.isfinite(limits), limits, around)
+
+
+def _movable(scene: Scene) -> set[str]:
+    return {body.name for body in scene.bodies if body.kind == "dynamic"}
+
+
+def _along(points: Floats, shares: Floats) -> Floats:
+    """Return places along the lines through points, at some shares of the way, (n, d)."""
+    steps = np.abs(np.diff(points, axis=0)).max(axis=1)
+    marks = np.concatenate([[0.0], np.cumsum(steps)])
+    rows = [np.interp(shares * marks[-1], marks, column) for column in points.T]
+    return np.stack(rows, axis=1)

@@ -1,0 +1,146 @@
+"""Arms go round what is in their way, or wait until it is gone."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+import tasks
+from experts import first_success
+from experts.geometry import gripper_facing
+from experts.obstacles import _corners, obstacles
+from experts.rehearsal import Rehearsal
+from experts.script import CLOSED, Pose, Scene, Script, Waypoint
+from experts.tips import pose_solver
+from experts.ways import NoWayError, Ways
+from kinematics.rotations import transform
+from simulation.shapes import Box, Capsule, Cylinder, Plane, Sphere
+
+HALF_PI = np.pi / 2
+MIDDLE = np.array([0.0, 0.0, 0.3])
+
+
+@pytest.fixture(scope="module")
+def two_arms() -> Rehearsal:
+    return Rehearsal(tasks.make("TwoRobotPickCube-v1"))
+
+
+def at(place: np.ndarray, facing: float = HALF_PI) -> object:
+    def poses(scene: Scene) -> list[Pose]:
+        return [(place, gripper_facing(facing, 0.0))]
+
+    return poses
+
+
+def crossing() -> Script:
+    """The left arm stands in the middle; the right one goes from one side of it to the other."""
+    sides = [np.array([x, 0.05, 0.3]) for x in (-0.25, 0.25)]
+    return {
+        "left": (Waypoint("stand", at(MIDDLE), CLOSED),),
+        "right": (
+            Waypoint("one side", at(sides[0], -HALF_PI), CLOSED),
+            Waypoint("other side", at(sides[1], -HALF_PI), CLOSED, after=("left.stand",)),
+        ),
+    }
+
+
+def test_an_arm_goes_round_another_one(two_arms: Rehearsal):
+    two_arms.begin(0)
+    straight = two_arms.play(crossing())
+    assert straight.obstructed
+    assert " touches " in straight.reason
+    two_arms.begin(0)
+    around = two_arms.play(crossing(), around=True)
+    assert around.reason == "the episode ended at left.stand, right.other side"
+    np.testing.assert_allclose(two_arms.scene().tcp("right")[0], [0.25, 0.05, 0.3], atol=0.02)
+
+
+def test_ways_are_the_same_every_time(two_arms: Rehearsal):
+    plays = []
+    for _ in range(2):
+        two_arms.begin(0)
+        plays.append(two_arms.play(crossing(), around=True).actions)
+    np.testing.assert_array_equal(*plays)
+
+
+def test_an_arm_waits_until_its_place_is_free(two_arms: Rehearsal):
+    """The left one leaves the middle after 50 steps; until then the right one stays away."""
+    script = {
+        "left": (
+            Waypoint("stand", at(MIDDLE), CLOSED, steps=50),
+            Waypoint("leave", at(np.array([0.0, -0.4, 0.4])), CLOSED),
+        ),
+        "right": (
+            Waypoint("ready", at(np.array([0.0, 0.35, 0.4]), -HALF_PI), CLOSED),
+            Waypoint("middle", at(MIDDLE, -HALF_PI), CLOSED),
+        ),
+    }
+    two_arms.begin(0)
+    assert " touches " in two_arms.play(script).reason
+    two_arms.begin(0)
+    attempt = two_arms.play(script, around=True)
+    assert attempt.reason == "the episode ended at left.leave, right.middle"
+    np.testing.assert_allclose(two_arms.scene().tcp("right")[0], MIDDLE, atol=0.02)
+
+
+def test_where_another_arm_stays_no_way_leads(two_arms: Rehearsal):
+    two_arms.begin(0)
+    two_arms.play({"left": (Waypoint("stand", at(MIDDLE), CLOSED),)})
+    scene = two_arms.scene()
+    goals = pose_solver(two_arms.task, "right").solutions(
+        MIDDLE, gripper_facing(-HALF_PI, 0.0), scene.qpos("right")
+    )
+    with pytest.raises(NoWayError, match=r"left/\S+ and right/\S+ overlap by .* at its end"):
+        Ways(two_arms.task).find("right", goals, scene, {})
+
+
+def test_bodies_are_in_the_way_unless_the_hand_is_at_them():
+    rehearsal = Rehearsal(tasks.make("PickCube-v1"))
+    cube = rehearsal.begin(0).body("cube")[0]
+    beside = [cube + (x, 0.0, 0.0) for x in (-0.12, 0.12)]
+    rehearsal.play({"arm": (Waypoint("beside", at(beside[0], 0.0), CLOSED),)})
+    scene, solver = rehearsal.scene(), pose_solver(rehearsal.task, "arm")
+
+    def way_to(place: np.ndarray) -> np.ndarray:
+        goals = solver.solutions(place, gripper_facing(0.0, 0.0), scene.qpos("arm"))
+        return Ways(rehearsal.task).find("arm", goals, scene, {})
+
+    assert len(way_to(cube)) == 1
+    assert len(way_to(beside[1])) > 1
+
+
+@pytest.mark.parametrize(
+    ("shape", "least", "greatest"),
+    [
+        (Box(half_size=(0.1, 0.2, 0.3)), (-0.1, -0.2, -0.3), (0.1, 0.2, 0.3)),
+        (Sphere(radius=0.1), (-0.1,) * 3, (0.1,) * 3),
+        (Cylinder(radius=0.1, half_length=0.3), (-0.3, -0.1, -0.1), (0.3, 0.1, 0.1)),
+        (Capsule(radius=0.1, half_length=0.3), (-0.4, -0.1, -0.1), (0.4, 0.1, 0.1)),
+        (Plane(), (-20, -10, -10), (0, 10, 10)),
+    ],
+)
+def test_shapes_are_where_they_are(shape, least, greatest):
+    corners = _corners(shape)
+    np.testing.assert_allclose(corners.min(axis=0), least, rtol=0.02)
+    np.testing.assert_allclose(corners.max(axis=0), greatest, rtol=0.02, atol=1e-9)
+
+
+def test_a_scene_s_bodies_stand_where_they_are(two_arms: Rehearsal):
+    scene = two_arms.begin(0)
+    found = obstacles(scene)
+    cube = found["cube"]
+    assert cube.name == "the cube"
+    np.testing.assert_allclose(
+        transform(np.asarray(cube.pose), cube.shapes[0]).mean(axis=0), scene.body("cube")[0]
+    )
+    assert "goal_site" not in found  # nothing can touch it
+
+
+def test_without_the_extra_the_reason_says_so(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "ompl", None)
+    task = tasks.make("TwoRobotPickCube-v1")
+    plan = first_success(task, 0, lambda scene: [crossing()])
+    assert " touches " in plan.reason
+    assert "no way round was sought: planning needs OMPL" in plan.reason
