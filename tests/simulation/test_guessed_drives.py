@@ -116,8 +116,10 @@ def test_every_joint_of_a_mimic_tree_goes_where_its_leader_sends_it(tmp_path):
         assert speeds.max() < 1.0
 
 
-@pytest.mark.parametrize("linked", [True, False])
-def test_jaws_that_hold_something_stay_parallel_if_their_joints_are_a_linkage(tmp_path, linked):
+@pytest.mark.parametrize(("linked", "watched"), [(True, False), (True, True), (False, False)])
+def test_jaws_that_hold_something_stay_parallel_if_their_joints_are_a_linkage(
+    tmp_path, linked, watched
+):
     parts, last = single_arm(end="")
     knuckles(parts, last)
     robot = guess_descriptor(parts.write(tmp_path), "made").descriptor
@@ -136,6 +138,8 @@ def test_jaws_that_hold_something_stay_parallel_if_their_joints_are_a_linkage(tm
         world.add("block", block, kind="static", position=centre, quaternion=turned)
 
     simulation = Simulation(layout, build, 1, PhysicsSettings())
+    if watched:  # what looks at each step of physics leaves them as they are
+        simulation.watch_arms()
     simulation.worlds[0].stand("arm", robot.keyframe("rest"))
     action = np.zeros((1, robot.action_dim), np.float32)
     action[0, -1] = -1.0
