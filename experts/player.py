@@ -138,8 +138,10 @@ class Player:
 
     def _go_on(self, scene: Scene) -> None:
         """Go to the next place of a way round once the arm is near the one before."""
+        if not self._later:
+            return
         away = np.abs(self._driver.arm(scene.qpos(self._robot)) - self._goal).max()
-        if self._later and away < VIA:
+        if away < VIA:
             self._goal = self._later.pop(0)
             self._nearest_yet, self._waited = np.inf, 0
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +21,10 @@ from motion.obstacles import Held, Obstacle, Track
 from robots import LayoutError
 from robots.action_split import is_gripper
 from robots.bodies.hulls import Hull, RobotModel, load_model
+from robots.common.bounds import FAR, checked_numbers, shown
 from robots.urdf.tree import link_index
+
+_Body = TypeVar("_Body", Obstacle, Held)
 
 WORLD = 0  # the part that never moves
 
@@ -102,11 +106,15 @@ class Bodies:
 
         Raises:
             AssetError: If a robot's files cannot be found or make no sense.
-            LayoutError: If two bodies have one name.
+            LayoutError: If two bodies have one name, or an argument is of another type.
             MissingPackageError: If trimesh or python-fcl is not installed.
             UnknownNameError: If there is no place that is said to hold something.
         """
-        self.layout, self.obstacles, self.held = layout, tuple(obstacles), tuple(held)
+        if not isinstance(layout, Layout):
+            raise LayoutError(f"layout is {shown(layout)}; it takes a layouts.Layout")
+        self.layout = layout
+        self.obstacles = _all_of("obstacles", obstacles, Obstacle)
+        self.held = _all_of("held", held, Held)
         self.robots = tuple(layout)
         self.models: Mapping[str, RobotModel] = {
             name: load_model(placement.robot) for name, placement in layout.items()
@@ -124,7 +132,7 @@ class Bodies:
         )
         self.tables = {
             name: slab_hull(np.array(top), TABLE_DEPTH, name)
-            for name, top in table_tops(layout, table).items()
+            for name, top in table_tops(layout, checked_table(table)).items()
         }
         self._check_names()
         self._part_of: dict[tuple[str, int], int] = {}
@@ -289,6 +297,27 @@ class Bodies:
             if tree.carrier(body) in hand or int(tree.drivers[body]) in drivers:
                 hand.add(body)
         return {self._part_of[robot, body] for body in hand}
+
+
+def checked_table(table: Sequence[float] | None) -> Rectangle | None:
+    """Return a table's outline as four numbers.
+
+    Raises:
+        LayoutError: If it is no rectangle.
+    """
+    if table is None:
+        return None
+    x_min, y_min, x_max, y_max = checked_numbers("table", table, 4, FAR, LayoutError, "m")
+    if not (x_min < x_max and y_min < y_max):
+        raise LayoutError(f"table is {shown(table)}; it takes x_min, y_min, x_max, y_max (m)")
+    return x_min, y_min, x_max, y_max
+
+
+def _all_of(what: str, given: Iterable[_Body], kind: type[_Body]) -> tuple[_Body, ...]:
+    bodies = tuple(given) if isinstance(given, Iterable) else ()
+    if not isinstance(given, Iterable) or not all(isinstance(body, kind) for body in bodies):
+        raise LayoutError(f"{what} is {shown(given)}; it takes any number of {kind.__name__}s")
+    return bodies
 
 
 def _base(placement: Placement) -> Floats:

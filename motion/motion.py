@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from kinematics.rotations import Floats
 from layouts import Layout
 from motion.curves import hermite, hermite_slopes
-from robots.common.bounds import FAR, checked_number
+from robots.common.bounds import FAR, checked_number, shown
 from robots.common.errors import MotionError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -106,7 +106,11 @@ class Motion:
 
         Args:
             times: (…) (s); one number gives (dof,), n of them give (n, dof).
+
+        Raises:
+            MotionError: If they are no finite numbers.
         """
+        times = _moments(times)
         return {
             name: hermite(self.times, qpos, self.velocities[name], times)
             for name, qpos in self.positions.items()
@@ -114,6 +118,7 @@ class Motion:
 
     def velocity(self, times: ArrayLike) -> dict[str, Floats]:
         """Return joint velocities by robot at some times, shaped as in `sample` (rad/s, m/s)."""
+        times = _moments(times)
         return {
             name: hermite_slopes(self.times, qpos, self.velocities[name], times)
             for name, qpos in self.positions.items()
@@ -336,3 +341,13 @@ def _frozen(array: ArrayLike | Sequence[float]) -> Floats:
 
 def _rebuild(fields: dict[str, Any]) -> Motion:
     return Motion(**fields)
+
+
+def _moments(times: ArrayLike) -> Floats:
+    try:
+        moments = np.asarray(times, float)
+    except (TypeError, ValueError):
+        moments = np.array(np.nan)
+    if not np.isfinite(moments).all():
+        raise MotionError(f"times are {shown(times)}; they must be finite numbers (s)")
+    return moments

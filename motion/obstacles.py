@@ -41,7 +41,7 @@ class Track:
         Raises:
             LayoutError: If they do not, or one of them makes no sense.
         """
-        times, poses = np.array(self.times, float), np.array(self.poses, float)
+        times, poses = _array("a track's times", self.times), _array("its poses", self.poses)
         if times.ndim != 1 or not len(times) or poses.shape != (len(times), 4, 4):
             raise LayoutError(
                 f"a track has times of shape {times.shape} and poses of shape {poses.shape}; it"
@@ -103,11 +103,21 @@ class Obstacle:
         """
         if not (isinstance(self.name, str) and self.name and self.name.isprintable()):
             raise LayoutError(f"an obstacle's name is {shown(self.name)}; it takes a text")
-        if not self.shapes:
-            raise LayoutError(f"obstacle {self.name!r} has no shape; it needs one at least")
-        object.__setattr__(self, "shapes", tuple(np.array(s, float) for s in self.shapes))
+        if not isinstance(self.shapes, (tuple, list)) or not self.shapes:
+            raise LayoutError(
+                f"the shapes of obstacle {self.name!r} are {shown(self.shapes)}; it takes one or"
+                " more in a tuple"
+            )
+        shapes = tuple(_array(f"a shape of obstacle {self.name!r}", s) for s in self.shapes)
+        for corners in shapes:
+            if corners.ndim != 2 or corners.shape[1] != 3 or not np.isfinite(corners).all():
+                raise LayoutError(
+                    f"a shape of obstacle {self.name!r} is {shown(corners.tolist())}; it takes the"
+                    " corners of a convex body, (n, 3) finite numbers (m)"
+                )
+        object.__setattr__(self, "shapes", shapes)
         if not isinstance(self.pose, Track):
-            pose = np.array(self.pose, float)
+            pose = _array(f"the pose of obstacle {self.name!r}", self.pose)
             _checked_pose(f"the pose of obstacle {self.name!r}", pose)
             object.__setattr__(self, "pose", pose)
 
@@ -143,7 +153,7 @@ class Obstacle:
 
     def moved(self, pose: ArrayLike | Track) -> Obstacle:
         """Return the same body elsewhere, at a pose, (4, 4) (m), or along a track."""
-        return replace(self, pose=pose if isinstance(pose, Track) else np.array(pose, float))
+        return replace(self, pose=pose)
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,11 +171,13 @@ class Held:
     obstacle: Obstacle
 
     def __post_init__(self) -> None:
-        """Refuse a body that moves by itself.
+        """Refuse what is no body, and one that moves by itself.
 
         Raises:
-            LayoutError: If it does.
+            LayoutError: If it is one.
         """
+        if not isinstance(self.obstacle, Obstacle):
+            raise LayoutError(f"{self.place} holds {shown(self.obstacle)}; it takes an Obstacle")
         if self.obstacle.moves:
             raise LayoutError(
                 f"obstacle {self.obstacle.name!r} follows a track; what {self.place} holds has a"
@@ -268,6 +280,8 @@ def mesh(
     """
     from robots.urdf.mesh_files import read_corners
 
+    if not isinstance(path, (str, os.PathLike)):
+        raise LayoutError(f"the mesh of {name} is {shown(path)}; it takes a file's path")
     factors = checked_numbers(f"the scale of {name}", scale, 3, FAR, LayoutError)
     corners = read_corners(os.fspath(path), factors, f"obstacle {name!r}", os.fspath(path))
     return Obstacle(name, (corners,), _pose(name, position, quaternion))
@@ -290,6 +304,13 @@ def _positive(what: str, value: Any) -> float:
     if number is None or not 0 < number <= FAR:
         raise LayoutError(f"{what} is {shown(value)} m; it must be greater than 0, {FAR:g} at most")
     return number
+
+
+def _array(what: str, numbers: Any) -> Floats:
+    try:
+        return np.array(numbers, float)
+    except (TypeError, ValueError):
+        raise LayoutError(f"{what}: {shown(numbers)} are no numbers") from None
 
 
 def _checked_pose(what: str, pose: NDArray[Any]) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from kinematics.rotations import Floats
 from layouts import Layout
 from layouts.validation.arguments import Rectangle
+from motion.bodies import checked_table
 from motion.cell import Cell
 from motion.clearances import Keeping
 from motion.goals import Goal, Target, read_targets
@@ -22,7 +23,7 @@ from motion.query import Query
 from motion.spaces import Progress
 from motion.timing import Accelerations, largest_accelerations, largest_velocities
 from motion.traffic import Course, Traffic, columns_of
-from robots.common.bounds import checked_number, checked_whole
+from robots.common.bounds import checked_number, checked_whole, shown
 from robots.common.errors import MotionError
 
 
@@ -89,18 +90,20 @@ def plan(
     checked_whole("seed", seed, 0, 2**31, MotionError)
     patience = checked_number("patience", patience, 1e-3, 1e6, MotionError, "s")
     clearance = checked_number("clearance", clearance, 0.0, 1.0, MotionError, "m")
-    cell = _cell(layout, tuple(obstacles), tuple(held), table)
+    table = checked_table(table)
+    cell = _cell(layout, obstacles, held, table)
     here = _start(cell, start)
     velocities = largest_velocities(layout, control_mode, velocity)
     accelerations = largest_accelerations(layout, velocities, acceleration)
-    traffic = _traffic(cell, here, others or {})
+    others = {} if others is None else others
+    traffic = _traffic(cell, here, others)
     targets = read_targets(cell, goals or {}, here)
     query = Query(
         cell,
         here,
         targets,
         traffic,
-        Keeping(cell, _robots(targets, others or {}), clearance, others or {}),
+        Keeping(cell, _robots(targets, others), clearance, others),
         _all(cell, velocities),
         clearance,
         seed,
@@ -139,11 +142,15 @@ def _traffic(cell: Cell, start: Floats, others: Mapping[str, Motion]) -> Traffic
     """Return what moves as it was told.
 
     Raises:
-        MotionError: If a motion is of another robot.
+        MotionError: If one is no motion, or one of another robot.
     """
+    if not isinstance(others, Mapping):
+        raise MotionError(f"others is {shown(others)}; it takes motions by robot")
     traffic = Traffic(cell, start)
     for name, motion in others.items():
         robot = cell.layout[name].robot
+        if not isinstance(motion, Motion):
+            raise MotionError(f"others[{name!r}] is {shown(motion)}; it takes a Motion")
         if name not in motion.positions or motion.layout[name].robot != robot:
             raise MotionError(f"others[{name!r}] is {motion!r}; it has no {name} that is {robot!r}")
         course = Course(
@@ -159,12 +166,12 @@ def _traffic(cell: Cell, start: Floats, others: Mapping[str, Motion]) -> Traffic
 
 def _cell(
     layout: Layout,
-    obstacles: tuple[Obstacle, ...],
-    held: tuple[Held, ...],
+    obstacles: Iterable[Obstacle],
+    held: Iterable[Held],
     table: Rectangle | None,
 ) -> Cell:
     """Return a cell; one of robots and tables alone is kept for the next plan."""
-    if obstacles or held:
+    if obstacles or held or not isinstance(layout, Layout):
         return Cell(layout, obstacles, held, table)
     return _plain_cell(layout, table)
 

@@ -17,7 +17,7 @@ from layouts import Layout
 from motion.paths import Path, without_straight_points
 from robots import RobotDescriptor
 from robots.action_split import JointGroup
-from robots.common.bounds import checked_number
+from robots.common.bounds import checked_number, shown
 from robots.common.errors import MissingPackageError, MotionError
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
@@ -94,11 +94,15 @@ def largest_accelerations(
     )
     for name, numbers in given.items():
         dof = layout[name].robot.dof
-        values = np.atleast_1d(np.asarray(numbers, float))
-        if values.ndim != 1 or len(values) not in (1, dof) or not (values > 0).all():
+        try:
+            values = np.atleast_1d(np.asarray(numbers, float))
+        except (TypeError, ValueError):
+            values = np.zeros(1)
+        right = (values > 0) & np.isfinite(values)
+        if values.ndim != 1 or len(values) not in (1, dof) or not right.all():
             raise MotionError(
-                f"acceleration of {name} is {numbers}; it must be a positive number (rad/s², m/s²)"
-                f" or one for each of its {dof} joints"
+                f"acceleration of {name} is {shown(numbers)}; it must be a positive number"
+                f" (rad/s², m/s²) or one for each of its {dof} joints"
             )
         found[name] = np.broadcast_to(values, (dof,)).copy()
     return found

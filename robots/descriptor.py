@@ -397,6 +397,8 @@ class RobotDescriptor:
                 changed.update(driven_in(name, split, own, has_tcp=has_tcp))
             except DescriptorError as error:
                 raise DescriptorError(f"{self.name}: {error}") from None
+        if not changed:  # all of the robot is held
+            return self.action_split
         return self.action_split.replace(**changed).made_of(declared)
 
     def describe_action(self) -> tuple[ActionNumber, ...]:

@@ -23,7 +23,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 ROBOT_FILES = (".urdf", ".srdf", ".stl", ".obj", ".dae", ".glb", ".gltf", ".ply")
 RECORDINGS = (".h5", ".hdf5", ".png", ".jpg", ".mp4", ".npz", ".parquet")
-FIGURES = "docs/*.png"  # drawn by this project's own commands
+FIGURES = "docs/**/*.png"  # drawn by this project's own commands
 
 
 @pytest.fixture(scope="module")
@@ -114,6 +114,7 @@ class TestDependencies:
             "video",
             "export",
             "mjcf",
+            "motion",
             "parity",
             "pettingzoo",
             "ray",
