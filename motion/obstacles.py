@@ -105,8 +105,8 @@ class Obstacle:
             raise LayoutError(f"an obstacle's name is {shown(self.name)}; it takes a text")
         if not isinstance(self.shapes, (tuple, list)) or not self.shapes:
             raise LayoutError(
-                f"the shapes of obstacle {self.name!r} are {shown(self.shapes)}; it takes one or"
-                " more in a tuple"
+                f"obstacle {self.name!r} has no shape; it needs a tuple of one at least, not"
+                f" {shown(self.shapes)}"
             )
         shapes = tuple(_array(f"a shape of obstacle {self.name!r}", s) for s in self.shapes)
         for corners in shapes:
