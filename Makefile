@@ -14,7 +14,7 @@ help:
 	@echo "make faults    whatever can go wrong, tried; writes docs/faults.md"
 	@echo "make check     lint, format, types, which room imports which, documentation, distribution"
 	@echo "make docs      the documentation as a site: open site/index.html"
-	@echo "make bench     what steps, resets and vectors cost beside native ManiSkill"
+	@echo "make bench     what steps, resets, vectors and plans cost, beside native ManiSkill and FCL"
 	@echo "make parity    every task beside native ManiSkill; writes docs/parity.md's table"
 	@echo "make clean     remove .venv"
 
@@ -51,6 +51,9 @@ docs: $(VENV)/.docs
 # ARGS="--record" keeps the figures for docs/parity.md.
 bench: $(VENV)/.test
 	OMP_NUM_THREADS=1 $(RUN) -m parity bench --out runs/bench $(ARGS)
+	OMP_NUM_THREADS=1 $(RUN) -m measurements.motion checks
+	OMP_NUM_THREADS=1 $(RUN) -m measurements.motion queries --cells 14 --queries 10 \
+		--out runs/bench/motion.jsonl
 	$(RUN) -m parity tables
 	$(RUN) -m measurements.gallery
 
