@@ -1,4 +1,4 @@
-"""``python -m measurements.experts``: experts of several robots, in their own layouts and others."""
+"""``python -m measurements.experts``: experts of several robots, and how often they succeed."""
 
 from __future__ import annotations
 
