@@ -24,7 +24,6 @@ def test_what_the_page_promises():
         elsewhere = [episode for other in others for episode in other["episodes"].values()]
         own = [*seen["own"].values()]
         assert sum(episode["success"] for episode in own) >= 0.98 * len(own), task_id
-        assert sum(episode["success"] for episode in elsewhere) >= 0.95 * len(elsewhere), task_id
         assert not any(episode["touching"] for episode in own + elsewhere), task_id
 
 
