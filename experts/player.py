@@ -124,7 +124,7 @@ class Player:
             return False
         if (waypoint.to, waypoint.turn, waypoint.at) != (None, None, None):
             away = np.abs(self._driver.arm(scene.qpos(self._robot)) - self._goal).max()
-            if away > waypoint.near:
+            if self._later or away > waypoint.near:
                 self._check_progress(float(away))
                 return False
         return waypoint.until is None or waypoint.until(scene)

@@ -10,7 +10,7 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.geometry import backed_off
+from experts.geometry import backed_off, turn
 from experts.grasps import (
     PLACE_YAWS,
     YAWS,
@@ -25,7 +25,7 @@ from experts.grasps import (
 )
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
-from kinematics.rotations import Floats
+from kinematics.rotations import Floats, multiply, rotate
 from tasks import MultiRobotTask
 from tasks.maniskill.two_robot_stack_cube import CUBE_HALF_SIZE
 
@@ -34,6 +34,7 @@ ON_TOP = (0.0, 0.0, 2 * CUBE_HALF_SIZE)  # from the green cube to where the blue
 IN_PLACE = 0.012  # how near to that place the blue cube is let go (m)
 CLEARANCE = 0.05  # how high above its place the blue cube is before it is lowered (m)
 WAITING = 0.12  # how high the blue cube is held until its turn comes (m)
+RISES = (0.1, 0.05, 0.0)  # how far an arm may rise when it makes room (m)
 
 
 @dataclass(frozen=True)
@@ -48,11 +49,18 @@ class Style:
         short: How far before the target's middle it is laid down; the target's radius is
             0.06 m (m).
         clearance: How high above its place it is before it is lowered (m).
+        aside: How far an arm turns about its base, away from the other one's, to make room for it
+            (rad): the left arm with its cube before the green one comes, the right arm after it.
+            With 0 the left arm waits above where its cube lay, and goes on as soon as the right
+            gripper has risen.
+        late: Whether the left arm picks its cube only when the right one has left.
     """
 
     tilt: float | None = radians(20)
     short: float = 0.05
     clearance: float = 0.02
+    aside: float = 0.0
+    late: bool = False
 
 
 # Tried in this order. The first solves each of the seeds 0 … 99.
@@ -64,6 +72,10 @@ STYLES = (
     Style(tilt=radians(10)),
     Style(tilt=None),
     Style(tilt=None, clearance=0.04),
+    Style(tilt=None, aside=0.4),
+    Style(tilt=None, aside=0.4, late=True),
+    Style(tilt=None, aside=0.7),
+    Style(tilt=None, aside=0.7, late=True),
 )
 
 
@@ -78,18 +90,18 @@ def stack_for_two(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
         TaskError: If an arm has no fingers, or cannot reach what it should.
     """
     need_fingers(task, "stacking cubes", STACKER, LAYER)
-    base = np.array(task.layout.arm(LAYER).base_position)
     return first_success(
         task,
         seed,
         lambda scene: [
-            {LAYER: _lay(task, style, base), STACKER: _stack(task, style, base)} for style in STYLES
+            {LAYER: _lay(task, style), STACKER: _stack(task, style)} for style in STYLES
         ],
     )
 
 
-def _lay(task: MultiRobotTask, style: Style, base: Floats) -> tuple[Waypoint, ...]:
+def _lay(task: MultiRobotTask, style: Style) -> tuple[Waypoint, ...]:
     """The right arm brings the green cube and makes room."""
+    base, other = _base(task, LAYER), _base(task, STACKER)
     at_target = partial(_at_target, style=style, base=base)
 
     def grips(scene: Scene) -> list[Pose]:
@@ -104,28 +116,33 @@ def _lay(task: MultiRobotTask, style: Style, base: Floats) -> tuple[Waypoint, ..
         return [backed_off(scene.tcp(LAYER), 0.08)]
 
     def retreat(scene: Scene) -> list[Pose]:
-        position, quaternion = backed_off(scene.tcp(LAYER), 0.1)
+        tcp = scene.tcp(LAYER)
+        if style.aside:
+            return [_swung(tcp, base, other, style.aside, up) for up in RISES]
+        position, quaternion = backed_off(tcp, 0.1)
         return [(position - 0.15 * _level(position - base), quaternion)]
 
     over = partial(place, up=style.clearance, yaws=YAWS)
     if style.tilt is None:
         over = partial(place, up=style.clearance, yaws=PLACE_YAWS)
         over = lowerable(task, LAYER, over, style.clearance)
+    begin = (f"{STACKER}.lift",) if style.aside and not style.late else ()
     return (
         *pick(LAYER, BASE, grips),
-        Waypoint("over", over, CLOSED),
+        Waypoint("over", over, CLOSED, after=begin),
         Waypoint("lower", partial(place, up=0.001), CLOSED, near=0.03),
         Waypoint("release", None, OPEN, steps=2),
         Waypoint("rise", rise, OPEN, near=0.1),
-        Waypoint("retreat", retreat, OPEN),
+        Waypoint("retreat", retreat, OPEN, near=0.2 if style.aside else 0.05),
     )
 
 
-def _stack(task: MultiRobotTask, style: Style, base: Floats) -> tuple[Waypoint, ...]:
+def _stack(task: MultiRobotTask, style: Style) -> tuple[Waypoint, ...]:
     """The left arm picks the blue cube, waits, and lays it on the green one."""
+    base, other = _base(task, STACKER), _base(task, LAYER)
 
     def on_top(scene: Scene) -> Floats:
-        return _at_target(scene, style, base) + ON_TOP
+        return _at_target(scene, style, other) + ON_TOP
 
     def grips(scene: Scene) -> list[Pose]:
         if style.tilt is None:
@@ -134,7 +151,14 @@ def _stack(task: MultiRobotTask, style: Style, base: Floats) -> tuple[Waypoint, 
 
     def lift(scene: Scene) -> list[Pose]:
         x, y, _ = scene.body(TOP)[0]
-        return held_at(scene, STACKER, TOP, np.array([x, y, WAITING]))
+        lifted = held_at(scene, STACKER, TOP, np.array([x, y, WAITING]))
+        return aside(lifted) if style.aside and not style.late else lifted
+
+    def ready(scene: Scene) -> list[Pose]:
+        return aside([backed_off(grip, WAITING) for grip in grips(scene)])
+
+    def aside(poses: Sequence[Pose]) -> list[Pose]:
+        return [_swung(pose, base, other, style.aside) for pose in poses]
 
     def place(scene: Scene, up: float, yaws: Sequence[float] = (0.0,)) -> list[Pose]:
         top = scene.body(BASE)[0] + ON_TOP + np.array([0.0, 0.0, up])
@@ -144,13 +168,30 @@ def _stack(task: MultiRobotTask, style: Style, base: Floats) -> tuple[Waypoint, 
     if style.tilt is None:
         over = lowerable(task, STACKER, partial(place, up=CLEARANCE, yaws=PLACE_YAWS), CLEARANCE)
     in_place = partial(is_near, body=TOP, other=BASE, offset=ON_TOP, limit=IN_PLACE)
-    return (
-        *pick(STACKER, TOP, grips),
-        Waypoint("lift", lift, CLOSED),
-        Waypoint("over", over, CLOSED, after=(f"{LAYER}.rise",)),
+    stack = (
         Waypoint("lower", partial(place, up=0.001), CLOSED, near=0.03, until=in_place),
         Waypoint("release", None, OPEN),
     )
+    left = (f"{LAYER}.{'retreat' if style.aside else 'rise'}",)
+    if style.late:
+        return (
+            Waypoint("ready", ready, OPEN, near=0.2),
+            Waypoint("wait", None, OPEN, after=left),
+            *pick(STACKER, TOP, grips),
+            Waypoint("lift", lift, CLOSED, near=0.3),
+            Waypoint("over", over, CLOSED),
+            *stack,
+        )
+    return (
+        *pick(STACKER, TOP, grips),
+        Waypoint("lift", lift, CLOSED, near=0.2 if style.aside else 0.05),
+        Waypoint("over", over, CLOSED, after=left),
+        *stack,
+    )
+
+
+def _base(task: MultiRobotTask, robot: str) -> Floats:
+    return np.array(task.layout.arm(robot).base_position)
 
 
 def _at_target(scene: Scene, style: Style, base: Floats) -> Floats:
@@ -158,6 +199,16 @@ def _at_target(scene: Scene, style: Style, base: Floats) -> Floats:
     target, _ = scene.body(TARGET)
     x, y, _ = target - style.short * _level(target - base)
     return np.array([x, y, CUBE_HALF_SIZE])
+
+
+def _swung(pose: Pose, base: Floats, other: Floats, angle: float, up: float = 0.0) -> Pose:
+    """Return a gripper's pose after the arm turned about its base, away from the other's (rad)."""
+    position, quaternion = pose
+    reach = (position - base) * (1.0, 1.0, 0.0)
+    left = np.array([-reach[1], reach[0], 0.0])
+    swing = turn("z", angle if left @ (position - other) > 0 else -angle)
+    place = position - reach + rotate(swing, reach) + (0.0, 0.0, up)
+    return place, multiply(swing, quaternion)
 
 
 def _level(vector: Floats) -> Floats:

@@ -27,7 +27,7 @@ def markdown(record: Seen) -> Iterator[str]:
         yield _row(task_id, "its own", [*seen["own"].values()])
         others = [other for other in seen["others"].values() if "layout" in other]
         episodes = [episode for other in others for episode in other["episodes"].values()]
-        yield _row(task_id, f"{len(others)} others", episodes)
+        yield _row(task_id, f"{len(others)} other{'s' * (len(others) != 1)}", episodes)
     yield from _failures(record)
 
 

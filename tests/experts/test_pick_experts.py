@@ -48,6 +48,17 @@ def test_a_cube_out_of_reach_is_an_error():
         find_expert("StackCube-v1")(env, 0)
 
 
+def test_arms_from_one_side_make_room_for_each_other():
+    """Both come from behind the cubes; the one that waits would stand where the other one goes."""
+    at = {"left": ((-0.225, -0.556, 0.0), 0.08), "right": ((-0.446, 0.194, 0.0), 0.44)}
+    robot = RobotRegistry.load("panda_wristcam")
+    layout = Layout(
+        {name: Placement(robot, position=p, rpy=(0.0, 0.0, yaw)) for name, (p, yaw) in at.items()}
+    )
+    env = tasks.make("TwoRobotStackCube-v1", layout=layout)
+    assert play(env, 0, find_expert("TwoRobotStackCube-v1")(env, 0)).solved
+
+
 @pytest.fixture(scope="module")
 def rehearsal() -> Rehearsal:
     return Rehearsal(task("StackCube-v1"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from experts import first_success
 from experts.geometry import gripper_facing
 from experts.obstacles import _corners, obstacles
 from experts.rehearsal import Rehearsal
-from experts.script import CLOSED, Pose, Scene, Script, Waypoint
+from experts.script import CLOSED, Pose, Scene, Waypoint
 from experts.tips import pose_solver
 from experts.ways import NoWayError, Ways
 from kinematics.rotations import transform
@@ -34,7 +35,7 @@ def at(place: np.ndarray, facing: float = HALF_PI) -> object:
     return poses
 
 
-def crossing() -> Script:
+def crossing() -> dict[str, tuple[Waypoint, ...]]:
     """The left arm stands in the middle; the right one goes from one side of it to the other."""
     sides = [np.array([x, 0.05, 0.3]) for x in (-0.25, 0.25)]
     return {
@@ -55,6 +56,22 @@ def test_an_arm_goes_round_another_one(two_arms: Rehearsal):
     around = two_arms.play(crossing(), around=True)
     assert around.reason == "the episode ended at left.stand, right.other side"
     np.testing.assert_allclose(two_arms.scene().tcp("right")[0], [0.25, 0.05, 0.3], atol=0.02)
+
+
+def test_a_way_round_is_done_at_its_end(two_arms: Rehearsal):
+    begun: list[float] = []
+
+    def up(scene: Scene) -> list[Pose]:
+        place, quaternion = scene.tcp("right")
+        begun.append(place[0])
+        return [(place + (0.0, 0.0, 0.05), quaternion)]
+
+    script = crossing()
+    one_side, other_side = script["right"]
+    right = (one_side, replace(other_side, near=0.3), Waypoint("up", up, CLOSED))
+    two_arms.begin(0)
+    two_arms.play(script | {"right": right}, around=True)
+    assert begun[0] > 0.05
 
 
 def test_ways_are_the_same_every_time(two_arms: Rehearsal):
