@@ -42,7 +42,12 @@ class Style:
     waiting: float = 0.75
 
 
-STYLES = (Style(), Style(legs=8, near=0.05), Style(legs=8, near=0.03, height=0.008, beyond=0.0))
+STYLES = (
+    Style(),
+    Style(legs=8, near=0.05),
+    Style(legs=8, near=0.03, height=0.008, beyond=0.0),
+    Style(waiting=0.6),
+)
 
 
 def pass_on(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
