@@ -54,6 +54,7 @@ class Style:
             With 0 the left arm waits above where its cube lay, and goes on as soon as the right
             gripper has risen.
         late: Whether the left arm picks its cube only when the right one has left.
+        ready: How near a gripper comes to its place above a cube before it goes down (rad).
     """
 
     tilt: float | None = radians(20)
@@ -61,6 +62,7 @@ class Style:
     clearance: float = 0.02
     aside: float = 0.0
     late: bool = False
+    ready: float = 0.1
 
 
 # Tried in this order. The first solves each of the seeds 0 … 99.
@@ -76,6 +78,7 @@ STYLES = (
     Style(tilt=None, aside=0.4, late=True),
     Style(tilt=None, aside=0.7),
     Style(tilt=None, aside=0.7, late=True),
+    Style(tilt=radians(10), short=0.03, aside=0.4, ready=0.03),
 )
 
 
@@ -128,7 +131,7 @@ def _lay(task: MultiRobotTask, style: Style) -> tuple[Waypoint, ...]:
         over = lowerable(task, LAYER, over, style.clearance)
     begin = (f"{STACKER}.lift",) if style.aside and not style.late else ()
     return (
-        *pick(LAYER, BASE, grips),
+        *pick(LAYER, BASE, grips, ready=style.ready),
         Waypoint("over", over, CLOSED, after=begin),
         Waypoint("lower", partial(place, up=0.001), CLOSED, near=0.03),
         Waypoint("release", None, OPEN, steps=2),
@@ -177,13 +180,13 @@ def _stack(task: MultiRobotTask, style: Style) -> tuple[Waypoint, ...]:
         return (
             Waypoint("ready", ready, OPEN, near=0.2),
             Waypoint("wait", None, OPEN, after=left),
-            *pick(STACKER, TOP, grips),
+            *pick(STACKER, TOP, grips, ready=style.ready),
             Waypoint("lift", lift, CLOSED, near=0.3),
             Waypoint("over", over, CLOSED),
             *stack,
         )
     return (
-        *pick(STACKER, TOP, grips),
+        *pick(STACKER, TOP, grips, ready=style.ready),
         Waypoint("lift", lift, CLOSED, near=0.2 if style.aside else 0.05),
         Waypoint("over", over, CLOSED, after=left),
         *stack,
