@@ -63,6 +63,19 @@ STYLES = (
         for height in (0.22, 0.3, 0.36, 0.15)
         for lean in (radians(60), radians(75))
     ),
+    # Wide pads touch each other unless each gripper holds less of the cube.
+    Style(half=0.018),
+    Style(half=0.018, give_tilt=radians(60), take_tilt=radians(30)),
+    *(
+        Style(
+            half=half,
+            pick_tilt=radians(30),
+            give_tilt=radians(30),
+            take_tilt=radians(30),
+            height=height,
+        )
+        for half, height in ((0.018, 0.22), (0.022, 0.3))
+    ),
 )
 
 
