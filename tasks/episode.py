@@ -64,6 +64,8 @@ class PlayedEpisode(Episode):
         terminated: Shape (T,).
         truncated: Shape (T,).
         seconds: Time that the steps took, without reading the states (s).
+        source: Who acted, as plain data that json can hold; None if nobody says.
+        drawn: What was varied in its world, likewise; None if nothing was.
     """
 
     states: States
@@ -72,6 +74,8 @@ class PlayedEpisode(Episode):
     terminated: NDArray[np.bool_]
     truncated: NDArray[np.bool_]
     seconds: float
+    source: Mapping[str, Any] | None = None
+    drawn: Mapping[str, Any] | None = None
 
     @property
     def solved(self) -> bool:

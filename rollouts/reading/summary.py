@@ -41,8 +41,10 @@ _EPISODE = {
     "reset_kwargs": maybe(fields({}, {"seed": _SEEDS, "options": maybe(OBJECT)})),
     "success": maybe(either(FLAG, NUMBER)),
 }
+# What only a recording of this library says, and not every one.
+_ABOUT = {"source": maybe(OBJECT), "drawn": maybe(OBJECT)}
 # An episode's own note in a recording of this library, which becomes its entry in the json.
-OWN_EPISODE = fields({**_EPISODE, "episode_seed": _SEED, "elapsed_steps": _STEPS})
+OWN_EPISODE = fields({**_EPISODE, "episode_seed": _SEED, "elapsed_steps": _STEPS}, _ABOUT)
 _SUMMARY = fields(
     {
         "env_info": fields(
@@ -55,7 +57,7 @@ _SUMMARY = fields(
                 "module": maybe(NAME),
             },
         ),
-        "episodes": items(fields({"episode_id": whole(0, 2**31 - 1)}, _EPISODE)),
+        "episodes": items(fields({"episode_id": whole(0, 2**31 - 1)}, {**_EPISODE, **_ABOUT})),
     },
     {"source_type": maybe(TEXT), "source_desc": maybe(TEXT)},
 )
@@ -75,6 +77,8 @@ class Entry:
         episode_seed: The same as the recording's own note of it, which may be absent.
         steps: Its control steps, or None.
         rebuilt: Whether its reset rebuilt the world.
+        source: Who acted; see `tasks.episode.PlayedEpisode`.
+        drawn: What was varied in its world; likewise.
     """
 
     episode_id: int
@@ -82,6 +86,8 @@ class Entry:
     episode_seed: int | None
     steps: int | None
     rebuilt: bool
+    source: dict[str, Any] | None = None
+    drawn: dict[str, Any] | None = None
 
     @property
     def group(self) -> str:
@@ -176,6 +182,8 @@ def _entry(episode: Mapping[str, Any]) -> Entry:
         episode_seed=_only(episode.get("episode_seed")),
         steps=episode.get("elapsed_steps"),
         rebuilt=bool(options.get("reconfigure")),
+        source=episode.get("source"),
+        drawn=episode.get("drawn"),
     )
 
 

@@ -59,6 +59,8 @@ class Trajectory:
         truncated: Shape (T,), or None.
         rebuilt: Whether its reset rebuilt the world, so that its states can be had again to the
             last bit; where worlds are reused, they also depend on the episodes before.
+        source: Who acted; None if the file does not say.
+        drawn: What was varied in its world, by axis; None if nothing was.
     """
 
     episode_id: int
@@ -71,6 +73,8 @@ class Trajectory:
     terminated: NDArray[np.bool_] | None = None
     truncated: NDArray[np.bool_] | None = None
     rebuilt: bool = False
+    source: Mapping[str, Any] | None = None
+    drawn: Mapping[str, Any] | None = None
 
     @property
     def solved(self) -> bool | None:
@@ -226,6 +230,8 @@ class TrajectoryFile(Sequence[Trajectory]):
             rewards=_column(arrays, "rewards", np.float32),
             **{flag: _column(arrays, flag, np.bool_) for flag in _FLAGS},
             rebuilt=entry.rebuilt,
+            source=entry.source,
+            drawn=entry.drawn,
         )
 
     def _texts(self, entry: Entry) -> dict[str, str]:
