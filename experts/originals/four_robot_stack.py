@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import radians
 
 import numpy as np
 from numpy.typing import NDArray
 
+from experts.driver import ArmDriver
 from experts.geometry import backed_off
 from experts.grasps import (
     PLACE_YAWS,
@@ -39,11 +40,15 @@ class Style:
             side of the cube, with which it can be brought to its place.
         waiting: How high a cube is held until its turn comes (m).
         clearance: How high above its place it is before it is lowered (m).
+        home: Whether an arm that has let go returns to where it started, not just out of the way.
+        patient: Whether an arm takes its cube only when the arm before it has let go.
     """
 
     tilt: float | None = radians(20)
     waiting: float = 0.12
     clearance: float = 0.05
+    home: bool = False
+    patient: bool = False
 
 
 STYLES = (
@@ -53,6 +58,10 @@ STYLES = (
     Style(tilt=radians(25), clearance=0.07, waiting=0.16),
     Style(tilt=None),
     Style(tilt=None, clearance=0.07, waiting=0.16),
+    Style(home=True),
+    Style(tilt=None, home=True),
+    Style(home=True, patient=True),
+    Style(tilt=None, home=True, patient=True),
 )
 
 
@@ -68,21 +77,32 @@ def stack_for_four(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
     """
     need_fingers(task, "stacking cubes", *ORDER)
     bases = {place: np.array(task.layout.arm(place).base_position) for place in ORDER}
-    return first_success(task, seed, lambda scene: [_script(task, s, bases) for s in STYLES])
 
+    def scripts(scene: Scene) -> list[Script]:
+        starts = {
+            place: ArmDriver(task.layout.arm(place).robot).arm(scene.qpos(place)) for place in ORDER
+        }
+        return [
+            {place: _stack(task, style, place, bases[place], starts[place]) for place in ORDER}
+            for style in STYLES
+        ]
 
-def _script(task: MultiRobotTask, style: Style, bases: dict[str, Floats]) -> Script:
-    places = list(ORDER)
-    return {
-        place: _stack(task, style, place, level, bases[place], places[level - 1] if level else None)
-        for level, place in enumerate(places)
-    }
+    return first_success(task, seed, scripts)
 
 
 def _stack(
-    task: MultiRobotTask, style: Style, robot: str, level: int, base: Floats, before: str | None
+    task: MultiRobotTask, style: Style, robot: str, base: Floats, start: Floats
 ) -> tuple[Waypoint, ...]:
-    """One arm picks its cube, waits for the one before it, and lays its own on top."""
+    """One arm picks its cube, waits for the one before it, and lays its own on top.
+
+    Args:
+        task: Says where it stands.
+        style: How.
+        robot: The arm.
+        base: Where it stands, (3,) (m, world).
+        start: Its joints at the beginning, (arm joints,) (rad).
+    """
+    level = list(ORDER).index(robot)
     cube = f"cube_{robot}"
     goal = np.array([0.0, 0.0, (2 * level + 1) * CUBE_HALF_SIZE])
 
@@ -111,15 +131,19 @@ def _stack(
     else:
         grips = partial(_grip, cube=cube, base=base, tilt=style.tilt)
         over = partial(place, up=style.clearance, yaws=YAWS)
-    turn = () if before is None else (f"{before}.rise",)
+    turn = (f"{list(ORDER)[level - 1]}.rise",) if level else ()
+    above, *picking = pick(robot, cube, grips)
     return (
-        *pick(robot, cube, grips),
+        replace(above, after=turn if style.patient else ()),
+        *picking,
         Waypoint("lift", lift, CLOSED),
         Waypoint("over", over, CLOSED, after=turn),
         Waypoint("lower", partial(place, up=0.001), CLOSED, near=0.03, until=in_place),
         Waypoint("release", None, OPEN, steps=2),
         Waypoint("rise", rise, OPEN, near=0.1),
-        Waypoint("retreat", retreat, OPEN),
+        Waypoint("retreat", turn=lambda arm: start - arm)
+        if style.home
+        else Waypoint("retreat", retreat, OPEN),
     )
 
 

@@ -29,14 +29,21 @@ class Style:
         legs: In how many parts; between them the arms' joints go straight, not the bar.
         beyond: How far above the height that counts it is brought (m).
         near: How near each arm must come to the end of a part before the next (rad).
+        ready: How near each gripper must come to its place above the bar before it goes down (rad).
     """
 
     legs: int = 4
     beyond: float = 0.02
     near: float = 0.04
+    ready: float = 0.1
 
 
-STYLES = (Style(), Style(legs=8, near=0.02), Style(legs=4, beyond=0.04, near=0.08))
+STYLES = (
+    Style(),
+    Style(ready=0.02),
+    Style(legs=8, near=0.02, ready=0.02),
+    Style(legs=4, beyond=0.04, near=0.08, ready=0.02),
+)
 
 
 def lift_for_two(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
@@ -75,7 +82,7 @@ def _script(style: Style, scene: Scene) -> Script:
             )
             for i, height in enumerate(tops)
         ]
-        script[robot] = (*pick(robot, BAR, partial(_grips, robot=robot)), *lift)
+        script[robot] = (*pick(robot, BAR, partial(_grips, robot=robot), ready=style.ready), *lift)
     return script
 
 
