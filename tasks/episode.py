@@ -207,4 +207,5 @@ def play(
         terminated=terminated,
         truncated=truncated,
         seconds=seconds,
+        drawn=task.drawn(),
     )
