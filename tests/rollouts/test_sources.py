@@ -1,6 +1,7 @@
 """Policies, takeovers and correctors as sources of recordings, and what is kept of who acted."""
 
 import json
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from hashlib import sha256
@@ -16,7 +17,7 @@ from robots import RecordingError, TaskError
 from rollouts import evaluate, record
 from rollouts.__main__ import main
 from rollouts.playing.executor import WorkerError
-from rollouts.playing.replay import replay
+from rollouts.playing.replay import replay, task_for
 from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
 from rollouts.recording.recorder import Recorder
 from rollouts.sources.actors import Actor, actor_of, episode_source
@@ -57,6 +58,18 @@ def test_a_policy_is_recorded_whoever_plays(tmp_path):
     recorded(tmp_path / "two", seeds=[2], num_envs=3)
     recorded(tmp_path / "two", num_envs=3)
     assert same_files(tmp_path / "one" / FILE, tmp_path / "two" / FILE)
+
+
+def test_worlds_that_vary_are_recorded(tmp_path):
+    varied = tasks.Randomization(mass={"Tee": tasks.Uniform(0.5, 2.0)})
+    episodes = recorded(tmp_path / "one", randomization=varied)
+    drawn = [episode.drawn["mass"]["Tee"] for episode in episodes]
+    assert len(set(drawn)) == 3
+    with TrajectoryFile(tmp_path / "one" / FILE) as file, closing(task_for(file)) as env:
+        assert all(replay(env, episode).difference is None for episode in file)
+        assert env.drawn() == episodes[-1].drawn
+    recorded(tmp_path / "at once", randomization=varied, num_envs=2)
+    assert same_files(tmp_path / "one" / FILE, tmp_path / "at once" / FILE)
 
 
 @pytest.mark.long
