@@ -207,6 +207,28 @@ def test_one_that_fails_does_not_cost_the_others(tmp_path):
     assert same_files(tmp_path / FILE, tmp_path / "more" / FILE)
 
 
+class Hand:
+    """A person, whom nobody copies."""
+
+    actor = Actor("person", "gamepad")
+
+    def __call__(self, obs):
+        return np.zeros(7, np.float32)
+
+    def __deepcopy__(self, memo):
+        raise AssertionError
+
+
+def test_a_person_takes_over_for_good(tmp_path):
+    (episode,) = recorded(tmp_path, takeover=Hand(), seeds=[0])
+    assert episode.source == {"kind": "person", "name": "gamepad"}
+    assert episode.actor is None
+    assert (episode.actions == 0).all()
+    assert json.loads((tmp_path / "trajectory.json").read_text())["source_desc"] == (
+        "gamepad; tests.rollouts.policies:Wanders"
+    )
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
