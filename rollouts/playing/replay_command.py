@@ -53,7 +53,7 @@ def add_recording(parser: argparse.ArgumentParser) -> None:
         help="its task, MODULE:ID for one of your own; without FILE, find its official one in"
         " $MS_ASSET_DIR/demos",
     )
-    add_cell_options(parser)
+    add_cell_options(parser, varying=False)
 
 
 def run(options: argparse.Namespace) -> int:
