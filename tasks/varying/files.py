@@ -11,7 +11,7 @@ import yaml
 
 from robots import TaskError, UnreadableFileError
 from robots.common.files import read_text
-from robots.common.new_files import write_whole
+from robots.common.writing import write_whole
 
 MAX_LENGTH = 1 << 18  # bytes
 
