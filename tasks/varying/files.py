@@ -10,10 +10,12 @@ from typing import Any
 import yaml
 
 from robots import TaskError, UnreadableFileError
+from robots.common.bounds import shown
 from robots.common.files import read_text
 from robots.common.writing import write_whole
 
 MAX_LENGTH = 1 << 18  # bytes
+MAX_DEPTH = 16  # of mappings and lists inside one another
 
 
 class _Loader(yaml.SafeLoader):
@@ -30,15 +32,10 @@ def read_data(path: str | PathLike[str]) -> Any:
     """
     try:
         text = read_text(path, MAX_LENGTH)
-        for event in yaml.parse(text, _Loader):
-            if isinstance(event, yaml.AliasEvent):
-                line = event.start_mark.line + 1
-                raise TaskError(f"{path}, line {line}: aliases (*{event.anchor}) are not read")
+        _check(text, path)
         node = yaml.compose(text, _Loader)
     except UnreadableFileError as error:
         raise TaskError(f"cannot read the randomization {str(path)!r}: {error.strerror}") from error
-    except RecursionError as error:
-        raise TaskError(f"{path}: it nests too deep") from error
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = "" if mark is None else f", line {mark.line + 1}"
@@ -58,6 +55,21 @@ def write_data(path: str | PathLike[str], data: Any) -> None:
     else:
         text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, allow_unicode=True)
     write_whole(path, text)
+
+
+def _check(text: str, path: str | PathLike[str]) -> None:
+    """Refuse what plain data does not need, before any of it is kept."""
+    depth = 0
+    for event in yaml.parse(text, _Loader):
+        where = f"{path}, line {event.start_mark.line + 1}"
+        if isinstance(event, yaml.AliasEvent):
+            raise TaskError(f"{where}: aliases (*{event.anchor}) are not read")
+        if tag := getattr(event, "tag", None):
+            raise TaskError(f"{where}: tags ({shown(tag)}) are not read")
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > MAX_DEPTH:
+            raise TaskError(f"{where}: it nests deeper than {MAX_DEPTH} levels")
 
 
 def _plain(node: yaml.Node, path: str) -> Any:
