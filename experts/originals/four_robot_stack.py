@@ -76,14 +76,13 @@ def stack_for_four(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
         TaskError: If an arm has no fingers, or cannot reach what it should.
     """
     need_fingers(task, "stacking cubes", *ORDER)
-    bases = {place: np.array(task.layout.arm(place).base_position) for place in ORDER}
 
     def scripts(scene: Scene) -> list[Script]:
         starts = {
             place: ArmDriver(task.layout.arm(place).robot).arm(scene.qpos(place)) for place in ORDER
         }
         return [
-            {place: _stack(task, style, place, bases[place], starts[place]) for place in ORDER}
+            {place: _stack(task, style, place, scene.base(place), starts[place]) for place in ORDER}
             for style in STYLES
         ]
 
