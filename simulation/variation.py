@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from simulation.looks import AS_DECLARED, Looks
 from simulation.parts import Part
 
 
@@ -17,6 +18,8 @@ class Variation:
 
     Attributes:
         mass: Factor on the mass of links and bodies, and on their inertia.
+        looks: What differs in its pictures.
     """
 
     mass: Mapping[Part, float] = field(default_factory=dict)
+    looks: Looks = AS_DECLARED

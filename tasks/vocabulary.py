@@ -56,6 +56,7 @@ from tasks.language.shaping import closeness, letting_go, stillness
 from tasks.language.stacking import diagonal, distance_to_top, is_at_rest, lies_on
 from tasks.registry import register_task
 from tasks.varying.distributions import Choice, Fixed, LogUniform, Normal, Uniform, Whole
+from tasks.varying.looks import CameraShift, Light, Surface, Texture
 from tasks.varying.randomization import Randomization
 
 __all__ = [
@@ -64,6 +65,7 @@ __all__ = [
     "Ball",
     "Box",
     "Camera",
+    "CameraShift",
     "Capsule",
     "Choice",
     "Color",
@@ -81,6 +83,7 @@ __all__ = [
     "GREEN",
     "Goal",
     "Info",
+    "Light",
     "LogUniform",
     "Mesh",
     "MultiRobotTask",
@@ -97,9 +100,11 @@ __all__ = [
     "Shape",
     "Sphere",
     "State",
+    "Surface",
     "TARGET_HEIGHT",
     "Table",
     "Target",
+    "Texture",
     "Vector3",
     "Uniform",
     "WHITE",

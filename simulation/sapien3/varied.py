@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 
 def vary(world: BuiltWorld, variation: Variation) -> None:
-    """Let a world differ from what was built."""
+    """Let a world differ from what was built; its pictures once the next one is taken."""
+    world.looks = variation.looks
     for part, factor in variation.mass.items():
         component = _component(world, part)
         mass, inertia = _as_built(world, part, "mass", lambda c=component: (c.mass, c.inertia))

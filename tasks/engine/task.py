@@ -133,7 +133,8 @@ class MultiRobotTask(Declaration, Remade):
         self._speeds = SpeedWatch(self._simulation)
         self._varying: Varying | None = None
         if scenario.randomization:
-            self._varying = Varying(scenario.randomization, self._simulation)
+            own_cameras = scenario.cameras or self.cameras
+            self._varying = Varying(scenario.randomization, self._simulation, own_cameras)
             self._draw(self._everywhere)
         self._camera: Any = None
         self._responds = type(self).respond is not Declaration.respond

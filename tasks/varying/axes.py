@@ -84,9 +84,19 @@ class Group:
         if not isinstance(data, Mapping):
             raise TaskError(f"{what} is {shown(data)}; it takes a {cls.__name__}")
         for name in data:
-            if name not in cls.limits:
-                raise UnknownNameError(f"number of {what}", name, cls.limits)
+            if name not in cls.names():
+                raise UnknownNameError(f"number of {what}", name, cls.names())
         return cls(**data)
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Return the names of what can be declared."""
+        return tuple(cls.limits)
+
+    @property
+    def drawn(self) -> dict[str, Distribution]:
+        """What is drawn for each thing, by name."""
+        return self.declared
 
     def to_json(self) -> Any:
         """Return it as plain data, which `read` turns into an equal one."""

@@ -8,8 +8,11 @@ from typing import Any
 
 from robots import TaskError, UnknownNameError
 from robots.common.bounds import shown
-from tasks.varying.axes import AXES
+from tasks.varying.axes import AXES as PHYSICS
 from tasks.varying.distributions import Distribution
+from tasks.varying.looks import LOOKS, CameraShift, Light, Surface, Texture
+
+AXES = {**PHYSICS, **LOOKS}
 
 
 def _by_name() -> Any:
@@ -28,9 +31,18 @@ class Randomization:
     Attributes:
         mass: Factor on the mass and the inertia of a body (``"cube"``), of all links of a robot
             alike (``"left"``), or of one link (``"left.panda_hand"``).
+        cameras: How cameras that observe are off their places: the task's own (``"base_camera"``)
+            and those of robots (``"left.hand_camera"``).
+        lights: How the lights ``"side"``, ``"top"`` and ``"ambient"`` differ from their own.
+        colors: What a body, a robot or a link is painted with.
+        textures: Which pattern covers a body; the colour of one that has both is the pattern's.
     """
 
     mass: Mapping[str, Distribution] = _by_name()
+    cameras: Mapping[str, CameraShift] = _by_name()
+    lights: Mapping[str, Light] = _by_name()
+    colors: Mapping[str, Surface] = _by_name()
+    textures: Mapping[str, Texture] = _by_name()
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense.

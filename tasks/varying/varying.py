@@ -9,14 +9,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulation import Simulation
+from simulation import Camera, Simulation
 from simulation.variation import Variation
 from tasks.varying.axes import Group
+from tasks.varying.looks import (
+    bodies_and_links,
+    body_names,
+    camera_names,
+    light_names,
+    looks,
+)
 from tasks.varying.randomization import Randomization
 from tasks.varying.streams import Stream
-from tasks.varying.targets import Target, heavy_parts, targets
+from tasks.varying.targets import Target, heavy_parts, linked_parts, targets
 
-_OFFERED = {"mass": heavy_parts}
+_OFFERED = {
+    "mass": heavy_parts,
+    "lights": lambda simulation: light_names(),
+    "colors": lambda simulation: bodies_and_links(simulation, linked_parts(simulation)),
+    "textures": body_names,
+}
 
 DRAWN = "drawn"  # what the names of what was drawn begin with in ``info``
 
@@ -24,8 +36,15 @@ DRAWN = "drawn"  # what the names of what was drawn begin with in ``info``
 class Varying:
     """What varies in N worlds, and what was last drawn for each of them."""
 
-    def __init__(self, randomization: Randomization, simulation: Simulation) -> None:
+    def __init__(
+        self, randomization: Randomization, simulation: Simulation, cameras: Sequence[Camera]
+    ) -> None:
         """Look up what the names of a randomization mean.
+
+        Args:
+            randomization: What varies.
+            simulation: The worlds.
+            cameras: The task's own cameras.
 
         Raises:
             UnknownNameError: If one means nothing.
@@ -33,7 +52,10 @@ class Varying:
         declared = randomization.declared
         self._targets: dict[str, dict[str, Target]] = {
             axis: targets(axis, declared[axis], offered(simulation))
-            for axis, offered in _OFFERED.items()
+            for axis, offered in {
+                **_OFFERED,
+                "cameras": lambda simulation: camera_names(simulation.layout, cameras),
+            }.items()
             if axis in declared
         }
         self._drawn: list[dict[str, Any]] = [{} for _ in range(simulation.num_envs)]
@@ -59,7 +81,9 @@ class Varying:
         simulation.vary({env: self._variation(env) for env in env_ids})
 
     def _variation(self, env: int) -> Variation:
-        return Variation(mass=self._values(env, "mass"))
+        return Variation(
+            mass=self._values(env, "mass"), looks=looks(lambda axis: self._values(env, axis))
+        )
 
     def _values(self, env: int, axis: str) -> dict[Any, Any]:
         """Return what was drawn for each single thing."""
@@ -70,8 +94,8 @@ class Varying:
 
 def _draw(takes: Any, stream: Stream, *names: str) -> Any:
     if isinstance(takes, Group):
-        fields = takes.declared.items()
-        return {name: _draw(drawn, stream, *names, name) for name, drawn in fields}
+        numbers = takes.drawn.items()
+        return {name: _draw(drawn, stream, *names, name) for name, drawn in numbers}
     return takes.value(stream.number(*names))
 
 
