@@ -11,7 +11,7 @@ from layouts import Layout
 from robots import TaskError, UnknownNameError
 from robots.common.bounds import shown
 from simulation import Camera, Simulation
-from simulation.cameras import RobotCamera
+from simulation.cameras import AnyCamera, RobotCamera
 from simulation.looks import (
     LIGHTS,
     PATTERNS,
@@ -23,8 +23,9 @@ from simulation.looks import (
     camera_name,
 )
 from simulation.parts import Part
-from tasks.varying.axes import Axis, Group, Limits
 from tasks.varying.distributions import Choice, Distribution, Uniform, Whole
+from tasks.varying.groups import Group, Limits
+from tasks.varying.targets import linked_parts
 
 _METRES = Limits(-inf, inf, "m")
 _ANGLE = Limits(-inf, inf, "rad")
@@ -191,40 +192,36 @@ class Texture(Group):
         return f"{' or '.join(self.kinds)}, {super().__str__()}"
 
 
-LOOKS = {
-    "cameras": Axis(CameraShift),
-    "lights": Axis(Light),
-    "colors": Axis(Surface),
-    "textures": Axis(Texture),
-}
-"""The axes of what pictures show, by their fields in `tasks.Randomization`."""
-
-
 # -- what they can be declared for ---------------------------------------------------------------
 
 
-def camera_names(layout: Layout, cameras: Sequence[Camera]) -> dict[str, tuple[str, ...]]:
+def look_targets(
+    cameras: Sequence[Camera],
+) -> dict[str, Callable[[Simulation], Mapping[str, tuple[Any, ...]]]]:
+    """Return what returns the things that each axis can be declared for, by name.
+
+    Args:
+        cameras: The task's own cameras.
+    """
+    return {
+        "cameras": lambda simulation: _cameras(simulation.layout, cameras),
+        "lights": lambda simulation: {name: (name,) for name in LIGHTS},
+        "colors": _painted,
+        "textures": lambda simulation: {name: (name,) for name in simulation.worlds[0].bodies},
+    }
+
+
+def _cameras(layout: Layout, cameras: Sequence[Camera]) -> dict[str, tuple[str, ...]]:
     """Return the names of the cameras that observe: a task's own, and those of its robots."""
-    every = [*cameras]
+    every: list[AnyCamera] = [*cameras]
     every += [RobotCamera(n, m) for n, place in layout.items() for m in place.robot.cameras]
     return {name: (name,) for name in map(camera_name, every)}
 
 
-def light_names() -> dict[str, tuple[str, ...]]:
-    """Return the names of the lights."""
-    return {name: (name,) for name in LIGHTS}
-
-
-def body_names(simulation: Simulation) -> dict[str, tuple[str, ...]]:
-    """Return the names of all bodies."""
-    return {name: (name,) for name in simulation.worlds[0].bodies}
-
-
-def bodies_and_links(
-    simulation: Simulation, links: Mapping[str, tuple[Part, ...]]
-) -> dict[str, tuple[Part, ...]]:
+def _painted(simulation: Simulation) -> dict[str, tuple[Part, ...]]:
     """Return everything that can be painted: bodies, robots, and each of their links."""
-    return {name: (Part(None, name),) for name in simulation.worlds[0].bodies} | dict(links)
+    bodies = {name: (Part(None, name),) for name in simulation.worlds[0].bodies}
+    return {**bodies, **linked_parts(simulation)}
 
 
 # -- what was drawn of them ----------------------------------------------------------------------
