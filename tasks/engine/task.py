@@ -40,7 +40,6 @@ from tasks.language.randomness import EpisodeRandom
 from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict
 from tasks.varying.distributions import Distribution, Normal
 from tasks.varying.noise import noise
-from tasks.varying.streams import Stream
 from tasks.varying.varying import Varying
 
 _NORMAL = Normal(1.0)
@@ -197,12 +196,12 @@ class MultiRobotTask(Declaration, Remade):
         """
         return None if self._varying is None else self._varying.drawn(env)
 
-    def layout_of(self, seed: int) -> Layout:
-        """Return the layout as its robots stand in the episode of a seed.
+    def standing(self, env: int = 0) -> Layout:
+        """Return the layout as robots stand in the present episode of an environment.
 
-        It is ``layout``, unless the bases of robots vary.
+        It is ``layout``, unless the bases of robots vary. What is planned is planned in this one.
         """
-        return self.layout if self._varying is None else self._varying.layout(Stream(seed))
+        return self.layout if self._varying is None else self._varying.layout(env)
 
     def scale(self, body: str) -> Floats:
         """Return the factor by which a body is larger than declared, (N,); 1 if sizes are fixed."""

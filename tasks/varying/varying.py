@@ -97,9 +97,9 @@ class Varying:
         rows = [dict(_leaves(DRAWN, drawn)) for drawn in self._drawn]
         return {name: np.array([row[name] for row in rows], np.float32) for name in rows[0]}
 
-    def layout(self, stream: Stream) -> Layout:
-        """Return the layout as robots stand in an episode."""
-        return self._standing(self._draw(stream))
+    def layout(self, env: int) -> Layout:
+        """Return the layout as robots stand in the present episode of an environment."""
+        return self._standing(self._drawn[env])
 
     def scale(self, body: str) -> Floats:
         """Return the factor on the size of a body in each environment, (N,)."""
