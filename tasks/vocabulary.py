@@ -56,6 +56,7 @@ from tasks.language.shaping import closeness, letting_go, stillness
 from tasks.language.stacking import diagonal, distance_to_top, is_at_rest, lies_on
 from tasks.registry import register_task
 from tasks.varying.axes import Shift
+from tasks.varying.distractors import Distractors
 from tasks.varying.distributions import Choice, Fixed, LogUniform, Normal, Uniform, Whole
 from tasks.varying.looks import CameraShift, Light, Surface, Texture
 from tasks.varying.randomization import Randomization
@@ -76,6 +77,7 @@ __all__ = [
     "Cylinder",
     "DARK_BLUE",
     "DARK_RED",
+    "Distractors",
     "EpisodeRandom",
     "FACE_UP",
     "Finish",

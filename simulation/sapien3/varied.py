@@ -27,7 +27,10 @@ def vary(world: BuiltWorld, variation: Variation) -> None:
 
     Robots move when they are placed next, and pictures differ from the next one on.
     """
-    world.looks = variation.looks
+    if variation.looks is not None:
+        world.looks = variation.looks
+    for part, weightless in variation.weightless.items():
+        _component(world, part).disable_gravity = weightless
     for part, factor in variation.mass.items():
         component = _component(world, part)
         mass, inertia = _as_built(world, part, "mass", lambda c=component: (c.mass, c.inertia))

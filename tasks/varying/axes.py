@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 from robots import TaskError
 from robots.common.bounds import shown
+from tasks.varying.distractors import Distractors
 from tasks.varying.distributions import Distribution
 from tasks.varying.groups import Group, Limits
 from tasks.varying.looks import CameraShift, Light, Surface, Texture
@@ -87,6 +88,7 @@ AXES = {
     "lights": Axis(Light),
     "colors": Axis(Surface),
     "textures": Axis(Texture),
+    "distractors": Axis(Distractors, named=False),
     "action_noise": Axis(_NOISE),
     "action_delay": Axis(_STEPS, named=False),
     "sensor_noise": Axis(_NOISE),

@@ -10,6 +10,9 @@ from robots import TaskError, UnknownNameError
 from robots.common.bounds import shown
 from tasks.varying.distributions import Distribution, Fixed, Whole, read_distribution
 
+Declared = Distribution | float | Mapping[str, Any] | None
+"""What a field of a `Group` takes: a distribution, a number, or plain data that describes one."""
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -52,7 +55,8 @@ class Group:
     """Several numbers that belong together; a frozen dataclass of distributions.
 
     Attributes:
-        limits: What each of them may be, by field; a field that is None is not varied.
+        limits: What each of them may be, by field; one that is None is not varied, and other fields
+            are no numbers that are drawn.
     """
 
     limits: ClassVar[Mapping[str, Limits]] = {}
@@ -70,7 +74,7 @@ class Group:
     @property
     def declared(self) -> dict[str, Distribution]:
         """The distributions of those that are varied, by field."""
-        given = {field.name: getattr(self, field.name) for field in fields(self)}  # pyright: ignore[reportArgumentType]
+        given = {name: getattr(self, name) for name in self.limits}
         return {name: value for name, value in given.items() if value is not None}
 
     @classmethod
@@ -93,10 +97,10 @@ class Group:
     @classmethod
     def names(cls) -> tuple[str, ...]:
         """Return the names of what can be declared."""
-        return tuple(cls.limits)
+        return tuple(field.name for field in fields(cls))  # pyright: ignore[reportArgumentType]
 
     @property
-    def drawn(self) -> dict[str, Distribution]:
+    def drawn(self) -> Mapping[str, Distribution | Group]:
         """What is drawn for each thing, by name."""
         return self.declared
 

@@ -24,7 +24,7 @@ from simulation.looks import (
 )
 from simulation.parts import Part
 from tasks.varying.distributions import Choice, Distribution, Uniform, Whole
-from tasks.varying.groups import Group, Limits
+from tasks.varying.groups import Declared, Group, Limits
 from tasks.varying.targets import linked_parts
 
 _METRES = Limits(-inf, inf, "m")
@@ -32,8 +32,6 @@ _ANGLE = Limits(-inf, inf, "rad")
 _FRACTION = Limits(0.0, 1.0, "a fraction")
 _STRENGTH = Limits(0.0, 100.0, "factor on what is declared")
 _SEEDS = 10**6
-
-Declared = Distribution | float | Mapping[str, Any] | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,11 +160,6 @@ class Texture(Group):
         object.__setattr__(self, "kinds", tuple(kinds))
 
     @property
-    def declared(self) -> dict[str, Distribution]:
-        """What is drawn from distributions that can be declared."""
-        return {name: getattr(self, name) for name in self.limits}
-
-    @property
     def drawn(self) -> dict[str, Distribution]:
         """What is drawn: which pattern, by its number in `PATTERNS`, two colours, and a seed."""
         colors = {name: self.declared[name] for name in ("red", "green", "blue")}
@@ -177,11 +170,6 @@ class Texture(Group):
             **{f"{name}_2": drawn for name, drawn in colors.items()},
             "seed": Whole(0, _SEEDS),
         }
-
-    @classmethod
-    def names(cls) -> tuple[str, ...]:
-        """Return the names of what can be declared."""
-        return "kinds", *cls.limits
 
     def to_json(self) -> Any:
         """Return it as plain data, which `read` turns into an equal one."""
@@ -227,16 +215,19 @@ def _painted(simulation: Simulation) -> dict[str, tuple[Part, ...]]:
 # -- what was drawn of them ----------------------------------------------------------------------
 
 
-def looks(values: Callable[[str], Mapping[Any, Mapping[str, float]]]) -> Looks:
+def looks(
+    values: Callable[[str], Mapping[Any, Mapping[str, float]]], paints: Mapping[Part, Paint]
+) -> Looks:
     """Return how a world looks by what was drawn.
 
     Args:
         values: Returns what was drawn of an axis, for each thing.
+        paints: Other paint, of what nothing was drawn for.
     """
     return Looks(
         {name: _shift(**drawn) for name, drawn in values("cameras").items()},
         {name: _glow(**drawn) for name, drawn in values("lights").items()},
-        {part: Paint(**drawn) for part, drawn in values("colors").items()},
+        {**paints, **{part: Paint(**drawn) for part, drawn in values("colors").items()}},
         {name: _pattern(drawn) for name, drawn in values("textures").items()},
     )
 

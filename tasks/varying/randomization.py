@@ -9,6 +9,7 @@ from typing import Any
 from robots import TaskError, UnknownNameError
 from robots.common.bounds import shown
 from tasks.varying.axes import AXES, Shift
+from tasks.varying.distractors import Distractors
 from tasks.varying.distributions import Distribution
 from tasks.varying.looks import CameraShift, Light, Surface, Texture
 
@@ -53,6 +54,7 @@ class Randomization:
         lights: How the lights ``"side"``, ``"top"`` and ``"ambient"`` differ from their own.
         colors: What a body, a robot or a link is painted with.
         textures: Which pattern covers a body; the colour of one that has both is the pattern's.
+        distractors: Bodies that have nothing to do with the task; see `Distractors`.
     """
 
     mass: Mapping[str, Distribution] = _by_name()
@@ -71,6 +73,7 @@ class Randomization:
     lights: Mapping[str, Light] = _by_name()
     colors: Mapping[str, Surface] = _by_name()
     textures: Mapping[str, Texture] = _by_name()
+    distractors: Distractors | None = None
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense.

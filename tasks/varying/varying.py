@@ -19,10 +19,12 @@ from tasks.varying import targets as find
 from tasks.varying.axes import AXES
 from tasks.varying.bases import shifted
 from tasks.varying.delays import ActionDelay, ObservationDelay
+from tasks.varying.distractors import Rectangle
 from tasks.varying.groups import Group
 from tasks.varying.looks import look_targets, looks
 from tasks.varying.noise import ActionNoise, Noisy, SensorNoise
 from tasks.varying.randomization import Randomization
+from tasks.varying.scattering import Scattering
 from tasks.varying.streams import Stream
 
 DRAWN = "drawn"  # what the names of what was drawn begin with in ``info``
@@ -49,7 +51,11 @@ class Varying:
     """
 
     def __init__(
-        self, randomization: Randomization, simulation: Simulation, cameras: Sequence[Camera]
+        self,
+        randomization: Randomization,
+        simulation: Simulation,
+        cameras: Sequence[Camera],
+        area: Rectangle,
     ) -> None:
         """Look up what the names of a randomization mean.
 
@@ -57,6 +63,7 @@ class Varying:
             randomization: What varies.
             simulation: The worlds.
             cameras: The task's own cameras.
+            area: Where distractors go if that is not declared; x_min, y_min, x_max, y_max (m).
 
         Raises:
             UnknownNameError: If one means nothing.
@@ -76,6 +83,9 @@ class Varying:
         self._sensors = SensorNoise(declared.get("sensor_noise", {}))
         self._sending = ActionDelay(count) if "action_delay" in declared else None
         self._seeing = ObservationDelay(count) if "observation_delay" in declared else None
+        self._scattering: Scattering | None = None
+        if "distractors" in declared:
+            self._scattering = Scattering(declared["distractors"], area)
 
     # -- drawing -----------------------------------------------------------------------------
 
@@ -119,6 +129,14 @@ class Varying:
     def apply(self, simulation: Simulation, env_ids: Sequence[int]) -> None:
         """Let worlds differ by what was drawn; their reset has begun."""
         simulation.vary({env: self._variation(self._drawn[env]) for env in env_ids})
+
+    def scatter(self, simulation: Simulation, state: State, env_ids: Sequence[int]) -> bool:
+        """Put distractors where they are clear of everything, and tell whether there are any."""
+        if self._scattering is None:
+            return False
+        drawn = {env: self._drawn[env]["distractors"] for env in env_ids}
+        self._scattering.scatter(simulation, state, drawn, self._streams)
+        return True
 
     # -- steps -------------------------------------------------------------------------------
 
@@ -194,7 +212,8 @@ class Varying:
         }
         standing = self._standing(drawn) if "bases" in drawn else {}
         bases = {name: (p.base_position, p.base_quaternion) for name, p in standing.items()}
-        seen = looks(lambda axis: self._each(drawn, axis))
+        paints = self._scattering.paints(drawn["distractors"]) if self._scattering else {}
+        seen = looks(lambda axis: self._each(drawn, axis), paints)
         return Variation(**factors, bases=bases, looks=seen)
 
     def _standing(self, drawn: Mapping[str, Any]) -> Layout:
