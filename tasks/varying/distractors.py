@@ -16,8 +16,9 @@ from robots.common.bounds import checked_choice, checked_number, checked_whole, 
 from robots.descriptor import Vector3
 from simulation import Box, Cylinder, Shape, Sphere, World
 from simulation.world import BodyKind
-from tasks.varying.distributions import Uniform
+from tasks.varying.distributions import Uniform, as_whole
 from tasks.varying.groups import Declared, Group, Limits
+from tasks.varying.looks import TONES
 from tasks.varying.streams import Stream
 
 SHAPES = ("box", "ball", "cylinder")
@@ -97,13 +98,13 @@ class Distractors(Group):
     kind: Kind = "dynamic"
     bodies: int | None = None
     shapes: Sequence[str] = SHAPES
-    size: Declared = Uniform(0.015, 0.03)
+    size: Declared = Uniform(0.015, 0.035)
     x: Declared = None
     y: Declared = None
     yaw: Declared = Uniform(-pi, pi)
-    red: Declared = Uniform(0.0, 1.0)
-    green: Declared = Uniform(0.0, 1.0)
-    blue: Declared = Uniform(0.0, 1.0)
+    red: Declared = TONES
+    green: Declared = TONES
+    blue: Declared = TONES
     gap: float = 0.02
 
     limits: ClassVar[Mapping[str, Limits]] = {
@@ -126,7 +127,7 @@ class Distractors(Group):
         checked_choice("Distractors: kind", self.kind, KINDS, TaskError)
         gap = checked_number("Distractors: gap", self.gap, 0.0, 1.0, TaskError, "m")
         least = int(self.declared["count"].bounds[1])
-        bodies = least if self.bodies is None else self.bodies
+        bodies = least if self.bodies is None else as_whole(self.bodies)
         checked_whole("Distractors: bodies", bodies, least, _MOST, TaskError)
         shapes = (self.shapes,) if isinstance(self.shapes, str) else self.shapes
         if not isinstance(shapes, Sequence) or not shapes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Any, ClassVar
@@ -23,7 +23,7 @@ from simulation.looks import (
     camera_name,
 )
 from simulation.parts import Part
-from tasks.varying.distributions import Choice, Distribution, Uniform, Whole
+from tasks.varying.distributions import Choice, Distribution, LogUniform, Whole
 from tasks.varying.groups import Declared, Group, Limits
 from tasks.varying.targets import linked_parts
 
@@ -32,6 +32,9 @@ _ANGLE = Limits(-inf, inf, "rad")
 _FRACTION = Limits(0.0, 1.0, "a fraction")
 _STRENGTH = Limits(0.0, 100.0, "factor on what is declared")
 _SEEDS = 10**6
+
+TONES = LogUniform(0.02, 1.0)
+"""Of light: dark, middle and bright tones about as often, as eyes see them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,9 +134,9 @@ class Texture(Group):
 
     kinds: Sequence[str] = PATTERNS
     cells: Declared = Whole(1, 6)
-    red: Declared = Uniform(0.0, 1.0)
-    green: Declared = Uniform(0.0, 1.0)
-    blue: Declared = Uniform(0.0, 1.0)
+    red: Declared = TONES
+    green: Declared = TONES
+    blue: Declared = TONES
 
     limits: ClassVar[Mapping[str, Limits]] = {
         "cells": Limits(1, 64, "repeats", whole=True),
@@ -184,17 +187,18 @@ class Texture(Group):
 
 
 def look_targets(
-    cameras: Sequence[Camera],
+    cameras: Sequence[Camera], painted: Container[str]
 ) -> dict[str, Callable[[Simulation], Mapping[str, tuple[Any, ...]]]]:
     """Return what returns the things that each axis can be declared for, by name.
 
     Args:
         cameras: The task's own cameras.
+        painted: Names of bodies whose colour is drawn with something else.
     """
     return {
         "cameras": lambda simulation: _cameras(simulation.layout, cameras),
         "lights": lambda simulation: {name: (name,) for name in LIGHTS},
-        "colors": _painted,
+        "colors": lambda simulation: _surfaces(simulation, painted),
         "textures": lambda simulation: {name: (name,) for name in simulation.worlds[0].bodies},
     }
 
@@ -206,9 +210,10 @@ def _cameras(layout: Layout, cameras: Sequence[Camera]) -> dict[str, tuple[str, 
     return {name: (name,) for name in map(camera_name, every)}
 
 
-def _painted(simulation: Simulation) -> dict[str, tuple[Part, ...]]:
+def _surfaces(simulation: Simulation, painted: Container[str]) -> dict[str, tuple[Part, ...]]:
     """Return everything that can be painted: bodies, robots, and each of their links."""
-    bodies = {name: (Part(None, name),) for name in simulation.worlds[0].bodies}
+    names = (name for name in simulation.worlds[0].bodies if name not in painted)
+    bodies = {name: (Part(None, name),) for name in names}
     return {**bodies, **linked_parts(simulation)}
 
 

@@ -70,9 +70,11 @@ class Varying:
         """
         self._declared = declared = randomization.declared
         self._layout = simulation.layout
+        own = declared["distractors"].every() if "distractors" in declared else ()
+        offers = {**_OFFERED, **look_targets(cameras, {one.name for one in own})}
         self._targets = {
             axis: find.targets(axis, declared[axis], offered(simulation))
-            for axis, offered in {**_OFFERED, **look_targets(cameras)}.items()
+            for axis, offered in offers.items()
             if axis in declared
         }
         self.rebuilds = any(AXES[axis].rebuilds for axis in declared)

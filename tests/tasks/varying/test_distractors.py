@@ -191,3 +191,6 @@ def test_they_are_written_and_read() -> None:
     for distractors in (SOME, ALL, Distractors(count=Whole(0, 2), bodies=6, kind="static", x=0.1)):
         declared = Randomization(distractors=distractors)
         assert Randomization.from_json(declared.to_json()) == declared
+    floats = {"count": {"whole": [0.0, 2.0]}, "bodies": 4.0}  # as files have them
+    read = Randomization.from_json({"distractors": floats})
+    assert read == Randomization(distractors=Distractors(count=Whole(0, 2), bodies=4))
