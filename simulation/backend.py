@@ -323,6 +323,13 @@ class Backend(Protocol):
         """Tell where a link pressed on a dynamic body in the last step of physics, (N,)."""
         ...
 
+    def extents(self, env: int) -> dict[Part, Floats]:
+        """Return the box around each link and body of a world that collides, but for planes.
+
+        Along the axes of the world: its lowest and its highest corner, (2, 3) (m).
+        """
+        ...
+
     def collision_shapes(self, env: int, body: str) -> list[tuple[str | float | list[float], ...]]:
         """Return the kind, pose and sizes of what a body collides with, as it was built."""
         ...

@@ -264,6 +264,10 @@ class Simulation:
         """Tell where a robot pressed on a movable object in the last step of physics, (N,)."""
         return self._backend.touching()
 
+    def extents(self, env: int) -> dict[Part, Floats]:
+        """Return the box around what collides; see `simulation.backend.Backend.extents`."""
+        return self._backend.extents(env)
+
     def collision_shapes(self, env: int, body: str) -> list[tuple[Any, ...]]:
         """Return the kind, pose and sizes of what a body collides with, as it was built.
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from robots.descriptor import Quaternion, Vector3
+from simulation.looks import Looks
 from simulation.parts import Part
 
 Factors = Mapping[Part, float]
@@ -26,6 +27,8 @@ class Variation:
         damping: Factor on their damping.
         joint_friction: Friction coefficient of joints.
         bases: Where robots stand: position (m, world) and quaternion (wxyz).
+        weightless: Whether bodies feel no gravity.
+        looks: What differs in its pictures; None leaves them as they are.
     """
 
     mass: Factors = field(default_factory=dict[Part, float])
@@ -36,3 +39,5 @@ class Variation:
     bases: Mapping[str, tuple[Vector3, Quaternion]] = field(
         default_factory=dict[str, tuple[Vector3, Quaternion]]
     )
+    weightless: Mapping[Part, bool] = field(default_factory=dict[Part, bool])
+    looks: Looks | None = None

@@ -9,6 +9,7 @@ from typing import Any
 
 from rich.console import Console
 
+from layouts.progress import Progress
 from layouts.view_command import add_page_options, page_words, show
 from robots import RobotLayoutsError, TaskError
 from robots.common.commands import exit_code, print_error, program, start
@@ -91,6 +92,24 @@ def _view(options: argparse.Namespace) -> int:
     return status
 
 
+def _preview(options: argparse.Namespace) -> None:
+    """Save one picture of several draws of a task."""
+    from tasks.preview import draws, expect_format, save
+
+    target = expect_format(options.out)
+    env = make(options.task, obs_mode="none", render_mode="rgb_array", **chosen_cell(options))
+    so_far = Progress(f"preview of {env.task_id}")
+    picture = draws(
+        env,
+        options.draws,
+        seed=options.seed,
+        camera=options.camera,
+        progress=lambda done: so_far.tell(f"draw {done} of {options.draws}"),
+    )
+    env.close()
+    print(f"picture: {save(picture, target)}")
+
+
 def _console() -> Console:
     console = Console(markup=False, highlight=False)
     console.width = max(console.width, MIN_WIDTH)
@@ -126,6 +145,21 @@ def _parser() -> argparse.ArgumentParser:
     add_cell_options(view)
     add_page_options(view)
     view.set_defaults(run=_view)
+    preview = commands.add_parser("preview", help="save one picture of several draws of a task")
+    preview.add_argument("task", metavar="TASK", help=TASK_HELP)
+    preview.add_argument(
+        "--out", default="preview.png", metavar="FILE", help=".png, .jpg or .webp (preview.png)"
+    )
+    preview.add_argument("--draws", type=int, default=12, metavar="N", help="how many (12)")
+    preview.add_argument("--seed", type=int, default=0, metavar="N", help="of the first (0)")
+    preview.add_argument(
+        "--camera",
+        metavar="NAME",
+        help="the camera that sees them, such as base_camera or left.hand_camera (the first one"
+        " that varies, or the place from which people see the task)",
+    )
+    add_cell_options(preview)
+    preview.set_defaults(run=_preview)
     return parser
 
 

@@ -56,7 +56,9 @@ from tasks.language.shaping import closeness, letting_go, stillness
 from tasks.language.stacking import diagonal, distance_to_top, is_at_rest, lies_on
 from tasks.registry import register_task
 from tasks.varying.axes import Shift
+from tasks.varying.distractors import Distractors
 from tasks.varying.distributions import Choice, Fixed, LogUniform, Normal, Uniform, Whole
+from tasks.varying.looks import CameraShift, Light, Surface, Texture
 from tasks.varying.randomization import Randomization
 
 __all__ = [
@@ -65,6 +67,7 @@ __all__ = [
     "Ball",
     "Box",
     "Camera",
+    "CameraShift",
     "Capsule",
     "Choice",
     "Color",
@@ -74,6 +77,7 @@ __all__ = [
     "Cylinder",
     "DARK_BLUE",
     "DARK_RED",
+    "Distractors",
     "EpisodeRandom",
     "FACE_UP",
     "Finish",
@@ -82,6 +86,7 @@ __all__ = [
     "GREEN",
     "Goal",
     "Info",
+    "Light",
     "LogUniform",
     "Mesh",
     "MultiRobotTask",
@@ -99,9 +104,11 @@ __all__ = [
     "Shift",
     "Sphere",
     "State",
+    "Surface",
     "TARGET_HEIGHT",
     "Table",
     "Target",
+    "Texture",
     "Vector3",
     "Uniform",
     "WHITE",

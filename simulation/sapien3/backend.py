@@ -20,6 +20,7 @@ from simulation.sapien3.contacts import (
     overlaps_in,
     presses_on_object,
 )
+from simulation.sapien3.extents import extents_of
 from simulation.sapien3.inverse_kinematics import InverseKinematics
 from simulation.sapien3.point_reach import PointReach
 from simulation.sapien3.pose_follower import JOINTS_OF_A_POSE, NearestFollower, PoseFollower
@@ -203,6 +204,10 @@ class SapienBackend:
     def touching(self) -> Flags:
         """Tell where a link pressed on a dynamic body; see `Backend`."""
         return np.array([presses_on_object(world.system.get_contacts()) for world in self.worlds])
+
+    def extents(self, env: int) -> dict[Part, Floats]:
+        """Return the box around what collides; see `Backend`."""
+        return extents_of(self.worlds[env])
 
     def collision_shapes(self, env: int, body: str) -> list[tuple[Any, ...]]:
         """Return what a body collides with; see `Backend`."""

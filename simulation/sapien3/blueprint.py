@@ -72,6 +72,9 @@ class Blueprint:
         """
         self.builder.set_scene(scene)
         self.builder.set_initial_pose(pose)
+        for link in self.builder.link_builders:
+            for record in link.visual_records:
+                record.material = _copied(record.material)
         if self.overlaps is not None:
             for link in self.builder.link_builders:
                 link.collision_groups = [1, 1, self.overlaps.get(link.name, 0), number + 1]
@@ -160,6 +163,15 @@ class _Loader(URDFLoader):
                 mesh.filename = unmirrored(mesh.filename, scale, where, self.urdf)
                 mesh.scale = None
         super()._build_link(link, link_builder)
+
+
+def _copied(material: Any) -> Any:
+    """Return a URDF's material for one articulation alone, which can be painted by itself."""
+    if material is None:
+        return None
+    own = type(material)(base_color=material.base_color)
+    own.base_color_texture = material.base_color_texture
+    return own
 
 
 def _needs_tendon(mimic: Any, descriptor: RobotDescriptor, model: UrdfModel) -> bool:

@@ -1,4 +1,4 @@
-"""Pictures of one world of SAPIEN's, all lit alike."""
+"""Pictures of one world of SAPIEN's, all lit alike but for what varies."""
 
 from __future__ import annotations
 
@@ -12,8 +12,16 @@ import torch
 from robots import SimulationError
 from robots.descriptor import Vector3
 from simulation.cameras import AnyCamera, RobotCamera, View
+from simulation.looks import AS_DECLARED, LIGHTS, Looks, camera_name
 from simulation.rotations import quaternion
 from simulation.sapien3.device import expect_render_device
+from simulation.sapien3.dressing import (
+    Wardrobe,
+    lamp_pose,
+    light_color,
+    shifted,
+    widened,
+)
 from simulation.sapien3.world import BuiltWorld
 
 # mani_skill 3.0.1, envs/sapien_env.py, _load_lighting: red, green, blue; directions point away
@@ -57,19 +65,20 @@ class Studio:
         self._world = weakref.proxy(world)
         self._scene = sapien.Scene([world.scene.render_system])
         self._scene.set_ambient_light(list(SKY))
-        for direction, color in LAMPS:
-            self._scene.add_directional_light(list(direction), list(color))
-        self._cameras: dict[tuple[Any, ...], Any] = {}
-        self._markers: list[Any] = [
-            body.entity.find_component_by_type(sapien.render.RenderBodyComponent)
-            for body in world.bodies.values()
-            if body.declared.marker
+        self._lamps: list[Any] = [
+            self._scene.add_directional_light(list(d), list(c)) for d, c in LAMPS
         ]
+        self._cameras: dict[tuple[Any, ...], Any] = {}
+        self._markers = _markers(world)
+        self._looks = AS_DECLARED  # that it has
+        self._wardrobe: Wardrobe | None = None
 
     def look(
         self, cameras: Mapping[str, AnyCamera], textures: Sequence[str], *, markers: bool
     ) -> list[View]:
         """Take pictures with all cameras at the same moment."""
+        if self._world.looks is not self._looks:
+            self._dress(self._world.looks)
         for marker in self._markers:
             marker.visibility = float(markers)
         placed = [self._placed(name, camera) for name, camera in cameras.items()]
@@ -88,10 +97,30 @@ class Studio:
             link = self._world.robots[camera.robot].link(camera.mount.link)
             mount = camera.mount
             placed.entity.set_pose(link.entity_pose)
-            placed.local_pose = sapien.Pose(list(mount.position), list(mount.quaternion))
+            pose = sapien.Pose(list(mount.position), list(mount.quaternion))
         else:
-            placed.local_pose = look_at(camera.eye, camera.target)
+            pose = look_at(camera.eye, camera.target)
+        shift = self._looks.cameras.get(camera_name(camera))
+        placed.local_pose = pose if shift is None else shifted(pose, shift)
+        if shift is not None:
+            placed.set_fovy(widened(lens.fov, shift), compute_x=True)
         return placed
+
+    def _dress(self, looks: Looks) -> None:
+        """Let everything look as it is to from now on."""
+        self._looks = looks
+        if looks.patterns or looks.paints:
+            if self._wardrobe is None:
+                self._wardrobe = Wardrobe(self._world)
+            self._wardrobe.dress(looks)
+            self._markers = _markers(self._world)
+        *names, everywhere = LIGHTS
+        for name, lamp, (direction, color) in zip(names, self._lamps, LAMPS, strict=True):
+            if glow := looks.lights.get(name):
+                lamp.color = light_color(color, glow)
+                lamp.entity.set_pose(lamp_pose(direction, glow))
+        if glow := looks.lights.get(everywhere):
+            self._scene.set_ambient_light(light_color(SKY, glow))
 
     def _add_camera(
         self, name: str, width: int, height: int, fov: float, near: float, far: float
@@ -101,6 +130,14 @@ class Studio:
         for image, pixels in _FORMATS.items():
             sapien.render.set_picture_format(image, pixels)
         return self._scene.add_camera(name, width, height, fov, near, far)
+
+
+def _markers(world: BuiltWorld) -> list[Any]:
+    return [
+        body.entity.find_component_by_type(sapien.render.RenderBodyComponent)
+        for body in world.bodies.values()
+        if body.declared.marker
+    ]
 
 
 def _view(camera: Any, textures: Sequence[str]) -> View:

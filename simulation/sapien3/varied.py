@@ -23,7 +23,14 @@ _Value = TypeVar("_Value")
 
 
 def vary(world: BuiltWorld, variation: Variation) -> None:
-    """Let a world differ from what was built; robots move when they are placed next."""
+    """Let a world differ from what was built.
+
+    Robots move when they are placed next, and pictures differ from the next one on.
+    """
+    if variation.looks is not None:
+        world.looks = variation.looks
+    for part, weightless in variation.weightless.items():
+        _component(world, part).disable_gravity = weightless
     for part, factor in variation.mass.items():
         component = _component(world, part)
         mass, inertia = _as_built(world, part, "mass", lambda c=component: (c.mass, c.inertia))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from sapien.render import (
     RenderTexture2D,
 )
 
+from robots.descriptor import Vector3
 from simulation.shapes import Box, Capsule, Cylinder, Floor, Mesh, Plane, Shape, Sphere
 
 _PLANE_HALF_SIZE = 50.0  # of what is drawn of an infinite plane (m)
@@ -27,15 +29,39 @@ _TEXTURES = ("base_color", "normal", "emission", "transmission", "metallic", "ro
 
 def visual_component(shapes: tuple[Shape, ...]) -> RenderBodyComponent | None:
     """Return what is drawn of a body, or None if nothing is."""
-    visible = [shape for shape in shapes if shape.visible]
-    if not visible:
+    visuals = [visual for _, visual in drawn_shapes(shapes)]
+    if not visuals:
         return None
     component = RenderBodyComponent()
-    for shape in visible:
-        visual = _visual(shape)
-        visual.local_pose = sapien.Pose(list(shape.position), list(shape.quaternion))
+    for visual in visuals:
         component.attach(visual)
     return component
+
+
+def drawn_shapes(shapes: tuple[Shape, ...]) -> Iterator[tuple[Shape, Any]]:
+    """Yield the shapes that are drawn, and what SAPIEN draws of each, at its place in the body."""
+    for shape in shapes:
+        if shape.visible:
+            visual = _visual(shape)
+            visual.local_pose = sapien.Pose(list(shape.position), list(shape.quaternion))
+            yield shape, visual
+
+
+def stretch(shape: Shape) -> Vector3:
+    """Return what SAPIEN multiplies the corners of what it draws with, along each axis."""
+    match shape:
+        case Box():
+            return shape.half_size
+        case Sphere():
+            return shape.radius, shape.radius, shape.radius
+        case Cylinder():
+            return shape.half_length, shape.radius, shape.radius
+        case Plane():
+            return 1.0, _PLANE_HALF_SIZE, _PLANE_HALF_SIZE
+        case Mesh():
+            return shape.scale
+        case _:
+            return 1.0, 1.0, 1.0
 
 
 def _visual(shape: Shape) -> Any:

@@ -10,6 +10,7 @@ import sapien.physx as physx
 
 from layouts import Layout
 from robots import SimulationError
+from simulation.looks import AS_DECLARED
 from simulation.parts import Part
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
 from simulation.sapien3.blueprint import Blueprint, read_blueprint
@@ -51,6 +52,7 @@ class BuiltWorld:
         bodies: Body by name.
         studio: Its cameras and lights, once a picture was taken.
         built: What varied parts were built with; see `simulation.sapien3.varied`.
+        looks: What differs in its pictures.
     """
 
     def __init__(
@@ -95,6 +97,7 @@ class BuiltWorld:
         self.articulations = [robot.articulation for robot in self.robots.values()]
         self.bodies: dict[str, BuiltBody] = {}
         self.built: dict[tuple[Part, str], Any] = {}
+        self.looks = AS_DECLARED
         self.studio: Any = None  # as long as this world lives, also in a fork
 
     def add(self, body: Body) -> BuiltBody:

@@ -39,6 +39,7 @@ from tasks.engine.speeds import SpeedWatch
 from tasks.engine.varied import Varied
 from tasks.language.randomness import EpisodeRandom
 from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict
+from tasks.varying.distractors import add_distractors, area_of
 from tasks.varying.varying import Varying
 
 
@@ -133,7 +134,12 @@ class MultiRobotTask(Declaration, Varied, Remade):
         )
         self._speeds = SpeedWatch(self._simulation)
         if scenario.randomization:
-            self._varying = Varying(scenario.randomization, self._simulation)
+            self._varying = Varying(
+                scenario.randomization,
+                self._simulation,
+                scenario.cameras or self.cameras,
+                area_of(self.table.outline(layout), self.viewpoint[1]),
+            )
             self._draw(self._everywhere)
             if self._varying.rebuilds:
                 self._simulation.rebuild(self._everywhere, self._build_again)
@@ -359,7 +365,7 @@ class MultiRobotTask(Declaration, Varied, Remade):
         world.design = self.design(rng)
         if self._varying is not None:
             self._varying.describe(world, index)
-        expect_nothing(self, "build", self.build(world))
+        self._fill(world)
         rng.restart_numpy()
 
     def _build_again(self, world: World, index: int) -> None:
@@ -367,7 +373,12 @@ class MultiRobotTask(Declaration, Varied, Remade):
         assert self._varying is not None
         world.design = self.simulation.worlds[index].design
         self._varying.describe(world, index)
+        self._fill(world)
+
+    def _fill(self, world: World) -> None:
         expect_nothing(self, "build", self.build(world))
+        if (varied := self.scenario.randomization) and varied.distractors:
+            add_distractors(world, varied.distractors)
 
     def _draw(self, ids: Iterable[int]) -> None:
         """Draw what varies in the coming episodes."""
@@ -388,6 +399,8 @@ class MultiRobotTask(Declaration, Varied, Remade):
         self._elapsed[ids] = 0
         self._speeds.begin(ids)
         state = self._read()
+        if self._varying is not None and self._varying.scatter(self.simulation, state, ids):
+            state = self._read()
         self.simulation.hold(state)
         if self._varying is not None:
             self._varying.rest(self.simulation, state, ids)

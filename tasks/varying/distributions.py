@@ -161,7 +161,7 @@ class Whole(_Range):
             TaskError: If they are none, or the wrong way round.
         """
         for bound in ("low", "high"):
-            value = _as_whole(getattr(self, bound))
+            value = as_whole(getattr(self, bound))
             whole = checked_whole(f"Whole: {bound}", value, -_MOST, _MOST, TaskError)
             _settle(self, **{bound: whole})
         super().__post_init__()
@@ -346,7 +346,7 @@ def _number(name: str, what: str, value: Any) -> float:
     return checked_number(f"{name}: {what}", value, -FAR, FAR, TaskError)
 
 
-def _as_whole(value: Any) -> Any:
+def as_whole(value: Any) -> Any:
     """Return a float that is a whole number as such: files do not tell the two apart."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 

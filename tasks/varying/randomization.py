@@ -11,8 +11,10 @@ from typing import Any
 from robots import RobotLayoutsError, TaskError, UnknownNameError
 from robots.common.bounds import shown
 from tasks.varying.axes import AXES, Shift
+from tasks.varying.distractors import Distractors
 from tasks.varying.distributions import Distribution
 from tasks.varying.files import read_data, write_data
+from tasks.varying.looks import CameraShift, Light, Surface, Texture
 
 
 def _by_name() -> Any:
@@ -50,6 +52,12 @@ class Randomization:
             ``"left.qpos"``, ``"*_pose"``. Images, reward and success are spared.
         observation_delay: How many control steps old observations are; until there is one that
             old, the episode's first.
+        cameras: How cameras that observe are off their places: the task's own (``"base_camera"``)
+            and those of robots (``"left.hand_camera"``).
+        lights: How the lights ``"side"``, ``"top"`` and ``"ambient"`` differ from their own.
+        colors: What a body, a robot or a link is painted with.
+        textures: Which pattern covers a body; the colour of one that has both is the pattern's.
+        distractors: Bodies that have nothing to do with the task; see `Distractors`.
     """
 
     mass: Mapping[str, Distribution] = _by_name()
@@ -64,6 +72,11 @@ class Randomization:
     action_delay: Distribution | None = None
     sensor_noise: Mapping[str, Distribution] = _by_name()
     observation_delay: Distribution | None = None
+    cameras: Mapping[str, CameraShift] = _by_name()
+    lights: Mapping[str, Light] = _by_name()
+    colors: Mapping[str, Surface] = _by_name()
+    textures: Mapping[str, Texture] = _by_name()
+    distractors: Distractors | None = None
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense.

@@ -62,10 +62,11 @@ def heavy_parts(simulation: Simulation) -> dict[str, tuple[Part, ...]]:
     """Return what has a mass: dynamic bodies, robots, and each of their links."""
     bodies = simulation.worlds[0].bodies.values()
     found = {body.name: (Part(None, body.name),) for body in bodies if body.kind == "dynamic"}
-    return {**found, **_links(simulation)}
+    return {**found, **linked_parts(simulation)}
 
 
-def _links(simulation: Simulation) -> dict[str, tuple[Part, ...]]:
+def linked_parts(simulation: Simulation) -> dict[str, tuple[Part, ...]]:
+    """Return the links of each robot, and each of them by itself."""
     links = {
         robot: tuple(Part(robot, link) for link in simulation.index.robots[robot].links)
         for robot in simulation.layout
@@ -78,7 +79,7 @@ def rough_parts(simulation: Simulation) -> dict[str, tuple[Part, ...]]:
     """Return what has a friction: bodies that touch others, robots, and each of their links."""
     bodies = simulation.worlds[0].bodies.values()
     touching = [body.name for body in bodies if any(shape.collides for shape in body.shapes)]
-    return {**{name: (Part(None, name),) for name in touching}, **_links(simulation)}
+    return {**{name: (Part(None, name),) for name in touching}, **linked_parts(simulation)}
 
 
 def sized_bodies(simulation: Simulation) -> dict[str, tuple[str, ...]]:

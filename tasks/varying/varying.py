@@ -12,15 +12,19 @@ from numpy.typing import NDArray
 
 from layouts import Layout
 from robots.descriptor import Vector3
-from simulation import Simulation, State, World
+from simulation import Camera, Simulation, State, World
 from simulation.maths import Floats
 from simulation.variation import Variation
 from tasks.varying import targets as find
-from tasks.varying.axes import AXES, Group
+from tasks.varying.axes import AXES
 from tasks.varying.bases import shifted
 from tasks.varying.delays import ActionDelay, ObservationDelay
+from tasks.varying.distractors import Rectangle
+from tasks.varying.groups import Group
+from tasks.varying.looks import look_targets, looks
 from tasks.varying.noise import ActionNoise, Noisy, SensorNoise
 from tasks.varying.randomization import Randomization
+from tasks.varying.scattering import Scattering
 from tasks.varying.streams import Stream
 
 DRAWN = "drawn"  # what the names of what was drawn begin with in ``info``
@@ -46,17 +50,31 @@ class Varying:
             changed in place.
     """
 
-    def __init__(self, randomization: Randomization, simulation: Simulation) -> None:
+    def __init__(
+        self,
+        randomization: Randomization,
+        simulation: Simulation,
+        cameras: Sequence[Camera],
+        area: Rectangle,
+    ) -> None:
         """Look up what the names of a randomization mean.
+
+        Args:
+            randomization: What varies.
+            simulation: The worlds.
+            cameras: The task's own cameras.
+            area: Where distractors go if that is not declared; x_min, y_min, x_max, y_max (m).
 
         Raises:
             UnknownNameError: If one means nothing.
         """
         self._declared = declared = randomization.declared
         self._layout = simulation.layout
+        own = declared["distractors"].every() if "distractors" in declared else ()
+        offers = {**_OFFERED, **look_targets(cameras, {one.name for one in own})}
         self._targets = {
             axis: find.targets(axis, declared[axis], offered(simulation))
-            for axis, offered in _OFFERED.items()
+            for axis, offered in offers.items()
             if axis in declared
         }
         self.rebuilds = any(AXES[axis].rebuilds for axis in declared)
@@ -67,6 +85,9 @@ class Varying:
         self._sensors = SensorNoise(declared.get("sensor_noise", {}))
         self._sending = ActionDelay(count) if "action_delay" in declared else None
         self._seeing = ObservationDelay(count) if "observation_delay" in declared else None
+        self._scattering: Scattering | None = None
+        if "distractors" in declared:
+            self._scattering = Scattering(declared["distractors"], area)
 
     # -- drawing -----------------------------------------------------------------------------
 
@@ -110,6 +131,14 @@ class Varying:
     def apply(self, simulation: Simulation, env_ids: Sequence[int]) -> None:
         """Let worlds differ by what was drawn; their reset has begun."""
         simulation.vary({env: self._variation(self._drawn[env]) for env in env_ids})
+
+    def scatter(self, simulation: Simulation, state: State, env_ids: Sequence[int]) -> bool:
+        """Put distractors where they are clear of everything, and tell whether there are any."""
+        if self._scattering is None:
+            return False
+        drawn = {env: self._drawn[env]["distractors"] for env in env_ids}
+        self._scattering.scatter(simulation, state, drawn, self._streams)
+        return True
 
     # -- steps -------------------------------------------------------------------------------
 
@@ -185,7 +214,9 @@ class Varying:
         }
         standing = self._standing(drawn) if "bases" in drawn else {}
         bases = {name: (p.base_position, p.base_quaternion) for name, p in standing.items()}
-        return Variation(**factors, bases=bases)
+        paints = self._scattering.paints(drawn["distractors"]) if self._scattering else {}
+        seen = looks(lambda axis: self._each(drawn, axis), paints)
+        return Variation(**factors, bases=bases, looks=seen)
 
     def _standing(self, drawn: Mapping[str, Any]) -> Layout:
         return shifted(self._layout, drawn["bases"]) if "bases" in drawn else self._layout
@@ -202,8 +233,8 @@ class Varying:
 def _value(takes: Any, stream: Stream, *names: str) -> Any:
     """Return what is drawn for a name: a number, or those of a group by field."""
     if isinstance(takes, Group):
-        fields = takes.declared.items()
-        return {name: _value(drawn, stream, *names, name) for name, drawn in fields}
+        numbers = takes.drawn.items()
+        return {name: _value(drawn, stream, *names, name) for name, drawn in numbers}
     return takes.value(stream.number(*names))
 
 

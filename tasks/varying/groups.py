@@ -1,0 +1,113 @@
+"""What a number that is drawn may be, and numbers that belong together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
+
+from robots import TaskError, UnknownNameError
+from robots.common.bounds import shown
+from tasks.varying.distributions import Distribution, Fixed, Whole, read_distribution
+
+Declared = Distribution | float | Mapping[str, Any] | None
+"""What a field of a `Group` takes: a distribution, a number, or plain data that describes one."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What may be drawn.
+
+    Attributes:
+        low: The smallest number that makes sense.
+        high: The largest.
+        unit: In words, for messages and tables.
+        whole: Whether it must be a whole number.
+    """
+
+    low: float
+    high: float
+    unit: str
+    whole: bool = False
+
+    def read(self, data: Any, what: str) -> Distribution:
+        """Return the distribution that was given, if all that it may draw is within.
+
+        Raises:
+            TaskError: If it is none, or may draw what makes no sense.
+        """
+        drawn = read_distribution(data, what)
+        if self.whole and isinstance(drawn, Fixed) and drawn.number.is_integer():
+            drawn = Whole(int(drawn.number), int(drawn.number))
+        if self.whole and not isinstance(drawn, Whole):
+            raise TaskError(f"{what} is drawn from {drawn}; it takes Whole(low, high)")
+        lowest, highest = drawn.bounds
+        if lowest < self.low or highest > self.high:
+            ends = [f"{self.low:g}", f"{self.high:g}"]
+            raise TaskError(
+                f"{what} may be {lowest:g} … {highest:g}, drawn from {drawn}; it must stay within"
+                f" {' … '.join(ends)} ({self.unit})"
+            )
+        return drawn
+
+
+class Group:
+    """Several numbers that belong together; a frozen dataclass of distributions.
+
+    Attributes:
+        limits: What each of them may be, by field; one that is None is not varied, and other fields
+            are no numbers that are drawn.
+    """
+
+    limits: ClassVar[Mapping[str, Limits]] = {}
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be drawn.
+
+        Raises:
+            TaskError: If a field is no distribution, or may draw what makes no sense.
+        """
+        for name, given in self.declared.items():
+            what = f"{type(self).__name__}: {name}"
+            object.__setattr__(self, name, self.limits[name].read(given, what))
+
+    @property
+    def declared(self) -> dict[str, Distribution]:
+        """The distributions of those that are varied, by field."""
+        given = {name: getattr(self, name) for name in self.limits}
+        return {name: value for name, value in given.items() if value is not None}
+
+    @classmethod
+    def read(cls, data: Any, what: str) -> Group:
+        """Return the group that was given, or that plain data describes.
+
+        Raises:
+            TaskError: If it is none.
+            UnknownNameError: If it has no such field.
+        """
+        if isinstance(data, cls):
+            return data
+        if not isinstance(data, Mapping):
+            raise TaskError(f"{what} is {shown(data)}; it takes a {cls.__name__}")
+        for name in data:
+            if name not in cls.names():
+                raise UnknownNameError(f"number of {what}", name, cls.names())
+        return cls(**data)
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Return the names of what can be declared."""
+        return tuple(field.name for field in fields(cls))  # pyright: ignore[reportArgumentType]
+
+    @property
+    def drawn(self) -> Mapping[str, Distribution | Group]:
+        """What is drawn for each thing, by name."""
+        return self.declared
+
+    def to_json(self) -> Any:
+        """Return it as plain data, which `read` turns into an equal one."""
+        return {name: drawn.to_json() for name, drawn in self.declared.items()}
+
+    def __str__(self) -> str:
+        """Show what is varied."""
+        return ", ".join(f"{name} {drawn}" for name, drawn in self.declared.items())
