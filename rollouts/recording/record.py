@@ -29,7 +29,7 @@ from rollouts.playing.plan_conversion import Planner
 from rollouts.playing.seeds import checked_seeds
 from rollouts.reading.provenance import describe_layout, differences, listing
 from rollouts.recording.episode_files import PartWriter
-from rollouts.recording.recorder import Recorder
+from rollouts.recording.recorder import FILE_SIZE, Recorder
 from tasks import MultiRobotTask, Scenario
 from tasks.episode import Score, play
 from tasks.registry import make_scenario
@@ -130,6 +130,7 @@ def record(
     layout: Layout | None = None,
     robots: RobotLike | Mapping[str, RobotLike] | None = None,
     bystanders: str | None = None,
+    file_size: float = FILE_SIZE,
     on_event: Callable[[Summary, Event | None], None] = lambda summary, event: None,
 ) -> Summary:
     """Record the episodes of some seeds; those that are in the folder already are kept.
@@ -148,6 +149,7 @@ def record(
         layout: Where robots stand, if not where the task's own do; see `tasks.make`.
         robots: Other robots for some places; see `tasks.make`.
         bystanders: What robots do that have no place in the task; see `tasks.Scenario`.
+        file_size: Size at which a further h5 file is begun (MB); see `Recorder`.
         on_event: Called once at the start without an event, and after every event.
 
     Raises:
@@ -167,17 +169,19 @@ def record(
     description = f"{getattr(expert, '__module__', '')}:{getattr(expert, '__qualname__', expert)}"
     env = cls(scenario)
     summary = Summary()
-    with Recorder(folder / FILE, env, resume=True, source_desc=description) as recorder:
+    keeping: dict[str, Any] = {"source_desc": description, "file_size": file_size}
+    with Recorder(folder / FILE, env, resume=True, **keeping) as recorder:
         env.close()
         summary.damaged, there = recorder.damaged, recorder.seeds
         missing = [seed for seed in seeds if seed not in there]
         summary.already, summary.recorded = len(seeds) - len(missing), len(there)
         on_event(summary, None)
+        recorder.expect(missing)
         job = EpisodeJob(cls, scenario, expert, recorder.writer)
         try:
             with closing(play_all(executor, job, missing)) as events:
                 for event in events:
-                    _note(summary, event, recorder.writer)
+                    _note(summary, event, recorder)
                     on_event(summary, event)
         finally:  # an interrupt may come between writing and counting
             summary.recorded = len(recorder)
@@ -191,16 +195,17 @@ def where_died(event: Event) -> str:
     )
 
 
-def _note(summary: Summary, event: Event, writer: PartWriter) -> None:
+def _note(summary: Summary, event: Event, recorder: Recorder) -> None:
     if isinstance(event.error, WorkersDied):
         raise event.error
     if event.died is not None:
         summary.deaths.append(where_died(event))
     elif event.error is not None and event.seed is not None:
         summary.failed[event.seed] = event.error
+        recorder.give_up(event.seed)
     elif event.result is not None and event.seed is not None:
         played, part = event.result
-        writer.store(event.seed, part)
+        recorder.store(event.seed, part)
         summary.played[event.seed] = played
         summary.recorded += 1
         summary.workers.add(event.worker)

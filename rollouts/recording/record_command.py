@@ -35,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--out", type=Path, required=True, metavar="DIR", help="folder of trajectory.h5 and .json")
     add_cell_options(parser)
     workers.add_control_mode(parser)
+    workers.add_file_size(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -58,6 +59,7 @@ def run(options: argparse.Namespace) -> int:
                 options.out,
                 executor,
                 control_mode=options.control_mode,
+                file_size=options.file_size,
                 **chosen_cell(options),
                 on_event=status.show,
             )
