@@ -77,6 +77,7 @@ class Entry:
         episode_seed: The same as the recording's own note of it, which may be absent.
         steps: Its control steps, or None.
         rebuilt: Whether its reset rebuilt the world.
+        success: Whether it ended in success, or None.
         source: Who acted; see `tasks.episode.PlayedEpisode`.
         drawn: What was varied in its world; likewise.
     """
@@ -86,6 +87,7 @@ class Entry:
     episode_seed: int | None
     steps: int | None
     rebuilt: bool
+    success: bool | None = None
     source: dict[str, Any] | None = None
     drawn: dict[str, Any] | None = None
 
@@ -182,6 +184,7 @@ def _entry(episode: Mapping[str, Any]) -> Entry:
         episode_seed=_only(episode.get("episode_seed")),
         steps=episode.get("elapsed_steps"),
         rebuilt=bool(options.get("reconfigure")),
+        success=None if episode.get("success") is None else bool(episode["success"]),
         source=episode.get("source"),
         drawn=episode.get("drawn"),
     )
