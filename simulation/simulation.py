@@ -21,6 +21,7 @@ from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, substeps
 from simulation.readout import Moment, ReadoutIndex
 from simulation.sapien3.backend import SapienBackend
 from simulation.state import State
+from simulation.variation import Variation
 from simulation.world import Placements, World
 
 
@@ -131,6 +132,11 @@ class Simulation:
         self._change()
         self._fresh.update(env_ids)
         self._backend.clear(env_ids)
+
+    def vary(self, variations: Mapping[int, Variation]) -> None:
+        """Let worlds differ from what was built; see `simulation.backend.Backend.vary`."""
+        self._change()
+        self._backend.vary(variations)
 
     def hold(self, state: State) -> None:
         """End a reset: targets that control modes remember are where the robots are now."""

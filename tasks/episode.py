@@ -202,4 +202,5 @@ def play(
         terminated=terminated,
         truncated=truncated,
         seconds=seconds,
+        drawn=task.drawn(),
     )

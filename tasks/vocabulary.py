@@ -55,6 +55,8 @@ from tasks.language.randomness import EpisodeRandom
 from tasks.language.shaping import closeness, letting_go, stillness
 from tasks.language.stacking import diagonal, distance_to_top, is_at_rest, lies_on
 from tasks.registry import register_task
+from tasks.varying.distributions import Choice, Fixed, LogUniform, Normal, Uniform, Whole
+from tasks.varying.randomization import Randomization
 
 __all__ = [
     "Area",
@@ -63,6 +65,7 @@ __all__ = [
     "Box",
     "Camera",
     "Capsule",
+    "Choice",
     "Color",
     "Compound",
     "Cube",
@@ -73,19 +76,23 @@ __all__ = [
     "EpisodeRandom",
     "FACE_UP",
     "Finish",
+    "Fixed",
     "Friction",
     "GREEN",
     "Goal",
     "Info",
+    "LogUniform",
     "Mesh",
     "MultiRobotTask",
     "Needs",
+    "Normal",
     "POLISHED",
     "Peg",
     "PhysicsSettings",
     "Plane",
     "Quaternion",
     "RED",
+    "Randomization",
     "Scenario",
     "Shape",
     "Sphere",
@@ -94,7 +101,9 @@ __all__ = [
     "Table",
     "Target",
     "Vector3",
+    "Uniform",
     "WHITE",
+    "Whole",
     "WideTable",
     "World",
     "add_goal",

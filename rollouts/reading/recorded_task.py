@@ -13,6 +13,7 @@ from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
 from tasks import MultiRobotTask, get_task_class, make
 from tasks.language.needs import ACT, HOLD
 from tasks.native.format import mode_by_arm
+from tasks.varying.randomization import Randomization
 
 MOST_ROBOTS = 64  # each takes memory, whoever wrote the file
 
@@ -78,6 +79,8 @@ def task_for(
         making |= _recorded(file, cls, {n: r for n, r in named.items() if r is not None})
     if "control_frequency" in (file.simulation or {}):
         making["control_frequency"] = file.simulation["control_frequency"]
+    varied = (file.simulation or {}).get("randomization")
+    making["randomization"] = None if varied is None else Randomization.from_json(varied)
     task = make(
         file.task_id,
         obs_mode="none",

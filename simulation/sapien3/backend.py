@@ -23,7 +23,9 @@ from simulation.sapien3.contacts import (
 from simulation.sapien3.inverse_kinematics import InverseKinematics
 from simulation.sapien3.point_reach import PointReach
 from simulation.sapien3.pose_follower import JOINTS_OF_A_POSE, NearestFollower, PoseFollower
+from simulation.sapien3.varied import vary
 from simulation.sapien3.world import BuiltWorld, build_world
+from simulation.variation import Variation
 from simulation.world import Placements, World
 
 _STILL = np.zeros(3, np.float32)
@@ -76,6 +78,11 @@ class SapienBackend:
         """Begin a reset; see `Backend`."""
         for i in env_ids:
             self.worlds[i].clear()
+
+    def vary(self, variations: Mapping[int, Variation]) -> None:
+        """Let worlds differ from what was built; see `Backend`."""
+        for i, variation in variations.items():
+            vary(self.worlds[i], variation)
 
     def place(self, placements: Placements) -> None:
         """Stand robots and move bodies; see `Backend`."""

@@ -10,6 +10,7 @@ import sapien.physx as physx
 
 from layouts import Layout
 from robots import SimulationError
+from simulation.parts import Part
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
 from simulation.sapien3.blueprint import Blueprint, read_blueprint
 from simulation.sapien3.collision import add_collision
@@ -49,6 +50,7 @@ class BuiltWorld:
         articulations: The robots' articulations, in layout order.
         bodies: Body by name.
         studio: Its cameras and lights, once a picture was taken.
+        built: What varied parts were built with; see `simulation.sapien3.varied`.
     """
 
     def __init__(
@@ -92,6 +94,7 @@ class BuiltWorld:
             self.robots[name] = SimulatedRobot(self.scene, name, placement, blueprint, number)
         self.articulations = [robot.articulation for robot in self.robots.values()]
         self.bodies: dict[str, BuiltBody] = {}
+        self.built: dict[tuple[Part, str], Any] = {}
         self.studio: Any = None  # as long as this world lives, also in a fork
 
     def add(self, body: Body) -> BuiltBody:

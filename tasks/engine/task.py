@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -38,6 +38,8 @@ from tasks.engine.scenario import Scenario
 from tasks.engine.speeds import SpeedWatch
 from tasks.language.randomness import EpisodeRandom
 from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict
+from tasks.varying.streams import Stream
+from tasks.varying.varying import Varying
 
 
 class _FreshScenario:
@@ -45,7 +47,9 @@ class _FreshScenario:
 
     def __get__(self, instance: object, owner: type[MultiRobotTask]) -> Scenario:
         """Return it; a task that was made has its own as an attribute."""
-        return Scenario(layout=owner.layout, physics=owner.physics)
+        return Scenario(
+            layout=owner.layout, physics=owner.physics, randomization=owner.randomization
+        )
 
 
 class MultiRobotTask(Declaration, Remade):
@@ -127,6 +131,10 @@ class MultiRobotTask(Declaration, Remade):
             visuals=scenario.draws,
         )
         self._speeds = SpeedWatch(self._simulation)
+        self._varying: Varying | None = None
+        if scenario.randomization:
+            self._varying = Varying(scenario.randomization, self._simulation)
+            self._draw(self._everywhere)
         self._camera: Any = None
         self._responds = type(self).respond is not Declaration.respond
         self.start = self._begin(list(range(self.num_envs)), reconfigured=True)
@@ -171,6 +179,17 @@ class MultiRobotTask(Declaration, Remade):
             raise SimulationError(f"this {type(self).__name__} is closed; make a new one")
         return self._simulation
 
+    def drawn(self, env: int = 0) -> dict[str, Any] | None:
+        """Return what was drawn for an environment's episode, by axis and name, as plain data.
+
+        Args:
+            env: The number of the environment.
+
+        Returns:
+            Such as ``{"mass": {"cube": 1.31}}``; see `tasks.Randomization`. None if nothing varies.
+        """
+        return None if self._varying is None else self._varying.drawn(env)
+
     def close(self) -> None:
         """Let the worlds go; closing twice is allowed."""
         self._simulation = None
@@ -209,8 +228,11 @@ class MultiRobotTask(Declaration, Remade):
         for i, own_seed in zip(ids, seeds, strict=True):
             if own_seed is not None:
                 self._rngs[i].restart(own_seed)
-            elif reconfigure:
+                continue
+            self._rngs[i].resets += 1
+            if reconfigure:
                 self._rngs[i].reseed_for_rebuild()
+        self._draw(ids)
         if reconfigure:
             self.simulation.rebuild(ids, self._build_world)
         return self._begin(ids, reconfigured=reconfigure)
@@ -341,8 +363,16 @@ class MultiRobotTask(Declaration, Remade):
         expect_nothing(self, "build", self.build(world))
         rng.restart_numpy()
 
+    def _draw(self, ids: Iterable[int]) -> None:
+        """Draw what varies in the coming episodes."""
+        if self._varying is not None:
+            for i in ids:
+                self._varying.draw(i, Stream(self._rngs[i].seed, self._rngs[i].resets))
+
     def _begin(self, ids: list[int], *, reconfigured: bool) -> tuple[Any, Info]:
         self.simulation.clear(ids)
+        if self._varying is not None:
+            self._varying.apply(self.simulation, ids)
         for i in ids:  # all that is placed here reaches the simulator in one go
             world = self.simulation.worlds[i]
             expect_nothing(self, "reset_robots", self.reset_robots(world, self._rngs[i]))
@@ -359,6 +389,8 @@ class MultiRobotTask(Declaration, Remade):
         check_info(type(self).__name__, info)
         self.observer.changed(ids)
         obs = self._observation(state, info)
+        if self._varying is not None:
+            info |= self._varying.info()
         return _tensors(obs), {**_tensors(info), "reconfigure": reconfigured}
 
     def _describe_observation(self) -> None:

@@ -54,11 +54,13 @@ class EpisodeRandom:
 
     Attributes:
         seed: What both streams last began with.
+        resets: How many resets without a seed came since then.
         numpy: Stream for joint noise.
         torch: Stream for objects and goals.
     """
 
     seed: int
+    resets: int
     numpy: np.random.RandomState
     torch: torch.Generator
 
@@ -72,6 +74,7 @@ class EpisodeRandom:
         """Start both streams anew, as an explicit seed does."""
         self._seeds.seed(seed)  # a new stream costs fifty times as much
         self.seed = self._numpy_seed = seed
+        self.resets = 0
         self.restart_numpy()
         self.torch.manual_seed(seed)
 
