@@ -120,10 +120,11 @@ class Recording(TrajectoryFile):
         number = bisect_right(self._starts, place) - 1
         inside = place - self._starts[number]
         found = self._file_of(number)[inside] if number else super().__getitem__(inside)
-        if found.actions.shape[1] != (self._action_dim or found.actions.shape[1]):
+        shape = found.actions.shape
+        if shape[1] != (self._action_dim or shape[1]):
             raise TrajectoryError(
-                f"traj_{inside} of {file_path(self.path, number)} cannot be played: its actions have"
-                f" shape {found.actions.shape}, not (T, {self._action_dim})"
+                f"traj_{inside} of {file_path(self.path, number)} cannot be played: its actions"
+                f" have shape {shape}, not (T, {self._action_dim})"
             )
         return replace(found, episode_id=place)
 
