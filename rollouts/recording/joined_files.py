@@ -28,6 +28,7 @@ from rollouts.reading.provenance import listing
 from rollouts.reading.summary import MAX_JSON, TrajectoryError
 from rollouts.recording.header import header_differences, header_hash, numbered
 from rollouts.recording.trajectory_writer import join, read_header, read_joined
+from rollouts.sources.header import Source, combined, source_of
 
 
 @dataclass
@@ -39,6 +40,7 @@ class OpenFile:
         groups: The groups of its episodes by seed, ascending.
         abouts: Their json, likewise.
         sizes: Their `Stored.size`, likewise.
+        sources: What its header says of its source, unless it is empty.
         lost: Seeds of episodes that it held, and that are damaged.
         whole: Whether there is nothing to mend in the h5 file.
     """
@@ -47,6 +49,7 @@ class OpenFile:
     groups: dict[int, str] = field(default_factory=dict[int, str])
     abouts: dict[int, dict[str, Any]] = field(default_factory=dict[int, dict[str, Any]])
     sizes: dict[int, int] = field(default_factory=dict[int, int])
+    sources: frozenset[Source] = frozenset()
     lost: frozenset[int] = frozenset()
     whole: bool = False
 
@@ -118,18 +121,29 @@ class JoinedFiles:
             path.with_suffix(".json").unlink(missing_ok=True)
             path.unlink(missing_ok=True)
 
-    def write(self, file: OpenFile, places: Mapping[int, Path | str], *, last: bool) -> None:
+    def write(
+        self,
+        file: OpenFile,
+        places: Mapping[int, Path | str],
+        sources: Iterable[Source] = (),
+        *,
+        last: bool,
+    ) -> None:
         """Write a file; the manifest must be written after it.
 
         Args:
             file: What is there.
             places: Where its episodes are, by seed, ascending: parts, or groups of what is there.
+            sources: What parts say of their source.
             last: Whether it may grow; else the next file becomes the last.
 
         Raises:
             RecordingError: If it cannot be written, or an episode not be read.
         """
-        path, header = file_path(self._path, file.number), numbered(self._header, file.number)
+        path, kept = file_path(self._path, file.number), file.groups.keys() & places.keys()
+        file.sources = frozenset(sources) | (file.sources if kept else frozenset())
+        about = combined(file.sources or [source_of(self._header)])
+        header = numbered({**self._header, **about}, file.number)
         if not (file.whole and list(places.values()) == list(file.groups.values())):
             joined = join(path, header, list(places.values()))
             file.groups = dict(zip(places, joined, strict=True))
@@ -198,6 +212,7 @@ class JoinedFiles:
             groups,
             {seed: joined.episodes[name] for seed, name in groups.items()},
             {seed: joined.sizes[name] for seed, name in groups.items()},
+            frozenset([source_of(joined.header)] if groups else ()),
             held - set(groups),
             in_order and not joined.damaged,
         )

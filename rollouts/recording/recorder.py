@@ -10,9 +10,11 @@ import weakref
 from collections import deque
 from collections.abc import Iterable
 from contextlib import suppress
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from types import TracebackType
+from typing import NamedTuple
 
 from robots import RecordingError, TaskError
 from robots.common.writing import PARTIAL
@@ -32,10 +34,18 @@ from rollouts.recording.episode_files import (
 from rollouts.recording.header import describe_task, header_differences, recorded_control_mode
 from rollouts.recording.joined_files import JoinedFiles, OpenFile
 from rollouts.recording.trajectory_writer import read_groups
+from rollouts.sources.header import Source, combined, source_of
 from tasks import MultiRobotTask
 from tasks.episode import PlayedEpisode
 
 __all__ = ["FILE_SIZE", "Recorder", "describe_layout"]
+
+
+class _Part(NamedTuple):
+    """A finished episode that is not joined yet: its size (bytes), and what its header says."""
+
+    size: int
+    source: Source
 
 
 class Recorder:
@@ -101,7 +111,7 @@ class Recorder:
         self.damaged: list[str] = []
         self._header, self._limit = describe_task(task, source, source_desc), file_size * 1e6
         self._files = JoinedFiles(self.path, self._header)
-        self._waiting: dict[int, int] = {}  # sizes of the parts that are there, by seed
+        self._waiting: dict[int, _Part] = {}  # by seed
         self._coming: deque[int] = deque()
         self._given_up = set[int]()
         with disk_errors(self.path):
@@ -173,7 +183,7 @@ class Recorder:
         if seed in self._files.seeds or part_path(self.parts, seed).exists():
             raise RecordingError(f"{self.path} has an episode of seed {seed} already")
         self.writer.store(seed, part)
-        self._waiting[seed] = part_size(part)
+        self._waiting[seed] = _Part(part_size(part), source_of(self._header))
         while (full := self._full_file()) is not None:
             self._fill_last(full)
 
@@ -244,7 +254,7 @@ class Recorder:
         if seed_of(part) in self._files.seeds:
             part.unlink()
         else:
-            self._waiting[seed_of(part)] = stored.size
+            self._waiting[seed_of(part)] = _Part(stored.size, source_of(header))
 
     def _full_file(self, *, certain: bool = False) -> list[int] | None:
         """Return the seeds of the next full file; None if there is not enough for one.
@@ -253,7 +263,7 @@ class Recorder:
             certain: Whether not to wait for those that are expected before.
         """
         lost = {seed for file in self._files.mending.values() for seed in file.lost}
-        waiting = {seed: size for seed, size in self._waiting.items() if seed not in lost}
+        waiting = {seed: part.size for seed, part in self._waiting.items() if seed not in lost}
         sizes = {**self._files.last.sizes, **waiting}
         if sum(sizes.values()) <= self._limit:
             return None
@@ -280,17 +290,19 @@ class Recorder:
         file, chosen = self._files.last, set(seeds)
         spilt = [seed for seed in file.groups if seed not in chosen]
         groups = [file.groups[seed] for seed in spilt]
-        path = file_path(self.path, file.number)
+        path, about = file_path(self.path, file.number), combined(file.sources)
+        writer = replace(self.writer, header={**self._header, **about})
         for seed, stored in zip(spilt, read_groups(path, groups) if spilt else (), strict=True):
-            self.writer.store(seed, self.writer.encode_stored(stored), sync=True)
-            self._waiting[seed] = stored.size
+            writer.store(seed, writer.encode_stored(stored), sync=True)
+            self._waiting[seed] = _Part(stored.size, source_of(writer.header))
         self._write(file, seeds, last=False)
 
     def _write(self, file: OpenFile, seeds: Iterable[int], *, last: bool) -> None:
         """Write a file and the manifest; then the parts that it was joined from are deleted."""
         parts = {s: part_path(self.parts, s) for s in seeds if s not in file.groups}
         places = {s: parts[s] if s in parts else file.groups[s] for s in sorted(seeds)}
-        self._files.write(file, places, last=last)
+        sources = {self._waiting[seed].source for seed in parts}
+        self._files.write(file, places, sources, last=last)
         self._files.write_manifest()
         for seed, part in parts.items():
             part.unlink(missing_ok=True)
@@ -299,12 +311,15 @@ class Recorder:
     def _join(self) -> None:
         for part in list_parts(self.parts):
             if seed_of(part) not in self._waiting:  # a worker process wrote it
-                self._waiting[seed_of(part)] = read_part(part)[1].size
+                header, stored = read_part(part)
+                self._waiting[seed_of(part)] = _Part(stored.size, source_of(header))
         for file in self._files.mending.values():
             again = file.lost & self._waiting.keys()
             if again:
                 self._write(file, {*file.groups, *again}, last=False)
-        certain = sum(self._waiting.values()) > 2 * self._limit  # not much waits for few that lack
+        certain = (
+            sum(part.size for part in self._waiting.values()) > 2 * self._limit
+        )  # not much waits for few that lack
         while (full := self._full_file(certain=certain)) is not None:
             self._fill_last(full)
         last = self._files.last

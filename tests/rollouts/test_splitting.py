@@ -257,6 +257,22 @@ def test_a_kill_at_any_moment_loses_nothing(tmp_path, push_t, straight, monkeypa
     assert stops >= 20
 
 
+def test_each_file_says_who_played_its_own_episodes(tmp_path, push_t):
+    env, episodes = push_t
+    path = tmp_path / "trajectory.h5"
+    for who, part in (("ann", episodes[:7]), ("bob", episodes[7:])):
+        write(path, env, part, resume=True, source="human", source_desc=who)
+    said = []
+    for file in sorted(tmp_path.glob("*.json")):
+        about = json.loads(file.read_text())
+        said += [(about["source_type"], about["source_desc"])] if "source_type" in about else []
+    assert [said[0], said[1], said[-1]] == [
+        ("human", "ann"),
+        ("mixed", "ann; bob"),
+        ("human", "bob"),
+    ]
+
+
 def test_a_size_that_makes_no_sense(tmp_path, push_t):
     with pytest.raises(TaskError, match=r"file_size is 0; it must be MB, more than 0"):
         Recorder(tmp_path / "a.h5", push_t[0], file_size=0)
