@@ -42,6 +42,7 @@ COMMANDS: Mapping[str, Command] = {
         demo="let an expert play a task, and keep recording, picture and video",
         record="let an expert play episodes in worker processes, and record them",
         replay="play a recording again, and compare what happens",
+        certify="play every episode of a recording again, and certify that it is the same",
         evaluate="let a policy or an expert play, and tell how well it does",
         convert="record a recording again in another control mode",
         export="write a recording as a dataset for LeRobot or robomimic",
