@@ -17,6 +17,7 @@ COMMANDS = {
     "convert": "rollouts.recording.convert_command",
     "replay": "rollouts.playing.replay_command",
     "certify": "rollouts.dataset.certify_command",
+    "report": "rollouts.dataset.report_command",
     "export": "rollouts.export.command",
     "view": "rollouts.view_command",
     "bench": "measurements.bench.command",

@@ -45,6 +45,7 @@ COMMANDS: Mapping[str, Command] = {
         certify="play every episode of a recording again, and certify that it is the same",
         evaluate="let a policy or an expert play, and tell how well it does",
         convert="record a recording again in another control mode",
+        report="write one page on a data set: counts, lengths, sources, what was varied, clips",
         export="write a recording as a dataset for LeRobot or robomimic",
         view="look at an episode of a recording in a browser",
         bench="measure what steps, resets, workers and recordings cost",

@@ -111,6 +111,7 @@ class Summary:
             layout, or by native's of robots.
         max_episode_steps: Control steps until an episode was truncated, or None.
         source_type: Where the actions come from, in ManiSkill's words, or None.
+        source_desc: The same in the recorder's own words, or None.
         episodes: Its episodes, in order.
     """
 
@@ -120,6 +121,7 @@ class Summary:
     control_mode: str | dict[str, str]
     max_episode_steps: int | None
     source_type: str | None
+    source_desc: str | None
     episodes: tuple[Entry, ...]
 
 
@@ -142,6 +144,7 @@ def read_summary(path: Path) -> Summary:
         ),
         max_episode_steps=info.get("max_episode_steps"),
         source_type=found.get("source_type"),
+        source_desc=found.get("source_desc"),
         episodes=tuple(_entry(episode) for episode in episodes),
     )
 
