@@ -111,6 +111,22 @@ class Simulation:
         """
         self._backend.step(self._drive(action, joint_positions, env_ids), self.substeps)
 
+    def rest(self, state: State, env_ids: Sequence[int]) -> None:
+        """Drive all joints of worlds to where they are, until a step drives them elsewhere.
+
+        Args:
+            state: The worlds as they are now; it stays the present one.
+            env_ids: Which worlds.
+        """
+        self.drive_targets[env_ids] = state.joint_positions[env_ids]
+        self._backend.drive(self.drive_targets, env_ids)
+        self._backend.drive_velocities(np.zeros_like(self.drive_targets), env_ids)
+
+    def coast(self, env_ids: Sequence[int]) -> None:
+        """Advance worlds by one control step without driving them anew."""
+        self._change()
+        self._backend.step(env_ids, self.substeps)
+
     def timed_step(
         self, action: NDArray[np.float32], clock: Callable[[], float] = perf_counter
     ) -> float:

@@ -55,6 +55,7 @@ from tasks.language.randomness import EpisodeRandom
 from tasks.language.shaping import closeness, letting_go, stillness
 from tasks.language.stacking import diagonal, distance_to_top, is_at_rest, lies_on
 from tasks.registry import register_task
+from tasks.varying.axes import Shift
 from tasks.varying.distributions import Choice, Fixed, LogUniform, Normal, Uniform, Whole
 from tasks.varying.randomization import Randomization
 
@@ -95,6 +96,7 @@ __all__ = [
     "Randomization",
     "Scenario",
     "Shape",
+    "Shift",
     "Sphere",
     "State",
     "TARGET_HEIGHT",

@@ -92,11 +92,12 @@ class Player:
         total = fsum(step.reward for step in self.steps)
         return Score(success, total, len(self.steps), "" if success else self.reason)
 
-    def episode(self, states: States) -> PlayedEpisode:
+    def episode(self, states: States, drawn: dict[str, Any] | None) -> PlayedEpisode:
         """Return what happened.
 
         Args:
             states: Those of its environment, each entry (T + 1, k), or with more rows after these.
+            drawn: What was varied in its world.
 
         Raises:
             TaskError: If it took no step.
@@ -117,6 +118,7 @@ class Player:
             terminated=np.array([step.terminated for step in self.steps]),
             truncated=np.array([step.truncated for step in self.steps]),
             seconds=fsum(step.seconds for step in self.steps),
+            drawn=drawn,
             actor=np.array([step.turn for step in self.steps], np.uint8),
             corrections=np.stack(corrections) if corrections else None,
         )
@@ -158,7 +160,8 @@ def record_together(env: MultiRobotTask, players: Sequence[Player]) -> list[Play
             {
                 kind: {name: rows[:, i] for name, rows in entries.items()}
                 for kind, entries in states.items()
-            }
+            },
+            env.drawn(i),
         )
         for i, player in enumerate(players)
     ]

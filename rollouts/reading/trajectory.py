@@ -104,6 +104,7 @@ class TrajectoryFile(Sequence[Trajectory]):
             files.
         action_split: Robot name → slice of the flat action; None in native's files.
         seeds: Reset seed of each episode, or None.
+        sources: Who acted in each episode, or None; see `Trajectory`.
     """
 
     def __init__(self, path: str | PathLike[str]) -> None:
@@ -128,6 +129,7 @@ class TrajectoryFile(Sequence[Trajectory]):
         self.max_episode_steps, self.source_type = summary.max_episode_steps, summary.source_type
         self._entries = summary.episodes
         self.seeds = tuple(entry.seed for entry in self._entries)
+        self.sources = tuple(entry.source for entry in self._entries)
         with self._damage("this h5 file"):
             self._file = Hdf5File(self.path)
             described = self._file.texts(names=("layout", "simulation", "guessed")) or {}
@@ -168,6 +170,18 @@ class TrajectoryFile(Sequence[Trajectory]):
         if isinstance(index, slice):
             return [self._read(entry) for entry in self._entries[index]]
         return self._read(self._entries[index])
+
+    @property
+    def corrected(self) -> bool:
+        """Whether there are episodes, and all hold what a corrector would have done.
+
+        Raises:
+            TrajectoryError: If the file is damaged.
+        """
+        if not all(source and "corrects" in source for source in self.sources):
+            return False
+        name = "corrections"
+        return bool(self) and all(name in self._shapes(e, (name,)) for e in self._entries)
 
     def expect(self, task_id: str, action_dim: int) -> None:
         """Refuse a file of another task, or of robots that take other actions.

@@ -37,6 +37,7 @@ from rollouts.sources.policies import EXPERT
 from tasks import MultiRobotTask, Scenario
 from tasks.episode import Policy, Score
 from tasks.registry import make_scenario
+from tasks.varying.randomization import Randomization
 
 FILE = "trajectory.h5"
 
@@ -173,6 +174,7 @@ def record(
     corrector: Policy | str | None = None,
     obs_mode: str = "state",
     num_envs: int = 1,
+    randomization: Randomization | None = None,
     file_size: float = FILE_SIZE,
     on_event: Callable[[Summary, Event | None], None] = lambda summary, event: None,
 ) -> Summary:
@@ -208,6 +210,7 @@ def record(
             is recorded is the same, and so it is with a policy whose attribute ``batched`` is True
             if each row of its actions follows from that row of the observations alone; see
             `rollouts.evaluate`.
+        randomization: What varies from episode to episode, if not what the task says.
         file_size: Size at which a further h5 file is begun (MB); see `Recorder`.
         on_event: Called once at the start without an event, and after every event.
 
@@ -226,6 +229,8 @@ def record(
     checked_whole("num_envs", num_envs, 1, None, TaskError)
     cast, actors = Actors.cast(cls, policy, takeover, corrector)
     cell: dict[str, Any] = {"layout": layout, "robots": robots, "bystanders": bystanders}
+    if randomization is not None:
+        cell["randomization"] = randomization
     scenario = make_scenario(cls, control_mode=control_mode, obs_mode=obs_mode, **cell)
     env = cls(scenario)
     summary = Summary()

@@ -91,7 +91,7 @@ class SapienBackend:
                 self.worlds[i].robots[name].reset(qpos)
         for name, rows in placements.bodies.items():
             for i, pose in rows.items():
-                self.worlds[i].set_pose(name, pose)
+                self.worlds[i].place(name, pose)
 
     def drive(self, targets: Floats, env_ids: Sequence[int]) -> None:
         """Set drive targets; see `Backend`."""

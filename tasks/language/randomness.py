@@ -12,6 +12,7 @@ from torch import Tensor
 
 from layouts import Layout
 from robots import TaskError
+from tasks.varying.streams import Stream
 
 
 class FirstSeeds:
@@ -69,6 +70,11 @@ class EpisodeRandom:
         self.torch, self.numpy = torch.Generator(), np.random.RandomState(0)
         self._seeds = np.random.RandomState(0)
         self.restart(seed)
+
+    @property
+    def stream(self) -> Stream:
+        """Where the numbers of the present episode come from that are not the task's own."""
+        return Stream(self.seed, self.resets)
 
     def restart(self, seed: int) -> None:
         """Start both streams anew, as an explicit seed does."""

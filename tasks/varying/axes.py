@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from math import inf, pi
 from typing import Any, ClassVar
 
 from robots import TaskError, UnknownNameError
 from robots.common.bounds import shown
-from tasks.varying.distributions import Distribution, Whole, read_distribution
+from tasks.varying.distributions import Distribution, Fixed, Whole, read_distribution
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,8 @@ class Limits:
             TaskError: If it is none, or may draw what makes no sense.
         """
         drawn = read_distribution(data, what)
+        if self.whole and isinstance(drawn, Fixed) and drawn.number.is_integer():
+            drawn = Whole(int(drawn.number), int(drawn.number))
         if self.whole and not isinstance(drawn, Whole):
             raise TaskError(f"{what} is drawn from {drawn}; it takes Whole(low, high)")
         lowest, highest = drawn.bounds
@@ -130,9 +133,45 @@ class Axis:
         return {name: self.takes.read(given, f"{what} of {name!r}") for name, given in data.items()}
 
 
+@dataclass(frozen=True, kw_only=True)
+class Shift(Group):
+    """How a robot's base is off its placement, in the world or in what it hangs on.
+
+    Attributes:
+        x: Along x (m).
+        y: Along y (m).
+        z: Along z (m).
+        yaw: Turn about z, at its own place (rad).
+    """
+
+    x: Distribution | None = None
+    y: Distribution | None = None
+    z: Distribution | None = None
+    yaw: Distribution | None = None
+
+    limits: ClassVar[Mapping[str, Limits]] = {
+        **dict.fromkeys(("x", "y", "z"), Limits(-100.0, 100.0, "m")),
+        "yaw": Limits(-2 * pi, 2 * pi, "rad"),
+    }
+
+
 _FACTOR = Limits(1e-3, 1e3, "factor on what is declared")
+_COEFFICIENT = Limits(0.0, 1e3, "coefficient of friction")
+_STEPS = Limits(0, 1000, "control steps", whole=True)
+_NOISE = Limits(-inf, inf, "added to the number")
 
 AXES = {
     "mass": Axis(_FACTOR),
+    "friction": Axis(_COEFFICIENT),
+    "size": Axis(Limits(0.01, 100.0, "factor on what is declared"), rebuilds=True),
+    "stiffness": Axis(_FACTOR),
+    "damping": Axis(_FACTOR),
+    "joint_friction": Axis(_COEFFICIENT),
+    "gravity": Axis(Limits(0.0, 1000.0, "m/s²"), named=False, rebuilds=True),
+    "bases": Axis(Shift),
+    "action_noise": Axis(_NOISE),
+    "action_delay": Axis(_STEPS, named=False),
+    "sensor_noise": Axis(_NOISE),
+    "observation_delay": Axis(_STEPS, named=False),
 }
 """Every axis by its field in `tasks.Randomization`, in the order in which they are shown."""

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, TypeVar
 from robots import UnknownNameError
 from simulation import Simulation
 from simulation.parts import Part
+from simulation.shapes import SIZED
 
 Thing = TypeVar("Thing")
 
@@ -71,3 +72,50 @@ def _links(simulation: Simulation) -> dict[str, tuple[Part, ...]]:
     }
     single = {str(part): (part,) for parts in links.values() for part in parts}
     return {**links, **single}
+
+
+def rough_parts(simulation: Simulation) -> dict[str, tuple[Part, ...]]:
+    """Return what has a friction: bodies that touch others, robots, and each of their links."""
+    bodies = simulation.worlds[0].bodies.values()
+    touching = [body.name for body in bodies if any(shape.collides for shape in body.shapes)]
+    return {**{name: (Part(None, name),) for name in touching}, **_links(simulation)}
+
+
+def sized_bodies(simulation: Simulation) -> dict[str, tuple[str, ...]]:
+    """Return the bodies that have a size, and are no furniture that every reset puts back."""
+    return {
+        body.name: (body.name,)
+        for body in simulation.worlds[0].bodies.values()
+        if not body.anchored and all(isinstance(shape, SIZED) for shape in body.shapes)
+    }
+
+
+def driven_joints(simulation: Simulation) -> dict[str, tuple[Part, ...]]:
+    """Return what has drives: robots, their joint groups, and joints."""
+    joints: dict[str, tuple[Part, ...]] = {}
+    for robot, placement in simulation.layout.items():
+        groups = placement.robot.action_split.groups
+        joints[robot] = tuple(Part(robot, joint) for joint in placement.robot.joints)
+        for joint in joints[robot]:
+            joints[str(joint)] = (joint,)
+        for name, group in groups.items():
+            joints[f"{robot}.{name}"] = tuple(Part(robot, joint) for joint in group.joints)
+    return joints
+
+
+def standing_robots(simulation: Simulation) -> dict[str, tuple[str, ...]]:
+    """Return the robots."""
+    return {robot: (robot,) for robot in simulation.layout}
+
+
+def action_numbers(simulation: Simulation) -> dict[str, tuple[int, ...]]:
+    """Return the action numbers of robots and of their joint groups."""
+    numbers: dict[str, tuple[int, ...]] = {}
+    first = 0
+    for robot, placement in simulation.layout.items():
+        begin = first
+        for name, group in placement.robot.action_split.groups.items():
+            numbers[f"{robot}.{name}"] = tuple(range(first, first + group.size))
+            first += group.size
+        numbers[robot] = tuple(range(begin, first))
+    return {name: own for name, own in numbers.items() if own}

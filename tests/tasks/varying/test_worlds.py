@@ -1,6 +1,8 @@
 """Worlds that vary: what a seed brings back, and what stays as it was."""
 
 import hashlib
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,11 +10,23 @@ import torch
 
 import tasks
 from simulation.sapien3.backend import worlds_below
-from tasks import LogUniform, MultiRobotTask, Randomization, Uniform
+from tasks import LogUniform, MultiRobotTask, Normal, Randomization, Shift, Uniform, Whole
 
 TASK = "TwoRobotPickCube-v1"
 REBUILT = {"reconfigure": True}
-VARIED = Randomization(mass={"cube": LogUniform(0.5, 2.0), "left": Uniform(0.8, 1.2)})
+IN_PLACE = Randomization(
+    mass={"cube": LogUniform(0.5, 2.0), "left": Uniform(0.8, 1.2)},
+    friction={"cube": Uniform(0.2, 1.0), "*.panda_hand": Uniform(0.5, 1.5)},
+    stiffness={"left": LogUniform(0.8, 1.25)},
+    damping={"*.arm": LogUniform(0.8, 1.25)},
+    joint_friction={"right.panda_joint1": Uniform(0.0, 0.2)},
+    bases={"*": Shift(x=Uniform(-0.02, 0.02), yaw=Normal(0.05, low=-0.1, high=0.1))},
+    action_noise={"left.arm": Normal(0.02)},
+    action_delay=Whole(0, 2),
+    sensor_noise={"*.qpos": Normal(0.01), "*_pose": Normal(0.001)},
+    observation_delay=Whole(0, 2),
+)
+VARIED = replace(IN_PLACE, size={"cube": Uniform(0.8, 1.2)}, gravity=Uniform(9.0, 10.5))
 
 
 def made(randomization: Randomization | None, num_envs: int = 1) -> MultiRobotTask:
@@ -47,10 +61,16 @@ def test_off_means_the_bits_of_before() -> None:
 
 
 def test_the_tasks_own_draws_stay_what_they_are() -> None:
+    """Also where sizes and gravity rebuild the world, and where a reset has no seed."""
     env, plain = made(VARIED), made(None)
-    for seed in (3, None):
-        obs, _ = env.reset(seed=seed)
-        assert torch.equal(obs, plain.reset(seed=seed)[0])
+    for seed in (3, None, None):
+        states = []
+        for one in (env, plain):
+            one.reset(seed=seed)
+            state = one.simulation.read()
+            goal, cube = state.pose("goal_site")[0], state.pose("cube")[0]
+            states.append([*state.joint_positions[0], *goal, *cube[:2], *cube[3:]])
+        np.testing.assert_array_equal(*states)
 
 
 def test_a_seed_brings_the_world_back() -> None:
@@ -89,7 +109,11 @@ def test_info_tells_what_was_drawn() -> None:
 
 
 def test_another_target_leaves_the_draws_of_the_others() -> None:
-    few, many = made(VARIED), made(Randomization(mass={"*": Uniform(0.9, 1.1), **VARIED.mass}))
+    mass = {"cube": LogUniform(0.5, 2.0)}
+    few, many = (
+        made(Randomization(mass=mass)),
+        made(replace(VARIED, mass={"*": Uniform(0.9, 1.1), **mass})),
+    )
     few.reset(seed=9)
     many.reset(seed=9)
     one, other = few.drawn(), many.drawn()
@@ -99,14 +123,47 @@ def test_another_target_leaves_the_draws_of_the_others() -> None:
     assert set(other["mass"]) == {"cube", "left", "right"}
 
 
+def physical(env: MultiRobotTask) -> dict[str, Any]:
+    """Return the numbers of a world that may be varied, as SAPIEN has them."""
+    (world,) = worlds_below(env.simulation)
+    numbers: dict[str, Any] = {}
+    components = {name: body.component for name, body in world.bodies.items()}
+    for name, robot in world.robots.items():
+        components.update({f"{name}.{link}": part for link, part in robot.links.items()})
+        numbers[name] = [*robot.base_pose.p.tolist(), *robot.base_pose.q.tolist()]
+        for joint in robot.joints:
+            numbers[f"{name}.{joint.name}"] = joint.stiffness, joint.damping, joint.friction
+    for name, component in components.items():
+        heavy = hasattr(component, "mass")
+        numbers[f"{name} mass"] = (component.mass, *component.inertia.tolist()) if heavy else ()
+        numbers[f"{name} friction"] = [
+            (shape.physical_material.static_friction, shape.physical_material.dynamic_friction)
+            for shape in component.collision_shapes
+        ]
+    return numbers
+
+
 def test_a_reset_begins_from_what_was_declared() -> None:
-    env, plain = made(VARIED), made(None)
-    (world,), (before,) = worlds_below(env.simulation), worlds_below(plain.simulation)
+    """Whatever was drawn before, a world that is used again has what a fresh one has."""
+    used, fresh, plain = made(IN_PLACE), made(IN_PLACE), made(None)
     for seed in (1, 2, 3):
-        env.reset(seed=seed)
-        drawn = env.drawn()
+        used.reset(seed=seed)
+        fresh.reset(seed=seed, options=REBUILT)
+        found = physical(used)
+        assert found == physical(fresh)
+        drawn, declared = used.drawn(), physical(plain)
         assert drawn is not None
-        declared, cube = before.bodies["cube"].component, world.bodies["cube"].component
-        assert cube.mass == pytest.approx(declared.mass * drawn["mass"]["cube"], rel=1e-6)
-        hand, link = (w.robots["left"].link("panda_hand") for w in (before, world))
-        assert link.mass == pytest.approx(hand.mass * drawn["mass"]["left"], rel=1e-6)
+        changed = {name for name, numbers in found.items() if numbers != declared[name]}
+        assert {"left", "right", "cube mass", "left.panda_hand mass"} < changed
+        assert not {"right.panda_hand mass", "table-workspace friction"} & changed
+        ratio = found["cube mass"][0] / declared["cube mass"][0]
+        assert ratio == pytest.approx(drawn["mass"]["cube"])
+
+
+def test_other_environments_go_on_as_they_are() -> None:
+    env, undisturbed = made(VARIED, 2), made(VARIED, 2)
+    for one in (env, undisturbed):
+        one.reset(seed=2, options=REBUILT)
+    env.reset(seed=[40], env_ids=[1])
+    assert env.drawn(0) == undisturbed.drawn(0)
+    assert digest(env)[0] == digest(undisturbed)[0]
