@@ -1,4 +1,8 @@
-"""How near different robots came to each other in recorded episodes, by exact distances."""
+"""How near different robots came to each other in recorded episodes.
+
+Distances are those of the convex hulls of their collision shapes, which can be a few millimetres
+larger than what the simulation makes of the same shapes.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +18,6 @@ from rollouts.reading.trajectory import Trajectory, TrajectoryFile
 from tasks import MultiRobotTask
 from tasks.native.format import articulation_keys
 
-STRIDE = 5  # control steps from one state that is looked at to the next
-
 
 @dataclass(frozen=True)
 class Clearances:
@@ -23,21 +25,18 @@ class Clearances:
 
     Attributes:
         places: Which episodes, by their place in the recording.
-        least: The least distance of links of different robots in each (m); negative where they
-            overlap.
-        stride: Control steps from one state that was looked at to the next.
+        least: The least distance of links of different robots in each (m), of all control steps;
+            negative where they overlap.
     """
 
     places: list[int]
     least: NDArray[np.float64]
-    stride: int
 
 
 def measure(
     file: TrajectoryFile,
     task: MultiRobotTask,
     places: Sequence[int],
-    stride: int = STRIDE,
     progress: Callable[[], None] = lambda: None,
 ) -> Clearances | None:
     """Return how near robots came; None if there is one alone, or an episode has no states.
@@ -46,7 +45,6 @@ def measure(
         file: The recording.
         task: Its task.
         places: Which episodes are looked at, by their place in the recording.
-        stride: Control steps from one state that is looked at to the next.
         progress: Called after each episode.
 
     Raises:
@@ -59,9 +57,9 @@ def measure(
         trajectory = file[place]
         if trajectory.states is None:
             return None
-        least.append(meter.least(trajectory, stride))
+        least.append(meter.least(trajectory))
         progress()
-    return Clearances(list(places), np.array(least), stride)
+    return Clearances(list(places), np.array(least))
 
 
 class _Meter:
@@ -73,10 +71,10 @@ class _Meter:
         self._standing: tuple[tuple[float, ...], ...] = ()
         self._distance: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
 
-    def least(self, trajectory: Trajectory, stride: int) -> float:
+    def least(self, trajectory: Trajectory) -> float:
         columns = self._reader.read(trajectory)
         states = np.concatenate([columns.qpos[name] for name in self._layout], axis=1)
-        return float(self._distances(columns)(states[::stride].astype(float)).min())
+        return float(self._distances(columns)(states.astype(float)).min())
 
     def _distances(self, columns: Columns) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
         """Return what measures where robots stand in an episode; mostly that of the last one."""

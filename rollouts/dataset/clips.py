@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ import numpy as np
 
 from rollouts.dataset.contents import Contents
 from rollouts.reading.trajectory import Trajectory, TrajectoryFile
-from rollouts.video import open_video
+from rollouts.video import Picture, open_video
 from simulation.rendering.pictures import Cameras
 from tasks import MultiRobotTask
 from tasks.engine.columns import overview
@@ -30,12 +31,14 @@ class Clip:
         seed: Its seed.
         words: What is special about it.
         video: An mp4 file's bytes.
+        poster: A jpeg's bytes: the last picture.
     """
 
     place: int
     seed: int
     words: str
     video: bytes
+    poster: bytes
 
 
 def chosen(contents: Contents, most: int) -> dict[int, str]:
@@ -78,27 +81,34 @@ def film(
     for place, words in places.items():
         trajectory = file[place]
         if trajectory.seed is not None:
-            clips.append(Clip(place, trajectory.seed, words, _film_one(task, trajectory)))
+            clips.append(Clip(place, trajectory.seed, words, *_film_one(task, trajectory)))
         progress()
     return clips
 
 
-def _film_one(task: MultiRobotTask, trajectory: Trajectory) -> bytes:
+def _film_one(task: MultiRobotTask, trajectory: Trajectory) -> tuple[bytes, bytes]:
+    """Return an mp4 file's bytes, and those of a jpeg of the last picture."""
+    import imageio.v2 as imageio
+
     eye, target = overview(task.layout) or task.viewpoint
+    steps, pictures = count(), list[Picture]()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "clip.mp4"
         with open_video(path, task.scenario.control_frequency / STRIDE) as append:
-            steps = count()
 
             def watch() -> None:
                 if next(steps) % STRIDE == 0:
-                    append(_halved(Cameras(task.simulation, eye, target).take()[0]))
+                    pictures[:] = [_halved(Cameras(task.simulation, eye, target).take()[0])]
+                    append(pictures[0])
 
             play(task, trajectory.seed or 0, trajectory.actions, watch)
-        return path.read_bytes()
+        video = path.read_bytes()
+    poster = io.BytesIO()
+    imageio.imwrite(poster, pictures[0], format="jpg")  # pyright: ignore[reportArgumentType]
+    return video, poster.getvalue()
 
 
-def _halved(picture: np.ndarray) -> np.ndarray:
+def _halved(picture: Picture) -> Picture:
     """Return a picture of half the size, (H, W, 3)."""
     height, width, _ = picture.shape
     squares = picture.reshape(height // 2, 2, width // 2, 2, 3)

@@ -97,7 +97,9 @@ def _header(report: Report) -> str:
     if report.clearances is not None:
         least = float(report.clearances.least.min())
         note = f"in a sample of {_plural(len(report.clearances.places), 'episode')}"
-        tiles.append(("least clearance", f"{least * 1e3:.1f} mm", note, "bad" if least < 0 else ""))
+        tiles.append(
+            ("least clearance of hulls", f"{least * 1e3:.1f} mm".replace("-", "−"), note, "")
+        )
     shown = "".join(
         f'<div class="tile"><dt>{escape(label)}</dt><dd class="value {kind}">{escape(value)}</dd>'
         f'<dd class="note">{escape(note)}</dd></div>'
@@ -165,9 +167,11 @@ def _clearances(report: Report) -> str:
     failed = ~report.contents.success[found.places]
     chart = histogram(found.least * 1e3, failed, "least clearance, mm", lambda v: f"{v:.0f} mm")
     words = (
-        "The least distance of links of different robots, in each of"
-        f" {_plural(len(found.places), 'episode')} that were evenly chosen: exact at every"
-        f" {found.stride}th control step, and not known in between."
+        "The least distance of links of different robots at any control step, in each of"
+        f" {_plural(len(found.places), 'episode')}, evenly chosen. It is that of the convex hulls"
+        " of their shapes, which can be a few millimetres larger than what the simulation"
+        " makes of them: fingers that grasp one thing may seem to overlap. The certificate counts"
+        " what touched."
     )
     return _section("Clearance between robots", f"<p>{words}</p><figure>{chart}</figure>")
 
@@ -193,15 +197,16 @@ def _certificate(certificate: Certificate | None) -> str:
         rows.append(("differs", f"seed {entry['seed']}, step {entry['step']}, {entry['array']}"))
     for entry in c.not_played[:10]:
         rows.append(("not played", f"seed {entry['seed']}: {entry['reason']}"))
-    return _section("Certificate", _table(("", ""), rows, numbers=False))
+    return _section("Certificate", _table(("", ""), rows, text=2))
 
 
 def _clips(clips: Sequence[Clip]) -> str:
     if not clips:
         return ""
     shown = "".join(
-        '<figure><video controls muted loop playsinline preload="metadata" width="256"'
-        f' height="256" src="data:video/mp4;base64,{base64.b64encode(clip.video).decode()}">'
+        '<figure><video controls muted loop playsinline width="256" height="256"'
+        f' poster="data:image/jpeg;base64,{base64.b64encode(clip.poster).decode()}"'
+        f' src="data:video/mp4;base64,{base64.b64encode(clip.video).decode()}">'
         f"</video><figcaption>{escape(_caption(clip))}</figcaption></figure>"
         for clip in clips
     )
@@ -219,7 +224,7 @@ def _layout(layout: Mapping[str, tuple[str, Sequence[float]]]) -> str:
         (place, robot, *(f"{value:.3f}" for value in position))
         for place, (robot, position) in layout.items()
     ]
-    return _section("Layout", _table(("place", "robot", "x (m)", "y (m)", "z (m)"), rows))
+    return _section("Layout", _table(("place", "robot", "x (m)", "y (m)", "z (m)"), rows, text=2))
 
 
 def _files(report: Report) -> str:
@@ -249,14 +254,16 @@ def _section(title: str, content: str) -> str:
     return f"<section><h2>{escape(title)}</h2>{content}</section>\n"
 
 
-def _table(names: Sequence[str], rows: Iterable[Sequence[str]], *, numbers: bool = True) -> str:
-    def cell(tag: str, place: int, text: str) -> str:
-        kind = ' class="number"' if numbers and place else ""
-        return f"<{tag}{kind}>{escape(text)}</{tag}>"
+def _table(names: Sequence[str], rows: Iterable[Sequence[str]], *, text: int = 1) -> str:
+    """Return a table; the first columns hold text, the others numbers."""
+
+    def cell(tag: str, place: int, words: str) -> str:
+        kind = ' class="number"' if place >= text else ""
+        return f"<{tag}{kind}>{escape(words)}</{tag}>"
 
     head = "".join(cell("th", i, name) for i, name in enumerate(names)) if any(names) else ""
     body = "".join(
-        f"<tr>{''.join(cell('td', i, text) for i, text in enumerate(row))}</tr>" for row in rows
+        f"<tr>{''.join(cell('td', i, words) for i, words in enumerate(row))}</tr>" for row in rows
     )
     return (
         f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
