@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from html import escape
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 WIDTH, HEIGHT = 320, 132  # of a chart
 _BASE = HEIGHT - 18  # y of the axis
 _TOP = 14
-BINS = 24
+MOST_BINS = 24
 
 
 def histogram(
@@ -56,10 +57,11 @@ def _edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
     low, high = float(values.min()), float(values.max())
     if low == high:
         return np.array([low - 0.5, high + 0.5])
+    bins = min(MOST_BINS, 4 + round(len(values) ** 0.5))
     if (values == np.round(values)).all():
-        step = max(1, round((high - low + 1) / BINS))
-        return np.arange(low - 0.5, high + step + 0.5, step)
-    return np.linspace(low, high, BINS + 1)
+        step = max(1, math.ceil((high - low + 1) / bins))
+        return np.arange(low - 0.5, high + step, step)
+    return np.linspace(low, high, bins + 1)
 
 
 def _bars(

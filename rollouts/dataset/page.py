@@ -97,9 +97,7 @@ def _header(report: Report) -> str:
     if report.clearances is not None:
         least = float(report.clearances.least.min())
         note = f"in a sample of {_plural(len(report.clearances.places), 'episode')}"
-        tiles.append(
-            ("least clearance of hulls", f"{least * 1e3:.1f} mm".replace("-", "−"), note, "")
-        )
+        tiles.append(("least clearance", f"{least * 1e3:.1f} mm".replace("-", "−"), note, ""))
     shown = "".join(
         f'<div class="tile"><dt>{escape(label)}</dt><dd class="value {kind}">{escape(value)}</dd>'
         f'<dd class="note">{escape(note)}</dd></div>'
@@ -168,10 +166,10 @@ def _clearances(report: Report) -> str:
     chart = histogram(found.least * 1e3, failed, "least clearance, mm", lambda v: f"{v:.0f} mm")
     words = (
         "The least distance of links of different robots at any control step, in each of"
-        f" {_plural(len(found.places), 'episode')}, evenly chosen. It is that of the convex hulls"
-        " of their shapes, which can be a few millimetres larger than what the simulation"
-        " makes of them: fingers that grasp one thing may seem to overlap. The certificate counts"
-        " what touched."
+        f" {_plural(len(found.places), 'episode')}, evenly chosen; it is negative where the convex"
+        " hulls of their shapes overlap. The simulation lets some links pass through each other"
+        " and counts no contact then: fingers and hands of robots of the same kind, as ManiSkill's"
+        " does."
     )
     return _section("Clearance between robots", f"<p>{words}</p><figure>{chart}</figure>")
 
