@@ -11,6 +11,7 @@ from robots import TaskError
 from rollouts.playing.plan_conversion import Planner
 from rollouts.playing.randomness import random_states, seed_all
 from rollouts.playing.together import Player, is_batched
+from rollouts.sources.actors import is_person
 from tasks import MultiRobotTask
 from tasks.episode import follow
 
@@ -90,5 +91,5 @@ class Casting:
 
 
 def _fresh(policy: Any) -> Any:
-    """Return a copy of a policy as it was passed; one that is batched is not copied."""
-    return policy if is_batched(policy) else deepcopy(policy)
+    """Return a copy of a policy as it was passed; people and what is batched are not copied."""
+    return policy if is_batched(policy) or is_person(policy) else deepcopy(policy)

@@ -64,6 +64,12 @@ def actor_of(policy: Any, name: str | None = None) -> Actor:
     return Actor(POLICY, name or name_of(policy), _checksum(policy))
 
 
+def is_person(policy: Any) -> bool:
+    """Return whether what gives actions says that it is a person."""
+    own = getattr(policy, "actor", None)
+    return isinstance(own, Actor) and own.kind == PERSON
+
+
 def name_of(policy: Any) -> str:
     """Return ``module:function`` of a function, ``module:Class`` of other things."""
     defined = _definition(policy)

@@ -86,16 +86,22 @@ def test_a_batched_policy_records_what_it_does_alone(tmp_path):
     assert same_files(tmp_path / "alone" / FILE, tmp_path / "at once" / FILE)
 
 
+def overlong(task, seed):
+    """An expert whose plan goes on when time is over."""
+    return np.tile(at_random(task, seed), (6, 1))
+
+
 def test_an_expert_is_recorded_as_ever(tmp_path, monkeypatch):
-    monkeypatch.setitem(registry.EXPERTS.registered, TASK, at_random)
+    """To the end of its plan."""
+    monkeypatch.setitem(registry.EXPERTS.registered, TASK, overlong)
     for count in (1, 2):
         episodes = recorded(tmp_path / str(count), policy="expert", num_envs=count)
     assert [episode.source for episode in episodes] == [None] * 3
     assert same_files(tmp_path / "1" / FILE, tmp_path / "2" / FILE)
     env = tasks.make(TASK)
-    with Recorder(tmp_path / FILE, env, source_desc="tests.rollouts.plays:at_random") as recorder:
+    with Recorder(tmp_path / FILE, env, source_desc=f"{__name__}:overlong") as recorder:
         for seed in range(3):
-            recorder.add(play(env, seed, at_random(env, seed)))
+            recorder.add(play(env, seed, overlong(env, seed)))
     assert same_files(tmp_path / "1" / FILE, tmp_path / FILE)
 
 
@@ -157,7 +163,7 @@ def test_several_sources_in_one_data_set(tmp_path, monkeypatch, capsys):
     for name, order in (("there", [0, 1, 2]), ("back", [2, 1, 0])):
         for source in (list(sources.values())[i] for i in order):
             record(TASK, source["seeds"], tmp_path / name, workers=0, **_without_seeds(source))
-        record(TASK, [0], tmp_path / name, workers=0, policy=still)  # nothing of that is new
+        record(TASK, [0], tmp_path / name, workers=0, policy=policies.quiet)  # there already
     assert same_files(tmp_path / "there" / FILE, tmp_path / "back" / FILE)
     header = json.loads((tmp_path / "there" / "trajectory.json").read_text())
     assert header["source_type"] == "mixed"
@@ -205,6 +211,28 @@ def test_one_that_fails_does_not_cost_the_others(tmp_path):
     assert {seed: str(error) for seed, error in again.failed.items()} == failed
     assert isinstance(next(iter(again.failed.values())), WorkerError)
     assert same_files(tmp_path / FILE, tmp_path / "more" / FILE)
+
+
+class Hand:
+    """A person, whom nobody copies."""
+
+    actor = Actor("person", "gamepad")
+
+    def __call__(self, obs):
+        return np.zeros(7, np.float32)
+
+    def __deepcopy__(self, memo):
+        raise AssertionError
+
+
+def test_a_person_takes_over_for_good(tmp_path):
+    (episode,) = recorded(tmp_path, takeover=Hand(), seeds=[0])
+    assert episode.source == {"kind": "person", "name": "gamepad"}
+    assert episode.actor is None
+    assert (episode.actions == 0).all()
+    assert json.loads((tmp_path / "trajectory.json").read_text())["source_desc"] == (
+        "gamepad; tests.rollouts.policies:Wanders"
+    )
 
 
 @pytest.mark.parametrize(
