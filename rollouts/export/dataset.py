@@ -17,6 +17,7 @@ from rollouts.export.columns import ColumnReader, Columns, succeeded
 from rollouts.export.credits import Credits
 from rollouts.export.folder import new_folder, refuse_used
 from rollouts.reading.recorded_task import task_class, task_for
+from rollouts.reading.recording import open_trajectories
 from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
 from tasks.description import read_docstring
 
@@ -32,7 +33,7 @@ class Export:
     """What is exported, and as what.
 
     Attributes:
-        recording: The h5 file, ours or native's, with its json beside it.
+        recording: An h5 file, ours or native's, with its json beside it, or a recording's folder.
         format: ``"lerobot"`` or ``"robomimic"``.
         out: Folder of the dataset; it must be new or empty.
         fps: Control steps per second that the dataset states (``"lerobot"`` only); those of the
@@ -90,7 +91,7 @@ def export(wanted: Export, progress: Progress = lambda done, total: None) -> Exp
     """
     out = Path(wanted.out)
     _check(wanted, out)
-    with TrajectoryFile(wanted.recording) as file:
+    with open_trajectories(wanted.recording) as file:
         if not len(file):
             raise TrajectoryError(f"{file.path} holds no episodes; there is nothing to export")
         task_class(file, wanted.task)

@@ -12,6 +12,7 @@ import numpy as np
 from robots import TaskError
 from robots.common.commands import program
 from rollouts.reading.recorded_task import task_class, task_for
+from rollouts.reading.recording import FILE, open_trajectories
 from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
 from tasks import MultiRobotTask, get_task_class
 from tasks.episode import States, play
@@ -19,9 +20,8 @@ from tasks.episode import States, play
 Start = Literal["seed", "state"]
 STARTS: tuple[Start, ...] = ("seed", "state")
 
-FILE = "trajectory.h5"
-
 __all__ = [
+    "FILE",
     "STARTS",
     "Replayed",
     "Start",
@@ -92,7 +92,7 @@ class Replayed:
 
 
 def open_recording(path: Path | None, task_id: str | None) -> TrajectoryFile:
-    """Open a recording: a file, the folder of one, or else the official one of a task.
+    """Open a recording: a file, all files in a folder, or else the official one of a task.
 
     Raises:
         TrajectoryError: If there is none, or it cannot be read or is of another task.
@@ -102,7 +102,7 @@ def open_recording(path: Path | None, task_id: str | None) -> TrajectoryFile:
         if task_id is None:
             raise TaskError("neither a file nor a task is given to replay")
         path = find_official(get_task_class(task_id).task_id)
-    file = TrajectoryFile(path / FILE if path.is_dir() else path)
+    file = open_trajectories(path)
     try:
         task_class(file, task_id)
     except BaseException:

@@ -46,7 +46,7 @@ def add_recording(parser: argparse.ArgumentParser) -> None:
         type=Path,
         nargs="?",
         metavar="FILE",
-        help="the h5 file, or the folder of a recording",
+        help="an h5 file, or the folder of a recording, with all its files",
     )
     add(
         "--task",

@@ -31,7 +31,7 @@ from rollouts.playing.together import BatchError, grouped, one_by_one, record_to
 from rollouts.playing.transport import as_ours
 from rollouts.reading.provenance import describe_layout, differences, listing
 from rollouts.recording.episode_files import PartWriter
-from rollouts.recording.recorder import Recorder
+from rollouts.recording.recorder import FILE_SIZE, Recorder
 from rollouts.recording.signing import Actors
 from rollouts.sources.policies import EXPERT
 from tasks import MultiRobotTask, Scenario
@@ -175,6 +175,7 @@ def record(
     obs_mode: str = "state",
     num_envs: int = 1,
     randomization: Randomization | None = None,
+    file_size: float = FILE_SIZE,
     on_event: Callable[[Summary, Event | None], None] = lambda summary, event: None,
 ) -> Summary:
     """Record the episodes of some seeds; those that are in the folder already are kept.
@@ -210,6 +211,7 @@ def record(
             if each row of its actions follows from that row of the observations alone; see
             `rollouts.evaluate`.
         randomization: What varies from episode to episode, if not what the task says.
+        file_size: Size at which a further h5 file is begun (MB); see `Recorder`.
         on_event: Called once at the start without an event, and after every event.
 
     Raises:
@@ -232,12 +234,15 @@ def record(
     scenario = make_scenario(cls, control_mode=control_mode, obs_mode=obs_mode, **cell)
     env = cls(scenario)
     summary = Summary()
-    with Recorder(folder / FILE, env, resume=True, **actors.header) as recorder:
+    with Recorder(
+        folder / FILE, env, resume=True, file_size=file_size, **actors.header
+    ) as recorder:
         env.close()
         summary.damaged, there = recorder.damaged, recorder.seeds
         missing = [seed for seed in seeds if seed not in there]
         summary.already, summary.recorded = len(seeds) - len(missing), len(there)
         on_event(summary, None)
+        recorder.expect(missing)
         together = grouped(missing, num_envs)
         at_once = replace(scenario, num_envs=max(map(len, together.values()), default=1))
         job = EpisodeJob(cls, at_once, cast, actors, recorder.writer, together)
@@ -245,7 +250,7 @@ def record(
             with closing(play_all(executor, job, list(together))) as events:
                 for event in events:
                     for single in _one_by_one(event, together):
-                        _note(summary, single, recorder.writer)
+                        _note(summary, single, recorder)
                         on_event(summary, single)
         finally:  # an interrupt may come between writing and counting
             summary.recorded = len(recorder)
@@ -271,16 +276,17 @@ def _one_by_one(event: Event, together: Mapping[int, Sequence[int]]) -> list[Eve
     ]
 
 
-def _note(summary: Summary, event: Event, writer: PartWriter) -> None:
+def _note(summary: Summary, event: Event, recorder: Recorder) -> None:
     if isinstance(event.error, WorkersDied):
         raise event.error
     if event.died is not None:
         summary.deaths.append(where_died(event))
     elif event.error is not None and event.seed is not None:
         summary.failed[event.seed] = event.error
+        recorder.give_up(event.seed)
     elif event.result is not None and event.seed is not None:
         played, part = event.result
-        writer.store(event.seed, part)
+        recorder.store(event.seed, part)
         summary.played[event.seed] = played
         summary.recorded += 1
         summary.workers.add(event.worker)

@@ -66,6 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_cell_options(parser)
     workers.add_control_mode(parser)
+    workers.add_file_size(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -94,6 +95,7 @@ def run(options: argparse.Namespace) -> int:
                 corrector=options.corrector,
                 obs_mode=options.obs_mode,
                 num_envs=options.num_envs,
+                file_size=options.file_size,
                 **chosen_cell(options),
                 on_event=status.show,
             )
