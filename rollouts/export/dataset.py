@@ -161,8 +161,9 @@ class _Work:
         if self._wanted.format == "robomimic":
             from rollouts.export.robomimic import RobomimicWriter
 
+            size = self._wanted.size
             with RobomimicWriter(
-                folder, self.reader, origin=origin, channels=channels
+                folder, self.reader, origin=origin, channels=channels, size=size
             ) as robomimic:
                 yield robomimic
             return

@@ -15,6 +15,7 @@ from rollouts.export.columns import POSE, ColumnReader, Columns, Floats
 from rollouts.export.robomimic_pictures import PictureArrays
 from rollouts.export.shots import Channel, Frame
 from rollouts.export.writer import DatasetWriter
+from tasks.engine.cameras import Size
 from tasks.engine.columns import robomimic_columns
 from tasks.episode import States
 
@@ -34,6 +35,7 @@ class RobomimicWriter(DatasetWriter):
         *,
         origin: Mapping[str, Any],
         channels: Sequence[Channel] = (),
+        size: Size | None = None,
     ) -> None:
         """Begin the file.
 
@@ -42,11 +44,12 @@ class RobomimicWriter(DatasetWriter):
             reader: Names the columns.
             origin: What is kept of where the episodes come from; anything that json can hold.
             channels: Which pictures there are of every moment.
+            size: Width and height of cameras' pictures (pixels) if not their own.
 
         Raises:
             TaskError: If pictures of two cameras would be called the same.
         """
-        self._reader, self._origin = reader, origin
+        self._reader, self._origin, self._size = reader, origin, size
         self._pictures = PictureArrays(channels)
         name = FILE_WITH_PICTURES if channels else FILE_NAME
         self._file = h5py.File(folder / name, "w")
@@ -131,7 +134,8 @@ class RobomimicWriter(DatasetWriter):
                 "control_mode": plain_mode(task.control_mode),
                 "reward_mode": task.reward_mode,
                 "control_frequency": task.scenario.control_frequency,
-            },
+            }
+            | ({} if self._size is None else {"camera_size": list(self._size)}),
         }
 
     def _names(self) -> dict[str, Sequence[str]]:

@@ -16,6 +16,7 @@ LARGE = {  # that bring gigabytes of CUDA, and are not installed for a test
     " integrations/lerobot_env_robot_layouts",
     "robomimic": "robomimic needs torchvision, which fits no CPU build of torch from the index",
 }
+PROGRAMS = [f"{client}{part}" for client in LARGE for part in ("", "_cameras")]
 
 pytestmark = [
     pytest.mark.long,
@@ -29,17 +30,18 @@ def test_a_client(client, tmp_path):
     play(python, HERE / "programs" / f"{client}_program.py", tmp_path / "out")
 
 
-@pytest.mark.parametrize("client", LARGE)
-def test_a_large_client(client, tmp_path):
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_a_large_client(program, tmp_path):
+    client = program.partition("_")[0]
     python = os.environ.get(variable := f"{client.upper()}_PYTHON")
     if python is None:
         pytest.skip(f"{LARGE[client]}; set {variable} to a Python that has it")
-    play(Path(python), HERE / "programs" / f"{client}_program.py", tmp_path / "out")
+    play(Path(python), HERE / "programs" / f"{program}_program.py", tmp_path / "out")
 
 
 def test_every_program_is_run():
     assert {path.name for path in (HERE / "programs").glob("*_program.py")} == {
-        f"{client}_program.py" for client in (*CLIENTS, *LARGE)
+        f"{client}_program.py" for client in (*CLIENTS, *PROGRAMS)
     }
 
 
