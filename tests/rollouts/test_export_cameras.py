@@ -28,6 +28,7 @@ from rollouts.reading.recorded_task import task_for
 from rollouts.reading.trajectory import TrajectoryFile
 from simulation import Camera
 from simulation.rendering.pictures import Observers, vulkan_problem
+from tests.rollouts.clusters import running_cluster
 from tests.rollouts.recordings import edited, record
 
 TASK, ROBOTS = "TwoRobotPickCube-v1", {"left": "panda_wristcam", "right": "panda_wristcam"}
@@ -40,7 +41,15 @@ LENGTHS = [2, 1]
 SIZE = (32, 24)
 REBUILT = {"reconfigure": True}
 
-drawn = pytest.mark.skipif(bool(vulkan_problem()), reason="nothing can be drawn here")
+
+@pytest.fixture(scope="module")
+def driver(renderer) -> None:
+    """Skip where nothing can be drawn."""
+    if problem := vulkan_problem():
+        pytest.skip(problem)
+
+
+drawn = pytest.mark.usefixtures("driver")
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +58,7 @@ def recording(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def seen(recording, renderer) -> list[list[dict[str, np.ndarray]]]:
+def seen(recording, driver) -> list[list[dict[str, np.ndarray]]]:
     """Return what an environment with cameras sees in every moment of every episode."""
     fields = {"obs_mode": "rgb+depth", "robots": ROBOTS, "camera_size": SIZE}
     env = tasks.make(TASK, **fields)
@@ -148,7 +157,7 @@ def test_the_columns_of_such_an_export_step_by_step(recording, seen, form):
 
 
 @drawn
-def test_where_no_replay_ends_pictures_are_of_the_recorded_states(tmp_path, renderer):
+def test_where_no_replay_ends_pictures_are_of_the_recorded_states(tmp_path):
     path = record(tmp_path / "push.h5", "PushT-v1", [3])
     with edited(path) as file:
         file["traj_0/env_states/actors/Tee"][1:, 0] += 0.05
@@ -371,3 +380,18 @@ def test_whatever_ends_drawing_in_workers_leaves_nothing(recording, tmp_path):
         export(wanted, interrupt, executor=executor)
     assert list(tmp_path.iterdir()) == []
     assert not any(Path(f"/proc/{worker}").exists() for worker in executor.workers)
+
+
+@drawn
+@pytest.mark.long
+def test_a_cluster_draws_the_same(recording, robomimic, tmp_path):
+    from rollouts.playing.ray_executor import RayExecutor
+
+    with running_cluster() as nodes:
+        nodes.grow(1)
+        wanted = Export(
+            recording, "robomimic", tmp_path / "out", cameras="all", depth=True, size=SIZE
+        )
+        export(wanted, executor=RayExecutor(nodes.address))
+    name = "image.hdf5"
+    assert (tmp_path / "out" / name).read_bytes() == (robomimic / name).read_bytes()

@@ -33,8 +33,8 @@ KEYS = [camera.replace(".", "_") for camera in CAMERAS]
 
 def near(depth):
     """Return depth (mm, 16 bits) as robomimic's networks take it: 0 to 1, the channel first."""
-    distance = np.asarray(depth).astype(np.int16).view(np.uint16).astype(np.float32)
-    return np.moveaxis(np.clip(distance / FAR, 0.0, 1.0), -1, -3)
+    distance = (depth * 1.0) % 65536  # an array or a tensor
+    return obs_utils.batch_image_hwc_to_chw((distance / FAR).clip(0, 1))
 
 
 def main(folder: Path) -> None:
