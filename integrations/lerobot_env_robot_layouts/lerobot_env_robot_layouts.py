@@ -64,7 +64,7 @@ class RobotLayoutsEnv(EnvConfig):
     """A task.
 
     Attributes:
-        task: Its id.
+        task: Its id; ``module:Id`` for one of your own.
         fps: Its control steps per second.
         robots: Other robots for some places: place → robot.
         control_mode: What actions mean; see `tasks.Scenario`.
@@ -106,7 +106,8 @@ class RobotLayoutsEnv(EnvConfig):
     @property
     def gym_id(self) -> str:
         """What ``gym.make`` knows the task by."""
-        return f"tasks:RobotLayouts/{self.task}"
+        module, _, task = self.task.rpartition(":")
+        return f"{module or 'tasks'}:RobotLayouts/{task}"
 
     @property
     def gym_kwargs(self) -> dict[str, Any]:

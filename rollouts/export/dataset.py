@@ -93,7 +93,7 @@ def export(
         AssetError: If robot files cannot be found.
     """
     out, progress = Path(wanted.out), _rising(progress)
-    wanted.check()
+    wanted.check(here=executor is None)
     with TrajectoryFile(wanted.recording) as file:
         if not len(file):
             raise TrajectoryError(f"{file.path} holds no episodes; there is nothing to export")

@@ -70,8 +70,11 @@ class Export:
             return (OVERVIEW,) if self.video else ()
         return (self.cameras,) if isinstance(self.cameras, str) else tuple(self.cameras)
 
-    def check(self) -> None:
+    def check(self, *, here: bool = True) -> None:
         """Refuse what cannot be done.
+
+        Args:
+            here: Whether this process draws the pictures; others say themselves if they cannot.
 
         Raises:
             UnknownNameError: If there is no such format.
@@ -88,7 +91,7 @@ class Export:
             raise MissingPackageError(f"LeRobot datasets need pyarrow: {INSTALL}")
         if self.format == "robomimic":
             self._expect_robomimic()
-        self._expect_pictures()
+        self._expect_pictures(here=here)
         refuse_used(Path(self.out))
 
     def _expect_robomimic(self) -> None:
@@ -100,7 +103,7 @@ class Export:
                     f" {words}lerobot"
                 )
 
-    def _expect_pictures(self) -> None:
+    def _expect_pictures(self, *, here: bool) -> None:
         names = self.camera_names
         if not all(isinstance(name, str) for name in names):
             raise TaskError(f"cameras are {shown(self.cameras)}; their names are needed")
@@ -121,5 +124,6 @@ class Export:
             require_pictures(
                 video=lerobot and not self.images,
                 images=lerobot and (self.images or self.depth),
+                driver=here,
                 without="video" if self.cameras is None else "cameras",
             )

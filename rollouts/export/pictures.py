@@ -21,12 +21,13 @@ from tasks.episode import States, follow, moments
 SHAPE = (SIZE, SIZE, 3)  # of the overview
 
 
-def require_pictures(*, video: bool, images: bool, without: str) -> None:
+def require_pictures(*, video: bool, images: bool, driver: bool, without: str) -> None:
     """Refuse to go on where no pictures can be made.
 
     Args:
         video: Whether videos are written.
         images: Whether png images are.
+        driver: Whether this process draws them.
         without: What to leave out then, in words.
 
     Raises:
@@ -37,7 +38,7 @@ def require_pictures(*, video: bool, images: bool, without: str) -> None:
         raise MissingPackageError(f"videos need imageio and ffmpeg: {INSTALL}")
     if images and find_spec("PIL") is None:
         raise MissingPackageError(f"png images need pillow: {INSTALL}")
-    if problem := vulkan_problem():
+    if driver and (problem := vulkan_problem()):
         raise SimulationError(f"no pictures can be drawn here: {problem}; export without {without}")
 
 

@@ -12,8 +12,8 @@ from tests.clients.environments import ROOT, new_environment, play
 HERE = Path(__file__).parent
 CLIENTS = ("cleanrl", "minari", "rllib", "skrl", "supersuit", "tianshou", "torchrl")
 LARGE = {  # that bring gigabytes of CUDA, and are not installed for a test
-    "lerobot": "LeRobot needs Python 3.12, 'lerobot[dataset]' by constraints/lerobot.txt and"
-    " integrations/lerobot_env_robot_layouts",
+    "lerobot": "LeRobot needs Python 3.12, 'lerobot[dataset]' by constraints/lerobot.txt,"
+    " imageio-ffmpeg and integrations/lerobot_env_robot_layouts",
     "robomimic": "robomimic needs torchvision, which fits no CPU build of torch from the index",
 }
 PROGRAMS = [f"{client}{part}" for client in LARGE for part in ("", "_cameras")]

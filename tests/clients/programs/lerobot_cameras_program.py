@@ -12,14 +12,11 @@ from lerobot.policies.act.configuration_act import ACTConfig
 from lerobot.policies.factory import make_policy, make_pre_post_processors
 from lerobot.scripts.lerobot_eval import rollout
 from lerobot.utils.import_utils import register_third_party_plugins
-
-from rollouts.export.dataset import Export, export
-from rollouts.reading.trajectory import TrajectoryFile
-from tests.clients.environments import ROOT
-from tests.clients.tray_recording import (
+from tray_recording import (
     CAMERAS,
     LENGTHS,
     ROBOTS,
+    ROOT,
     SIZE,
     TASK,
     TEXT,
@@ -27,6 +24,9 @@ from tests.clients.tray_recording import (
     observed,
     record,
 )
+
+from rollouts.export.dataset import Export, export
+from rollouts.reading.trajectory import TrajectoryFile
 
 sys.path.insert(0, str(ROOT / "integrations" / "lerobot_env_robot_layouts"))
 

@@ -12,10 +12,7 @@ from robomimic.algo import RolloutPolicy, algo_factory
 from robomimic.config import config_factory
 from robomimic.utils import file_utils, obs_utils
 from robomimic.utils.dataset import SequenceDataset
-
-from rollouts.export.dataset import Export, export
-from rollouts.reading.trajectory import TrajectoryFile
-from tests.clients.tray_recording import (
+from tray_recording import (
     CAMERAS,
     LENGTHS,
     ROBOTS,
@@ -26,6 +23,9 @@ from tests.clients.tray_recording import (
     observed,
     record,
 )
+
+from rollouts.export.dataset import Export, export
+from rollouts.reading.trajectory import TrajectoryFile
 
 FAR = 3000.0  # mm, that counts as 1 in what the network sees
 KEYS = [camera.replace(".", "_") for camera in CAMERAS]

@@ -14,7 +14,8 @@ from rollouts.reading.trajectory import Trajectory
 from rollouts.recording.recorder import Recorder
 from tasks.episode import play
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "docs" / "tutorials"))
+ROOT = Path(__file__).parents[3]
+sys.path.insert(0, str(ROOT / "docs" / "tutorials"))
 
 TASK = "tray:TwoArmTray-v1"
 TEXT = "Lift a tray with a gripper at each end, level, to 20 cm."
