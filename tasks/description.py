@@ -183,6 +183,11 @@ def read_docstring(cls: type[MultiRobotTask]) -> Docstring:
     return Docstring(summary, "\n".join(filter(None, drawn)), success)
 
 
+def instruction_of(cls: type[MultiRobotTask]) -> str:
+    """Return what robots are told to do in a task, in a sentence."""
+    return cls.instruction or read_docstring(cls).summary
+
+
 def describe(env: MultiRobotTask) -> Iterator[RenderableType]:
     """Yield everything there is to know about a task, as lines and tables to print.
 

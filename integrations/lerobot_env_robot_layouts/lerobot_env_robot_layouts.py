@@ -5,7 +5,9 @@ evaluated as it is:
 
     lerobot-eval --policy.path=outputs/… --env.type=robot_layouts --env.task=PickCube-v1
 
-A policy that was trained on an export with video needs ``--env.video=true``.
+A policy that was trained on an export with video needs ``--env.video=true``, and one that was
+trained on an export with all cameras ``--env.cameras=true`` and, if these were given another size,
+``--env.camera_size='[96, 64]'``.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from lerobot.envs.configs import EnvConfig
 from lerobot.utils.constants import ACTION, OBS_ENV_STATE, OBS_STATE
 
 from tasks import get_task_class
-from tasks.description import read_docstring
+from tasks.description import instruction_of
 
 # What LeRobot's evaluation calls what it renames to the names of datasets.
 NAMES = {
@@ -28,7 +30,7 @@ NAMES = {
     "velocity": "observation.velocity",
     "environment_state": OBS_ENV_STATE,
 }
-PICTURE, PICTURES = "pixels/overview", "observation.images.overview"
+PICTURES = "observation.images."  # and the name of a camera
 KINDS = {"environment_state": FeatureType.ENV}
 
 
@@ -38,15 +40,19 @@ class LeRobotNames(gym.ObservationWrapper):
     def __init__(self, env: gym.Env, task_id: str) -> None:
         """Rename what the environment observes."""
         super().__init__(env)
-        self.task = self.task_description = read_docstring(get_task_class(task_id)).summary
+        self.task = self.task_description = instruction_of(get_task_class(task_id))
         self.observation_space = gym.spaces.Dict(self.observation(env.observation_space))
 
     def observation(self, observation: Any) -> dict[str, Any]:
         """Return an observation, or its space, under LeRobot's names."""
         known = observation.keys()
         renamed = {key: observation[name] for key, name in NAMES.items() if name in known}
-        if PICTURES in known:
-            pixels = {"overview": observation[PICTURES]}
+        pixels = {
+            name.removeprefix(PICTURES): observation[name]
+            for name in known
+            if name.startswith(PICTURES)
+        }
+        if pixels:
             is_space = isinstance(observation, gym.spaces.Dict)
             renamed["pixels"] = gym.spaces.Dict(pixels) if is_space else pixels
         return renamed
@@ -58,11 +64,13 @@ class RobotLayoutsEnv(EnvConfig):
     """A task.
 
     Attributes:
-        task: Its id.
+        task: Its id; ``module:Id`` for one of your own.
         fps: Its control steps per second.
         robots: Other robots for some places: place → robot.
         control_mode: What actions mean; see `tasks.Scenario`.
         video: Whether policies see the pictures of exports with video, which needs a Vulkan driver.
+        cameras: Whether policies see those of exports with all cameras, which needs one, too.
+        camera_size: Width and height of these (pixels); None: each camera's own.
         render_mode: ``"rgb_array"``, as LeRobot films episodes, which needs one, too, or None.
     """
 
@@ -71,6 +79,8 @@ class RobotLayoutsEnv(EnvConfig):
     robots: dict[str, str] = field(default_factory=dict)
     control_mode: str = "pd_joint_delta_pos"
     video: bool = False
+    cameras: bool = False
+    camera_size: list[int] | None = None
     render_mode: str | None = "rgb_array"
 
     def __post_init__(self) -> None:
@@ -82,10 +92,10 @@ class RobotLayoutsEnv(EnvConfig):
             if key in env.observation_space.spaces:
                 kind, shape = KINDS.get(key, FeatureType.STATE), env.observation_space[key].shape
                 self.features[key], self.features_map[key] = PolicyFeature(kind, shape), name
-        if self.video:
-            shape = env.observation_space["pixels"]["overview"].shape
-            self.features[PICTURE] = PolicyFeature(FeatureType.VISUAL, shape)
-            self.features_map[PICTURE] = PICTURES
+        for camera, space in env.observation_space.spaces.get("pixels", {}).items():
+            key = f"pixels/{camera}"
+            self.features[key] = PolicyFeature(FeatureType.VISUAL, space.shape)
+            self.features_map[key] = f"{PICTURES}{camera}"
         env.close()
 
     @property
@@ -96,13 +106,15 @@ class RobotLayoutsEnv(EnvConfig):
     @property
     def gym_id(self) -> str:
         """What ``gym.make`` knows the task by."""
-        return f"tasks:RobotLayouts/{self.task}"
+        module, _, task = self.task.rpartition(":")
+        return f"{module or 'tasks'}:RobotLayouts/{task}"
 
     @property
     def gym_kwargs(self) -> dict[str, Any]:
         """Arguments of ``gym.make``."""
         return {
-            "obs_mode": "lerobot+video" if self.video else "lerobot",
+            "obs_mode": "lerobot" + "+video" * self.video + "+cameras" * self.cameras,
+            "camera_size": self.camera_size,
             "robots": self.robots or None,
             "control_mode": self.control_mode,
             "control_frequency": self.fps,

@@ -6,8 +6,12 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rollouts.playing.command_options import add_arguments as add_executor_arguments
+from rollouts.playing.command_options import chosen_executor, stop_signals
+
 if TYPE_CHECKING:
     from rollouts.export.dataset import Exported
+    from rollouts.playing.executor import Executor
 
 DESCRIPTION = "write a recording as a dataset: LeRobot v3.0 or robomimic hdf5"
 EPILOG = (
@@ -25,8 +29,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--out", type=Path, required=True, metavar="DIR", help="new folder for the dataset")
     add("--fps", type=int, metavar="N", help="steps per second to state (default: the task's, 20)")
     add("--video", action="store_true", help="draw every step, too (lerobot; needs Vulkan)")
+    add(
+        "--cameras",
+        nargs="+",
+        metavar="NAME",
+        help="draw what these cameras see, as videos (lerobot) or arrays (robomimic): all,"
+        " overview, or by place: base_camera, left.hand_camera",
+    )
+    add("--images", action="store_true", help="png images, which lose nothing, in place of videos")
+    add("--depth", action="store_true", help="what the cameras tell of depth, too (mm, 16 bits)")
+    add("--size", type=_size, metavar="WxH", help="pixels of their pictures (each camera's own)")
+    add("--instruction", metavar="TEXT", help="what is to be done (what the task says)")
     add("--only-successes", action="store_true", help="leave out episodes that end in failure")
     add("--task", help="the recording's task; MODULE:ID for one of your own")
+    add_executor_arguments(parser, none_given="0")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -49,16 +65,36 @@ def run(options: argparse.Namespace) -> int:
         video=options.video,
         only_successes=options.only_successes,
         task=options.task,
+        cameras=options.cameras,
+        images=options.images,
+        depth=options.depth,
+        size=options.size,
+        instruction=options.instruction,
     )
-    with LiveLine(unit="episodes") as line:
+    with LiveLine(unit="episodes") as line, stop_signals():
 
         def show(done: float, total: int) -> None:
             line.total = total
             line.update(round(done, 1), f"exporting {options.recording.name}")
 
-        done = export(wanted, show)
+        done = export(wanted, show, executor=_artists(options), tell=line.say)
     print(_summary(done))
     return 0
+
+
+def _artists(options: argparse.Namespace) -> Executor | None:
+    """Return who draws; None: this process."""
+    if options.ray is None and not options.workers:
+        return None
+    return chosen_executor(options)
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.partition("x")
+    try:
+        return int(width), int(height)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no size; it is WxH, as 128x96") from None
 
 
 def _summary(done: Exported) -> str:

@@ -2,58 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Iterable, Mapping
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from importlib.util import find_spec
-from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol
 
-from layouts import Layout
-from layouts.placement import RobotLike
-from robots import MissingPackageError, TaskError, UnknownNameError
+from robots import TaskError
 from rollouts.export.columns import ColumnReader, Columns, succeeded
 from rollouts.export.credits import Credits
-from rollouts.export.folder import new_folder, refuse_used
+from rollouts.export.folder import new_folder
+from rollouts.export.options import FORMATS, Export
 from rollouts.reading.recorded_task import task_class, task_for
 from rollouts.reading.recording import open_trajectories
-from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
-from tasks.description import read_docstring
+from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
+from tasks.description import instruction_of
 
-FORMATS = ("lerobot", "robomimic")
-INSTALL = "pip install 'robot-layouts[export]'"
+if TYPE_CHECKING:
+    from rollouts.export.drawing_job import DrawnEpisode
+    from rollouts.export.pictures import Drawing
+    from rollouts.export.shots import Frame, Shots
+    from rollouts.playing.executor import Executor
+
+__all__ = ["FORMATS", "Export", "Exported", "export"]
 
 Progress = Callable[[float, int], None]
-AddEpisode = Callable[[Columns, Callable[[int], None]], None]
+Draw = Callable[[Columns], "Drawing | DrawnEpisode | None"]
 
 
-@dataclass(frozen=True)
-class Export:
-    """What is exported, and as what.
+class Writer(Protocol):
+    """Writes episodes one after the other."""
 
-    Attributes:
-        recording: An h5 file, ours or native's, with its json beside it, or a recording's folder.
-        format: ``"lerobot"`` or ``"robomimic"``.
-        out: Folder of the dataset; it must be new or empty.
-        fps: Control steps per second that the dataset states (``"lerobot"`` only); those of the
-            task if None.
-        video: Whether pictures of the episodes are drawn (``"lerobot"`` only).
-        only_successes: Whether episodes whose last step is no success are left out.
-        task: The recording's task; ``module:Id`` for one of a module that no package lists.
-        layout: Where its robots stood, where the recording cannot say it.
-        robots: Which robots these were, where the recording cannot say it.
-    """
+    def add(
+        self,
+        columns: Columns,
+        frames: Iterable[Frame] = (),
+        watch: Callable[[int], None] = ...,
+        *,
+        text: str | None = None,
+    ) -> None:
+        """Write an episode, its pictures, and what is to be done in it."""
+        ...
 
-    recording: str | PathLike[str]
-    format: str
-    out: str | PathLike[str]
-    fps: int | None = None
-    video: bool = False
-    only_successes: bool = False
-    task: str | None = None
-    layout: Layout | None = None
-    robots: Mapping[str, RobotLike] | None = None
+    def note(self, about: Mapping[str, Any]) -> None:
+        """Keep more about the last episode."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -73,36 +66,54 @@ class Exported:
     left_out: int
 
 
-def export(wanted: Export, progress: Progress = lambda done, total: None) -> Exported:
+def export(
+    wanted: Export,
+    progress: Progress = lambda done, total: None,
+    *,
+    executor: Executor | None = None,
+    tell: Callable[[str], None] = lambda text: None,
+) -> Exported:
     """Write a dataset; it appears when it is complete.
+
+    Its bytes do not depend on who draws.
 
     Args:
         wanted: What to export.
         progress: Called with the episodes done, fractions included, and those there are.
+        executor: Who draws the pictures, such as `rollouts.playing.executor.ProcessExecutor`; None:
+            this process.
+        tell: Called with what happens to workers, in words.
 
     Raises:
-        UnknownNameError: If there is no such format, task or robot.
+        UnknownNameError: If there is no such format, task, robot or camera.
         TrajectoryError: If the recording cannot be read, holds no states, or no episode is left.
         RecordingError: If the dataset cannot be written, or its folder holds something already.
         MissingPackageError: If a package that the format needs is not installed.
         TaskError: If the options do not go together.
         SimulationError: If there is no Vulkan driver to draw pictures with.
+        WorkerError: If workers cannot be started, or die again and again.
         AssetError: If robot files cannot be found.
     """
-    out = Path(wanted.out)
-    _check(wanted, out)
+    out, progress = Path(wanted.out), _rising(progress)
+    wanted.check(here=executor is None)
     with open_trajectories(wanted.recording) as file:
         if not len(file):
             raise TrajectoryError(f"{file.path} holds no episodes; there is nothing to export")
-        task_class(file, wanted.task)
-        task = task_for(file, layout=wanted.layout, robots=wanted.robots, pictures=wanted.video)
-        reader = ColumnReader(task, Credits(file))
+        work = _Work(wanted, file, here=executor is None)
         episodes = steps = 0
-        with new_folder(out) as folder, _writer(wanted, folder, file, reader) as add:
+        with (
+            new_folder(out) as folder,
+            work.writer(folder) as writer,
+            work.artist(folder, executor, progress, tell) as draw,
+        ):
             for i, trajectory in enumerate(file):
                 if not wanted.only_successes or succeeded(trajectory):
-                    columns = reader.read(trajectory)
-                    add(columns, _part(progress, i, len(columns), len(file)))
+                    columns = work.reader.read(trajectory)
+                    watch = _part(progress, i, len(columns) + 1, len(file))
+                    drawn = draw(columns)
+                    writer.add(columns, drawn or (), watch, text=work.text(trajectory))
+                    if drawn is not None and work.seen:
+                        writer.note({"pictures_exact": drawn.exact})
                     episodes, steps = episodes + 1, steps + len(columns)
                 progress(i + 1, len(file))
             if not episodes:
@@ -110,45 +121,95 @@ def export(wanted: Export, progress: Progress = lambda done, total: None) -> Exp
         return Exported(out, episodes, steps, len(file) - episodes)
 
 
-@contextmanager
-def _writer(
-    wanted: Export, folder: Path, file: TrajectoryFile, reader: ColumnReader
-) -> Generator[AddEpisode]:
-    """Yield a function that writes an episode and tells how many pictures it has drawn."""
-    origin = _origin(file, reader)
-    if wanted.format == "robomimic":
-        from rollouts.export.robomimic import RobomimicWriter
+class _Work:
+    """What is to be exported: the columns, the pictures, the texts.
 
-        with RobomimicWriter(folder, reader, origin=origin) as robomimic:
-            yield lambda columns, watch: robomimic.add(columns)
-        return
-    from rollouts.export.lerobot import LeRobotWriter
-    from rollouts.export.pictures import draw
+    Attributes:
+        reader: Names the columns.
+        seen: Whether there are pictures of the task's or its robots' cameras.
+    """
 
-    text = read_docstring(type(reader.task)).summary
-    fps = wanted.fps or _whole(reader.task.scenario.control_frequency)
-    with LeRobotWriter(folder, reader, task_text=text, fps=fps, origin=origin) as lerobot:
-        yield lambda columns, watch: lerobot.add(
-            columns, draw(reader.task, columns) if wanted.video else None, watch
+    def __init__(self, wanted: Export, file: TrajectoryFile, *, here: bool) -> None:
+        """Make the task; it can be drawn if ``here`` says that this process draws."""
+        task_class(file, wanted.task)
+        names = wanted.camera_names
+        task = task_for(
+            file, layout=wanted.layout, robots=wanted.robots, pictures=here and bool(names)
         )
+        self.reader, self._wanted, self._file = ColumnReader(task, Credits(file)), wanted, file
+        self._shots: Shots | None = None
+        if names:
+            from rollouts.export.shots import choose_shots
 
+            self._shots = choose_shots(task, names, size=wanted.size, depth=wanted.depth)
+        self.seen = bool(self._shots and self._shots.cameras)
+        self._instruction = instruction_of(type(task))
 
-def _check(wanted: Export, out: Path) -> None:
-    """Refuse what cannot be done before anything is read."""
-    if wanted.format not in FORMATS:
-        raise UnknownNameError("export format", wanted.format, FORMATS)
-    if wanted.fps is not None and wanted.fps < 1:
-        raise TaskError(f"fps is {wanted.fps}; it must be 1 or more")
-    if wanted.format == "lerobot" and find_spec("pyarrow") is None:
-        raise MissingPackageError(f"LeRobot datasets need pyarrow: {INSTALL}")
-    if wanted.format == "robomimic" and (wanted.video or wanted.fps is not None):
-        what = "video" if wanted.video else "fps"
-        raise TaskError(f"a robomimic dataset has no {what} here; leave it out, or choose lerobot")
-    if wanted.video:
-        from rollouts.export.pictures import require_pictures
+    def text(self, trajectory: Trajectory) -> str | None:
+        """Return what is to be done in an episode; None if nobody says so or asks.
 
-        require_pictures()
-    refuse_used(out)
+        The task's own is given with pictures alone, as robomimic datasets of old held none.
+        """
+        given = self._wanted.instruction
+        if isinstance(given, Mapping):
+            given = given.get(trajectory.episode_id)
+        said = given or (trajectory.source or {}).get("instruction")
+        return said if isinstance(said, str) else self._instruction if self.seen else None
+
+    @contextmanager
+    def writer(self, folder: Path) -> Generator[Writer]:
+        """Yield what writes the episodes."""
+        origin = _origin(self._file, self.reader)
+        channels = self._shots.channels if self._shots else []
+        if self._wanted.format == "robomimic":
+            from rollouts.export.robomimic import RobomimicWriter
+
+            size = self._wanted.size
+            with RobomimicWriter(
+                folder, self.reader, origin=origin, channels=channels, size=size
+            ) as robomimic:
+                yield robomimic
+            return
+        from rollouts.export.lerobot import LeRobotWriter
+
+        with LeRobotWriter(
+            folder,
+            self.reader,
+            task_text=self._instruction,
+            fps=self._wanted.fps or _whole(self.reader.task.scenario.control_frequency),
+            origin=origin,
+            channels=channels,
+            images=self._wanted.images,
+        ) as lerobot:
+            yield lerobot
+
+    @contextmanager
+    def artist(
+        self,
+        folder: Path,
+        executor: Executor | None,
+        progress: Progress,
+        tell: Callable[[str], None],
+    ) -> Generator[Draw]:
+        """Yield what draws each episode in its turn; see `export`."""
+        shots, wanted, file, task = self._shots, self._wanted, self._file, self.reader.task
+        if shots is None:
+            yield lambda columns: None
+            return
+        last = wanted.format == "robomimic"  # which holds what is seen after a step, too
+        if executor is None:
+            from rollouts.export.pictures import Drawing
+
+            yield lambda columns: Drawing(task, columns, shots, last=last)
+            return
+        from rollouts.export.drawing_job import DrawingCrew, DrawingJob
+
+        path = file.path.absolute()
+        job = DrawingJob(path, type(task), shots, last, wanted.layout, wanted.robots)
+        numbers = [i for i in range(len(file)) if not wanted.only_successes or succeeded(file[i])]
+        crew = DrawingCrew(job, executor, numbers, folder, lambda n: progress(n, len(file)), tell)
+        with closing(crew.episodes()) as drawn:
+            yield lambda columns: next(drawn)
 
 
 def _whole(frequency: float) -> int:
@@ -157,9 +218,22 @@ def _whole(frequency: float) -> int:
     return int(frequency)
 
 
-def _part(progress: Progress, done: int, pictures: int, total: int) -> Callable[[int], None]:
-    """Return what tells of pictures drawn, of those of the episode after ``done`` episodes."""
-    return lambda drawn: progress(done + drawn / pictures, total)
+def _part(progress: Progress, done: int, moments: int, total: int) -> Callable[[int], None]:
+    """Return what tells of moments drawn, of those of the episode after ``done`` episodes."""
+    return lambda drawn: progress(done + drawn / moments, total)
+
+
+def _rising(progress: Progress) -> Progress:
+    """Return what passes on only what is more than was done before."""
+    most = 0.0
+
+    def show(done: float, total: int) -> None:
+        nonlocal most
+        if done > most:
+            most = done
+            progress(done, total)
+
+    return show
 
 
 def _origin(file: TrajectoryFile, reader: ColumnReader) -> dict[str, Any]:

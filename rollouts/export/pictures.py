@@ -1,132 +1,135 @@
-"""Pictures of recorded episodes, and the mp4 files that hold many episodes each."""
+"""Draws recorded episodes, moment by moment."""
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robots import MissingPackageError, SimulationError
 from rollouts.export.columns import Columns, state_row
+from rollouts.export.shots import RGB, Channel, Frame, Picture, Shots
 from rollouts.reading.trajectory import TrajectoryError
 from rollouts.video import INSTALL
-from simulation.rendering.pictures import SIZE, Cameras, vulkan_problem
+from simulation import Simulation
+from simulation.rendering.pictures import SIZE, Cameras, Observers, vulkan_problem
 from tasks import MultiRobotTask
-from tasks.engine.columns import overview
+from tasks.engine.columns import OVERVIEW
 from tasks.episode import States, follow, moments
 
-SHAPE = (SIZE, SIZE, 3)
-CODEC = "h264"
-PIXEL_FORMAT = "yuv420p"
-# A keyframe every second frame, as LeRobot has them, so that any frame is near one; no frames
-# that refer to later ones, so that frame k is shown at k / fps exactly.
-ENCODING = ["-g", "2", "-bf", "0", "-crf", "23", "-preset", "veryfast", "-movflags", "+faststart"]
+SHAPE = (SIZE, SIZE, 3)  # of the overview
 
 
-def require_pictures() -> None:
-    """Refuse to go on where no video can be made.
-
-    Raises:
-        MissingPackageError: If imageio is not installed.
-        SimulationError: If there is no usable Vulkan driver.
-    """
-    try:
-        import imageio_ffmpeg  # noqa: F401  # pyright: ignore[reportUnusedImport]
-    except ImportError:
-        raise MissingPackageError(f"videos need imageio and ffmpeg: {INSTALL}") from None
-    if problem := vulkan_problem():
-        raise SimulationError(f"no pictures can be drawn here: {problem}; export without video")
-
-
-def draw(task: MultiRobotTask, columns: Columns) -> Generator[NDArray[np.uint8]]:
-    """Draw an episode as it was recorded: the state before each of its T steps.
-
-    The actions are played, so that what is no part of a state is there too. Where the world does
-    not follow the recording to the last bit, it is put into the recorded state.
+def require_pictures(*, video: bool, images: bool, driver: bool, without: str) -> None:
+    """Refuse to go on where no pictures can be made.
 
     Args:
-        task: Made with ``render_mode="rgb_array"``.
-        columns: The episode.
-
-    Yields:
-        One picture, (512, 512, 3), per step.
+        video: Whether videos are written.
+        images: Whether png images are.
+        driver: Whether this process draws them.
+        without: What to leave out then, in words.
 
     Raises:
-        TrajectoryError: If the recording does not say with which seed the episode began.
+        MissingPackageError: If a package that writes them is not installed.
+        SimulationError: If there is no usable Vulkan driver.
     """
-    if columns.seed is None:
-        raise TrajectoryError(
-            f"episode {columns.episode_id} names no seed, without which its scene cannot be built;"
-            " export without video"
-        )
-    happening = moments(task, columns.seed, follow(columns.actions), len(columns) - 1)
-    next(happening)
-    eye, target = overview(task.layout) or task.viewpoint
-    cameras = Cameras(task.simulation, eye, target)
-    for t in range(len(columns)):
-        _put(task, columns.states, t)
-        yield cameras.take()[0]
-        next(happening, None)
+    if video and find_spec("imageio_ffmpeg") is None:
+        raise MissingPackageError(f"videos need imageio and ffmpeg: {INSTALL}")
+    if images and find_spec("PIL") is None:
+        raise MissingPackageError(f"png images need pillow: {INSTALL}")
+    if driver and (problem := vulkan_problem()):
+        raise SimulationError(f"no pictures can be drawn here: {problem}; export without {without}")
 
 
-def _put(task: MultiRobotTask, states: States, t: int) -> None:
-    current, recorded = task.get_state_dict(), state_row(states, t)
-    same = all(
-        np.array_equal(current[kind][name].numpy(), row)
-        for kind, rows in recorded.items()
-        for name, row in rows.items()
-    )
-    if not same:
-        task.set_state_dict(recorded)
+class Drawing:
+    """The pictures of an episode as it was recorded; iterating draws them, moment by moment.
 
-
-@dataclass
-class VideoFile:
-    """An mp4 file that is being written.
+    The actions are played, so that what is no part of a state is there too, and pictures are those
+    of ``obs_mode="rgb"`` to the last bit. Where the world does not follow the recording to the last
+    bit, it is put into the recorded state, from which links of robots are within a micrometre of
+    where they were.
 
     Attributes:
-        path: The file.
-        fps: Frames per second.
-        frames: Frames written so far.
+        exact: Whether the world followed the recording to the last bit, as far as it was drawn.
     """
 
-    path: Path
-    fps: int
-    frames: int = 0
+    def __init__(
+        self, task: MultiRobotTask, columns: Columns, shots: Shots, *, last: bool = False
+    ) -> None:
+        """Prepare to draw.
 
-    def __post_init__(self) -> None:
-        """Begin the file."""
-        import imageio.v2 as imageio
+        Args:
+            task: Made with ``render_mode="rgb_array"``.
+            columns: The episode, of T steps.
+            shots: What is drawn of every moment.
+            last: Whether the state after the last step is drawn as well: T + 1 moments, not T.
 
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        self._writer: Any = imageio.get_writer(
-            self.path,
-            fps=self.fps,
-            codec="libx264",
-            quality=None,
-            pixelformat=PIXEL_FORMAT,
-            output_params=ENCODING,
+        Raises:
+            TrajectoryError: If the recording does not say with which seed the episode began.
+        """
+        if columns.seed is None:
+            raise TrajectoryError(
+                f"episode {columns.episode_id} names no seed, without which its scene cannot be"
+                " built; export without pictures"
+            )
+        self._task, self._columns, self._shots, self._seed = task, columns, shots, columns.seed
+        self._moments = len(columns) + last
+        self.exact = True
+
+    def __len__(self) -> int:
+        """Return the number of moments."""
+        return self._moments
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Play and draw."""
+        task, actions = self._task, follow(self._columns.actions)
+        happening = moments(task, self._seed, actions, len(self) - 1)
+        next(happening)
+        take = _taker(self._shots, task.simulation)
+        for t in range(len(self)):
+            if not _is_in_state(task, self._columns.states, t):
+                task.set_state_dict(state_row(self._columns.states, t))
+                self.exact = False
+            yield take()
+            next(happening, None)
+
+
+def _is_in_state(task: MultiRobotTask, states: States, t: int) -> bool:
+    current = task.get_state_dict()
+    return all(
+        np.array_equal(current[kind][name].numpy(), row)
+        for kind, rows in state_row(states, t).items()
+        for name, row in rows.items()
+    )
+
+
+def _taker(shots: Shots, simulation: Simulation) -> Callable[[], Frame]:
+    """Return what takes all pictures of the present moment."""
+    channels = shots.channels
+    whole = Cameras(simulation, *shots.viewpoint) if shots.viewpoint else None
+    observers = Observers(simulation, shots.cameras, shots.textures) if shots.cameras else None
+
+    def take() -> Frame:
+        taken: dict[tuple[str, str], Picture] = {}
+        if whole is not None:
+            taken[OVERVIEW, RGB] = whole.take()[0]
+        if observers is not None:
+            for name, view in observers.look(0).items():
+                for texture, image in view.images.items():
+                    taken[name, texture] = np.ascontiguousarray(image)
+        return {
+            channel: _expected(taken[channel.camera, channel.texture], channel)
+            for channel in channels
+        }
+
+    return take
+
+
+def _expected(picture: Picture, channel: Channel) -> Picture:
+    if picture.shape != channel.shape or picture.dtype != channel.dtype:
+        raise SimulationError(
+            f"a picture of {channel.camera} has shape {picture.shape} and type {picture.dtype};"
+            f" {channel.shape} and {np.dtype(channel.dtype)} were asked for"
         )
-
-    @property
-    def seconds(self) -> float:
-        """Length of what is written so far (s)."""
-        return self.frames / self.fps
-
-    @property
-    def size(self) -> int:
-        """Bytes on disk; the last frames may be on their way."""
-        return self.path.stat().st_size if self.path.exists() else 0
-
-    def add(self, picture: NDArray[np.uint8]) -> None:
-        """Write one more frame."""
-        self._writer.append_data(picture)
-        self.frames += 1
-
-    def close(self) -> None:
-        """Finish the file; closing twice is allowed."""
-        self._writer.close()
+    return picture

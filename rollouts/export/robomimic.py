@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +12,15 @@ import numpy as np
 
 from robots.control_modes import plain_mode
 from rollouts.export.columns import POSE, ColumnReader, Columns, Floats
+from rollouts.export.robomimic_pictures import PictureArrays
+from rollouts.export.shots import Channel, Frame
 from rollouts.export.writer import DatasetWriter
+from tasks.engine.cameras import Size
 from tasks.engine.columns import robomimic_columns
 from tasks.episode import States
 
 FILE_NAME = "low_dim.hdf5"  # what robomimic calls observations without pictures
+FILE_WITH_PICTURES = "image.hdf5"  # and with them
 GYM = 2  # robomimic's number for environments made by gym
 VALIDATION_EVERY = 10  # the last of each ten demonstrations is for validation
 
@@ -24,27 +28,59 @@ VALIDATION_EVERY = 10  # the last of each ten demonstrations is for validation
 class RobomimicWriter(DatasetWriter):
     """Writes episodes one after the other; the file is complete when it is closed."""
 
-    def __init__(self, folder: Path, reader: ColumnReader, *, origin: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        reader: ColumnReader,
+        *,
+        origin: Mapping[str, Any],
+        channels: Sequence[Channel] = (),
+        size: Size | None = None,
+    ) -> None:
         """Begin the file.
 
         Args:
             folder: An empty folder.
             reader: Names the columns.
             origin: What is kept of where the episodes come from; anything that json can hold.
+            channels: Which pictures there are of every moment.
+            size: Width and height of cameras' pictures (pixels) if not their own.
+
+        Raises:
+            TaskError: If pictures of two cameras would be called the same.
         """
-        self._reader, self._origin = reader, origin
-        self._file = h5py.File(folder / FILE_NAME, "w")
+        self._reader, self._origin, self._size = reader, origin, size
+        self._pictures = PictureArrays(channels)
+        name = FILE_WITH_PICTURES if channels else FILE_NAME
+        self._file = h5py.File(folder / name, "w")
         self._data = self._file.create_group("data")
         self._total, self._solved = 0, list[str]()
 
-    def add(self, columns: Columns) -> None:
-        """Write one episode."""
+    def add(
+        self,
+        columns: Columns,
+        frames: Iterable[Frame] = (),
+        watch: Callable[[int], None] = lambda frame: None,
+        *,
+        text: str | None = None,
+    ) -> None:
+        """Write one episode.
+
+        Args:
+            columns: The episode, of T steps.
+            frames: The pictures of T + 1 moments, if the dataset has channels.
+            watch: Called with the number of moments whose pictures are written.
+            text: What is to be done in it, which robomimic gives to policies that are told so; None
+                to leave it out.
+        """
         name, steps = f"demo_{len(self._data)}", len(columns)
         demo = self._data.create_group(name)
         demo.attrs["num_samples"] = steps
         demo.attrs["episode_id"] = columns.episode_id
         if columns.seed is not None:
             demo.attrs["seed"] = columns.seed
+        if text is not None:
+            demo.attrs["ep_meta"] = json.dumps({"lang": text})
         states = flat_states(columns.states)
         demo["actions"] = columns.actions
         demo["states"] = states[:-1]
@@ -62,11 +98,16 @@ class RobomimicWriter(DatasetWriter):
         for key, rows in observed.items():
             demo[f"obs/{key}"] = rows[:-1]
             demo[f"next_obs/{key}"] = rows[1:]
+        self._pictures.add(demo, steps, frames, watch)
         if "state_layout" not in self._data.attrs:
             self._data.attrs["state_layout"] = json.dumps(state_layout(columns.states))
         if columns.success is not None and columns.success[-1]:
             self._solved.append(name)
         self._total += steps
+
+    def note(self, about: Mapping[str, Any]) -> None:
+        """Keep more about where the last episode comes from: numbers, flags or texts by name."""
+        self._data[f"demo_{len(self._data) - 1}"].attrs.update(about)
 
     def _let_go(self) -> None:
         self._file.close()
@@ -99,7 +140,8 @@ class RobomimicWriter(DatasetWriter):
                 "control_mode": plain_mode(task.control_mode),
                 "reward_mode": task.reward_mode,
                 "control_frequency": task.scenario.control_frequency,
-            },
+            }
+            | ({} if self._size is None else {"camera_size": list(self._size)}),
         }
 
     def _names(self) -> dict[str, Sequence[str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,8 @@ from numpy.typing import NDArray
 Statistics = dict[str, NDArray[np.float64]]
 
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
-LEVELS = 256  # of a channel of a picture
+LEVELS = 256  # of a colour of a picture
+DEPTH_LEVELS = 65536  # of a distance (mm)
 
 
 def describe_numbers(numbers: NDArray[np.generic]) -> Statistics:
@@ -37,16 +39,25 @@ def describe_numbers(numbers: NDArray[np.generic]) -> Statistics:
 class PictureStatistics:
     """Counts how often each level occurs in each channel; everything else follows from that."""
 
-    def __init__(self) -> None:
-        """Begin with no pictures."""
-        self.pictures = 0
-        self._counts = np.zeros((3, LEVELS), np.int64)
+    def __init__(
+        self, channels: int = 3, levels: int = LEVELS, largest: float = LEVELS - 1
+    ) -> None:
+        """Begin with no pictures.
 
-    def add(self, picture: NDArray[np.uint8]) -> None:
-        """Count a picture, (height, width, 3)."""
+        Args:
+            channels: Numbers of a pixel.
+            levels: Their values are 0 to this number - 1.
+            largest: The value that counts as 1 in what is described.
+        """
+        self.pictures, self._largest = 0, largest
+        self._counts = np.zeros((channels, levels), np.int64)
+
+    def add(self, picture: NDArray[np.integer[Any]]) -> None:
+        """Count a picture, (height, width, channels)."""
         self.pictures += 1
-        for counts, channel in zip(self._counts, np.moveaxis(picture, 2, 0), strict=True):
-            counts += np.bincount(channel.ravel(), minlength=LEVELS)
+        unsigned = picture.view(np.uint16) if picture.dtype == np.int16 else picture
+        for counts, channel in zip(self._counts, np.moveaxis(unsigned, 2, 0), strict=True):
+            counts += np.bincount(channel.ravel(), minlength=len(counts))
 
     def include(self, others: PictureStatistics) -> None:
         """Count the pictures that others counted, too."""
@@ -54,8 +65,11 @@ class PictureStatistics:
         self._counts += others._counts
 
     def describe(self) -> Statistics:
-        """Return statistics of each channel scaled to [0, 1], each (3, 1, 1), and ``count``."""
-        levels = np.arange(LEVELS) / (LEVELS - 1)
+        """Return statistics of each channel, each (channels, 1, 1), and ``count``.
+
+        Colours are scaled to [0, 1].
+        """
+        levels = np.arange(self._counts.shape[1]) / self._largest
         weights = self._counts / self._counts.sum(1, keepdims=True)
         mean = weights @ levels
         columns = {
@@ -68,7 +82,7 @@ class PictureStatistics:
                 for name, share in QUANTILES.items()
             },
         }
-        found = {name: column.reshape(3, 1, 1) for name, column in columns.items()}
+        found = {name: column.reshape(-1, 1, 1) for name, column in columns.items()}
         return found | {"count": np.array([self.pictures])}
 
 

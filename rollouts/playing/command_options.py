@@ -20,14 +20,20 @@ if TYPE_CHECKING:
 INTERRUPTED = 130  # exit code, as shells have it
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments that say who plays."""
+def add_arguments(parser: argparse.ArgumentParser, none_given: str = "1") -> None:
+    """Add the arguments that say who plays.
+
+    Args:
+        parser: Takes them.
+        none_given: How many processes play if the command does not say, in words.
+    """
     add = parser.add_argument
     add(
         "--workers",
         type=zero_or_more,
         metavar="W",
-        help="how many processes (1; with --ray, one for each CPU of the cluster); 0: this one",
+        help=f"how many processes ({none_given}; with --ray, one for each CPU of the cluster);"
+        " 0: this one",
     )
     add(
         "--episode-timeout",

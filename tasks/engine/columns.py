@@ -14,7 +14,8 @@ from simulation.maths import Floats, all_finite
 from tasks.engine.finite import NotFinite
 
 LEROBOT, FILMED, ROBOMIMIC = COLUMN_MODES = ("lerobot", "lerobot+video", "robomimic")
-CAMERA = "observation.images.overview"  # LeRobot's feature of an exported video
+OVERVIEW = "overview"  # the camera that shows all robots to people
+CAMERA = f"observation.images.{OVERVIEW}"  # LeRobot's feature of an exported video
 Viewpoint = tuple[Vector3, Vector3]
 """Where a camera is, and the point in the middle of its picture (m, world)."""
 
@@ -67,6 +68,20 @@ def robomimic_columns(
             if arm.partition(".")[0] == place
         }
     return columns | ({"object": bodies} if bodies.shape[1] else {})
+
+
+def picture_column(mode: str, camera: str, texture: str) -> str:
+    """Return what exports call the pictures of a camera.
+
+    Args:
+        mode: ``"lerobot"`` or ``"robomimic"``, which takes no dots where a network learns from it.
+        camera: Its name by place.
+        texture: ``"rgb"`` or ``"depth"``.
+    """
+    if mode == ROBOMIMIC:
+        kind = "image" if texture == "rgb" else texture
+        return f"{camera.replace('.', '_')}_{kind}"
+    return f"observation.images.{camera}" + ("" if texture == "rgb" else f"_{texture}")
 
 
 def overview(layout: Layout) -> Viewpoint | None:

@@ -51,6 +51,8 @@ class Declaration:
         rebuilds: Whether every reset builds the worlds anew, with a new `design`.
         viewpoint: Camera position and target of `render` (m, world).
         cameras: Cameras that observe, where images are asked for; those of the robots come after.
+        instruction: What is to be done, in a sentence, for robots that are told so; the beginning
+            of the class's docstring if empty.
         sensed: Which parts of `observe` a real robot knows, so that they are observed beside
             images; the others are privileged. ``*`` stands for any letters.
     """
@@ -75,6 +77,7 @@ class Declaration:
         (0.0, 0.0, 0.35),
     )
     cameras: ClassVar[tuple[Camera, ...]] = (Camera((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1)),)
+    instruction: ClassVar[str] = ""
     sensed: ClassVar[tuple[str, ...]] = ("*tcp_pose",)
 
     def __init_subclass__(cls, **kwargs: Any) -> None:

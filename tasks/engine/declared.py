@@ -162,6 +162,8 @@ def _check_numbers(cls: type[Declaration]) -> None:
 
 def _check_views(cls: type[Declaration]) -> None:
     task = cls.__name__
+    if not isinstance(cls.instruction, str):
+        raise TaskError(f"{task}.instruction is {shown(cls.instruction)}; a sentence is needed")
     if not isinstance(cls.cameras, (tuple, list)) or not all(
         isinstance(camera, Camera) for camera in cls.cameras
     ):

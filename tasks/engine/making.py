@@ -21,6 +21,7 @@ class ScenarioFields(TypedDict, total=False):
     render_mode: str | None
     headless: bool
     cameras: Sequence[Camera]
+    camera_size: tuple[int, int] | None
     simulator: str
     check_layout: bool
     bystanders: str | None

@@ -14,9 +14,18 @@ from numpy.typing import NDArray
 from layouts import Layout
 from robots import TaskError, unknown_name_message
 from simulation import Camera, Simulation, State
-from simulation.cameras import TEXTURES, RobotCamera
+from simulation.cameras import TEXTURES, AnyCamera, RobotCamera
 from simulation.maths import Array, Floats, all_finite
-from tasks.engine.columns import COLUMN_MODES, FILMED, ColumnObserver, Viewpoint
+from tasks.engine.cameras import Size, expect_apart, place_name, resized
+from tasks.engine.columns import (
+    COLUMN_MODES,
+    FILMED,
+    LEROBOT,
+    ROBOMIMIC,
+    ColumnObserver,
+    Viewpoint,
+    picture_column,
+)
 from tasks.engine.finite import NotFinite
 from tasks.native import controllers
 from tasks.native.format import native_joints, observation_keys
@@ -28,7 +37,20 @@ if TYPE_CHECKING:
 PLAIN_MODES = ("state", "state_dict", "none", *COLUMN_MODES)
 SHORT_MODES = {"rgbd": "rgb+depth"}
 STATE_FORMS = ("state", "state_dict")  # what may be joined to images
-OBS_MODES = (*PLAIN_MODES, "rgb", "rgbd", "rgb+depth+state", "depth", "rgb+segmentation")
+SEEN_COLUMNS = {  # what cameras add to the columns of exported datasets
+    f"{columns}+cameras{more}": (columns, textures)
+    for columns in (LEROBOT, ROBOMIMIC)
+    for more, textures in (("", ("rgb",)), ("+depth", ("rgb", "depth")))
+}
+OBS_MODES = (
+    *PLAIN_MODES,
+    *SEEN_COLUMNS,
+    "rgb",
+    "rgbd",
+    "rgb+depth+state",
+    "depth",
+    "rgb+segmentation",
+)
 """Examples of observation modes; images and a form of state are joined in any order."""
 
 JOINTS = "qpos", "qvel"  # that every robot observes of itself
@@ -45,7 +67,8 @@ class ObservationMode:
         flat: Whether everything but images is one flat part.
         privileged: Whether it includes what only a simulation knows.
         nothing: Whether nothing is observed.
-        columns: The mode, if it is the columns of exported datasets that are observed.
+        columns: Which of `COLUMN_MODES`, if it is the columns of exported datasets that are
+            observed.
     """
 
     textures: tuple[str, ...] = ()
@@ -71,6 +94,9 @@ def read_mode(name: str) -> ObservationMode:
     if name in PLAIN_MODES:
         columns = name if name in COLUMN_MODES else None
         return ObservationMode(flat=name == "state", nothing=name == "none", columns=columns)
+    if name in SEEN_COLUMNS:
+        columns, textures = SEEN_COLUMNS[name]
+        return ObservationMode(textures, columns=columns)
     parts = SHORT_MODES.get(name, name).split("+")
     for part in parts:
         if part not in (*TEXTURES, *STATE_FORMS):
@@ -89,13 +115,13 @@ def read_mode(name: str) -> ObservationMode:
     return ObservationMode(textures, flat="state" in forms, privileged=bool(forms))
 
 
-def cameras_of(layout: Layout, cameras: Iterable[Camera]) -> dict[str, Camera | RobotCamera]:
+def cameras_of(layout: Layout, cameras: Iterable[Camera]) -> dict[str, AnyCamera]:
     """Return every camera of a task under native's name: its own first, then each robot's.
 
     Raises:
         TaskError: If two have the same name.
     """
-    found: dict[str, Camera | RobotCamera] = {}
+    found: dict[str, AnyCamera] = {}
     for camera in cameras:
         if camera.name in found:
             raise TaskError(f"two cameras are called {camera.name!r}; names must differ")
@@ -127,6 +153,7 @@ class Observer:
         cameras: Iterable[Camera],
         sensed: Sequence[str],
         viewpoint: Viewpoint,
+        size: Size | None = None,
     ) -> None:
         """Remember how to observe.
 
@@ -136,17 +163,21 @@ class Observer:
             cameras: The task's own cameras.
             sensed: See `tasks.MultiRobotTask`.
             viewpoint: From where people see the task.
+            size: Width and height of all pictures (pixels); None: each camera's own.
 
         Raises:
             TaskError: If images are asked for and there is no camera, or two have the same name.
         """
         self.mode = mode
-        self.cameras = cameras_of(layout, cameras) if mode.textures else {}
+        found = cameras_of(layout, cameras) if mode.textures else {}
+        self.cameras = {name: resized(camera, size) for name, camera in found.items()}
         if mode.textures and not self.cameras:
             raise TaskError("there is no camera: the task declares none, nor do its robots")
         self._keys, self._robots, self._sensed = observation_keys(layout), tuple(layout), sensed
         self._rig: _CameraRig | None = None
         self._columns = ColumnObserver(layout, mode.columns, viewpoint) if mode.columns else None
+        if mode.columns:
+            expect_apart(name for *_, name in self._picture_columns())
 
     def observe(
         self,
@@ -170,16 +201,18 @@ class Observer:
         if self.mode.nothing:
             return {}
         if self._columns:
-            return self._columns.observe(simulation, state)
+            observed = self._columns.observe(simulation, state)
+            seen = self._look(simulation)["sensor_data"] if self.cameras else {}
+            for camera, texture, name in self._picture_columns():
+                observed[name] = seen[camera][texture]
+            return observed
         if not self.mode.privileged:
             parts = self._sensible(parts)
         if noisy is not None:
             parts = {name: noisy(name, values) for name, values in parts.items()}
         if not self.mode.textures:
             return self._state(simulation, state, parts, noisy)
-        if self._rig is None:
-            self._rig = _CameraRig(simulation, self.cameras, self.mode.textures)
-        images = self._rig.look()
+        images = self._look(simulation)
         seen = self._state(simulation, state, parts, noisy)
         return {**images, "state": seen} if self.mode.flat else {**seen, **images}
 
@@ -232,6 +265,23 @@ class Observer:
         return slices
 
     # -- inside ------------------------------------------------------------------------------
+
+    def _look(self, simulation: Simulation) -> dict[str, Any]:
+        if self._rig is None:
+            self._rig = _CameraRig(simulation, self.cameras, self.mode.textures)
+        return self._rig.look()
+
+    def _picture_columns(self) -> list[tuple[str, str, str]]:
+        """Return camera, texture and the name of its column, of each picture of an export."""
+        return [
+            (
+                name,
+                texture,
+                picture_column(str(self.mode.columns), place_name(name, camera), texture),
+            )
+            for name, camera in self.cameras.items()
+            for texture in self.mode.textures
+        ]
 
     def _state(
         self,
@@ -297,7 +347,7 @@ class _CameraRig:
     def __init__(
         self,
         simulation: Simulation,
-        cameras: Mapping[str, Camera | RobotCamera],
+        cameras: Mapping[str, AnyCamera],
         textures: Sequence[str],
     ) -> None:
         from simulation.rendering.pictures import Observers  # loaded with the first picture

@@ -15,6 +15,7 @@ from robots.common.bounds import checked_choice, checked_flag, checked_whole, sh
 from simulation import SAPIEN_DEFAULTS, Camera, PhysicsSettings
 from simulation.physics import substeps
 from tasks.engine.bystanders import BYSTANDERS
+from tasks.engine.cameras import checked_size
 from tasks.engine.display import scenario_html, scenario_text
 from tasks.engine.observation import read_mode
 from tasks.varying.randomization import Randomization
@@ -38,7 +39,9 @@ class Scenario:
             ``state_dict``, without which images come only with what a real robot senses.
             ``"lerobot"`` and ``"robomimic"`` give the columns that exports in these formats hold,
             under their names, so that a policy trained on one plays here as it is;
-            ``"lerobot+video"`` gives the pictures of exports with video, too.
+            ``"lerobot+video"`` gives the pictures of exports with video, too; ``"lerobot+cameras"``
+            and ``"robomimic+cameras"`` those of all cameras, and ``+depth`` after that what these
+            tell of depth.
         reward_mode: One of the task's modes; None takes its first.
         control_mode: One of `robots.CONTROL_MODES`, or of the robots' own; or a mapping from arms
             to modes. An arm is a robot, or a limb of one. Arms that are left out, and all if this
@@ -50,6 +53,8 @@ class Scenario:
         headless: No window is opened; the only choice.
         cameras: Cameras to observe with, in the place of the task's own; empty takes those. Those
             of the robots come after.
+        camera_size: Width and height (pixels) of what all these cameras see; None: each camera's
+            own.
         simulator: ``"sapien3"``.
         bystanders: What the layout's robots do that have no place in the task: ``"hold"`` still and
             take no action number, or ``"act"``, with action numbers of their own. None refuses
@@ -71,6 +76,7 @@ class Scenario:
     render_mode: str | None = None
     headless: bool = True
     cameras: Sequence[Camera] = field(default_factory=list[Camera])
+    camera_size: tuple[int, int] | None = None
     simulator: str = "sapien3"
     bystanders: str | None = None
     randomization: Randomization | None = None
@@ -137,6 +143,8 @@ class Scenario:
             checked_whole("max_episode_steps", self.max_episode_steps, 1, most, TaskError)
         substeps(self.physics or SAPIEN_DEFAULTS, self.control_frequency)
         _check_cameras(self.cameras)
+        if self.camera_size is not None:
+            checked_size("camera_size", self.camera_size)
 
 
 def check_control_mode(layout: Layout, mode: object) -> None:

@@ -114,7 +114,8 @@ class MultiRobotTask(Declaration, Varied, Remade):
         self._reader = ActionReader(self.layout, self.num_envs)
         mode = read_mode(scenario.obs_mode)
         cameras = scenario.cameras or self.cameras if mode.textures else ()
-        self.observer = Observer(self.layout, mode, cameras, self.sensed, self.viewpoint)
+        size = scenario.camera_size
+        self.observer = Observer(self.layout, mode, cameras, self.sensed, self.viewpoint, size)
         first = self.first_seed if first_seed is None else first_seed
         self._rngs = [EpisodeRandom(first + i) for i in range(self.num_envs)]
         self._max_reward = np.array(self.max_reward, np.float32)

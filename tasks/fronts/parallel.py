@@ -16,7 +16,7 @@ from robots import TaskError, UnknownNameError
 from robots.common.bounds import shown
 from tasks.engine.arguments import checked_seeds, own_options
 from tasks.engine.columns import COLUMN_MODES
-from tasks.engine.observation import space_of
+from tasks.engine.observation import SEEN_COLUMNS, space_of
 from tasks.engine.remade import Remade
 from tasks.fronts.numbers import info_row, row, stepper
 from tasks.language.randomness import FirstSeeds
@@ -71,7 +71,8 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         """Make the task; see `tasks.parallel_env`."""
         if "num_envs" in fields:
             raise TaskError("parallel_env takes no num_envs: it is one environment")
-        if (mode := fields.get("obs_mode")) in ("none", *COLUMN_MODES):
+        mode = fields.get("obs_mode")
+        if mode in ("none", *COLUMN_MODES, *SEEN_COLUMNS):
             raise TaskError(f"parallel_env takes no obs_mode={mode!r}; choices: 'state', 'rgb', …")
         self.task = make(task_id, render_mode=render_mode, **fields)
         self.render_mode = render_mode

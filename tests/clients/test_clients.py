@@ -12,10 +12,11 @@ from tests.clients.environments import ROOT, new_environment, play
 HERE = Path(__file__).parent
 CLIENTS = ("cleanrl", "minari", "rllib", "skrl", "supersuit", "tianshou", "torchrl")
 LARGE = {  # that bring gigabytes of CUDA, and are not installed for a test
-    "lerobot": "LeRobot needs Python 3.12, 'lerobot[dataset]' by constraints/lerobot.txt and"
-    " integrations/lerobot_env_robot_layouts",
+    "lerobot": "LeRobot needs Python 3.12, 'lerobot[dataset]' by constraints/lerobot.txt,"
+    " imageio-ffmpeg and integrations/lerobot_env_robot_layouts",
     "robomimic": "robomimic needs torchvision, which fits no CPU build of torch from the index",
 }
+PROGRAMS = [f"{client}{part}" for client in LARGE for part in ("", "_cameras")]
 
 pytestmark = [
     pytest.mark.long,
@@ -29,17 +30,18 @@ def test_a_client(client, tmp_path):
     play(python, HERE / "programs" / f"{client}_program.py", tmp_path / "out")
 
 
-@pytest.mark.parametrize("client", LARGE)
-def test_a_large_client(client, tmp_path):
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_a_large_client(program, tmp_path):
+    client = program.partition("_")[0]
     python = os.environ.get(variable := f"{client.upper()}_PYTHON")
     if python is None:
         pytest.skip(f"{LARGE[client]}; set {variable} to a Python that has it")
-    play(Path(python), HERE / "programs" / f"{client}_program.py", tmp_path / "out")
+    play(Path(python), HERE / "programs" / f"{program}_program.py", tmp_path / "out")
 
 
 def test_every_program_is_run():
     assert {path.name for path in (HERE / "programs").glob("*_program.py")} == {
-        f"{client}_program.py" for client in (*CLIENTS, *LARGE)
+        f"{client}_program.py" for client in (*CLIENTS, *PROGRAMS)
     }
 
 

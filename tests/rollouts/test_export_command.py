@@ -21,6 +21,7 @@ from robots.descriptor import ActionSplit
 from rollouts.__main__ import main
 from rollouts.export.columns import ColumnReader
 from rollouts.export.dataset import Export, export
+from rollouts.export.shots import choose_shots
 from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
 from rollouts.recording.recorder import Recorder
 from tasks.episode import play
@@ -218,10 +219,10 @@ def test_without_pyarrow_the_extra_is_named(recording, tmp_path, capsys, monkeyp
     assert run(recording, "--format", "robomimic", "--out", tmp_path / "out") == 0
 
 
-@pytest.mark.parametrize("words", [("--video",), ("--fps", "20")])
+@pytest.mark.parametrize("words", [("--video",), ("--images",), ("--fps", "20")])
 def test_options_of_another_format_are_refused(recording, tmp_path, capsys, words):
     assert run(recording, "--format", "robomimic", "--out", tmp_path / "out", *words) == 1
-    expected = f"a robomimic dataset has no {words[0][2:]} here"
+    expected = f"a robomimic dataset has no {words[0][2:]} here; leave it out, or choose"
     assert expected in capsys.readouterr().err
 
 
@@ -254,14 +255,15 @@ def test_pictures_follow_the_recorded_states(recording, monkeypatch):
     with TrajectoryFile(recording) as file:
         task = tasks.make(TASK)
         columns = ColumnReader(task).read(file[2])
-        shown = [
-            task.get_state_dict()["actors"]["Tee"].numpy()[0] for _ in pictures.draw(task, columns)
-        ]
+        shots = choose_shots(task, ["overview"])
+        drawing = pictures.Drawing(task, columns, shots)
+        shown = [task.get_state_dict()["actors"]["Tee"].numpy()[0] for _ in drawing]
+        assert not drawing.exact
         recorded = columns.states["actors"]["Tee"][:-1]
         np.testing.assert_array_equal(shown[0], recorded[0])
         np.testing.assert_allclose(np.array(shown)[:, :7], recorded[:, :7], atol=1e-6)
         with pytest.raises(TrajectoryError, match="episode 2 names no seed"):
-            next(pictures.draw(task, dataclasses.replace(columns, seed=None)))
+            pictures.Drawing(task, dataclasses.replace(columns, seed=None), shots)
 
 
 def test_pictures_of_an_exact_replay_need_no_help(recording, monkeypatch):
@@ -269,13 +271,17 @@ def test_pictures_of_an_exact_replay_need_no_help(recording, monkeypatch):
     with TrajectoryFile(recording) as file:
         task = tasks.make(TASK)
         monkeypatch.setattr(task, "set_state_dict", lambda state: pytest.fail("put into a state"))
-        assert len(list(pictures.draw(task, ColumnReader(task).read(file[2])))) == 4
+        columns = ColumnReader(task).read(file[2])
+        drawing = pictures.Drawing(task, columns, choose_shots(task, ["overview"]))
+        assert len(list(drawing)) == 4
+        assert drawing.exact
 
 
 UNFINISHED = """
 import sys, time
 from robots.common.commands import start
 from rollouts.export.dataset import Export, export
+from rollouts.export.shots import choose_shots
 def main():
     def wait(done, total):
         print("writing", flush=True)

@@ -11,7 +11,8 @@ from robots import TaskError
 from rollouts import evaluate
 from rollouts.export.columns import ColumnReader
 from rollouts.export.dataset import Export, export
-from rollouts.export.pictures import draw
+from rollouts.export.pictures import Drawing
+from rollouts.export.shots import choose_shots
 from rollouts.reading.recorded_task import task_for
 from rollouts.reading.trajectory import TrajectoryFile
 from simulation.rendering.pictures import vulkan_problem
@@ -90,7 +91,10 @@ def test_the_pictures_that_an_export_films(task_id, tmp_path):
         for trajectory in file:
             columns = ColumnReader(drawn).read(trajectory)
             obs, _ = task.reset(seed=trajectory.seed, options=REBUILT)
-            for picture, action in zip(draw(drawn, columns), trajectory.actions, strict=True):
+            shots = choose_shots(drawn, ["overview"])
+            frames = Drawing(drawn, columns, shots)
+            for frame, action in zip(frames, trajectory.actions, strict=True):
+                (picture,) = frame.values()
                 assert picture.std() > 10
                 np.testing.assert_array_equal(obs["observation.images.overview"][0], picture)
                 obs, *_ = task.step(action[None])

@@ -259,7 +259,8 @@ MISTAKES = (
         {},
         (
             "unknown obs_mode 'states'. Did you mean 'state'? Choices: state, state_dict, none,"
-            " lerobot, lerobot+video, robomimic, rgb, rgbd, rgb+depth+state, depth,"
+            " lerobot, lerobot+video, robomimic, lerobot+cameras, lerobot+cameras+depth,"
+            " robomimic+cameras, robomimic+cameras+depth, rgb, rgbd, rgb+depth+state, depth,"
             " rgb+segmentation. Besides, any of rgb, depth, segmentation, position are joined by"
             " '+', and one of state, state_dict to them"
         ),

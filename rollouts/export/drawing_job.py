@@ -1,0 +1,173 @@
+"""Draws the episodes of a recording in workers, and hands their pictures out in its order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from layouts import Layout
+from layouts.placement import RobotLike
+from rollouts.export.columns import ColumnReader
+from rollouts.export.pictures import Drawing
+from rollouts.export.shots import Channel, Frame, Picture, Shots
+from rollouts.playing.events import Event
+from rollouts.playing.executor import Executor, modules_of, play_all, report
+from rollouts.reading.recorded_task import task_for
+from rollouts.reading.recording import open_trajectories
+from tasks import MultiRobotTask
+
+
+@dataclass(frozen=True)
+class DrawnEpisode:
+    """The pictures of an episode; iterating gives them moment by moment.
+
+    Attributes:
+        pictures: Channel → its pictures, (moments, height, width, k).
+        exact: See `rollouts.export.pictures.Drawing`.
+    """
+
+    pictures: Mapping[Channel, Picture]
+    exact: bool
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Give all pictures of one moment after the other."""
+        for moment in zip(*self.pictures.values(), strict=True):
+            yield dict(zip(self.pictures, moment, strict=True))
+
+
+@dataclass(frozen=True)
+class DrawingJob:
+    """Makes what draws the episodes of a recording, which are numbered as in the file.
+
+    Attributes:
+        recording: The h5 file, where workers can read it.
+        task: Class of the task that was recorded; loading it imports its module.
+        shots: What is drawn of every moment.
+        last: Whether the state after the last step is drawn as well.
+        layout: Where its robots stood, where the recording cannot say it.
+        robots: Which robots these were, where the recording cannot say it.
+    """
+
+    recording: Path
+    task: type[MultiRobotTask]
+    shots: Shots
+    last: bool
+    layout: Layout | None = None
+    robots: Mapping[str, RobotLike] | None = None
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """The modules that a worker on another machine may need."""
+        return modules_of(self.task)
+
+    def __call__(self) -> Callable[[int], DrawnEpisode]:
+        """Make the task in a worker, and return what draws an episode by its number.
+
+        Raises:
+            RobotLayoutsError: If it cannot be made there, or the recording cannot be read.
+        """
+        torch.set_num_threads(1)  # the tensors are small, and other workers want the cores
+        return _Drawer(self)
+
+
+class _Drawer:
+    """Draws episodes in one world, which is built anew for each."""
+
+    def __init__(self, job: DrawingJob) -> None:
+        self._job, self._file = job, open_trajectories(job.recording)
+        self._task = task_for(self._file, layout=job.layout, robots=job.robots, pictures=True)
+        self._reader = ColumnReader(self._task)
+
+    def __call__(self, number: int) -> DrawnEpisode:
+        """Draw an episode."""
+        job, columns = self._job, self._reader.read(self._file[number])
+        drawing = Drawing(self._task, columns, job.shots, last=job.last)
+        pictures = {
+            channel: np.empty((len(drawing), *channel.shape), channel.dtype)
+            for channel in job.shots.channels
+        }
+        for moment, frame in enumerate(drawing):
+            for channel, picture in frame.items():
+                pictures[channel][moment] = picture
+            report((moment + 1) / len(drawing))
+        return DrawnEpisode(pictures, drawing.exact)
+
+    def close(self) -> None:
+        """Let the worlds and the file go."""
+        self._task.close()
+        self._file.close()
+
+
+@dataclass
+class DrawingCrew:
+    """Workers that draw some episodes of a recording; what comes out of turn waits on the disk.
+
+    Attributes:
+        job: What they do.
+        executor: Who they are.
+        numbers: Which episodes, in the order in which they are taken.
+        folder: A folder of the dataset's, where those wait that come out of turn; it is left empty.
+        watch: Called with the episodes drawn so far, fractions included.
+        tell: Called with what happens to workers, in words.
+    """
+
+    job: DrawingJob
+    executor: Executor
+    numbers: Sequence[int]
+    folder: Path
+    watch: Callable[[float], None]
+    tell: Callable[[str], None]
+    _parts: dict[int, float] = field(default_factory=dict[int, float])
+
+    def episodes(self) -> Generator[DrawnEpisode]:
+        """Give the episodes in their order.
+
+        Raises:
+            RobotLayoutsError: If one cannot be drawn, or workers died of it again and again.
+        """
+        turn = iter(self.numbers)
+        wanted = next(turn, None)
+        with closing(play_all(self.executor, self.job, self.numbers)) as events:
+            for event in events:
+                self._follow(event)
+                if event.result is None or event.seed is None:
+                    continue
+                if event.seed != wanted:
+                    self._put_aside(event.seed, event.result)
+                    continue
+                yield event.result
+                wanted = next(turn, None)
+                while wanted is not None and self._waiting(wanted).exists():
+                    yield self._take_back(wanted)
+                    wanted = next(turn, None)
+
+    def _follow(self, event: Event) -> None:
+        if event.error is not None:
+            raise event.error
+        if event.died is not None:
+            at = "" if event.seed is None else f" at episode {event.seed}"
+            self.tell(f"{event.died}{at}; another takes its place")
+        elif event.seed is None:
+            self.tell(str(event.note))
+        else:
+            self._parts[event.seed] = 1.0 if event.result is not None else event.note
+            self.watch(sum(self._parts.values()))
+
+    def _waiting(self, number: int) -> Path:
+        return self.folder / f".drawn_{number}.npz"
+
+    def _put_aside(self, number: int, episode: DrawnEpisode) -> None:
+        pictures = {str(i): pictures for i, pictures in enumerate(episode.pictures.values())}
+        np.savez(self._waiting(number), exact=episode.exact, **pictures)  # pyright: ignore[reportArgumentType]
+
+    def _take_back(self, number: int) -> DrawnEpisode:
+        with np.load(self._waiting(number)) as file:
+            pictures = {c: file[str(i)] for i, c in enumerate(self.job.shots.channels)}
+            episode = DrawnEpisode(pictures, bool(file["exact"]))
+        self._waiting(number).unlink()
+        return episode

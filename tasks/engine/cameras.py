@@ -1,0 +1,78 @@
+"""What cameras are called by place, and cameras that take pictures of another size."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from robots import TaskError
+from robots.common.bounds import checked_whole, shown
+from simulation.cameras import AnyCamera, RobotCamera
+
+Size = tuple[int, int]
+"""Width and height of a picture (pixels)."""
+
+_MOST_PIXELS = 16384  # of a side, as of `simulation.Camera`
+
+
+def place_name(name: str, camera: AnyCamera) -> str:
+    """Return what a camera is called by place: ``base_camera``, ``left.hand_camera``.
+
+    Args:
+        name: Its name in observations, which is native's.
+        camera: The camera.
+    """
+    return f"{camera.robot}.{camera.mount.name}" if isinstance(camera, RobotCamera) else name
+
+
+def resized(camera: AnyCamera, size: Size | None) -> AnyCamera:
+    """Return a camera that takes pictures of another size; its view is as high as before."""
+    if size is None:
+        return camera
+    width, height = size
+    if isinstance(camera, RobotCamera):
+        return replace(camera, mount=replace(camera.mount, width=width, height=height))
+    return replace(camera, width=width, height=height)
+
+
+def checked_size(what: str, value: Any) -> Size:
+    """Return a size of pictures.
+
+    Raises:
+        TaskError: If it is none.
+    """
+    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 2:
+        raise TaskError(f"{what} is {shown(value)}; width and height (pixels) are needed")
+    width, height = (checked_whole(what, side, 1, _MOST_PIXELS, TaskError) for side in value)
+    return width, height
+
+
+def by_place(cameras: Mapping[str, AnyCamera]) -> dict[str, AnyCamera]:
+    """Return cameras by their names by place, in the same order.
+
+    Args:
+        cameras: Camera by its name in observations.
+
+    Raises:
+        TaskError: If two are called the same then.
+    """
+    names = [place_name(name, camera) for name, camera in cameras.items()]
+    expect_apart(names)
+    return dict(zip(names, cameras.values(), strict=True))
+
+
+def expect_apart(names: Iterable[str]) -> None:
+    """Refuse names of which two are the same.
+
+    Raises:
+        TaskError: If so.
+    """
+    seen = set[str]()
+    for name in names:
+        if name in seen:
+            raise TaskError(
+                f"pictures of two cameras would both be called {name!r}; give one of the cameras"
+                " another name"
+            )
+        seen.add(name)
