@@ -7,8 +7,10 @@ else (no legs, wheels, heads or slides), of the size and number of joints that m
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
 
 from measurements.robots.sources import Robot, find_robots, package_folder
 from robots import RobotDescriptor, RobotLayoutsError
@@ -36,18 +38,27 @@ class Arm:
 
 @lru_cache(maxsize=4)
 def arms_of(packages: tuple[str, ...]) -> tuple[Arm, ...]:
-    """Return the arms of installed packages, the first of each name in each package, sorted.
+    """Return the arms of installed packages; see `arms_in`.
 
     Raises:
         MissingPackageError: If a package is not installed.
         UnknownNameError: If it is none in which robots are known to lie.
     """
+    return tuple(arms_in([(name, package_folder(name)) for name in packages]))
+
+
+def arms_in(folders: Iterable[tuple[str, Path]]) -> list[Arm]:
+    """Return the arms whose URDFs lie in folders, the first of each name in each, sorted by path.
+
+    Args:
+        folders: What each is called, and where it is.
+    """
     found: dict[tuple[str, str], Arm] = {}
-    for file in find_robots([(name, package_folder(name)) for name in packages]):
+    for file in find_robots(folders):
         robot = _arm(file)
         if robot is not None:
             found.setdefault((file.source, robot.name), Arm(file.key, robot))
-    return tuple(found.values())
+    return list(found.values())
 
 
 def _arm(file: Robot) -> RobotDescriptor | None:

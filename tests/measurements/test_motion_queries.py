@@ -6,12 +6,19 @@ from pathlib import Path
 
 import numpy as np
 
+from layouts import face_to_face
 from measurements.motion import queries
 from measurements.motion.__main__ import main
 from measurements.motion.answers import ALONE, markdown, page
-from measurements.motion.cells import FLOOR, RandomPostures, random_cell
+from measurements.motion.arms import arms_in
+from measurements.motion.cells import FLOOR, LARGE_REACH, RandomPostures, random_cell
+from measurements.motion.execution import Stage
+from motion import Motion
 from motion.cell import Cell
+from robots import RobotRegistry
+from tests.three_links import arm, save
 
+LEANING = np.array([0, 0.9, 0, 0.6, 0, 0, 0, 0, 0])  # rad; of a Panda, from its start
 PAGE = Path(__file__).parents[2] / "docs/planning.md"
 LINE = {
     "cell": 0,
@@ -34,6 +41,35 @@ def test_a_seed_gives_one_cell_with_one_row_of_postures():
     first, second = (next(RandomPostures(cell, 0.01).drawn((1, 2, 3))) for _ in range(2))
     assert np.array_equal(first, second)
     assert cell.checker(clearance=0.01).free(first[None])[0]
+
+
+def test_arms_come_from_urdfs_of_one_arm(tmp_path):
+    save(tmp_path, arm(), "three_joints.urdf")
+    folder = RobotRegistry.load("so100").urdf.locate().parent
+    (found,) = arms_in([("toys", tmp_path), ("shop", folder)])
+    assert found.source == "shop/so100.urdf"
+    assert found.robot.name.endswith("_urdf")
+    assert len(found.robot.arm_joints) == 5
+    layout = random_cell(4, 4, [found.robot])
+    assert layout == random_cell(4, 4, [found.robot])
+    assert {p.robot.reach < LARGE_REACH for p in layout.values()} == {True}
+    assert 0 < sum(p.robot == found.robot for p in layout.values()) < 4
+
+
+def test_a_motion_on_which_robots_meet_is_seen_to_touch():
+    layout = face_to_face({"left": "panda", "right": "panda"}, spacing=0.9)
+    stage = Stage(layout, "pd_joint_pos")
+    ahead = {name: p.start_qpos + LEANING for name, p in layout.items()}
+    times, share = np.array([0.0, 1.0]), np.array([0.0, 1.0])[:, None]
+    meeting = {n: p.start_qpos + share * (ahead[n] - p.start_qpos) for n, p in layout.items()}
+    still = {n: np.zeros((2, p.robot.dof)) for n, p in layout.items()}
+    seen = stage.carry_out(Motion(layout, times, meeting, still))
+    assert {"left", "right"} == {part.split(".")[0] for part in seen["touching"][0].split(", ")}
+    begun = {n: np.tile(p.start_qpos, (2, 1)) for n, p in layout.items()}
+    seen = stage.carry_out(Motion(layout, times, begun, still))
+    assert (seen["executed"], seen["touching"]) == (True, [])
+    assert seen["stray"] < 0.01
+    stage.close()
 
 
 def test_a_record_goes_on_where_it_stopped(tmp_path, capsys):
