@@ -21,6 +21,7 @@ COLUMNS = (
     "arms",
     "queries",
     "solved",
+    "solved, of those with a way alone",
     "in time",
     "median s",
     "90 % s",
@@ -71,11 +72,12 @@ def page(shown: Mapping[str, Any]) -> Iterator[str]:
     yield "counts motions in which links of two robots touched in any step of physics, and the"
     yield "column beside it says how far any link was from where the plan had it."
     yield ""
-    yield "*An arm finds no way even alone*: the planner says so; some random goals lie in pockets"
-    yield "from which no way leads out. *Wrongly said to be infeasible*: a goal that stands for a"
-    yield "free posture is said to be out of reach or in collision. *Infeasible, recognised*: two"
-    yield "more queries per cell, in which one arm's goal is out of its reach or inside something,"
-    yield "and how many of them were refused for that reason."
+    yield "*An arm finds no way even alone*: the planner says so; some random postures lie in"
+    yield "pockets, such as beyond the floor for an upper arm that turns half way round at most."
+    yield "*Wrongly said to be infeasible*: a goal that stands for a free posture is said to be out"
+    yield "of reach or in collision. *Infeasible, recognised*: two more queries per cell, in which"
+    yield "one arm's goal is out of its reach or inside something, and how many of them were refused"
+    yield "for that reason."
     yield ""
     yield f"Made with {_listed(shown['versions'])}."
     yield ""
@@ -113,10 +115,12 @@ def _row(arms: int, every: Sequence[Seen]) -> str:
     clearances = [s["clearance"] for s in checked if s["clearance"] is not None]
     tried = [s for s in solved if "executed" in s]
     strays = [s["stray"] for s in tried if s["executed"]]
+    alone = sum(ALONE in s.get("message", "") for s in seen)
     numbers = [
         arms,
         len(seen),
         _share(len(solved), len(seen)),
+        _share(len(solved), len(seen) - alone),
         _share(in_time, len(seen)),
         *(f"{np.quantile(seconds, q):.2f}" for q in (0.5, 0.9, 0.99, 1.0)),
         _share(sum(s["certified"] for s in checked), len(checked)),
@@ -125,7 +129,7 @@ def _row(arms: int, every: Sequence[Seen]) -> str:
         f"{sum(s['executed'] for s in tried)} of {len(tried)}",
         sum(bool(s["touching"]) for s in tried),
         f"{1e3 * max(strays):.1f}" if strays else "",
-        sum(ALONE in s.get("message", "") for s in seen),
+        alone,
         sum(s.get("reason") in REASONS for s in seen),
         f"{sum(s.get('reason') == INFEASIBLE[s['goal']] for s in hopeless)} of {len(hopeless)}",
     ]

@@ -90,8 +90,9 @@ class RandomPostures:
     """Postures of all arms of a cell in which nothing comes near anything.
 
     One arm after the other is drawn until it keeps clear of those before: joints anywhere within
-    their limits, but not more than half a turn from where the layout starts them, as arms that
-    stand on a floor cannot turn all the way round.
+    their limits (those that turn without end: half a turn to each side of zero), but not more than
+    half a turn from where the layout starts them, as arms that stand on a floor cannot turn all the
+    way round.
     """
 
     def __init__(self, cell: Cell, clearance: float) -> None:
@@ -102,9 +103,8 @@ class RandomPostures:
             clearance: How near robots may come to each other (m).
         """
         self._cell, self._whole = cell, cell.checker()
-        self._limits = np.clip(
-            cell.limits, cell.start[:, None] - np.pi, cell.start[:, None] + np.pi
-        )
+        limits = np.nan_to_num(cell.limits, posinf=np.pi, neginf=-np.pi)
+        self._limits = np.clip(limits, cell.start[:, None] - np.pi, cell.start[:, None] + np.pi)
         self._checkers: dict[str, Checker] = {}
         for i, name in enumerate(cell.robots):
             later = [(name, other) for other in cell.robots[i + 1 :]]

@@ -84,7 +84,7 @@ def test_a_record_goes_on_where_it_stopped(tmp_path, capsys):
     assert (asked["executed"], asked["touching"]) == (True, [])
     assert asked["sources"] == ["catalogue", "catalogue"]
     row = capsys.readouterr().out.splitlines()[2]
-    assert row.startswith("| 2 | 2 | 100.0% | 50.0% |")
+    assert row.startswith("| 2 | 2 | 100.0% | 100.0% | 50.0% |")
     assert row.endswith("| 2 of 2 |")
 
 
@@ -110,8 +110,8 @@ def test_the_table_counts_every_miss():
     ]
     row = list(markdown(record))[-1]
     assert row == (
-        "| 2 | 5 | 60.0% | 60.0% | 0.10 | 0.22 | 0.29 | 0.30 | 100.0% | 0 | 12.3 | 2 of 3 | 1"
-        " | 2.1 | 1 | 1 | 1 of 2 |"
+        "| 2 | 5 | 60.0% | 75.0% | 60.0% | 0.10 | 0.22 | 0.29 | 0.30 | 100.0% | 0 | 12.3"
+        " | 2 of 3 | 1 | 2.1 | 1 | 1 | 1 of 2 |"
     )
 
 
