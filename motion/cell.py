@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kinematics.rotations import inverse_pose
-from motion.bodies import Bodies
+from layouts import Layout
+from layouts.validation.arguments import Rectangle
+from motion.bodies import Bodies, checked_table
 from motion.collisions import Checker
 from motion.obstacles import Held, Obstacle
 from robots import LayoutError, UnknownNameError
@@ -94,6 +97,23 @@ class Cell(Bodies):
         one, other = ({self.solids[i].owner, self.solids[i].name} for i in pair)
         first, second = names
         return (first in one and second in other) or (second in one and first in other)
+
+
+def cell_of(
+    layout: Layout,
+    obstacles: Iterable[Obstacle] = (),
+    held: Iterable[Held] = (),
+    table: Rectangle | None = None,
+) -> Cell:
+    """Return a cell; the last ones of robots and tables alone are kept."""
+    if obstacles or held or not isinstance(layout, Layout):
+        return Cell(layout, obstacles, held, table)
+    return _plain_cell(layout, checked_table(table))
+
+
+@lru_cache(maxsize=8)
+def _plain_cell(layout: Layout, table: Rectangle | None) -> Cell:
+    return Cell(layout, table=table)
 
 
 def _distance(what: str, value: float) -> float:

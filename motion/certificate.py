@@ -13,7 +13,7 @@ from layouts import Layout
 from layouts.validation.arguments import Rectangle
 from layouts.validation.findings import length_text
 from motion import timing
-from motion.cell import Cell
+from motion.cell import Cell, cell_of
 from motion.collisions import Checker
 from motion.curves import hermite, hermite_slopes
 
@@ -115,7 +115,7 @@ def certify(
     turn: float,
 ) -> Certificate:
     """Check a motion; see `motion.Motion.certify`."""
-    cell = Cell(layout, obstacles, held, table)
+    cell = cell_of(layout, obstacles, held, table)
     curve = _Curve(
         times,
         np.concatenate([positions[name] for name in cell.robots], axis=1),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING
@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 
 from kinematics import solve as inverse
 from kinematics.rotations import Floats, inverse_pose, pose_matrix
-from layouts import Layout
 from robots.action_split import is_gripper
-from robots.bodies.hulls import RobotModel
 from robots.common.bounds import FAR, checked_numbers
 from robots.common.errors import MotionError, NoPlanError
 from robots.descriptor import IDENTITY, RobotDescriptor
@@ -25,6 +23,7 @@ if TYPE_CHECKING:
 
 STARTS = 24  # places that inverse kinematics starts from, besides the posture now and keyframes
 STARTS_IN_REGION = 6  # the same for each point of a region
+MORE = 16  # times as many, before it is said that nothing brings a place there
 POINTS = 12  # of a region that are tried
 CANDIDATES = 8  # postures per place that a search may choose from
 ALIKE = 0.05  # rad, m: postures nearer than that are one
@@ -108,6 +107,7 @@ class Target:
         moving: Indices of the coordinates that may move, among the cell's, (d,).
         candidates: What brings it there, best first, (n, d) (rad, m).
         goal: What was asked, in words.
+        others: Returns what else brings it there, (m, d), which takes a longer search.
     """
 
     place: str
@@ -115,6 +115,7 @@ class Target:
     moving: NDArray[np.intp]
     candidates: Floats
     goal: str
+    others: Callable[[], Floats]
 
 
 def read_targets(cell: Cell, goals: Mapping[str, Goal], start: Floats) -> tuple[Target, ...]:
@@ -161,15 +162,17 @@ def _target(cell: Cell, place: str, goal: Goal, start: Floats) -> Target:
     first = cell.slices[robot].start
     if isinstance(goal, TcpGoal | RegionGoal):
         columns = np.array([own.joints.index(joint) for joint in arm_joints(arm)], np.intp)
-        found = _postures(cell, place, goal, start[cell.slices[robot]], columns)
-        return Target(place, robot, columns + first, found, str(goal))
+        postures = _Postures(cell, place, goal, start[cell.slices[robot]], columns)
+        found = postures.first()
+        return Target(place, robot, columns + first, found, str(goal), postures.others)
     joints, values = _joint_goal(place, arm, goal)
     columns = np.array([own.joints.index(joint) for joint in joints], np.intp)
     _expect_within_limits(place, joints, values, cell.limits[columns + first])
     arms = np.isin(joints, arm_joints(arm))
     kept = arms | (values != start[columns + first])
     columns, values = columns[kept], values[kept]
-    return Target(place, robot, columns + first, values[None], "joint positions")
+    none = np.empty((0, len(columns)))
+    return Target(place, robot, columns + first, values[None], "joint positions", lambda: none)
 
 
 def _joint_goal(
@@ -203,61 +206,84 @@ def _expect_within_limits(
         )
 
 
-def _postures(
-    cell: Cell, place: str, goal: TcpGoal | RegionGoal, start: Floats, columns: NDArray[np.intp]
-) -> Floats:
-    """Return what brings a TCP to its goal, the shortest joint way first, (n, d)."""
-    count = STARTS_IN_REGION if isinstance(goal, RegionGoal) else STARTS
-    model = cell.models[cell.layout.owner(place)]
-    solver = _Solver(cell.layout, place, model, start, columns, count)
-    found: list[Floats] = []
-    nearest = np.inf, np.inf
-    for position, quaternion in goal.poses():
-        solutions = solver.solve(position, quaternion)
-        best = int(np.argmin(solutions.missing + solutions.turn_missing))
-        nearest = min(
-            nearest, (float(solutions.missing[best]), float(solutions.turn_missing[best]))
-        )
-        found += list(solutions.qpos[solutions.solved][:, columns])
-    if not found:
-        missing, turn = nearest
-        turned = "" if turn < 1e-2 else f" and {np.degrees(turn):.0f}° from its orientation"
-        raise NoPlanError(
-            f"{place} does not get to its goal, {goal}: it stays {missing:.3g} m away{turned}",
-            "unreachable",
-            missing,
-        )
-    here = start[columns]
-    unwound = solver.unwound(np.array(found), here)
-    order = np.argsort(np.abs(unwound - here).max(axis=1), kind="stable")
-    return _different(unwound[order])
+class _Postures:
+    """What brings a place's TCP to a goal.
 
-
-class _Solver:
-    """Inverse kinematics of one place from where it is, from keyframes and from many others."""
+    Inverse kinematics starts from where the place is, from keyframes and from a few random
+    postures; from many more only where those lead to nothing that will do.
+    """
 
     def __init__(
         self,
-        layout: Layout,
+        cell: Cell,
         place: str,
-        model: RobotModel,
+        goal: TcpGoal | RegionGoal,
         start: Floats,
         columns: NDArray[np.intp],
-        count: int,
     ) -> None:
+        layout = cell.layout
         placement = layout[layout.owner(place)]
-        self._tree, self._columns = model.kinematics, columns
+        self._place, self._goal, self._columns = place, goal, columns
+        self._tree = cell.models[layout.owner(place)].kinematics
         self._back = inverse_pose(pose_matrix(placement.base_position, placement.base_quaternion))
-        self._tcp = find_tcp(layout.arm(place).robot, model.kinematics)
-        keyframes = np.array(list(placement.robot.keyframes.values()))
-        limits = model.kinematics.limits[columns]
-        starts = np.tile(start, (1 + len(keyframes) + count, 1))
-        starts[1 : 1 + len(keyframes), columns] = keyframes[:, columns]
-        starts[1 + len(keyframes) :, columns] = inverse.scattered(limits, count)
-        starts[:, columns] = np.clip(starts[:, columns], limits[:, 0], limits[:, 1])
-        self._starts = starts
+        self._tcp = find_tcp(layout.arm(place).robot, self._tree)
+        self._count = STARTS_IN_REGION if isinstance(goal, RegionGoal) else STARTS
+        keyframes = list(placement.robot.keyframes.values())
+        self._known = np.array([start, *keyframes], float)[:, columns]
+        self._start = start
+        self._nearest = np.inf, np.inf
 
-    def solve(self, position: Floats, quaternion: Floats | None) -> inverse.Solutions:
+    def first(self) -> Floats:
+        """Return what is found soon, the shortest joint way first, (n, d).
+
+        Raises:
+            NoPlanError: If there is nothing, after a longer search, too.
+        """
+        found = self._from(np.concatenate([self._known, self._scattered(0, 1)]))
+        if not len(found):
+            found = self.others()
+        if not len(found):
+            missing, turn = self._nearest
+            turned = "" if turn < 1e-2 else f" and {np.degrees(turn):.0f}° from its orientation"
+            raise NoPlanError(
+                f"{self._place} does not get to its goal, {self._goal}: it stays"
+                f" {missing:.3g} m away{turned}",
+                "unreachable",
+                missing,
+            )
+        return found
+
+    def others(self) -> Floats:
+        """Return what a longer search finds, the shortest joint way first, (n, d)."""
+        return self._from(self._scattered(1, MORE))
+
+    def _scattered(self, first: int, last: int) -> Floats:
+        """Return random starts, of the first so many times as many as are tried at first."""
+        limits = self._tree.limits[self._columns]
+        return inverse.scattered(limits, last * self._count)[first * self._count :]
+
+    def _from(self, starts: Floats) -> Floats:
+        """Return what the goal's poses lead to from some starts, (n, d)."""
+        low, high = self._tree.limits[self._columns].T
+        whole = np.tile(self._start, (len(starts), 1))
+        whole[:, self._columns] = np.clip(starts, low, high)
+        found: list[Floats] = []
+        for position, quaternion in self._goal.poses():
+            solutions = self._solve(whole, position, quaternion)
+            best = int(np.argmin(solutions.missing + solutions.turn_missing))
+            nearest = float(solutions.missing[best]), float(solutions.turn_missing[best])
+            self._nearest = min(self._nearest, nearest)
+            found += list(solutions.qpos[solutions.solved][:, self._columns])
+        if not found:
+            return np.empty((0, len(self._columns)))
+        here = self._start[self._columns]
+        unwound = self._unwound(np.array(found), here)
+        order = np.argsort(np.abs(unwound - here).max(axis=1), kind="stable")
+        return different(unwound[order])
+
+    def _solve(
+        self, starts: Floats, position: Floats, quaternion: Floats | None
+    ) -> inverse.Solutions:
         """Return what a world pose of the TCP leads to from each start."""
         pose = self._back @ pose_matrix(position, IDENTITY if quaternion is None else quaternion)
         tcp = self._tcp
@@ -268,9 +294,9 @@ class _Solver:
             tcp.turned,
             tcp.offset if tcp.offset.any() else None,
         )
-        return inverse.solve(self._tree, goal, self._starts, self._columns.tolist())
+        return inverse.solve(self._tree, goal, starts, self._columns.tolist())
 
-    def unwound(self, postures: Floats, near: Floats) -> Floats:
+    def _unwound(self, postures: Floats, near: Floats) -> Floats:
         """Return postures with whole turns taken off where the limits allow it, (n, d)."""
         turns = np.array([self._turns(i) for i in self._columns.tolist()])
         low, high = self._tree.limits[self._columns].T
@@ -282,7 +308,8 @@ class _Solver:
         return not self._tree.slides[self._tree.drivers == coordinate].any()
 
 
-def _different(postures: Floats) -> Floats:
+def different(postures: Floats) -> Floats:
+    """Return postures, (n, d), without those that are nearly as one before, and not too many."""
     kept: list[Floats] = []
     for posture in postures:
         if all(np.abs(posture - other).max() > ALIKE for other in kept):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from kinematics.rotations import Floats
 from layouts import Layout
 from layouts.validation.arguments import Rectangle
 from motion.bodies import checked_table
-from motion.cell import Cell
+from motion.cell import Cell, cell_of
 from motion.clearances import Keeping
 from motion.goals import Goal, Target, read_targets
 from motion.motion import Motion
@@ -91,7 +90,7 @@ def plan(
     patience = checked_number("patience", patience, 1e-3, 1e6, MotionError, "s")
     clearance = checked_number("clearance", clearance, 0.0, 1.0, MotionError, "m")
     table = checked_table(table)
-    cell = _cell(layout, obstacles, held, table)
+    cell = cell_of(layout, obstacles, held, table)
     here = _start(cell, start)
     velocities = largest_velocities(layout, control_mode, velocity)
     accelerations = largest_accelerations(layout, velocities, acceleration)
@@ -162,23 +161,6 @@ def _traffic(cell: Cell, start: Floats, others: Mapping[str, Motion]) -> Traffic
         traffic = traffic.with_course(course)
         start[course.columns] = motion.positions[name][0]
     return traffic
-
-
-def _cell(
-    layout: Layout,
-    obstacles: Iterable[Obstacle],
-    held: Iterable[Held],
-    table: Rectangle | None,
-) -> Cell:
-    """Return a cell; one of robots and tables alone is kept for the next plan."""
-    if obstacles or held or not isinstance(layout, Layout):
-        return Cell(layout, obstacles, held, table)
-    return _plain_cell(layout, table)
-
-
-@lru_cache(maxsize=8)
-def _plain_cell(layout: Layout, table: Rectangle | None) -> Cell:
-    return Cell(layout, table=table)
 
 
 def _start(cell: Cell, given: Mapping[str, ArrayLike] | ArrayLike | None) -> Floats:

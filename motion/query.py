@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import product
 
 import numpy as np
 
 from kinematics.rotations import Floats
 from motion.cell import Cell
 from motion.clearances import Keeping
-from motion.goals import CANDIDATES, Target
+from motion.ends import find_ends
+from motion.goals import Target
 from motion.paths import Path
 from motion.priorities import coordinated
 from motion.search import connect
@@ -23,8 +23,6 @@ from robots.common.errors import NoPlanError
 
 FEW = 4  # robots that plan together at first
 RESTARTS = 4  # searches of all robots together
-COMBINATIONS = 512  # of postures of all places that are tried as goals
-ENDS = 4  # of them that a search may choose from
 FINEST, COARSEST = 2e-3, 0.01  # m; between places that are looked at: the clearance, if within
 RADIANS_PER_METRE = 5.0  # how far links may turn between two of them, beside how far they travel
 
@@ -78,7 +76,8 @@ class Query:
         """
         self.keeping.expect_free_start(self.start)
         self.keeping.relax(self.start)
-        ends = self._combined({target.place: self._candidates(target) for target in self.targets})
+        end = self.traffic.end
+        ends = find_ends(self.targets, self.keeping, self.traffic.positions(end), end)
         self.keeping.relax(ends[0], self.traffic.end)
         return ends
 
@@ -129,44 +128,6 @@ class Query:
         if points is None and len(space.robots) > 1:
             points = coordinated(space, self.keeping, start, goals[0], self.seed, self.resolution)
         return together(first=int(few), restarts=RESTARTS) if points is None else points
-
-    def _candidates(self, target: Target) -> Floats:
-        """Return the postures in which a robot touches nothing but what moves, too, (n, d)."""
-        if sum(other.robot == target.robot for other in self.targets) > 1:
-            return target.candidates[:CANDIDATES]
-        others = [other.robot for other in self.targets if other.robot != target.robot]
-        states = self._at_end(len(target.candidates))
-        states[:, target.moving] = target.candidates
-        overlaps = self.keeping.overlaps(others)
-        free = overlaps.free(states, self.traffic.end)
-        if not free.any():
-            contact = overlaps.contact(states[0], self.traffic.end)
-            raise NoPlanError(
-                f"at the goal of {target.place}, {target.goal}, {contact}", "goal in collision"
-            )
-        wide = self.keeping.checker([target.robot], others).free(states[free], self.traffic.end)
-        return target.candidates[free][np.argsort(~wide, kind="stable")][:CANDIDATES]
-
-    def _combined(self, candidates: dict[str, Floats]) -> Floats:
-        counts = [range(len(candidates[target.place])) for target in self.targets]
-        chosen = sorted(product(*counts), key=lambda choice: (sum(choice), choice))[:COMBINATIONS]
-        states = self._at_end(len(chosen))
-        for i, target in enumerate(self.targets):
-            postures = candidates[target.place][[choice[i] for choice in chosen]]
-            states[:, target.moving] = postures
-        free = self.keeping.overlaps().free(states, self.traffic.end)
-        if not free.any():
-            contact = self.keeping.overlaps().contact(states[0], self.traffic.end)
-            who = " and ".join(target.place for target in self.targets)
-            raise NoPlanError(
-                f"the goals of {who} exclude each other: there {contact}", "goal in collision"
-            )
-        wide = self.keeping.checker(self.robots).free(states[free], self.traffic.end)
-        return states[free][np.argsort(~wide, kind="stable")][:ENDS]
-
-    def _at_end(self, count: int) -> Floats:
-        """Return where everything is once all that moves as it was told has stopped, (count, D)."""
-        return np.tile(self.traffic.positions(self.traffic.end), (count, 1))
 
     def _not_found(self, robots: Collection[str]) -> NoPlanError:
         who = ", ".join(target.place for target in self.targets if target.robot in robots)

@@ -11,6 +11,7 @@ from kinematics.rotations import Floats
 from layouts import Layout, face_to_face, grid, ring, side_by_side
 from layouts.validation.arguments import Rectangle
 from motion.cell import Cell
+from motion.collisions import Checker
 from motion.goals import arm_joints
 from robots import RobotDescriptor, RobotLayoutsError, RobotRegistry
 
@@ -30,6 +31,8 @@ LARGE = (
     "talos_left_arm",
 )
 SMALL = ("so100", "so101", "koch")
+LARGE_REACH = 0.5  # m; of arms from elsewhere, those with less are small
+SHARE_OF_EXTRA = 0.45  # of the arms, where there are some from elsewhere
 SHARE_OF_SMALL = 0.15  # of the cells; arms of both sizes seldom share space
 CLOSENESS = 0.75, 1.05  # of distances that presets choose by themselves
 FLOOR: Rectangle = (-6.0, -6.0, 6.0, 6.0)  # m; robots stand on it
@@ -48,8 +51,8 @@ def random_cell(seed: int, arms: int, extra: Sequence[RobotDescriptor] = ()) -> 
     while True:
         small = random.random() < SHARE_OF_SMALL
         pool = [RobotRegistry.load(name) for name in (SMALL if small else LARGE)]
-        pool += [] if small else list(extra)
-        robots = {f"arm{i}": pool[int(random.integers(len(pool)))] for i in range(arms)}
+        others = [robot for robot in extra if (robot.reach < LARGE_REACH) == small]
+        robots = {f"arm{i}": _drawn(random, pool, others) for i in range(arms)}
         closeness = float(random.uniform(*CLOSENESS))
         try:
             layout = _arranged(robots, int(random.integers(3)), closeness)
@@ -57,6 +60,13 @@ def random_cell(seed: int, arms: int, extra: Sequence[RobotDescriptor] = ()) -> 
                 return layout
         except RobotLayoutsError:
             continue
+
+
+def _drawn(
+    random: np.random.Generator, pool: Sequence[RobotDescriptor], others: Sequence[RobotDescriptor]
+) -> RobotDescriptor:
+    chosen = others if others and random.random() < SHARE_OF_EXTRA else pool
+    return chosen[int(random.integers(len(chosen)))]
 
 
 def _arranged(robots: dict[str, RobotDescriptor], kind: int, closeness: float) -> Layout:
@@ -76,47 +86,50 @@ def _arranged(robots: dict[str, RobotDescriptor], kind: int, closeness: float) -
     )
 
 
-def random_postures(cell: Cell, seed: Sequence[int], clearance: float) -> Iterator[Floats]:
-    """Yield postures of all arms in which nothing comes near anything, (D,) (rad, m).
+class RandomPostures:
+    """Postures of all arms of a cell in which nothing comes near anything.
 
     One arm after the other is drawn until it keeps clear of those before: joints anywhere within
-    their limits, but not more than half a turn from where the layout starts them, as arms that
-    stand on a floor cannot turn all the way round.
-
-    Args:
-        cell: The cell.
-        seed: Of everything random.
-        clearance: How near robots may come to each other (m).
+    their limits (those that turn without end: half a turn to each side of zero), but not more than
+    half a turn from where the layout starts them, as arms that stand on a floor cannot turn all the
+    way round.
     """
-    random = np.random.default_rng(list(seed))
-    limits = np.clip(cell.limits, cell.start[:, None] - np.pi, cell.start[:, None] + np.pi)
-    while True:
-        state: Floats | None = cell.start.copy()
+
+    def __init__(self, cell: Cell, clearance: float) -> None:
+        """Prepare to draw.
+
+        Args:
+            cell: The cell.
+            clearance: How near robots may come to each other (m).
+        """
+        self._cell, self._whole = cell, cell.checker()
+        limits = np.nan_to_num(cell.limits, posinf=np.pi, neginf=-np.pi)
+        self._limits = np.clip(limits, cell.start[:, None] - np.pi, cell.start[:, None] + np.pi)
+        self._checkers: dict[str, Checker] = {}
         for i, name in enumerate(cell.robots):
-            if state is not None:
-                state = _with_arm(cell, state, i, name, limits, random, clearance)
-        if state is not None and cell.checker().free(state[None])[0]:
-            yield state
+            later = [(name, other) for other in cell.robots[i + 1 :]]
+            self._checkers[name] = cell.checker([name], clearance, except_=later)
 
+    def drawn(self, seed: Sequence[int]) -> Iterator[Floats]:
+        """Yield postures, (D,) (rad, m), the same for the same seed."""
+        random = np.random.default_rng(list(seed))
+        while True:
+            state: Floats | None = self._cell.start.copy()
+            for name in self._cell.robots:
+                if state is not None:
+                    state = self._with_arm(state, name, random)
+            if state is not None and self._whole.free(state[None])[0]:
+                yield state
 
-def _with_arm(
-    cell: Cell,
-    state: Floats,
-    number: int,
-    name: str,
-    limits: Floats,
-    random: np.random.Generator,
-    clearance: float,
-) -> Floats | None:
-    robot = cell.layout[name].robot
-    columns = [cell.slices[name].start + robot.joints.index(j) for j in arm_joints(robot)]
-    later = [(name, other) for other in cell.robots[number + 1 :]]
-    checker = cell.checker([name], clearance, except_=later)
-    for _ in range(TRIES // 20):
-        states = np.tile(state, (20, 1))
-        low, high = limits[columns].T
-        states[:, columns] = random.uniform(low, high, (20, len(columns)))
-        free = checker.free(states)
-        if free.any():
-            return states[np.argmax(free)]
-    return None
+    def _with_arm(self, state: Floats, name: str, random: np.random.Generator) -> Floats | None:
+        robot = self._cell.layout[name].robot
+        first = self._cell.slices[name].start
+        columns = [first + robot.joints.index(joint) for joint in arm_joints(robot)]
+        low, high = self._limits[columns].T
+        for _ in range(TRIES // 20):
+            states = np.tile(state, (20, 1))
+            states[:, columns] = random.uniform(low, high, (20, len(columns)))
+            free = self._checkers[name].free(states)
+            if free.any():
+                return states[np.argmax(free)]
+        return None

@@ -9,11 +9,13 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from experts import Followed, follow
+from kinematics.rotations import Floats
 from layouts import Layout, face_to_face, ring
 from motion import Motion, NoPlanError, TcpGoal, plan
 from robots import CONTROL_MODES, RobotLayoutsError
@@ -33,11 +35,16 @@ HEIGHTS = 0.3, 0.7  # of goals, in the same shares
 
 
 class FreeRobots(MultiRobotTask):
-    """Robots that stand where their layout starts them, and nothing else."""
+    """Robots that stand where their layout starts them, and nothing else.
+
+    Attributes:
+        starts: Joint positions of those that begin elsewhere (rad, m).
+    """
 
     layout = CELLS["two pandas"]
     robot_counts = range(1, 9)
     max_episode_steps = 10_000
+    starts: Mapping[str, Floats] = MappingProxyType({})
 
     def build(self, world: World) -> None:
         """Add nothing."""
@@ -48,7 +55,7 @@ class FreeRobots(MultiRobotTask):
     def reset_robots(self, world: World, rng: EpisodeRandom) -> None:
         """Stand the robots where they start, without noise."""
         for name, placement in self.layout.items():
-            world.stand(name, placement.start_qpos)
+            world.stand(name, self.starts.get(name, placement.start_qpos))
 
     def evaluate(self, state: State) -> dict[str, Any]:
         """Nothing is ever achieved."""

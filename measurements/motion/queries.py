@@ -1,8 +1,9 @@
 """``python -m measurements.motion queries``: random questions to the planner, and its answers.
 
-Cells are random valid layouts of mixed arms; in each, random free postures are start and goal of
-all arms, every fourth goal as TCP poses. A line of JSON is kept per query, so that a run goes on
-where it stopped; the table is beside it as markdown.
+Cells are random valid layouts of mixed arms, of the catalogue and from URDFs of installed packages.
+In each, random free postures are start and goal of all arms, every fourth goal as TCP poses; two
+more questions have no answer. What is planned is certified, and carried out in SAPIEN. A line of
+JSON is kept per query, so that a run goes on where it stopped; the table is beside it as markdown.
 """
 
 from __future__ import annotations
@@ -11,32 +12,65 @@ import argparse
 import json
 import multiprocessing
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
-import numpy as np
-
-from kinematics.rotations import Floats, quaternion_of
-from measurements.motion.cells import FLOOR, random_cell, random_postures
-from measurements.robots.record import versions_of
-from motion import Motion, NoPlanError, TcpGoal, plan
+from kinematics.rotations import Floats
+from measurements.motion.answers import (
+    CATALOGUE,
+    IN_COLLISION,
+    INFEASIBLE,
+    OUT_OF_REACH,
+    Seen,
+    markdown,
+    page,
+    summary,
+)
+from measurements.motion.arms import arms_of
+from measurements.motion.cells import FLOOR, RandomPostures, random_cell
+from measurements.motion.execution import Stage
+from measurements.motion.random_goals import goals_at, in_collision, out_of_reach
+from measurements.robots.sources import PACKAGES
+from motion import Motion, NoPlanError, plan
 from motion.cell import Cell
-from motion.goals import Goal, arm_joints
+from motion.goals import Goal
 from motion.search import import_ompl
 from motion.timing import import_toppra
 from robots import RobotLayoutsError
 from robots.common.writing import write_whole
-from robots.urdf.tcp import find_tcp
+from rollouts.progress import LiveLine
 
 RECORD = Path("runs/motion_queries.jsonl")
 CLEARANCE = 0.01  # m
-PATIENCE = {2: 5.0, 3: 5.0, 4: 5.0}  # s of processor time within which a plan counts as solved
-LONGEST = 30.0  # s, the same for more arms
-ALONE = "even if the other robots that move were not there"  # in the planner's message
-WAIT = 120.0  # s; wall time after which a query is given up, whatever else the machine does
+MODE = "pd_joint_pos"  # control mode
+HOPELESS = 1000  # number of the first question of a cell that has no answer
+WAIT = 1800.0  # s; wall time after which a query is given up, whatever else the machine does
 
-Seen = dict[str, Any]
+
+class Query(NamedTuple):
+    """A question.
+
+    Attributes:
+        cell: Number of the cell.
+        arms: How many it holds.
+        number: Of the question among those of the cell.
+        kind: How the goals are given, or why nothing gets there: see `INFEASIBLE`.
+        seed: Of everything random.
+        sources: Packages from whose URDFs some arms come.
+        certify: Whether to check the answer densely.
+        execute: Whether to carry it out.
+    """
+
+    cell: int
+    arms: int
+    number: int
+    kind: str
+    seed: int
+    sources: tuple[str, ...]
+    certify: bool
+    execute: bool
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,29 +79,47 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--cells", type=int, default=200, metavar="N", help="random layouts (%(default)s)")
     add("--queries", type=int, default=50, metavar="M", help="of each (%(default)s)")
     add("--arms", default="2-8", metavar="A-B", help="how many, from-to (%(default)s)")
+    add(
+        "--sources",
+        nargs="+",
+        default=[],
+        metavar="PACKAGE",
+        help=f"arms from URDFs of installed packages, too: {', '.join(PACKAGES)}",
+    )
     add("--workers", type=int, default=1, metavar="N", help="processes at a time (%(default)s)")
     add("--seed", type=int, default=0, metavar="S", help="of everything random (%(default)s)")
+    add(
+        "--round",
+        type=int,
+        default=10,
+        metavar="N",
+        help="queries of a cell before the next cell's, round after round (%(default)s)",
+    )
     add("--no-certify", action="store_true", help="leave the dense recheck out")
+    add(
+        "--execute",
+        type=int,
+        default=1,
+        metavar="K",
+        help="carry every K-th motion out in SAPIEN; 0 for none (%(default)s)",
+    )
     add("--out", type=Path, default=RECORD, metavar="FILE", help="the record (%(default)s)")
     add("--page", type=Path, metavar="FILE", help="write a page, such as docs/planning.md, too")
 
 
 def run(options: argparse.Namespace) -> int:
     """Ask what the record does not hold yet, and write its table."""
-    first, _, last = options.arms.partition("-")
-    counts = range(int(first), int(last or first) + 1)
     known = {(seen["cell"], seen["query"]) for seen in read(options.out)}
-    wanted = [
-        (cell, counts[cell % len(counts)], query, options.seed, not options.no_certify)
-        for cell in range(options.cells)
-        for query in range(options.queries)
-        if (cell, query) not in known
-    ]
+    wanted = [query for query in questions(options) if (query.cell, query.number) not in known]
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    with open(options.out, "a", encoding="utf-8") as record:
+    with (
+        open(options.out, "a", encoding="utf-8") as record,
+        LiveLine(len(wanted), "queries") as line,
+    ):
         for seen in _asked(wanted, options.workers):
             record.write(json.dumps(seen) + "\n")
             record.flush()
+            line.advance(1, f"cell {seen['cell']}, query {seen['query']}")
     table = options.out.with_suffix(".md")
     write_whole(table, "\n".join(markdown(read(options.out))) + "\n")
     print(table.read_text(encoding="utf-8"))
@@ -78,30 +130,25 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def summary(record: Sequence[Seen]) -> dict[str, Any]:
-    """Return what a page shows of a record: with what it was made, and the rows of its table."""
-    return {
-        "versions": versions_of("ompl", "toppra", "python-fcl", "numpy"),
-        "cells": len({seen["cell"] for seen in record}),
-        "queries": len(record),
-        "table": list(markdown(record)),
-    }
-
-
-def page(shown: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the lines of the page."""
-    versions = ", ".join(f"{name} {version}" for name, version in shown["versions"].items())
-    yield "# Planning, measured"
-    yield ""
-    yield f"{shown['queries']} queries to `motion.plan` in {shown['cells']} random valid cells of"
-    yield "mixed arms over a floor: from one random posture of all arms, free of collisions, to"
-    yield "another, every fourth as TCP poses. `python -m measurements.motion queries --page` wrote"
-    yield "this page. Times are processor time of one core, of whole plans. *In time* is within 5 s"
-    yield "for up to four arms and 30 s for more; *certified* by `Motion.certify`, every millimetre"
-    yield "and half degree. A goal that is said to be out of reach or in collision is a miss, too."
-    yield f"Made with {versions}."
-    yield ""
-    yield from shown["table"]
+def questions(options: argparse.Namespace) -> Iterator[Query]:
+    """Yield all questions, some of each cell first, so that a run that is cut off has seen all."""
+    first, _, last = options.arms.partition("-")
+    counts = range(int(first), int(last or first) + 1)
+    kinds = dict(enumerate(INFEASIBLE, HOPELESS))
+    kinds |= {i: "tcp" if i % 4 == 3 else "joints" for i in range(options.queries)}
+    for begun in range(0, len(kinds), options.round):
+        for cell in range(options.cells):
+            for number in [*kinds][begun : begun + options.round]:
+                yield Query(
+                    cell,
+                    counts[cell % len(counts)],
+                    number,
+                    kinds[number],
+                    options.seed,
+                    tuple(options.sources),
+                    not options.no_certify,
+                    options.execute > 0 and number % options.execute == 0,
+                )
 
 
 def read(path: Path) -> list[Seen]:
@@ -111,7 +158,7 @@ def read(path: Path) -> list[Seen]:
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
 
 
-def _asked(wanted: Sequence[tuple[int, int, int, int, bool]], workers: int) -> Iterator[Seen]:
+def _asked(wanted: Sequence[Query], workers: int) -> Iterator[Seen]:
     if workers < 2:
         yield from map(ask, wanted)
         return
@@ -119,122 +166,106 @@ def _asked(wanted: Sequence[tuple[int, int, int, int, bool]], workers: int) -> I
         yield from pool.imap_unordered(ask, wanted, chunksize=5)
 
 
-_last: dict[tuple[int, int, int], Cell] = {}
+class _Place:
+    """A cell, and what it takes to ask questions in it.
+
+    Attributes:
+        cell: The cell.
+        sources: Where each robot comes from.
+        postures: Random ones.
+    """
+
+    def __init__(self, query: Query) -> None:
+        arms = arms_of(query.sources)
+        extra = [arm.robot for arm in arms]
+        self.cell = Cell(random_cell(query.seed + query.cell, query.arms, extra), table=FLOOR)
+        known = {arm.robot: arm.source for arm in arms}
+        robots = [placement.robot for placement in self.cell.layout.values()]
+        self.sources = [known.get(robot, CATALOGUE) for robot in robots]
+        self.postures = RandomPostures(self.cell, CLEARANCE)
+
+    @cached_property
+    def stage(self) -> Stage:
+        """Where motions are carried out."""
+        return Stage(self.cell.layout, MODE)
 
 
-def ask(query: tuple[int, int, int, int, bool]) -> Seen:
-    """Ask one question: cell, arms, query, seed, and whether to certify the answer."""
-    number, arms, which, seed, certify = query
+_last: dict[tuple[int, int, tuple[str, ...]], _Place] = {}
+
+
+def _place(query: Query) -> _Place:
+    """Return a query's cell; the last one is kept."""
+    key = query.seed + query.cell, query.arms, query.sources
+    if key not in _last:
+        for old in _last.values():
+            if "stage" in vars(old):
+                old.stage.close()
+        _last.clear()
+        _last[key] = _Place(query)
+    return _last[key]
+
+
+def ask(query: Query) -> Seen:
+    """Ask one question, and return what came of it."""
     import_ompl()
     import_toppra()
-    key = seed + number, arms, 0
-    if key not in _last:
-        _last.clear()
-        _last[key] = Cell(random_cell(seed + number, arms), table=FLOOR)
-    cell = _last[key]
-    postures = random_postures(cell, (seed, number, which), CLEARANCE)
-    start, end = next(postures), next(postures)
+    place = _place(query)
+    cell = place.cell
+    drawn = place.postures.drawn((query.seed, query.cell, query.number))
+    start, end = next(drawn), next(drawn)
     seen: Seen = {
-        "cell": number,
-        "query": which,
-        "arms": arms,
+        "cell": query.cell,
+        "query": query.number,
+        "arms": query.arms,
         "robots": [p.robot.name for p in cell.layout.values()],
-        "goal": "tcp" if which % 4 == 3 else "joints",
+        "sources": place.sources,
+        "goal": query.kind,
     }
     began, wall = time.process_time(), time.monotonic()
     try:
         motion = plan(
             cell.layout,
             start,
-            goals(cell, end, tcp=which % 4 == 3),
+            _goals(query, cell, end),
             table=FLOOR,
             clearance=CLEARANCE,
-            seed=which,
+            seed=query.number,
             patience=WAIT,
-            control_mode="pd_joint_pos",
+            control_mode=MODE,
         )
-    except NoPlanError as error:
-        seen |= {"solved": False, "reason": error.reason, "message": str(error)}
-        motion = None
     except RobotLayoutsError as error:
-        seen |= {"solved": False, "reason": type(error).__name__, "message": str(error)}
+        reason = error.reason if isinstance(error, NoPlanError) else type(error).__name__
+        seen |= {"solved": False, "reason": reason, "message": str(error)}
         motion = None
     seen |= {
         "seconds": round(time.process_time() - began, 4),
         "wall": round(time.monotonic() - wall, 4),
     }
-    return seen | (_answer(motion, certify) if motion is not None else {})
+    if motion is None:
+        return seen
+    seen |= {"solved": True, "duration": round(motion.duration, 3)}
+    if query.certify:
+        seen |= _certified(motion)
+    return seen | (place.stage.carry_out(motion) if query.execute else {})
 
 
-def _answer(motion: Motion, certify: bool) -> Seen:
-    answer: Seen = {"solved": True, "duration": round(motion.duration, 3)}
-    if certify:
-        certificate = motion.certify()
-        near = certificate.clearance
-        answer |= {
-            "certified": certificate.ok,
-            "collisions": len(certificate.collisions),
-            "moments": certificate.moments,
-            "clearance": None if near is None else round(near.distance, 5),
-        }
-        if not certificate.ok:
-            answer["certificate"] = str(certificate)
+def _goals(query: Query, cell: Cell, end: Floats) -> dict[str, Goal]:
+    if query.kind == OUT_OF_REACH:
+        return out_of_reach(cell, end)
+    if query.kind == IN_COLLISION:
+        return in_collision(cell, end, query.number)
+    return goals_at(cell, end, tcp=query.kind == "tcp")
+
+
+def _certified(motion: Motion) -> Seen:
+    certificate = motion.certify()
+    near = certificate.clearance
+    answer: Seen = {
+        "certified": certificate.ok,
+        "collisions": len(certificate.collisions),
+        "moments": certificate.moments,
+        "clearance": None if near is None else round(near.distance, 5),
+    }
+    if not certificate.ok:
+        answer["certificate"] = str(certificate)
     return answer
-
-
-def goals(cell: Cell, end: Floats, *, tcp: bool) -> dict[str, Goal]:
-    """Return the goals of all arms that a posture, (D,), stands for."""
-    found: dict[str, Goal] = {}
-    poses = cell.poses(end[None]) if tcp else None
-    for name, placement in cell.layout.items():
-        robot, own = placement.robot, end[cell.slices[name]]
-        if poses is None:
-            found[name] = [float(own[robot.joints.index(joint)]) for joint in arm_joints(robot)]
-            continue
-        tree = cell.models[name].kinematics
-        point = find_tcp(robot, tree)
-        first = cell.links.index((name, tree.links[0]))
-        links = poses[:, first : first + len(tree.links)]
-        found[name] = TcpGoal(
-            point.places(links)[0].tolist(), quaternion_of(links[0, point.turned, :3, :3]).tolist()
-        )
-    return found
-
-
-def markdown(record: Sequence[Seen]) -> Iterator[str]:
-    """Yield the lines of the table: a row per number of arms."""
-    yield (
-        "| arms | queries | solved | in time | median s | 90 % s | 99 % s | slowest s | certified"
-        " | collisions | least clearance mm | an arm finds no way even alone"
-        " | wrongly said to be infeasible |"
-    )
-    yield "|" + " ---: |" * 13
-    for arms in sorted({seen["arms"] for seen in record}):
-        yield _row(arms, [seen for seen in record if seen["arms"] == arms])
-
-
-def _row(arms: int, seen: Sequence[Seen]) -> str:
-    known = ("goal in collision", "start in collision", "unreachable")
-    solved = [s for s in seen if s["solved"]]
-    wrong = [s for s in seen if s.get("reason") in known]  # goals are those of free postures
-    seconds = np.array([s["seconds"] for s in seen])
-    in_time = sum(s["seconds"] <= PATIENCE.get(arms, LONGEST) for s in solved)
-    checked = [s for s in solved if "certified" in s]
-    clearances = [s["clearance"] for s in checked if s["clearance"] is not None]
-    numbers = [
-        arms,
-        len(seen),
-        _share(len(solved), len(seen)),
-        _share(in_time, len(seen)),
-        *(f"{np.quantile(seconds, q):.2f}" for q in (0.5, 0.9, 0.99, 1.0)),
-        _share(sum(s["certified"] for s in checked), len(checked)),
-        sum(s["collisions"] for s in checked),
-        f"{1e3 * min(clearances):.1f}" if clearances else "",
-        sum(ALONE in s.get("message", "") for s in seen),
-        len(wrong),
-    ]
-    return "| " + " | ".join(map(str, numbers)) + " |"
-
-
-def _share(part: int, whole: int) -> str:
-    return f"{part / whole:.1%}" if whole else ""

@@ -1,18 +1,36 @@
 """The benchmark of queries: the same cells again, a record that goes on, and its table."""
 
 import json
+from argparse import ArgumentParser
 from pathlib import Path
 
 import numpy as np
 
+from layouts import face_to_face
 from measurements.motion import queries
 from measurements.motion.__main__ import main
-from measurements.motion.cells import FLOOR, random_cell, random_postures
+from measurements.motion.answers import ALONE, markdown, page
+from measurements.motion.arms import arms_in
+from measurements.motion.cells import FLOOR, LARGE_REACH, RandomPostures, random_cell
+from measurements.motion.execution import Stage
+from motion import Motion
 from motion.cell import Cell
+from robots import RobotRegistry
+from tests.three_links import arm, save
 
+LEANING = np.array([0, 0.9, 0, 0.6, 0, 0, 0, 0, 0])  # rad; of a Panda, from its start
 PAGE = Path(__file__).parents[2] / "docs/planning.md"
-LINE = {"cell": 0, "query": 0, "arms": 2, "robots": ["panda", "panda"], "goal": "joints"}
+LINE = {
+    "cell": 0,
+    "query": 0,
+    "arms": 2,
+    "robots": ["panda", "panda"],
+    "sources": ["catalogue", "pybullet/franka_panda/panda.urdf"],
+    "goal": "joints",
+}
 SOLVED = {"solved": True, "certified": True, "collisions": 0, "clearance": 0.0123}
+EXECUTED = {"executed": True, "touching": [], "stray": 0.0021, "late": 0.0}
+REFUSED = {"solved": False, "seconds": 0.1, "message": ""}
 
 
 def test_a_seed_gives_one_cell_with_one_row_of_postures():
@@ -20,9 +38,38 @@ def test_a_seed_gives_one_cell_with_one_row_of_postures():
     assert layout == random_cell(1, 2)
     assert layout != random_cell(2, 2)
     cell = Cell(layout, table=FLOOR)
-    first, second = (next(random_postures(cell, (1, 2, 3), 0.01)) for _ in range(2))
+    first, second = (next(RandomPostures(cell, 0.01).drawn((1, 2, 3))) for _ in range(2))
     assert np.array_equal(first, second)
     assert cell.checker(clearance=0.01).free(first[None])[0]
+
+
+def test_arms_come_from_urdfs_of_one_arm(tmp_path):
+    save(tmp_path, arm(), "three_joints.urdf")
+    folder = RobotRegistry.load("so100").urdf.locate().parent
+    (found,) = arms_in([("toys", tmp_path), ("shop", folder)])
+    assert found.source == "shop/so100.urdf"
+    assert found.robot.name.endswith("_urdf")
+    assert len(found.robot.arm_joints) == 5
+    layout = random_cell(4, 4, [found.robot])
+    assert layout == random_cell(4, 4, [found.robot])
+    assert {p.robot.reach < LARGE_REACH for p in layout.values()} == {True}
+    assert 0 < sum(p.robot == found.robot for p in layout.values()) < 4
+
+
+def test_a_motion_on_which_robots_meet_is_seen_to_touch():
+    layout = face_to_face({"left": "panda", "right": "panda"}, spacing=0.9)
+    stage = Stage(layout, "pd_joint_pos")
+    ahead = {name: p.start_qpos + LEANING for name, p in layout.items()}
+    times, share = np.array([0.0, 1.0]), np.array([0.0, 1.0])[:, None]
+    meeting = {n: p.start_qpos + share * (ahead[n] - p.start_qpos) for n, p in layout.items()}
+    still = {n: np.zeros((2, p.robot.dof)) for n, p in layout.items()}
+    seen = stage.carry_out(Motion(layout, times, meeting, still))
+    assert {"left", "right"} == {part.split(".")[0] for part in seen["touching"][0].split(", ")}
+    begun = {n: np.tile(p.start_qpos, (2, 1)) for n, p in layout.items()}
+    seen = stage.carry_out(Motion(layout, times, begun, still))
+    assert (seen["executed"], seen["touching"]) == (True, [])
+    assert seen["stray"] < 0.01
+    stage.close()
 
 
 def test_a_record_goes_on_where_it_stopped(tmp_path, capsys):
@@ -30,34 +77,58 @@ def test_a_record_goes_on_where_it_stopped(tmp_path, capsys):
     record.write_text(json.dumps(LINE | SOLVED | {"seconds": 9.0}) + "\n")
     arguments = ["queries", "--cells", "1", "--queries", "2", "--arms", "2", "--seed", "1"]
     assert main([*arguments, "--out", str(record)]) == 0
-    known, asked = queries.read(record)
+    known, *hopeless, asked = queries.read(record)
     assert known["seconds"] == 9.0
+    assert [seen["reason"] for seen in hopeless] == ["unreachable", "goal in collision"]
     assert (asked["query"], asked["solved"], asked["certified"]) == (1, True, True)
-    assert capsys.readouterr().out.splitlines()[2].startswith("| 2 | 2 | 100.0% | 50.0% |")
+    assert (asked["executed"], asked["touching"]) == (True, [])
+    assert asked["sources"] == ["catalogue", "catalogue"]
+    row = capsys.readouterr().out.splitlines()[2]
+    assert row.startswith("| 2 | 2 | 100.0% | 100.0% | 50.0% |")
+    assert row.endswith("| 2 of 2 |")
+
+
+def test_a_run_that_is_cut_off_has_seen_all_cells():
+    parser = ArgumentParser()
+    queries.add_arguments(parser)
+    options = parser.parse_args(["--cells", "2", "--queries", "4", "--round", "3"])
+    asked = [(query.cell, query.kind) for query in queries.questions(options)]
+    first = ["out of reach", "in collision", "joints"]
+    assert asked[:6] == [(cell, kind) for cell in (0, 1) for kind in first]
+    assert asked[6:] == [(cell, kind) for cell in (0, 1) for kind in ("joints", "joints", "tcp")]
 
 
 def test_the_table_counts_every_miss():
     record = [
-        LINE | SOLVED | {"seconds": 0.1},
-        LINE | {"solved": False, "seconds": 0.3, "reason": "not found", "message": queries.ALONE},
-        LINE | {"solved": False, "seconds": 0.1, "reason": "unreachable", "message": ""},
+        LINE | SOLVED | EXECUTED | {"seconds": 0.1},
+        LINE | SOLVED | EXECUTED | {"seconds": 0.1, "touching": ["a/hand, b/hand"]},
+        LINE | SOLVED | {"seconds": 0.1, "executed": False, "touching": []},
+        LINE | REFUSED | {"seconds": 0.3, "reason": "not found", "message": ALONE},
+        LINE | REFUSED | {"reason": "unreachable"},
+        LINE | REFUSED | {"reason": "unreachable", "goal": "out of reach"},
+        LINE | REFUSED | {"reason": "not found", "goal": "in collision"},
     ]
-    row = list(queries.markdown(record))[-1]
+    row = list(markdown(record))[-1]
     assert row == (
-        "| 2 | 3 | 33.3% | 33.3% | 0.10 | 0.26 | 0.30 | 0.30 | 100.0% | 0 | 12.3 | 1 | 1 |"
+        "| 2 | 5 | 60.0% | 75.0% | 60.0% | 0.10 | 0.22 | 0.29 | 0.30 | 100.0% | 0 | 12.3"
+        " | 2 of 3 | 1 | 2.1 | 1 | 1 | 1 of 2 |"
     )
 
 
 def test_the_page_is_the_records():
     shown = json.loads(PAGE.with_suffix(".json").read_text())
-    assert PAGE.read_text() == "\n".join(queries.page(shown)) + "\n"
+    assert PAGE.read_text() == "\n".join(page(shown)) + "\n"
 
 
 def test_a_page_shows_the_record(tmp_path):
     record = tmp_path / "queries.jsonl"
     record.write_text(json.dumps(LINE | SOLVED | {"seconds": 0.1}) + "\n")
-    page = tmp_path / "page.md"
-    words = ["queries", "--cells", "1", "--queries", "1", "--out", str(record), "--page", str(page)]
+    path = tmp_path / "page.md"
+    words = ["queries", "--cells", "0", "--out", str(record), "--page", str(path)]
     assert main(words) == 0
-    assert "1 queries to `motion.plan` in 1 random" in page.read_text()
-    assert page.read_text().splitlines()[-1] == list(queries.markdown(queries.read(record)))[-1]
+    text = path.read_text()
+    assert "1 queries to `motion.plan` in 1 random" in text
+    assert (
+        "Of the 2 arms, 1 were made by\n`RobotDescriptor.from_urdf` from URDFs of pybullet" in text
+    )
+    assert text.splitlines()[-1] == list(markdown(queries.read(record)))[-1]
