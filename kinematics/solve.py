@@ -21,6 +21,9 @@ DAMPING = 0.03  # m and rad; keeps steps small near singular postures
 LONGEST_STEP = 0.4  # of a joint, per iteration (rad or m)
 NEAR_ENOUGH = 1e-3, 1e-2  # m and rad
 
+_APPROACHES = 4  # steps of `approach`
+_HOMEWARD = 0.02  # of the way to its posture, in each of them
+
 _SWEEPS = 30  # over all joints, of the search for the farthest place
 _ANGLES = 90  # tried per joint and sweep
 _SMALLEST_GAIN = 1e-5  # m per sweep
@@ -102,6 +105,59 @@ def solve(
     turn_missing = np.linalg.norm(errors[:, 3:], axis=1)
     solved = (missing < NEAR_ENOUGH[0]) & (turn_missing < NEAR_ENOUGH[1])
     return Solutions(qpos, missing, turn_missing, solved)
+
+
+def approach(
+    tree: Tree,
+    goal: Goal,
+    qpos: Floats,
+    free: Sequence[int],
+    longest: Floats | float,
+    rest: Floats,
+) -> Floats:
+    """Bring a tree a step nearer to a goal: the place first, then the orientation.
+
+    Unlike `solve` it never leaves the neighbourhood. An arm of too few joints, or one whose goal is
+    out of reach, ends where the place is missed least; one of more joints than needed keeps near a
+    posture with what is left over.
+
+    Args:
+        tree: The links.
+        goal: What is asked for, for one posture.
+        qpos: Coordinates to start from, (coordinates,) (rad, m).
+        free: Indices of the coordinates that may move, within their limits.
+        longest: How far each of them may move in all, one number or (free,) (rad or m).
+        rest: The posture, (free,) (rad, m).
+
+    Returns:
+        Coordinates, (coordinates,) (rad, m).
+    """
+    low, high = tree.limits[free].T
+    began = qpos[free]
+    low, high = np.maximum(low, began - longest), np.minimum(high, began + longest)
+    low, high = np.minimum(low, began), np.maximum(high, began)  # where it begins beyond a limit
+    rows = qpos[None].copy()
+    for _ in range(_APPROACHES):
+        errors, slopes = _errors(tree, goal, rows, free)
+        at = rows[0, free]
+        step = _by_priority(errors[0], slopes[0], rest - at)
+        # A joint at a limit that it is drawn beyond leaves the way to the others.
+        stuck = ((at <= low) & (step < 0)) | ((at >= high) & (step > 0))
+        if stuck.any():
+            step = _by_priority(errors[0], np.where(stuck, 0.0, slopes[0]), rest - at)
+        rows[0, free] = np.clip(at + step, low, high)
+    return rows[0]
+
+
+def _by_priority(errors: Floats, slopes: Floats, homeward: Floats) -> Floats:
+    """Return the way that mends the place; then what else it can; then goes a bit homeward."""
+    way, spare = np.zeros(slopes.shape[1]), np.eye(slopes.shape[1])
+    for missing, own in ((errors[:3], slopes[:3]), (errors[3:], slopes[3:])):
+        left = own @ spare
+        back = left.T @ np.linalg.inv(left @ left.T + DAMPING**2 * np.eye(len(missing)))
+        way = way + back @ (missing - own @ way)
+        spare = spare - back @ left
+    return way + spare @ (_HOMEWARD * homeward)
 
 
 def _descend(tree: Tree, goal: Goal, qpos: Floats, free: Sequence[int], iterations: int) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from kinematics.rotations import Floats, quaternion_of
 from layouts.frames import table_outlines
 from layouts.preview import COLOURS
-from layouts.viewer.cell import Cell, Contact
+from layouts.viewer.cell import Cell, Contact, Thing
 from layouts.viewer.text import node
 from layouts.visuals import Part, simplified
 from robots.urdf.tree import link_index
@@ -39,14 +39,16 @@ class Scene:
     ``/(ways)/ROBOT/…``: no robot's name has brackets.
     """
 
-    def __init__(self, api: Any, cell: Cell) -> None:
+    def __init__(self, api: Any, cell: Cell, drawn: Collection[str] = tuple(OVERLAYS)) -> None:
         """Draw the cell as it starts.
 
         Args:
             api: The ``scene`` of a viser server.
             cell: What to draw.
+            drawn: Those of `OVERLAYS` that can be shown; the fewer, the quicker robots move.
         """
-        self._api, self._cell = api, cell
+        self._api, self._cell, self._drawn = api, cell, drawn
+        self._bases: dict[str, Any] = {}
         self._overlays: dict[str, dict[str, Any]] = {name: {} for name in cell.layout}
         self._moving: dict[str, list[tuple[int, Any]]] = {name: [] for name in cell.layout}
         self._touching: dict[tuple[str, str], Any] = {}
@@ -59,8 +61,17 @@ class Scene:
             self._draw_ways(name, colour)
             self.pose(name, cell.start[name])
         for name, thing in cell.things.items():
-            self._things[name] = _add_parts(api, node("(things)", name), thing.parts)
-            self.place(name, thing.pose)
+            self.draw(name, thing)
+
+    def draw(self, name: str, thing: Thing) -> None:
+        """Draw a thing, in the place of one of the same name if there is one."""
+        self._things[name] = _add_parts(self._api, node("(things)", name), thing.parts)
+        self.place(name, thing.pose)
+
+    def stand(self, name: str, pose: Floats) -> None:
+        """Let a robot's base stand at a pose: position (m, world), quaternion (wxyz), (7,)."""
+        base = self._bases[name]
+        base.position, base.wxyz = tuple(pose[:3]), tuple(pose[3:])
 
     def pose(self, name: str, qpos: Floats) -> None:
         """Show a robot at joint positions.
@@ -73,6 +84,11 @@ class Scene:
         places = [(tuple(p[:3, 3]), _wxyz(p[:3, :3])) for p in poses]
         for link, handle in self._moving[name]:
             handle.position, handle.wxyz = places[link]
+
+    @property
+    def things(self) -> tuple[str, ...]:
+        """Names of the things that are drawn."""
+        return tuple(self._things)
 
     def place(self, name: str, pose: Floats) -> None:
         """Show a thing at a pose: position (m, world), quaternion (wxyz), (7,)."""
@@ -112,22 +128,29 @@ class Scene:
     def _draw_robot(self, name: str, colour: tuple[int, int, int]) -> None:
         api, placement = self._api, self._cell.layout[name]
         pose = placement.base_pose
-        api.add_frame(f"/{name}", show_axes=False, position=pose.position, wxyz=pose.quaternion)
+        self._bases[name] = api.add_frame(
+            f"/{name}", show_axes=False, position=pose.position, wxyz=pose.quaternion
+        )
         for overlay, at_first in OVERLAYS.items():
             visible = at_first and overlay not in self._cell.hidden
             visible |= overlay == "collision" and not self._cell.visuals[name]
             self._overlays[name][overlay] = api.add_frame(
                 f"/{name}/{overlay}", show_axes=False, visible=visible
             )
-        self._draw_meshes(name)
-        self._draw_frames(name)
-        self._draw_hulls(name, colour)
+        if "meshes" in self._drawn:
+            self._draw_meshes(name)
+        if "frames" in self._drawn:
+            self._draw_frames(name)
+        if "collision" in self._drawn or not self._cell.visuals[name]:
+            self._draw_hulls(name, colour)
         reach = placement.robot.reach
-        self._draw_circle(name, reach, colour)
-        api.add_icosphere(
-            f"/{name}/reach sphere/ball", reach, color=colour, opacity=0.12, side="double",
-            subdivisions=4, cast_shadow=False, receive_shadow=False,
-        )  # fmt: skip
+        if "reach" in self._drawn:
+            self._draw_circle(name, reach, colour)
+        if "reach sphere" in self._drawn:
+            api.add_icosphere(
+                f"/{name}/reach sphere/ball", reach, color=colour, opacity=0.12, side="double",
+                subdivisions=4, cast_shadow=False, receive_shadow=False,
+            )  # fmt: skip
         api.add_label(f"/{name}/label", name, position=(0.0, 0.0, min(0.15, reach / 4)))
 
     def _draw_meshes(self, name: str) -> None:
