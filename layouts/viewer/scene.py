@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from layouts.frames import table_outlines
 from layouts.preview import COLOURS
 from layouts.viewer.cell import Cell, Contact, Thing
 from layouts.viewer.text import node
-from layouts.visuals import Part, simplified
+from layouts.visuals import Part, coarse, simplified
 from robots.urdf.tree import link_index
 
 # What can be shown and hidden, and whether it is shown at first.
@@ -24,6 +24,7 @@ OVERLAYS: Mapping[str, bool] = {
     "reach sphere": False,
     "collision": False,
 }
+COARSE = "coarse"  # one more, for quick pictures: hulls, without shine and shadows
 TOUCHING = (214, 39, 40)
 TABLE_COLOUR = (222, 207, 184)
 FRAME_LENGTH = 0.08  # in reaches
@@ -45,7 +46,8 @@ class Scene:
         Args:
             api: The ``scene`` of a viser server.
             cell: What to draw.
-            drawn: Those of `OVERLAYS` that can be shown; the fewer, the quicker robots move.
+            drawn: Those of `OVERLAYS` that can be shown; the fewer, the quicker robots move. With
+                `COARSE`, `hurry` chooses between that and the meshes.
         """
         self._api, self._cell, self._drawn = api, cell, drawn
         self._bases: dict[str, Any] = {}
@@ -65,7 +67,8 @@ class Scene:
 
     def draw(self, name: str, thing: Thing) -> None:
         """Draw a thing, in the place of one of the same name if there is one."""
-        self._things[name] = _add_parts(self._api, node("(things)", name), thing.parts)
+        add = _add_plain if COARSE in self._drawn else _add_parts
+        self._things[name] = add(self._api, node("(things)", name), thing.parts)
         self.place(name, thing.pose)
 
     def stand(self, name: str, pose: Floats) -> None:
@@ -100,6 +103,12 @@ class Scene:
         for name in self._cell.layout if names is None else names:
             self._overlays[name][overlay].visible = visible
 
+    def hurry(self, quick: bool) -> None:
+        """Draw robots coarsely and without shadows, or as they are."""
+        self.show(COARSE, quick)
+        self.show("meshes", not quick)
+        self._api.configure_default_lights(cast_shadow=not quick)
+
     def show_ways(self, visible: bool) -> None:
         """Show or hide the lines of the cell."""
         self._ways.visible = visible
@@ -131,14 +140,17 @@ class Scene:
         self._bases[name] = api.add_frame(
             f"/{name}", show_axes=False, position=pose.position, wxyz=pose.quaternion
         )
-        for overlay, at_first in OVERLAYS.items():
+        extra = {COARSE: False} if COARSE in self._drawn else {}
+        for overlay, at_first in {**OVERLAYS, **extra}.items():
             visible = at_first and overlay not in self._cell.hidden
             visible |= overlay == "collision" and not self._cell.visuals[name]
             self._overlays[name][overlay] = api.add_frame(
                 f"/{name}/{overlay}", show_axes=False, visible=visible
             )
         if "meshes" in self._drawn:
-            self._draw_meshes(name)
+            self._draw_meshes(name, "meshes", _add_parts)
+        if COARSE in self._drawn:
+            self._draw_meshes(name, COARSE, _add_plain)
         if "frames" in self._drawn:
             self._draw_frames(name)
         if "collision" in self._drawn or not self._cell.visuals[name]:
@@ -153,10 +165,10 @@ class Scene:
             )  # fmt: skip
         api.add_label(f"/{name}/label", name, position=(0.0, 0.0, min(0.15, reach / 4)))
 
-    def _draw_meshes(self, name: str) -> None:
+    def _draw_meshes(self, name: str, overlay: str, add: Callable[..., Any]) -> None:
         kinematics = self._cell.models[name].kinematics
         for link, parts in self._cell.visuals[name].items():
-            handle = _add_parts(self._api, node(name, "meshes", link), parts)
+            handle = add(self._api, node(name, overlay, link), parts)
             self._moving[name].append((kinematics.link(link), handle))
 
     def _draw_frames(self, name: str) -> None:
@@ -251,6 +263,24 @@ def _add_parts(api: Any, path: str, parts: Sequence[Part]) -> Any:
     scene = trimesh.Scene([simplified(part).mesh for part in parts])
     data: Any = scene.export(file_type="glb")
     return api.add_glb(path, data)
+
+
+def _add_plain(api: Any, path: str, parts: Sequence[Part]) -> Any:
+    """Add parts coarsely, each in one colour that needs little computing."""
+    frame = api.add_frame(path, show_axes=False)
+    for number, part in enumerate(map(coarse, parts)):
+        *rgb, alpha = part.rgba
+        api.add_mesh_simple(
+            f"{path}/{number}",
+            np.asarray(part.mesh.vertices, np.float32),
+            np.asarray(part.mesh.faces, np.uint32),
+            color=tuple(round(255 * share) for share in rgb),
+            opacity=alpha if alpha < 1 else None,
+            material="toon5",
+            flat_shading=True,
+            cast_shadow=False,
+        )
+    return frame
 
 
 def _joined(hulls: Sequence[Floats]) -> tuple[Any, Any]:

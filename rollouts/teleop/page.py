@@ -11,7 +11,7 @@ import numpy as np
 
 from kinematics.rotations import Floats
 from layouts.viewer.page import tell
-from layouts.viewer.scene import Scene
+from layouts.viewer.scene import COARSE, Scene
 from layouts.viewer.server import serving
 from layouts.viewer.text import Text, printable
 from robots import RobotLayoutsError
@@ -19,12 +19,13 @@ from rollouts.teleop.keys import KEYS, KEYS_TEXT, Jog
 from rollouts.teleop.pace import Pace
 from rollouts.teleop.seats import Seats
 from rollouts.teleop.session import Phase, Session
-from rollouts.teleop.stopwatch import Stopwatch, gizmo_node
+from rollouts.teleop.stopwatch import QUICK, Stopwatch, gizmo_node
 from tasks.description import read_docstring
 from tasks.view import live_thing, task_cell
 
 IDLE = 0.25  # s between looks at what the page should say while nothing happens
-GIZMO_SIZE = 0.15  # m
+GIZMO_SIZE = 0.2  # m
+VIEW, NEAREST = (0.9, -0.55, 0.6), 0.9  # from the TCPs to the camera: direction, and least way (m)
 UNDO = 1.0  # s that the key takes back
 SLOW = 0.98  # of real time; below that the page says so
 _GIZMO_TEXT = "The coloured axes at each gripper move and turn where it is to go."
@@ -50,8 +51,8 @@ class TeleopPage:
         task = session.task
         server.scene.set_up_direction("+z")
         cell = task_cell(task, task.task_id)
-        self._scene = Scene(server.scene, cell, drawn=("meshes",))
-        self._scene.aim(server.initial_camera)
+        self._scene = Scene(server.scene, cell, drawn=("meshes", COARSE))
+        self._aim(server.initial_camera)
         self._shapes = {name: body.shapes for name, body in self._bodies.items()}
         self._shown: dict[str, Floats] = {}
         self._gizmos = {arm: self._add_gizmo(arm) for arm in session.arms}
@@ -225,6 +226,14 @@ class TeleopPage:
         self._show_world()
         self._show_targets()
 
+    def _aim(self, camera: Any) -> None:
+        """Let a camera look at where the TCPs are, from the front right, from above."""
+        places = np.array([pose[:3] for pose in self._session.targets.values()])
+        middle = places.mean(axis=0)
+        distance = NEAREST + 1.2 * float(np.linalg.norm(np.ptp(places, axis=0)))
+        camera.look_at = tuple(middle)
+        camera.position = tuple(middle + distance * np.array(VIEW) / np.linalg.norm(VIEW))
+
     def _show_world(self) -> None:
         """Show where robots and bodies are; what has not moved is not sent again."""
         state = self._session.task.simulation.read()
@@ -298,6 +307,8 @@ class TeleopPage:
         with gui.add_folder("Times"):
             self._clock, self._count = Text(gui, ""), Text(gui, "")
             self._stopwatch = Stopwatch(self._server, session.arms)
+            quick = gui.add_checkbox(QUICK, False)
+            quick.on_update(lambda event: self._scene.hurry(event.target.value))
         with gui.add_folder("Back to an earlier step"):
             self._build_undo(gui)
         with gui.add_folder("Keys"):
