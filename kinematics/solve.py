@@ -22,6 +22,7 @@ LONGEST_STEP = 0.4  # of a joint, per iteration (rad or m)
 NEAR_ENOUGH = 1e-3, 1e-2  # m and rad
 
 _APPROACHES = 4  # steps of `approach`
+_PLACE_DAMPING, _TURN_DAMPING = 0.005, 0.1  # m, rad; the place must hardly give way
 _HOMEWARD = 0.02  # of the way to its posture, in each of them
 
 _SWEEPS = 30  # over all joints, of the search for the farthest place
@@ -140,24 +141,37 @@ def approach(
     for _ in range(_APPROACHES):
         errors, slopes = _errors(tree, goal, rows, free)
         at = rows[0, free]
-        step = _by_priority(errors[0], slopes[0], rest - at)
+        way, aside = _by_priority(errors[0], slopes[0], rest - at)
         # A joint at a limit that it is drawn beyond leaves the way to the others.
-        stuck = ((at <= low) & (step < 0)) | ((at >= high) & (step > 0))
+        stuck = ((at <= low) & (way + aside < 0)) | ((at >= high) & (way + aside > 0))
         if stuck.any():
-            step = _by_priority(errors[0], np.where(stuck, 0.0, slopes[0]), rest - at)
-        rows[0, free] = np.clip(at + step, low, high)
+            way, aside = _by_priority(errors[0], np.where(stuck, 0.0, slopes[0]), rest - at)
+            aside = np.where(stuck, 0.0, aside)
+        at = at + _share(way, at, low, high) * way
+        at = at + _share(aside, at, low, high) * aside
+        rows[0, free] = np.clip(at, low, high)
     return rows[0]
 
 
-def _by_priority(errors: Floats, slopes: Floats, homeward: Floats) -> Floats:
-    """Return the way that mends the place; then what else it can; then goes a bit homeward."""
-    way, spare = np.zeros(slopes.shape[1]), np.eye(slopes.shape[1])
-    for missing, own in ((errors[:3], slopes[:3]), (errors[3:], slopes[3:])):
-        left = own @ spare
-        back = left.T @ np.linalg.inv(left @ left.T + DAMPING**2 * np.eye(len(missing)))
-        way = way + back @ (missing - own @ way)
-        spare = spare - back @ left
-    return way + spare @ (_HOMEWARD * homeward)
+def _by_priority(errors: Floats, slopes: Floats, homeward: Floats) -> tuple[Floats, Floats]:
+    """Return the way that mends the place; and one that mends what else it can, a bit homeward."""
+    way, spare = _mended(errors[:3], slopes[:3], np.eye(slopes.shape[1]), _PLACE_DAMPING)
+    aside, left = _mended(errors[3:] - slopes[3:] @ way, slopes[3:], spare, _TURN_DAMPING)
+    return way, aside + left @ (_HOMEWARD * homeward)
+
+
+def _mended(errors: Floats, slopes: Floats, spare: Floats, damping: float) -> tuple[Floats, Floats]:
+    """Return the way within what is spare that mends errors, and what is still spare then."""
+    own = slopes @ spare
+    back = own.T @ np.linalg.inv(own @ own.T + damping**2 * np.eye(len(errors)))
+    return back @ errors, spare - back @ own
+
+
+def _share(way: Floats, at: Floats, low: Floats, high: Floats) -> float:
+    """Return how much of a way stays within bounds, 0 … 1."""
+    room = np.where(way > 0, high - at, low - at)
+    shares = room[way != 0] / way[way != 0]
+    return float(np.clip(shares.min(initial=1.0), 0.0, 1.0))
 
 
 def _descend(tree: Tree, goal: Goal, qpos: Floats, free: Sequence[int], iterations: int) -> Floats:

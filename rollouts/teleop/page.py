@@ -25,6 +25,7 @@ from tasks.view import live_thing, task_cell
 
 IDLE = 0.25  # s between looks at what the page should say while nothing happens
 GIZMO_SIZE = 0.2  # m
+FIELD_OF_VIEW = np.radians(60)  # from the upper to the lower edge
 VIEW, NEAREST = (0.9, -0.55, 0.6), 0.9  # from the TCPs to the camera: direction, and least way (m)
 UNDO = 1.0  # s that the key takes back
 SLOW = 0.98  # of real time; below that the page says so
@@ -52,7 +53,9 @@ class TeleopPage:
         server.scene.set_up_direction("+z")
         cell = task_cell(task, task.task_id)
         self._scene = Scene(server.scene, cell, drawn=("meshes", COARSE))
-        self._aim(server.initial_camera)
+        camera = server.initial_camera
+        camera.fov = FIELD_OF_VIEW
+        camera.position, camera.look_at = viewpoint(session)
         self._shapes = {name: body.shapes for name, body in self._bodies.items()}
         self._shown: dict[str, Floats] = {}
         self._gizmos = {arm: self._add_gizmo(arm) for arm in session.arms}
@@ -226,14 +229,6 @@ class TeleopPage:
         self._show_world()
         self._show_targets()
 
-    def _aim(self, camera: Any) -> None:
-        """Let a camera look at where the TCPs are, from the front right, from above."""
-        places = np.array([pose[:3] for pose in self._session.targets.values()])
-        middle = places.mean(axis=0)
-        distance = NEAREST + 1.2 * float(np.linalg.norm(np.ptp(places, axis=0)))
-        camera.look_at = tuple(middle)
-        camera.position = tuple(middle + distance * np.array(VIEW) / np.linalg.norm(VIEW))
-
     def _show_world(self) -> None:
         """Show where robots and bodies are; what has not moved is not sent again."""
         state = self._session.task.simulation.read()
@@ -366,6 +361,14 @@ class TeleopPage:
 
     async def _bid_farewell(self, client: Any) -> None:
         self._waiting.put(lambda: self._seats.leave(client.client_id))
+
+
+def viewpoint(session: Session) -> tuple[Floats, Floats]:
+    """Return where the camera is at first, and what it looks at: the TCPs; each (3,) (m, world)."""
+    places = np.array([pose[:3] for pose in session.targets.values()])
+    middle = places.mean(axis=0)
+    distance = NEAREST + 1.2 * float(np.linalg.norm(np.ptp(places, axis=0)))
+    return middle + distance * np.array(VIEW) / np.linalg.norm(VIEW), middle
 
 
 def serve(

@@ -51,8 +51,12 @@ class _Arm:
     drives: list[_Drive] = field(default_factory=list[_Drive])
     grippers: list[DrivenGroup] = field(default_factory=list[DrivenGroup])
 
-    def prepare(self) -> None:
-        """Look up its links, once all of its groups are known."""
+    def prepare(self) -> list[_Drive]:
+        """Look up its links, once all of its groups are known.
+
+        Returns:
+            What drives those that do not move its TCP, such as fingers: it is no longer its own.
+        """
         layout = self.task.layout
         self._robot = layout.owner(self.name)
         before = list(layout)[: list(layout).index(self._robot)]
@@ -64,6 +68,11 @@ class _Arm:
         self._links = [self._tree.link(tree.links[link]) for link in tcp.links]
         self._turned, self._offset = self._tree.link(tree.links[tcp.turned]), tcp.offset
         self._own = slice(first, first + robot.dof)
+        moving = {first + int(joint) for joint in self._tree.drivers}
+        moves = [bool(moving & {*np.r_[group.joints].tolist()}) for group in self.groups]
+        others = [drive for drive, own in zip(self.drives, moves, strict=True) if not own]
+        self.drives = [drive for drive in self.drives if drive not in others]
+        self.groups = [group for group, own in zip(self.groups, moves, strict=True) if own]
         self.joints = np.concatenate([np.r_[group.joints] for group in self.groups])
         self._free: list[int] = (self.joints - first).tolist()
         self._rest = self.task.simulation.read().joint_positions[0, self.joints].astype(float)
@@ -72,6 +81,7 @@ class _Arm:
             np.concatenate([np.full(len(g.group.joints), by[g.group.unit]) for g in self.groups])
             for by in (LEAD, JOINT_SPEED)
         )
+        return others
 
     def ahead(self, target: Floats, joints: Floats, state: State, seconds: float) -> Floats:
         """Return joints of all robots of which this arm's are a step nearer to a pose.
@@ -126,7 +136,7 @@ class Steering:
             self._take(driven)
         self._arms = {arm.name: arm for arm in self._arms.values() if arm.groups}
         for arm in self._arms.values():
-            arm.prepare()
+            self._still += arm.prepare()
         self.arms = tuple(self._arms)
         self.with_gripper = tuple(name for name, arm in self._arms.items() if arm.grippers)
         self.turned = tuple(name for name, arm in self._arms.items() if arm.turns)
