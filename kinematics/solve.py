@@ -21,6 +21,10 @@ DAMPING = 0.03  # m and rad; keeps steps small near singular postures
 LONGEST_STEP = 0.4  # of a joint, per iteration (rad or m)
 NEAR_ENOUGH = 1e-3, 1e-2  # m and rad
 
+_APPROACHES = 4  # steps of `approach`
+_PLACE_DAMPING, _TURN_DAMPING = 0.005, 0.1  # m, rad; the place must hardly give way
+_HOMEWARD = 0.02  # of the way to its posture, in each of them
+
 _SWEEPS = 30  # over all joints, of the search for the farthest place
 _ANGLES = 90  # tried per joint and sweep
 _SMALLEST_GAIN = 1e-5  # m per sweep
@@ -102,6 +106,72 @@ def solve(
     turn_missing = np.linalg.norm(errors[:, 3:], axis=1)
     solved = (missing < NEAR_ENOUGH[0]) & (turn_missing < NEAR_ENOUGH[1])
     return Solutions(qpos, missing, turn_missing, solved)
+
+
+def approach(
+    tree: Tree,
+    goal: Goal,
+    qpos: Floats,
+    free: Sequence[int],
+    longest: Floats | float,
+    rest: Floats,
+) -> Floats:
+    """Bring a tree a step nearer to a goal: the place first, then the orientation.
+
+    Unlike `solve` it never leaves the neighbourhood. An arm of too few joints, or one whose goal is
+    out of reach, ends where the place is missed least; one of more joints than needed keeps near a
+    posture with what is left over.
+
+    Args:
+        tree: The links.
+        goal: What is asked for, for one posture.
+        qpos: Coordinates to start from, (coordinates,) (rad, m).
+        free: Indices of the coordinates that may move, within their limits.
+        longest: How far each of them may move in all, one number or (free,) (rad or m).
+        rest: The posture, (free,) (rad, m).
+
+    Returns:
+        Coordinates, (coordinates,) (rad, m).
+    """
+    low, high = tree.limits[free].T
+    began = qpos[free]
+    low, high = np.maximum(low, began - longest), np.minimum(high, began + longest)
+    low, high = np.minimum(low, began), np.maximum(high, began)  # where it begins beyond a limit
+    rows = qpos[None].copy()
+    for _ in range(_APPROACHES):
+        errors, slopes = _errors(tree, goal, rows, free)
+        at = rows[0, free]
+        way, aside = _by_priority(errors[0], slopes[0], rest - at)
+        # A joint at a limit that it is drawn beyond leaves the way to the others.
+        stuck = ((at <= low) & (way + aside < 0)) | ((at >= high) & (way + aside > 0))
+        if stuck.any():
+            way, aside = _by_priority(errors[0], np.where(stuck, 0.0, slopes[0]), rest - at)
+            aside = np.where(stuck, 0.0, aside)
+        at = at + _share(way, at, low, high) * way
+        at = at + _share(aside, at, low, high) * aside
+        rows[0, free] = np.clip(at, low, high)
+    return rows[0]
+
+
+def _by_priority(errors: Floats, slopes: Floats, homeward: Floats) -> tuple[Floats, Floats]:
+    """Return the way that mends the place; and one that mends what else it can, a bit homeward."""
+    way, spare = _mended(errors[:3], slopes[:3], np.eye(slopes.shape[1]), _PLACE_DAMPING)
+    aside, left = _mended(errors[3:] - slopes[3:] @ way, slopes[3:], spare, _TURN_DAMPING)
+    return way, aside + left @ (_HOMEWARD * homeward)
+
+
+def _mended(errors: Floats, slopes: Floats, spare: Floats, damping: float) -> tuple[Floats, Floats]:
+    """Return the way within what is spare that mends errors, and what is still spare then."""
+    own = slopes @ spare
+    back = own.T @ np.linalg.inv(own @ own.T + damping**2 * np.eye(len(errors)))
+    return back @ errors, spare - back @ own
+
+
+def _share(way: Floats, at: Floats, low: Floats, high: Floats) -> float:
+    """Return how much of a way stays within bounds, 0 … 1."""
+    room = np.where(way > 0, high - at, low - at)
+    shares = room[way != 0] / way[way != 0]
+    return float(np.clip(shares.min(initial=1.0), 0.0, 1.0))
 
 
 def _descend(tree: Tree, goal: Goal, qpos: Floats, free: Sequence[int], iterations: int) -> Floats:

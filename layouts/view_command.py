@@ -30,6 +30,14 @@ def add_view_options(
 
 def add_page_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that say where a page is served or saved; see `show`."""
+    add_server_options(parser)
+    parser.add_argument(
+        "--html", metavar="FILE", help="save the page as one file instead, without sliders"
+    )
+
+
+def add_server_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say where a page is served."""
     parser.add_argument(
         "--host",
         default=LOOPBACK,
@@ -38,9 +46,6 @@ def add_page_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--port", type=int, default=PORT, metavar="N", help="port (%(default)s; 0: any free one)"
-    )
-    parser.add_argument(
-        "--html", metavar="FILE", help="save the page as one file instead, without sliders"
     )
 
 

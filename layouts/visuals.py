@@ -25,6 +25,8 @@ Rgba = tuple[float, float, float, float]  # 0 … 1
 GREY: Rgba = (0.7, 0.7, 0.7, 1.0)
 SIDES = 48  # of the polygon that stands for a circle
 MANY_TRIANGLES = 60_000  # of one mesh; with more it is drawn coarser
+FEW_TRIANGLES = 500  # of one mesh; with more its hull is drawn in quick pictures
+COARSE_CELLS = 40  # along the longest side of such a mesh
 CELLS = 300  # along the longest side of a mesh that is drawn coarser
 
 
@@ -115,6 +117,25 @@ def simplified(part: Part) -> Part:
     _, first = np.unique(np.sort(faces[distinct], axis=1), axis=0, return_index=True)
     faces = faces[distinct][np.sort(first)]
     return coloured(trimesh.Trimesh(places * cell, faces, process=False), part.rgba)
+
+
+def coarse(part: Part) -> Part:
+    """Return the convex hull of a part that has many triangles, for quick pictures.
+
+    Corners move by less than 1/80 of its longest side.
+    """
+    import trimesh
+    from scipy.spatial import QhullError
+
+    mesh = part.mesh
+    if len(mesh.faces) <= FEW_TRIANGLES:
+        return part
+    cell = float(np.ptp(mesh.vertices, axis=0).max()) / COARSE_CELLS
+    places = np.unique(np.round(mesh.vertices / cell), axis=0) * cell
+    try:
+        return coloured(trimesh.convex.convex_hull(places), part.rgba)
+    except QhullError:  # it is flat
+        return simplified(part)
 
 
 def _named_colours(root: Element, urdf: Path) -> Iterator[tuple[str, Rgba]]:

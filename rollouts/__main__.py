@@ -13,6 +13,7 @@ from tasks.cell_options import add_cell_options, chosen_cell
 # Command -> its module, with DESCRIPTION, add_arguments(parser) and run(options).
 COMMANDS = {
     "record": "rollouts.recording.record_command",
+    "teleop": "rollouts.teleop.command",
     "evaluate": "rollouts.evaluate_command",
     "convert": "rollouts.recording.convert_command",
     "replay": "rollouts.playing.replay_command",

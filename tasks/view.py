@@ -33,13 +33,22 @@ def task_cell(task: MultiRobotTask, title: str, motion: Motion | None = None) ->
         MissingPackageError: If trimesh or python-fcl is not installed.
     """
     world, state = task.simulation.worlds[0], task.simulation.read()
-    things = {
-        name: Thing(parts, state.pose(name)[0].astype(float))
-        for name, body in world.bodies.items()
-        if (parts := body_parts(body.shapes))
-    }
+    drawn = {name: live_thing(task, name) for name in world.bodies}
+    things = {name: thing for name, thing in drawn.items() if thing is not None}
     start = {name: state.qpos(name)[0].astype(float) for name in task.layout}
     return Cell(title, task.standing(), things, motion, start)
+
+
+def live_thing(task: MultiRobotTask, name: str) -> Thing | None:
+    """Return what a page shows of a body as it is now, or None if that is not drawn.
+
+    Args:
+        task: A task that has been reset.
+        name: The body.
+    """
+    parts = body_parts(task.simulation.worlds[0].bodies[name].shapes)
+    pose = task.simulation.read().pose(name)[0].astype(float)
+    return Thing(parts, pose) if parts else None
 
 
 def recorded_motion(

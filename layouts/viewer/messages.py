@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 MESSAGE_BYTES = 1 << 14  # of the largest that is read; a camera's takes some hundred
+_UNIT = 1e-3  # by how much a quaternion may be longer or shorter than 1
 
 
 def fits(server: Any, data: str | bytes) -> bool:
@@ -19,16 +21,43 @@ def fits(server: Any, data: str | bytes) -> bool:
         server: The viser server.
         data: What came over the WebSocket.
     """
-    from viser import _messages
+    from viser import _messages as kinds
 
+    taken = (
+        kinds.ViewerCameraMessage,
+        kinds.GuiUpdateMessage,
+        kinds.CommandTriggerMessage,
+        kinds.TransformControlsDragStartMessage,
+        kinds.TransformControlsUpdateMessage,
+        kinds.TransformControlsDragEndMessage,
+    )
     try:
-        message = _decoded(data, (_messages.ViewerCameraMessage, _messages.GuiUpdateMessage))
+        message = _decoded(data, taken)
     except (ValueError, RecursionError):
         return False
-    if isinstance(message, _messages.ViewerCameraMessage):
+    match message:
+        case kinds.ViewerCameraMessage():
+            return True
+        case kinds.GuiUpdateMessage():
+            control = server.gui._gui_input_handle_from_uuid.get(message.uuid)
+            return set(message.updates) == {"value"} and _takes(control, message.updates["value"])
+        case kinds.CommandTriggerMessage():
+            command = server.gui._command_handle_from_uuid.get(message.uuid)
+            return command is not None and not command.disabled
+        case _:
+            return _drags(server, message)
+
+
+def _drags(server: Any, message: Any) -> bool:
+    """Return whether a message drags a gizmo of the page that is shown to a pose in its reach."""
+    gizmo = server.scene._handle_from_transform_controls_name.get(message.name)
+    if gizmo is None or not gizmo.visible or message.owner:
+        return False
+    if not hasattr(message, "position"):  # it only takes the gizmo, or lets go of it
         return True
-    control = server.gui._gui_input_handle_from_uuid.get(message.uuid)
-    return set(message.updates) == {"value"} and _takes(control, message.updates["value"])
+    limits = zip(gizmo.translation_limits, message.position, strict=True)
+    length = math.hypot(*message.wxyz)
+    return all(low <= x <= high for (low, high), x in limits) and abs(length - 1) < _UNIT
 
 
 def _decoded(data: str | bytes, kinds: tuple[type, ...]) -> Any:

@@ -204,18 +204,30 @@ def serve(cell: Cell, host: str, port: int, announce: Callable[[str], None]) -> 
     """
     with serving(host, port, cell.title) as (server, address):
         page = Page(server, cell)
-        if not is_loopback(host):
-            announce(
-                f"listening at {host}: others on this network can open and move it, too, at this"
-                " machine's name or address and with the token; nothing is encrypted"
-            )
-        announce(f"{cell.title}: {address} (Ctrl-C ends it)")
+        tell(cell.title, host, address, announce)
         before = time.monotonic()
         while True:
             time.sleep(PAUSE)
             now = time.monotonic()
             page.tick(now - before)
             before = now
+
+
+def tell(title: str, host: str, address: str, announce: Callable[[str], None]) -> None:
+    """Tell where a page is, and who else may open it.
+
+    Args:
+        title: What the page calls itself.
+        host: Address at which it listens.
+        address: What to open in a browser.
+        announce: Called with each line.
+    """
+    if not is_loopback(host):
+        announce(
+            f"listening at {host}: others on this network can open and move it, too, at this"
+            " machine's name or address and with the token; nothing is encrypted"
+        )
+    announce(f"{title}: {address} (Ctrl-C ends it)")
 
 
 def contacts_text(contacts: list[Contact]) -> str:

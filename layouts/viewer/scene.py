@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,9 @@ import numpy as np
 from kinematics.rotations import Floats, quaternion_of
 from layouts.frames import table_outlines
 from layouts.preview import COLOURS
-from layouts.viewer.cell import Cell, Contact
+from layouts.viewer.cell import Cell, Contact, Thing
 from layouts.viewer.text import node
-from layouts.visuals import Part, simplified
+from layouts.visuals import Part, coarse, simplified
 from robots.urdf.tree import link_index
 
 # What can be shown and hidden, and whether it is shown at first.
@@ -24,6 +24,7 @@ OVERLAYS: Mapping[str, bool] = {
     "reach sphere": False,
     "collision": False,
 }
+COARSE = "coarse"  # one more, for quick pictures: hulls, without shine and shadows
 TOUCHING = (214, 39, 40)
 TABLE_COLOUR = (222, 207, 184)
 FRAME_LENGTH = 0.08  # in reaches
@@ -39,14 +40,17 @@ class Scene:
     ``/(ways)/ROBOT/…``: no robot's name has brackets.
     """
 
-    def __init__(self, api: Any, cell: Cell) -> None:
+    def __init__(self, api: Any, cell: Cell, drawn: Collection[str] = tuple(OVERLAYS)) -> None:
         """Draw the cell as it starts.
 
         Args:
             api: The ``scene`` of a viser server.
             cell: What to draw.
+            drawn: Those of `OVERLAYS` that can be shown; the fewer, the quicker robots move. With
+                `COARSE`, `hurry` chooses between that and the meshes.
         """
-        self._api, self._cell = api, cell
+        self._api, self._cell, self._drawn = api, cell, drawn
+        self._bases: dict[str, Any] = {}
         self._overlays: dict[str, dict[str, Any]] = {name: {} for name in cell.layout}
         self._moving: dict[str, list[tuple[int, Any]]] = {name: [] for name in cell.layout}
         self._touching: dict[tuple[str, str], Any] = {}
@@ -59,8 +63,18 @@ class Scene:
             self._draw_ways(name, colour)
             self.pose(name, cell.start[name])
         for name, thing in cell.things.items():
-            self._things[name] = _add_parts(api, node("(things)", name), thing.parts)
-            self.place(name, thing.pose)
+            self.draw(name, thing)
+
+    def draw(self, name: str, thing: Thing) -> None:
+        """Draw a thing, in the place of one of the same name if there is one."""
+        add = _add_plain if COARSE in self._drawn else _add_parts
+        self._things[name] = add(self._api, node("(things)", name), thing.parts)
+        self.place(name, thing.pose)
+
+    def stand(self, name: str, pose: Floats) -> None:
+        """Let a robot's base stand at a pose: position (m, world), quaternion (wxyz), (7,)."""
+        base = self._bases[name]
+        base.position, base.wxyz = tuple(pose[:3]), tuple(pose[3:])
 
     def pose(self, name: str, qpos: Floats) -> None:
         """Show a robot at joint positions.
@@ -74,6 +88,11 @@ class Scene:
         for link, handle in self._moving[name]:
             handle.position, handle.wxyz = places[link]
 
+    @property
+    def things(self) -> tuple[str, ...]:
+        """Names of the things that are drawn."""
+        return tuple(self._things)
+
     def place(self, name: str, pose: Floats) -> None:
         """Show a thing at a pose: position (m, world), quaternion (wxyz), (7,)."""
         handle = self._things[name]
@@ -83,6 +102,12 @@ class Scene:
         """Show or hide one of `OVERLAYS`, of some robots or of all."""
         for name in self._cell.layout if names is None else names:
             self._overlays[name][overlay].visible = visible
+
+    def hurry(self, quick: bool) -> None:
+        """Draw robots coarsely and without shadows, or as they are."""
+        self.show(COARSE, quick)
+        self.show("meshes", not quick)
+        self._api.configure_default_lights(cast_shadow=not quick)
 
     def show_ways(self, visible: bool) -> None:
         """Show or hide the lines of the cell."""
@@ -112,28 +137,38 @@ class Scene:
     def _draw_robot(self, name: str, colour: tuple[int, int, int]) -> None:
         api, placement = self._api, self._cell.layout[name]
         pose = placement.base_pose
-        api.add_frame(f"/{name}", show_axes=False, position=pose.position, wxyz=pose.quaternion)
-        for overlay, at_first in OVERLAYS.items():
+        self._bases[name] = api.add_frame(
+            f"/{name}", show_axes=False, position=pose.position, wxyz=pose.quaternion
+        )
+        extra = {COARSE: False} if COARSE in self._drawn else {}
+        for overlay, at_first in {**OVERLAYS, **extra}.items():
             visible = at_first and overlay not in self._cell.hidden
             visible |= overlay == "collision" and not self._cell.visuals[name]
             self._overlays[name][overlay] = api.add_frame(
                 f"/{name}/{overlay}", show_axes=False, visible=visible
             )
-        self._draw_meshes(name)
-        self._draw_frames(name)
-        self._draw_hulls(name, colour)
+        if "meshes" in self._drawn:
+            self._draw_meshes(name, "meshes", _add_parts)
+        if COARSE in self._drawn:
+            self._draw_meshes(name, COARSE, _add_plain)
+        if "frames" in self._drawn:
+            self._draw_frames(name)
+        if "collision" in self._drawn or not self._cell.visuals[name]:
+            self._draw_hulls(name, colour)
         reach = placement.robot.reach
-        self._draw_circle(name, reach, colour)
-        api.add_icosphere(
-            f"/{name}/reach sphere/ball", reach, color=colour, opacity=0.12, side="double",
-            subdivisions=4, cast_shadow=False, receive_shadow=False,
-        )  # fmt: skip
+        if "reach" in self._drawn:
+            self._draw_circle(name, reach, colour)
+        if "reach sphere" in self._drawn:
+            api.add_icosphere(
+                f"/{name}/reach sphere/ball", reach, color=colour, opacity=0.12, side="double",
+                subdivisions=4, cast_shadow=False, receive_shadow=False,
+            )  # fmt: skip
         api.add_label(f"/{name}/label", name, position=(0.0, 0.0, min(0.15, reach / 4)))
 
-    def _draw_meshes(self, name: str) -> None:
+    def _draw_meshes(self, name: str, overlay: str, add: Callable[..., Any]) -> None:
         kinematics = self._cell.models[name].kinematics
         for link, parts in self._cell.visuals[name].items():
-            handle = _add_parts(self._api, node(name, "meshes", link), parts)
+            handle = add(self._api, node(name, overlay, link), parts)
             self._moving[name].append((kinematics.link(link), handle))
 
     def _draw_frames(self, name: str) -> None:
@@ -228,6 +263,24 @@ def _add_parts(api: Any, path: str, parts: Sequence[Part]) -> Any:
     scene = trimesh.Scene([simplified(part).mesh for part in parts])
     data: Any = scene.export(file_type="glb")
     return api.add_glb(path, data)
+
+
+def _add_plain(api: Any, path: str, parts: Sequence[Part]) -> Any:
+    """Add parts coarsely, each in one colour that needs little computing."""
+    frame = api.add_frame(path, show_axes=False)
+    for number, part in enumerate(map(coarse, parts)):
+        *rgb, alpha = part.rgba
+        api.add_mesh_simple(
+            f"{path}/{number}",
+            np.asarray(part.mesh.vertices, np.float32),
+            np.asarray(part.mesh.faces, np.uint32),
+            color=tuple(round(255 * share) for share in rgb),
+            opacity=alpha if alpha < 1 else None,
+            material="toon5",
+            flat_shading=True,
+            cast_shadow=False,
+        )
+    return frame
 
 
 def _joined(hulls: Sequence[Floats]) -> tuple[Any, Any]:

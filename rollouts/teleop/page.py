@@ -1,0 +1,401 @@
+"""The page on which people steer: the live world, gizmos, buttons and keys over a `Session`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from queue import Empty, SimpleQueue
+from time import monotonic
+from typing import Any, NoReturn
+
+import numpy as np
+
+from kinematics.rotations import Floats
+from layouts.viewer.page import tell
+from layouts.viewer.scene import COARSE, Scene
+from layouts.viewer.server import serving
+from layouts.viewer.text import Text, printable
+from robots import RobotLayoutsError
+from rollouts.teleop.keys import KEYS, KEYS_TEXT, Jog
+from rollouts.teleop.pace import Pace
+from rollouts.teleop.seats import Seats
+from rollouts.teleop.session import Phase, Session
+from rollouts.teleop.stopwatch import QUICK, Stopwatch, gizmo_node
+from tasks.description import read_docstring
+from tasks.view import live_thing, task_cell
+
+IDLE = 0.25  # s between looks at what the page should say while nothing happens
+GIZMO_SIZE = 0.2  # m
+FIELD_OF_VIEW = np.radians(60)  # from the upper to the lower edge
+VIEW, NEAREST = (0.9, -0.55, 0.6), 0.9  # from the TCPs to the camera: direction, and least way (m)
+UNDO = 1.0  # s that the key takes back
+SLOW = 0.98  # of real time; below that the page says so
+_GIZMO_TEXT = "The coloured axes at each gripper move and turn where it is to go."
+
+
+class TeleopPage:
+    """A session on a viser server.
+
+    Everything happens in the thread that calls `run` or `tick`; what browsers send waits for it.
+    """
+
+    def __init__(self, server: Any, session: Session) -> None:
+        """Draw the world and the panel.
+
+        Args:
+            server: A viser server.
+            session: What to steer; its replays are shown from now on.
+        """
+        self._server, self._session = server, session
+        self._waiting: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._said = 0.0  # when
+        self._pace, self._seats = Pace(session.seconds), Seats(session.arms)
+        task = session.task
+        server.scene.set_up_direction("+z")
+        cell = task_cell(task, task.task_id)
+        self._scene = Scene(server.scene, cell, drawn=("meshes", COARSE))
+        camera = server.initial_camera
+        camera.fov = FIELD_OF_VIEW
+        camera.position, camera.look_at = viewpoint(session)
+        self._shapes = {name: body.shapes for name, body in self._bodies.items()}
+        self._shown: dict[str, Floats] = {}
+        self._gizmos = {arm: self._add_gizmo(arm) for arm in session.arms}
+        self._build(cell.title, cell.notes)
+        session.on_replay = self._show_replay
+        server.on_client_connect(self._greet)
+        server.on_client_disconnect(self._bid_farewell)
+        self._show_world()
+        self._show_targets()
+
+    def run(self) -> NoReturn:
+        """Go on until something, such as Ctrl-C, raises."""
+        while True:
+            self.tick()
+
+    def tick(self) -> None:
+        """Do what browsers ask for, and take a step once it is due; wait for either till then."""
+        running = self._session.phase is Phase.RUNNING
+        asked = self._handle_waiting(max(self._pace.left(), 0.0) if running else IDLE)
+        if self._session.phase is Phase.RUNNING and self._pace.left() <= 0:
+            self._step()
+        if asked or monotonic() - self._said > IDLE:
+            self._say()
+            self._said = monotonic()
+
+    # -- what happens ------------------------------------------------------------------------
+
+    def _step(self) -> None:
+        self._session.step()
+        self._pace.stepped()
+        if self._pace.behind:  # it catches up first; the picture of the last step is shown
+            return
+        with self._server.atomic():
+            self._show_world()
+            for arm, pose in self._session.targets.items():
+                x, y, z = pose[:3].tolist()
+                self._stopwatch.stepped(arm, (x, y, z))
+
+    def _handle_waiting(self, patience: float) -> bool:
+        """Do all that browsers have asked for; wait for that if they have not.
+
+        Args:
+            patience: How long to wait (s).
+
+        Returns:
+            Whether there was anything.
+        """
+        asked = False
+        try:
+            while True:
+                wait = patience > 0 and not asked
+                self._do(
+                    self._waiting.get(timeout=patience) if wait else self._waiting.get_nowait()
+                )
+                asked = True
+        except Empty:
+            return asked
+
+    def _do(self, act: Callable[[], None]) -> None:
+        try:
+            act()
+        except RobotLayoutsError as error:
+            self._note.text = f"Not done: {error}"
+
+    def _asks(self, act: Callable[[int], None]) -> Callable[[Any], Any]:
+        """Return a callback of viser that lets the thread of this page do something."""
+
+        async def ask(event: Any) -> None:  # awaited, so that nothing overtakes
+            client = event.client_id
+            if client is not None:  # not set by this page itself
+                self._waiting.put(lambda: act(client))
+
+        return ask
+
+    # -- arms --------------------------------------------------------------------------------
+
+    def _add_gizmo(self, arm: str) -> Any:
+        gizmo = self._server.scene.add_transform_controls(
+            gizmo_node(arm),
+            GIZMO_SIZE,
+            depth_test=False,
+            disable_rotations=arm not in self._session.steering.turned,
+        )
+
+        async def dragged(event: Any) -> None:
+            pose = np.concatenate([event.target.position, event.target.wxyz])
+            client, phase = event.client_id, event.phase
+            self._waiting.put(lambda: self._drag(client, arm, phase, pose))
+
+        gizmo.on_update(dragged)
+        return gizmo
+
+    def _drag(self, client: int, arm: str, phase: str, pose: Floats) -> None:
+        if phase == "start":
+            self._seats.take(client, arm)
+        elif phase == "update" and self._seats.owns(client, arm):
+            pose[3:] /= np.linalg.norm(pose[3:])
+            self._session.aim(arm, pose)
+        elif phase == "end" and not self._seats.owns(client, arm):
+            self._show_targets()
+
+    def _jog(self, client: int, jog: Jog) -> None:
+        arm = self._seats.arm_of(client)
+        way, turn = jog.scaled(self._key_step.value / 1000, np.radians(self._key_turn.value))
+        self._session.shift(arm, way, turn)
+        self._show_targets()
+
+    def _toggle(self, client: int, arm: str | None = None) -> None:
+        if arm is not None:
+            self._seats.take(client, arm)
+        arm = self._seats.arm_of(client)
+        self._session.grip(arm, not self._session.closed[arm])
+
+    def _let_go(self, client: int, arm: str) -> None:
+        self._seats.take(client, arm)
+        self._session.let_go(arm)
+        self._show_targets()
+
+    # -- the episode -------------------------------------------------------------------------
+
+    def _start_or_stop(self, _: int) -> None:
+        if self._session.phase is Phase.RUNNING:
+            self._session.stop()
+        else:
+            self._session.start()
+            self._pace.restart()
+
+    def _back(self, _: int) -> None:
+        steps = len(self._session.actions)
+        self._undo(max(0, steps - round(UNDO / self._session.seconds)))
+
+    def _undo(self, step: int) -> None:
+        self._session.stop()
+        self._session.undo(min(step, len(self._session.actions)))
+        self._show_anew()
+
+    def _keep(self, _: int) -> None:
+        seed, steps = self._session.seed, len(self._session.actions)
+        episode = self._session.keep()
+        self._show_anew()
+        how = "solved" if episode.solved else "not solved"
+        self._note.text = f"Kept: seed {seed}, {steps} steps, {how}."
+
+    def _discard(self, _: int) -> None:
+        self._session.discard()
+        self._show_anew()
+
+    def _skip(self, _: int) -> None:
+        self._session.skip()
+        self._show_anew()
+
+    def _show_replay(self, done: int, steps: int) -> None:
+        if done % 100 == 0 and done < steps:
+            self._status.text = f"Playing step {done} of {steps} again …"
+
+    # -- what is shown -----------------------------------------------------------------------
+
+    @property
+    def _bodies(self) -> Any:
+        return self._session.task.simulation.worlds[0].bodies
+
+    def _show_anew(self) -> None:
+        """Show a world that was built anew, whose bodies may have other shapes."""
+        for name, body in self._bodies.items():
+            if body.shapes != self._shapes.get(name):
+                thing = live_thing(self._session.task, name)
+                if thing is not None:
+                    self._scene.draw(name, thing)
+                self._shapes[name] = body.shapes
+        self._shown.clear()
+        self._show_world()
+        self._show_targets()
+
+    def _show_world(self) -> None:
+        """Show where robots and bodies are; what has not moved is not sent again."""
+        state = self._session.task.simulation.read()
+        for name in self._session.task.layout:
+            if self._moved(f"base of {name}", base := state.base_pose(name)[0]):
+                self._scene.stand(name, base.astype(float))
+            if self._moved(f"joints of {name}", qpos := state.qpos(name)[0]):
+                self._scene.pose(name, qpos.astype(float))
+        for name in self._scene.things:
+            if self._moved(f"body {name}", pose := state.pose(name)[0]):
+                self._scene.place(name, pose.astype(float))
+
+    def _moved(self, what: str, now: Floats) -> bool:
+        before = self._shown.get(what)
+        self._shown[what] = now.copy()
+        return before is None or not np.array_equal(before, now)
+
+    def _show_targets(self) -> None:
+        for arm, pose in self._session.targets.items():
+            gizmo = self._gizmos[arm]
+            gizmo.position, gizmo.wxyz = pose[:3], pose[3:]
+
+    def _say(self) -> None:
+        """Say how the episode stands; texts that stay the same are not sent again."""
+        session = self._session
+        steps = len(session.actions)
+        solved = "solved" if session.success else "not solved"
+        _write(
+            self._status,
+            f"Seed {session.seed}: {session.phase.value}, step {steps}"
+            f" ({steps * session.seconds:.1f} s), {solved}",
+        )
+        speed = f"Time runs at {self._pace.speed:.0%} of real time"
+        lost = f"; it stood still for {self._pace.lost:.1f} s" if self._pace.lost else ""
+        slow = self._pace.speed < SLOW or self._pace.lost
+        _write(self._clock, f"{speed}{lost}; no step is left out." if slow else "Real time.")
+        solved_episodes = sum(session.kept.values())
+        _write(self._count, f"{len(session.kept)} episodes kept, {solved_episodes} of them solved")
+        if session.phase is not Phase.RUNNING and self._earlier.max != max(steps, 1):
+            self._earlier.max = max(steps, 1)
+            self._earlier.value = min(self._earlier.value, steps)
+        self._run.label = "Stop (P)" if session.phase is Phase.RUNNING else "Start (P)"
+        for arm, text in self._arm_texts.items():
+            away = np.linalg.norm(session.steering.tcp(arm)[:3] - session.targets[arm][:3])
+            gripper = f", {'closed' if session.closed[arm] else 'open'}"
+            own = gripper if arm in session.steering.with_gripper else ""
+            place = ", ".join(f"{x:.3f}" for x in session.targets[arm][:3])
+            holder = self._seats.holder(arm)
+            _write(text, f"{holder}{own}\nto ({place}) m, {away * 1000:.0f} mm to go")
+
+    # -- the panel ---------------------------------------------------------------------------
+
+    def _build(self, title: str, notes: list[str]) -> None:
+        gui, session = self._server.gui, self._session
+        # viser's own share button would put the page on the internet, at one click.
+        gui.configure_theme(show_logo=False, show_share_button=False)
+        gui.main_panel.dock_right()
+        Text(gui, title, bold=True)
+        Text(gui, read_docstring(type(session.task)).summary)
+        for note in notes:
+            Text(gui, note)
+        self._status, self._note = Text(gui, ""), Text(gui, "")
+        self._run = self._add_button("Start (P)", self._start_or_stop)
+        self._add_button(f"Back {UNDO:g} s (Z)", self._back)
+        self._add_button("Keep (M)", self._keep)
+        self._add_button("Discard (X)", self._discard)
+        self._add_button("Next seed (N)", self._skip)
+        self._arm_texts: dict[str, Text] = {}
+        for arm in session.arms:
+            self._build_arm(arm)
+        with gui.add_folder("Times"):
+            self._clock, self._count = Text(gui, ""), Text(gui, "")
+            self._stopwatch = Stopwatch(self._server, session.arms)
+            quick = gui.add_checkbox(QUICK, False)
+            quick.on_update(lambda event: self._scene.hurry(event.target.value))
+        with gui.add_folder("Back to an earlier step"):
+            self._build_undo(gui)
+        with gui.add_folder("Keys"):
+            Text(gui, f"{KEYS_TEXT}\n{_GIZMO_TEXT}")
+            self._key_step = gui.add_slider("Move by (mm)", 1, 50, 1, 10)
+            self._key_turn = gui.add_slider("Turn by (degrees)", 1, 30, 1, 5)
+        self._add_keys()
+
+    def _build_arm(self, arm: str) -> None:
+        gui = self._server.gui
+        robot = self._session.task.layout.arm(arm).robot.name
+        with gui.add_folder(f"{printable(arm)} ({robot})"):
+            self._arm_texts[arm] = Text(gui, "")
+            self._add_button("Take", lambda client: self._seats.take(client, arm))
+            if arm in self._session.steering.with_gripper:
+                self._add_button("Open or close (G)", lambda client: self._toggle(client, arm))
+            self._add_button("Stay where it is", lambda client: self._let_go(client, arm))
+
+    def _build_undo(self, gui: Any) -> None:
+        self._earlier = gui.add_slider("Step", 0, 1, 1, 0)
+        self._add_button("Go back there", lambda _: self._undo(int(self._earlier.value)))
+
+    def _add_button(self, label: str, act: Callable[[int], None]) -> Any:
+        button = self._server.gui.add_button(label)
+        button.on_click(self._asks(act))
+        return button
+
+    def _add_keys(self) -> None:
+        for key, jog in KEYS.items():
+            self._add_key(key, jog.label, lambda client, jog=jog: self._jog(client, jog), jog.shift)
+        for key, label, act in (
+            ("P", "Start or stop", self._start_or_stop),
+            ("Z", "Back", self._back),
+            ("M", "Keep", self._keep),
+            ("X", "Discard", self._discard),
+            ("N", "Next seed", self._skip),
+            ("G", "Open or close the gripper", self._toggle),
+        ):
+            self._add_key(key, label, act)
+        for number, arm in enumerate(self._session.arms[:9], start=1):
+            act = lambda client, arm=arm: self._seats.take(client, arm)  # noqa: E731
+            self._add_key(str(number), f"Take {printable(arm)}", act)
+
+    def _add_key(
+        self, key: str, label: str, act: Callable[[int], None], shift: bool = False
+    ) -> None:
+        modifier = "shift" if shift else None
+        command = self._server.gui.add_command(label, hotkey=key[-1], modifier=modifier)
+        command.on_trigger(self._asks(act))
+
+    # -- browsers ----------------------------------------------------------------------------
+
+    async def _greet(self, client: Any) -> None:
+        self._waiting.put(lambda: self._seats.enter(client))
+
+    async def _bid_farewell(self, client: Any) -> None:
+        self._waiting.put(lambda: self._seats.leave(client.client_id))
+
+
+def viewpoint(session: Session) -> tuple[Floats, Floats]:
+    """Return where the camera is at first, and what it looks at: the TCPs; each (3,) (m, world)."""
+    places = np.array([pose[:3] for pose in session.targets.values()])
+    middle = places.mean(axis=0)
+    distance = NEAREST + 1.2 * float(np.linalg.norm(np.ptp(places, axis=0)))
+    return middle + distance * np.array(VIEW) / np.linalg.norm(VIEW), middle
+
+
+def serve(
+    session: Session,
+    host: str,
+    port: int,
+    announce: Callable[[str], None],
+) -> NoReturn:
+    """Serve a page until something, such as Ctrl-C, raises.
+
+    Args:
+        session: What is steered.
+        host: Address to listen at.
+        port: Port to listen at; 0 takes a free one.
+        announce: Called with the lines that tell where the page is.
+
+    Raises:
+        MissingPackageError: If viser is not installed.
+        ViewerError: If the port is in use, or the address is none of this machine's.
+    """
+    title = f"Steering {session.task.task_id}"
+    with serving(host, port, title) as (server, address):
+        page = TeleopPage(server, session)
+        tell(title, host, address, announce)
+        page.run()
+
+
+def _write(text: Text, words: str) -> None:
+    if text.text != words:
+        text.text = words

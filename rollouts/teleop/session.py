@@ -1,0 +1,264 @@
+"""An episode that people steer step by step, take back in part, and keep or discard."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from enum import Enum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinematics.rotations import Floats, multiply, quaternion_about
+from robots import RecordingError, TaskError, UnknownNameError
+from rollouts.recording.recorder import Recorder
+from rollouts.teleop.steering import Steering
+from tasks import MultiRobotTask
+from tasks.episode import REBUILT, PlayedEpisode, play
+
+PERSON: Mapping[str, Any] = {"kind": "person", "name": "browser"}
+_UNIT = 1e-6  # by how much a quaternion may be longer or shorter than 1
+
+
+class Phase(Enum):
+    """Where an episode is."""
+
+    READY = "ready"
+    RUNNING = "running"
+    STOPPED = "stopped"
+
+
+class _Moment(NamedTuple):
+    """What people asked for at a step."""
+
+    targets: dict[str, Floats]
+    closed: dict[str, bool]
+    reference: Floats
+
+
+class Session:
+    """Steers a task with one environment; needs no browser, and is used by one thread.
+
+    An episode begins with the reset of its seed in a freshly built world. What goes back to an
+    earlier moment, and what is kept, is played from there once more: actions and seed are all
+    that an episode follows from.
+
+    Attributes:
+        task: The task.
+        seed: Seed of the episode.
+        phase: Whether it has begun, and whether it goes on.
+        actions: What has been done in it, each (A,).
+        success: Whether the task is solved now.
+        observation: What the task last returned.
+        targets: By arm, where its TCP is to be: position (m, world), quaternion (wxyz), (7,).
+        closed: By arm, whether its gripper is to be closed.
+        on_replay: Called with the number of steps played again, and how many there are.
+        kept: Seeds of the episodes kept so far, by whether they were solved.
+    """
+
+    def __init__(
+        self,
+        task: MultiRobotTask,
+        recorder: Recorder | None = None,
+        seed: int = 0,
+    ) -> None:
+        """Begin an episode.
+
+        Args:
+            task: A task with one environment.
+            recorder: Where episodes are kept; None if they are only returned.
+            seed: Of the first episode, or of one of the next if that is recorded already.
+
+        Raises:
+            TaskError: If the task has several environments, or no arm can be steered.
+        """
+        self.task, self._recorder = task, recorder
+        self.on_replay: Callable[[int, int], None] = lambda done, steps: None
+        self.kept: dict[int, bool] = {}
+        self._begin(self._free_seed(seed))
+
+    @property
+    def arms(self) -> tuple[str, ...]:
+        """Names of the arms that can be steered, as the task calls them."""
+        return self.steering.arms
+
+    @property
+    def seconds(self) -> float:
+        """Time from one step to the next (s)."""
+        return 1 / self.task.scenario.control_frequency
+
+    def aim(self, arm: str, pose: Floats) -> None:
+        """Say where the TCP of an arm is to be.
+
+        Args:
+            arm: Its name.
+            pose: Position (m, world), then quaternion (wxyz), (7,).
+
+        Raises:
+            UnknownNameError: If no arm of that name can be steered.
+            TaskError: If the pose makes no sense.
+        """
+        self._check(arm)
+        pose = np.array(pose, float)
+        if pose.shape != (7,) or not np.isfinite(pose).all():
+            raise TaskError(f"a pose is 7 finite numbers; {arm} was given {pose.tolist()}")
+        length = float(np.linalg.norm(pose[3:]))
+        if abs(length - 1) > _UNIT:
+            raise TaskError(f"the quaternion for {arm} has the length {length:.6g}; it must be 1")
+        self.targets[arm] = pose
+
+    def shift(self, arm: str, way: Floats | None = None, turn: Floats | None = None) -> None:
+        """Move and turn the place where the TCP of an arm is to be.
+
+        Args:
+            arm: Its name.
+            way: By how much to move it, (3,) (m, world); None: not at all.
+            turn: Axis in the world by whose length to turn it, (3,) (rad); None: not at all.
+
+        Raises:
+            UnknownNameError: If no arm of that name can be steered.
+            TaskError: If it makes no sense.
+        """
+        self._check(arm)
+        pose = self.targets[arm].copy()
+        if way is not None:
+            pose[:3] += way
+        if turn is not None and (angle := float(np.linalg.norm(turn))):
+            pose[3:] = multiply(quaternion_about((turn / angle).tolist(), angle), pose[3:])
+            pose[3:] /= np.linalg.norm(pose[3:])
+        self.aim(arm, pose)
+
+    def let_go(self, arm: str) -> None:
+        """Let an arm stay where it is.
+
+        Raises:
+            UnknownNameError: If no arm of that name can be steered.
+        """
+        self._check(arm)
+        self.targets[arm] = self.steering.tcp(arm)
+
+    def grip(self, arm: str, closed: bool) -> None:
+        """Close or open the gripper of an arm; of one that has none, nothing happens.
+
+        Raises:
+            UnknownNameError: If no arm of that name can be steered.
+        """
+        self._check(arm)
+        self.closed[arm] = closed
+
+    def start(self) -> None:
+        """Let the episode go on."""
+        self.phase = Phase.RUNNING
+
+    def stop(self) -> None:
+        """Let it stand still."""
+        if self.phase is Phase.RUNNING:
+            self.phase = Phase.STOPPED
+
+    def step(self) -> None:
+        """Take one control step towards what people ask for."""
+        targets = {arm: pose.copy() for arm, pose in self.targets.items()}
+        self._moments.append(_Moment(targets, dict(self.closed), self.steering.reference.copy()))
+        action = self.steering.action(self.targets, self.closed)
+        self._do(action)
+        self.actions.append(action)
+        self._successes.append(self.success)
+
+    def undo(self, step: int) -> None:
+        """Go back to an earlier moment of the episode, exactly, and stop there.
+
+        The world is built and reset once more, and the steps up to that moment are played again.
+
+        Args:
+            step: How many steps of the episode stay.
+
+        Raises:
+            TaskError: If the episode has fewer.
+        """
+        if not 0 <= step <= len(self.actions):
+            raise TaskError(f"the episode has steps 0 to {len(self.actions)}; there is no {step}")
+        if step == len(self.actions):
+            return self.stop()
+        actions, moment = self.actions[:step], self._moments[step]
+        moments, successes = self._moments[:step], self._successes[:step]
+        self._begin(self.seed)
+        for number, action in enumerate(actions, start=1):
+            self._do(action)
+            self.on_replay(number, len(actions))
+        self.actions, self._moments, self._successes = actions, moments, successes
+        self.phase = Phase.STOPPED if actions else Phase.READY
+        self.targets = {arm: pose.copy() for arm, pose in moment.targets.items()}
+        self.closed, self.steering.reference = dict(moment.closed), moment.reference.copy()
+
+    def keep(self) -> PlayedEpisode:
+        """Record the episode, and begin the next one.
+
+        Returns:
+            The episode, as it was played once more from its seed and actions.
+
+        Raises:
+            TaskError: If nothing has been done in it.
+            RecordingError: If it cannot be written, or does not come out the same when it is played
+                again; it goes on as it was.
+        """
+        if not self.actions:
+            raise TaskError("there is nothing to keep: the episode has no steps yet")
+        self.stop()
+        episode = self._played_again()
+        if self._recorder is not None:
+            self._recorder.add(episode)
+        self.kept[self.seed] = episode.solved
+        self._begin(self._free_seed(self.seed + 1))
+        return episode
+
+    def discard(self) -> None:
+        """Forget the episode, and begin it anew."""
+        self._begin(self.seed)
+
+    def skip(self) -> None:
+        """Forget the episode, and begin that of the next seed."""
+        self._begin(self._free_seed(self.seed + 1))
+
+    # -- inside ------------------------------------------------------------------------------
+
+    def _begin(self, seed: int) -> None:
+        self.observation, _ = self.task.reset(seed, options=REBUILT)
+        self.seed, self.phase, self.success = seed, Phase.READY, False
+        self.actions: list[NDArray[np.float32]] = []
+        self._moments: list[_Moment] = []
+        self._successes: list[bool] = []
+        self.steering = Steering(self.task)
+        self.targets = {arm: self.steering.tcp(arm) for arm in self.arms}
+        self.closed = dict.fromkeys(self.arms, False)
+
+    def _do(self, action: NDArray[np.float32]) -> None:
+        self.observation, _, _, _, info = self.task.step(action[None])
+        self.success = bool(info["success"])
+
+    def _played_again(self) -> PlayedEpisode:
+        states, done = self.task.get_state_dict(), iter(range(len(self.actions) + 1))
+        actions = np.array(self.actions, np.float32)
+        watch = self.on_replay
+        episode = play(self.task, self.seed, actions, lambda: watch(next(done), len(actions)))
+        same = episode.success.tolist() == self._successes and all(
+            np.array_equal(rows[-1], np.asarray(states[kind][name])[0])
+            for kind, entries in episode.states.items()
+            for name, rows in entries.items()
+        )
+        if not same:
+            raise RecordingError(
+                f"the episode of seed {self.seed} came out different when it was played again, so"
+                " it is not kept: something else than seed and actions decides what happens"
+            )
+        return replace(episode, source=dict(PERSON))
+
+    def _free_seed(self, seed: int) -> int:
+        taken = self._recorder.seeds if self._recorder is not None else self.kept
+        while seed in taken:
+            seed += 1
+        return seed
+
+    def _check(self, arm: str) -> None:
+        if arm not in self.targets:
+            raise UnknownNameError("arm that can be steered", arm, self.targets)

@@ -1,0 +1,259 @@
+"""Which action brings TCPs nearer to where people want them, whatever the control mode."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experts.motion_drives import Aim, JointDrive, TcpDrive
+from experts.script import CLOSED, OPEN
+from experts.tips import link_tree
+from kinematics.rotations import (
+    Floats,
+    inverse_pose,
+    pose_matrix,
+    rotation_about,
+    rotation_vector,
+)
+from kinematics.solve import Goal, approach
+from robots import TaskError
+from robots.action_split import is_gripper
+from robots.urdf.tcp import find_tcp
+from simulation import State
+from tasks import MultiRobotTask
+from tasks.driving import DrivenGroup, driven_groups
+
+SPEED, TURN_SPEED = 0.5, 2.0  # of a TCP (m/s, rad/s)
+JOINT_SPEED = {"rad": 2.0, "m": 0.3}  # rad/s, m/s
+LEAD = {"rad": 0.02, "m": 0.005}  # how far joints are driven ahead of what stops them (rad, m)
+_HALVINGS = 6  # of a step, until all numbers are within bounds
+_Drive = JointDrive | TcpDrive
+
+
+@dataclass
+class _Arm:
+    """An arm, and what its TCP hangs on.
+
+    Attributes:
+        name: As the task calls it.
+        task: Of which it is.
+        groups: What drives it.
+        drives: The same, each in its control mode.
+        grippers: Its grippers.
+    """
+
+    name: str
+    task: MultiRobotTask
+    groups: list[DrivenGroup] = field(default_factory=list[DrivenGroup])
+    drives: list[_Drive] = field(default_factory=list[_Drive])
+    grippers: list[DrivenGroup] = field(default_factory=list[DrivenGroup])
+
+    def prepare(self) -> list[_Drive]:
+        """Look up its links, once all of its groups are known.
+
+        Returns:
+            What drives those that do not move its TCP, such as fingers: it is no longer its own.
+        """
+        layout = self.task.layout
+        self._robot = layout.owner(self.name)
+        before = list(layout)[: list(layout).index(self._robot)]
+        first = sum(layout[name].robot.dof for name in before)
+        robot = layout[self._robot].robot
+        tree = link_tree(robot)
+        tcp = find_tcp(layout.arm(self.name).robot, tree)
+        self._tree = tree.towards(tcp.needed)
+        self._links = [self._tree.link(tree.links[link]) for link in tcp.links]
+        self._turned, self._offset = self._tree.link(tree.links[tcp.turned]), tcp.offset
+        self._own = slice(first, first + robot.dof)
+        moving = {first + int(joint) for joint in self._tree.drivers}
+        moves = [bool(moving & {*np.r_[group.joints].tolist()}) for group in self.groups]
+        others = [drive for drive, own in zip(self.drives, moves, strict=True) if not own]
+        self.drives = [drive for drive in self.drives if drive not in others]
+        self.groups = [group for group, own in zip(self.groups, moves, strict=True) if own]
+        self.joints = np.concatenate([np.r_[group.joints] for group in self.groups])
+        self._free: list[int] = (self.joints - first).tolist()
+        self._rest = self.task.simulation.read().joint_positions[0, self.joints].astype(float)
+        self.turns = all(group.group.asks.turn for group in self.groups if group.group.asks.tcp)
+        self.lead, self._fastest = (
+            np.concatenate([np.full(len(g.group.joints), by[g.group.unit]) for g in self.groups])
+            for by in (LEAD, JOINT_SPEED)
+        )
+        return others
+
+    def ahead(self, target: Floats, joints: Floats, state: State, seconds: float) -> Floats:
+        """Return joints of all robots of which this arm's are a step nearer to a pose.
+
+        Args:
+            target: Where the TCP is to be: position (m, world), quaternion (wxyz), (7,).
+            joints: Of all robots, (dof,) (rad, m).
+            state: The world.
+            seconds: Of a step (s).
+        """
+        base = state.base_pose(self._robot)[0].astype(float)
+        wanted = inverse_pose(pose_matrix(base[:3], base[3:])) @ pose_matrix(target[:3], target[3:])
+        qpos = joints[self._own]
+        poses = self._tree.forward(qpos[None])[0]
+        rotation = poses[self._turned, :3, :3]
+        place = poses[self._links, :3, 3].mean(axis=0) + rotation @ self._offset
+        way = _shortened(wanted[:3, 3] - place, SPEED * seconds)
+        turn = _shortened(rotation_vector(wanted[:3, :3] @ rotation.T), TURN_SPEED * seconds)
+        turned = _turn(turn) @ rotation if self.turns else None
+        goal = Goal(place + way, self._links, turned, self._turned, self._offset)
+        moved = joints.copy()
+        longest = self._fastest * seconds
+        moved[self._own] = approach(self._tree, goal, qpos, self._free, longest, self._rest)
+        return moved
+
+
+class Steering:
+    """Says what to do next so that TCPs get to where they should be.
+
+    TCPs go straight there, at `SPEED` and `TURN_SPEED` at most; the place comes before the
+    orientation where an arm cannot have both. What stops an arm is pushed by `LEAD` and no more.
+
+    Attributes:
+        arms: Names of the arms that can be steered, as the task calls them.
+        with_gripper: Those of them that have a gripper.
+        turned: Those of them whose control mode says how the TCP is turned, too.
+        reference: Where joints are driven to, those of all robots, (dof,) (rad, m).
+    """
+
+    def __init__(self, task: MultiRobotTask) -> None:
+        """Take a task that has been reset.
+
+        Raises:
+            TaskError: If it has several environments, or no arm of it can be steered.
+        """
+        if task.num_envs != 1:
+            raise TaskError(f"people steer in 1 environment; the task has {task.num_envs}")
+        self._task, self._seconds = task, 1 / task.scenario.control_frequency
+        self._arms = {full: _Arm(name, task) for name, full in task.layout.places.items()}
+        self._still: list[_Drive] = []
+        for driven in driven_groups(task.layout):
+            self._take(driven)
+        self._arms = {arm.name: arm for arm in self._arms.values() if arm.groups}
+        for arm in self._arms.values():
+            self._still += arm.prepare()
+        self.arms = tuple(self._arms)
+        self.with_gripper = tuple(name for name, arm in self._arms.items() if arm.grippers)
+        self.turned = tuple(name for name, arm in self._arms.items() if arm.turns)
+        if not self.arms:
+            raise TaskError(f"{task.task_id} has no arm that can be steered in this control mode")
+        self._begun = task.simulation.read().joint_positions[0].astype(float)
+        self.reference = self._begun.copy()
+        self._speed = np.zeros_like(self.reference)
+
+    def tcp(self, arm: str) -> Floats:
+        """Return where an arm's TCP is: position (m, world), quaternion (wxyz), (7,)."""
+        return self._task.simulation.read().tcp_pose(arm)[0].astype(float)
+
+    def action(
+        self, targets: Mapping[str, Floats], closed: Mapping[str, bool]
+    ) -> NDArray[np.float32]:
+        """Return the next action, (A,).
+
+        Args:
+            targets: By arm, where its TCP is to be: position (m, world), quaternion (wxyz), (7,).
+            closed: By arm, whether its gripper is to be closed.
+        """
+        state = self._task.simulation.read()
+        where = state.joint_positions[0].astype(float)
+        action = np.zeros(self._task.layout.action_dim, np.float32)
+        here, then = self._begun.copy(), self._begun.copy()
+        for name, arm in self._arms.items():
+            own, lead = arm.joints, arm.lead
+            start = where.copy()
+            start[own] = np.clip(self.reference[own], where[own] - lead, where[own] + lead)
+            here[own] = start[own]
+            then[own] = arm.ahead(targets[name], start, state, self._seconds)[own]
+        for arm in self._arms.values():
+            self._drive(arm.drives, arm.joints, here, then, state, action)
+            for gripper in arm.grippers:
+                action[gripper.numbers] = _gripper_number(gripper, closed[arm.name])
+        self._drive(self._still, np.array([], np.intp), here, here, state, action)
+        return action
+
+    # -- inside ------------------------------------------------------------------------------
+
+    def _take(self, driven: DrivenGroup) -> None:
+        """Note what drives a joint group: an arm that is steered, or what holds it still."""
+        if not driven.group.size or driven.group.asks.drive:
+            return
+        if driven.arm is None or is_gripper(driven.name):
+            if driven.arm is not None:
+                self._arms[driven.arm].grippers.append(driven)
+            else:
+                self._still.append(_drive_of(driven, self._task, moves=False))
+            return
+        self._arms[driven.arm].groups.append(driven)
+        self._arms[driven.arm].drives.append(_drive_of(driven, self._task, moves=True))
+
+    def _drive(
+        self,
+        drives: list[_Drive],
+        joints: NDArray[np.intp],
+        here: Floats,
+        then: Floats,
+        state: State,
+        action: NDArray[np.float32],
+    ) -> None:
+        """Fill in the numbers that drive joints as far as they go within bounds."""
+        for drive in drives:
+            drive.learn(state)
+        enough, too_much, share = 0.0, 1.0, 1.0
+        for _ in range(_HALVINGS):
+            if self._within(drives, self._aim(share, here, then), state, action):
+                enough = share
+            else:
+                too_much = share
+            if enough == 1.0:
+                break
+            share = (enough + too_much) / 2
+        aim = self._aim(enough, here, then)
+        self._within(drives, aim, state, action)
+        self.reference[joints] = (aim.here + aim.way)[joints]
+        self._speed[joints] = aim.way[joints] / self._seconds
+
+    def _aim(self, share: float, here: Floats, then: Floats) -> Aim:
+        way = share * (then - here)
+        return Aim(here, way, way / self._seconds - self._speed)
+
+    def _within(
+        self,
+        drives: list[_Drive],
+        aim: Aim,
+        state: State,
+        action: NDArray[np.float32],
+    ) -> bool:
+        every = True
+        for drive in drives:
+            action[drive.numbers], within = drive.towards(aim, state)
+            every = every and within
+        return every
+
+
+def _drive_of(driven: DrivenGroup, task: MultiRobotTask, *, moves: bool) -> _Drive:
+    kind = TcpDrive if driven.group.asks.tcp else JointDrive
+    return kind(driven, task, 1 / task.scenario.control_frequency, moves=moves)
+
+
+def _gripper_number(gripper: DrivenGroup, closed: bool) -> Floats | float:
+    if gripper.group.normalised:
+        return CLOSED if closed else OPEN
+    low, high = np.array(gripper.group.ranges).T
+    return low if closed else high
+
+
+def _shortened(way: Floats, longest: float) -> Floats:
+    length = float(np.linalg.norm(way))
+    return way if length <= longest else way * (longest / length)
+
+
+def _turn(vector: Floats) -> Floats:
+    """Return the rotation about a vector by its length (rad), (3, 3)."""
+    angle = float(np.linalg.norm(vector))
+    axis = vector / angle if angle > 0 else np.array([0.0, 0.0, 1.0])
+    return rotation_about(axis.tolist(), np.array(angle))
