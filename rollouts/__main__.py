@@ -16,6 +16,8 @@ COMMANDS = {
     "evaluate": "rollouts.evaluate_command",
     "convert": "rollouts.recording.convert_command",
     "replay": "rollouts.playing.replay_command",
+    "certify": "rollouts.dataset.certify_command",
+    "report": "rollouts.dataset.report_command",
     "export": "rollouts.export.command",
     "view": "rollouts.view_command",
     "bench": "measurements.bench.command",

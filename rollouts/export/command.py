@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Tell a parser what the command takes."""
     parser.epilog = EPILOG
     add = parser.add_argument
-    add("recording", type=Path, metavar="FILE", help="recorded episodes (.h5, its .json beside it)")
+    add("recording", type=Path, metavar="FILE", help="an h5 file, or a recording's folder")
     add("--format", required=True, metavar="FORMAT", help="lerobot or robomimic")
     add("--out", type=Path, required=True, metavar="DIR", help="new folder for the dataset")
     add("--fps", type=int, metavar="N", help="steps per second to state (default: the task's, 20)")

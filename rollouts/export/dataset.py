@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from robots import TaskError
 from rollouts.export.columns import ColumnReader, Columns, succeeded
+from rollouts.export.credits import Credits
 from rollouts.export.folder import new_folder
 from rollouts.export.options import FORMATS, Export
 from rollouts.reading.recorded_task import task_class, task_for
+from rollouts.reading.recording import open_trajectories
 from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
 from tasks.description import instruction_of
 
@@ -94,7 +96,7 @@ def export(
     """
     out, progress = Path(wanted.out), _rising(progress)
     wanted.check(here=executor is None)
-    with TrajectoryFile(wanted.recording) as file:
+    with open_trajectories(wanted.recording) as file:
         if not len(file):
             raise TrajectoryError(f"{file.path} holds no episodes; there is nothing to export")
         work = _Work(wanted, file, here=executor is None)
@@ -134,7 +136,7 @@ class _Work:
         task = task_for(
             file, layout=wanted.layout, robots=wanted.robots, pictures=here and bool(names)
         )
-        self.reader, self._wanted, self._file = ColumnReader(task), wanted, file
+        self.reader, self._wanted, self._file = ColumnReader(task, Credits(file)), wanted, file
         self._shots: Shots | None = None
         if names:
             from rollouts.export.shots import choose_shots
@@ -157,7 +159,8 @@ class _Work:
     @contextmanager
     def writer(self, folder: Path) -> Generator[Writer]:
         """Yield what writes the episodes."""
-        origin, channels = _origin(self._file), self._shots.channels if self._shots else []
+        origin = _origin(self._file, self.reader)
+        channels = self._shots.channels if self._shots else []
         if self._wanted.format == "robomimic":
             from rollouts.export.robomimic import RobomimicWriter
 
@@ -201,7 +204,7 @@ class _Work:
             return
         from rollouts.export.drawing_job import DrawingCrew, DrawingJob
 
-        path = file.path.absolute()
+        path = Path(wanted.recording).absolute()
         job = DrawingJob(path, type(task), shots, last, wanted.layout, wanted.robots)
         numbers = [i for i in range(len(file)) if not wanted.only_successes or succeeded(file[i])]
         crew = DrawingCrew(job, executor, numbers, folder, lambda n: progress(n, len(file)), tell)
@@ -233,10 +236,12 @@ def _rising(progress: Progress) -> Progress:
     return show
 
 
-def _origin(file: TrajectoryFile) -> dict[str, Any]:
+def _origin(file: TrajectoryFile, reader: ColumnReader) -> dict[str, Any]:
+    actors = reader.credits.actors if reader.credits else []
     return {
         "task_id": file.task_id,
         "control_mode": file.control_mode,
         "source_type": file.source_type,
         "layout": file.layout,
+        **({"actors": actors} if actors else {}),
     }

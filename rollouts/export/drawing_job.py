@@ -18,7 +18,7 @@ from rollouts.export.shots import Channel, Frame, Picture, Shots
 from rollouts.playing.events import Event
 from rollouts.playing.executor import Executor, modules_of, play_all, report
 from rollouts.reading.recorded_task import task_for
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import open_trajectories
 from tasks import MultiRobotTask
 
 
@@ -45,7 +45,7 @@ class DrawingJob:
     """Makes what draws the episodes of a recording, which are numbered as in the file.
 
     Attributes:
-        recording: The h5 file, where workers can read it.
+        recording: The h5 file or the recording's folder, where workers can read it.
         task: Class of the task that was recorded; loading it imports its module.
         shots: What is drawn of every moment.
         last: Whether the state after the last step is drawn as well.
@@ -79,7 +79,7 @@ class _Drawer:
     """Draws episodes in one world, which is built anew for each."""
 
     def __init__(self, job: DrawingJob) -> None:
-        self._job, self._file = job, TrajectoryFile(job.recording)
+        self._job, self._file = job, open_trajectories(job.recording)
         self._task = task_for(self._file, layout=job.layout, robots=job.robots, pictures=True)
         self._reader = ColumnReader(self._task)
 

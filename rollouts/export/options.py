@@ -25,7 +25,7 @@ class Export:
     """What is exported, and as what.
 
     Attributes:
-        recording: The h5 file, ours or native's, with its json beside it.
+        recording: An h5 file, ours or native's, with its json beside it, or a recording's folder.
         format: ``"lerobot"`` or ``"robomimic"``.
         out: Folder of the dataset; it must be new or empty.
         fps: Control steps per second that the dataset states (``"lerobot"`` only); those of the

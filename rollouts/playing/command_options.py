@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import signal
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from robots import CONTROL_MODES, DescriptorError, TaskError
 from robots.control_modes import read_mode
 from rollouts.playing.dispatch import EPISODE_SECONDS, check_timeout
+from rollouts.reading.manifest import FILE_SIZE
 
 if TYPE_CHECKING:
     from rollouts.playing.executor import Executor
@@ -97,6 +99,27 @@ def _timeout(text: str) -> float | None:
         words = f"{text} is no limit; it must be seconds, more than 0, or none"
         raise argparse.ArgumentTypeError(words) from None
     return seconds
+
+
+def add_file_size(parser: argparse.ArgumentParser) -> None:
+    """Add the argument that says when a recording goes on in another file."""
+    parser.add_argument(
+        "--file-size",
+        type=_size,
+        default=FILE_SIZE,
+        metavar="MB",
+        help="begin another file, trajectory_0001.h5 and so on, when one is so large (%(default)g)",
+    )
+
+
+def _size(text: str) -> float:
+    try:
+        size = float(text)
+    except ValueError:
+        size = 0.0
+    if not 0 < size < math.inf:
+        raise argparse.ArgumentTypeError(f"{text} is no size; it must be MB, more than 0")
+    return size
 
 
 def _at_least(least: int, text: str) -> int:

@@ -12,6 +12,7 @@ import numpy as np
 from robots import TaskError
 from robots.common.commands import program
 from rollouts.reading.recorded_task import task_class, task_for
+from rollouts.reading.recording import FILE, open_trajectories
 from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
 from tasks import MultiRobotTask, get_task_class
 from tasks.episode import States, play
@@ -19,9 +20,8 @@ from tasks.episode import States, play
 Start = Literal["seed", "state"]
 STARTS: tuple[Start, ...] = ("seed", "state")
 
-FILE = "trajectory.h5"
-
 __all__ = [
+    "FILE",
     "STARTS",
     "Replayed",
     "Start",
@@ -70,6 +70,7 @@ class Replayed:
         compared: Whether the file holds states to compare with.
         difference: Where the states part, or None.
         exact: Whether the states must be equal to the last bit.
+        varied_alike: Whether what varies in its world was drawn here as it was recorded.
     """
 
     episode_id: int
@@ -80,17 +81,18 @@ class Replayed:
     compared: bool
     difference: StateDifference | None
     exact: bool
+    varied_alike: bool = True
 
     @property
     def agrees(self) -> bool:
-        """Whether success is as recorded, and states are where they must be."""
-        if self.recorded not in (None, self.success):
+        """Whether success and world are as recorded, and states are where they must be."""
+        if self.recorded not in (None, self.success) or not self.varied_alike:
             return False
         return not (self.exact and self.difference)
 
 
 def open_recording(path: Path | None, task_id: str | None) -> TrajectoryFile:
-    """Open a recording: a file, the folder of one, or else the official one of a task.
+    """Open a recording: a file, all files in a folder, or else the official one of a task.
 
     Raises:
         TrajectoryError: If there is none, or it cannot be read or is of another task.
@@ -100,7 +102,7 @@ def open_recording(path: Path | None, task_id: str | None) -> TrajectoryFile:
         if task_id is None:
             raise TaskError("neither a file nor a task is given to replay")
         path = find_official(get_task_class(task_id).task_id)
-    file = TrajectoryFile(path / FILE if path.is_dir() else path)
+    file = open_trajectories(path)
     try:
         task_class(file, task_id)
     except BaseException:
@@ -170,6 +172,7 @@ def replay(task: MultiRobotTask, trajectory: Trajectory, start: Start = "seed") 
         compared=compared,
         difference=first_difference(trajectory.states or {}, episode.states) if compared else None,
         exact=start == "seed" and trajectory.rebuilt,
+        varied_alike=trajectory.drawn in (None, episode.drawn),
     )
 
 

@@ -42,7 +42,9 @@ _EPISODE = {
     "success": maybe(either(FLAG, NUMBER)),
 }
 # What only a recording of this library says, and not every one.
-_ABOUT = {"source": maybe(OBJECT), "drawn": maybe(OBJECT)}
+_ACTOR = fields({"kind": NAME, "name": TEXT}, {"sha256": maybe(TEXT)})
+_SOURCE = fields({"kind": NAME}, {"actors": items(_ACTOR), "corrects": _ACTOR})
+_ABOUT = {"source": maybe(_SOURCE), "drawn": maybe(OBJECT)}
 # An episode's own note in a recording of this library, which becomes its entry in the json.
 OWN_EPISODE = fields({**_EPISODE, "episode_seed": _SEED, "elapsed_steps": _STEPS}, _ABOUT)
 _SUMMARY = fields(
@@ -77,6 +79,7 @@ class Entry:
         episode_seed: The same as the recording's own note of it, which may be absent.
         steps: Its control steps, or None.
         rebuilt: Whether its reset rebuilt the world.
+        success: Whether it ended in success, or None.
         source: Who acted; see `tasks.episode.PlayedEpisode`.
         drawn: What was varied in its world; likewise.
     """
@@ -86,6 +89,7 @@ class Entry:
     episode_seed: int | None
     steps: int | None
     rebuilt: bool
+    success: bool | None = None
     source: dict[str, Any] | None = None
     drawn: dict[str, Any] | None = None
 
@@ -107,6 +111,7 @@ class Summary:
             layout, or by native's of robots.
         max_episode_steps: Control steps until an episode was truncated, or None.
         source_type: Where the actions come from, in ManiSkill's words, or None.
+        source_desc: The same in the recorder's own words, or None.
         episodes: Its episodes, in order.
     """
 
@@ -116,6 +121,7 @@ class Summary:
     control_mode: str | dict[str, str]
     max_episode_steps: int | None
     source_type: str | None
+    source_desc: str | None
     episodes: tuple[Entry, ...]
 
 
@@ -138,6 +144,7 @@ def read_summary(path: Path) -> Summary:
         ),
         max_episode_steps=info.get("max_episode_steps"),
         source_type=found.get("source_type"),
+        source_desc=found.get("source_desc"),
         episodes=tuple(_entry(episode) for episode in episodes),
     )
 
@@ -182,6 +189,7 @@ def _entry(episode: Mapping[str, Any]) -> Entry:
         episode_seed=_only(episode.get("episode_seed")),
         steps=episode.get("elapsed_steps"),
         rebuilt=bool(options.get("reconfigure")),
+        success=None if episode.get("success") is None else bool(episode["success"]),
         source=episode.get("source"),
         drawn=episode.get("drawn"),
     )

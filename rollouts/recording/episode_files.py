@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from robots import RecordingError
 from robots.common.files import parse_json, read_regular
-from robots.common.writing import PARTIAL, write_whole
+from robots.common.writing import PARTIAL, written_whole
 from rollouts.reading.episode_checksum import STATES
 from rollouts.reading.hdf5_reading import MAX_BYTES
 from rollouts.reading.json_fields import (
@@ -43,10 +43,11 @@ _EARLIER = ".h5"
 _SEED = re.compile(r"seed-([0-9]{10,})")
 _OPENING = b"robot-layouts episode 1\n"
 _CHECKSUM = 4  # bytes
+_ARRAY_BYTES, _GROUP_BYTES = 256, 1024  # that HDF5 takes besides numbers and texts, about
 _MAX_PART = MAX_BYTES + 2**24  # bytes
 
 _ARRAY_NAME = re.compile(
-    r"(actions|rewards|success|terminated|truncated"
+    r"(actions|rewards|success|terminated|truncated|actor|corrections"
     r"|env_states(/[^/\0]+){2}|env_states/controller(/[^/\0]+){1,3})"
 )
 _CONTENT = fields(
@@ -57,7 +58,7 @@ _CONTENT = fields(
 )
 _ARRAY = (
     Kind("the name of an array", lambda v: isinstance(v, str) and bool(_ARRAY_NAME.fullmatch(v))),
-    Kind("a kind of numbers", lambda v: v in ("<f4", "<f8", "|b1")),
+    Kind("a kind of numbers", lambda v: v in ("<f4", "<f8", "|b1", "|u1")),
     items(whole(0, MAX_BYTES)),
 )
 
@@ -81,6 +82,12 @@ class Stored:
     def about(self) -> dict[str, Any]:
         """Its entry in the json, without ``episode_id``."""
         return json.loads(self.attributes["episode"])
+
+    @property
+    def size(self) -> int:
+        """About how many bytes it takes in an h5 file; the same whatever file it is in."""
+        numbers = sum(rows.nbytes for rows in self.arrays.values())
+        return _size(self.attributes, len(self.arrays), numbers)
 
 
 @dataclass(frozen=True)
@@ -113,18 +120,31 @@ class PartWriter:
         """
         self.store(episode.seed, self.encode(episode))
 
-    def store(self, seed: int, part: bytes) -> None:
-        """Write an episode that was encoded, perhaps on another machine; else as `write`."""
-        write_whole(part_path(self.folder, seed), part, RecordingError, parents=False)
+    def store(self, seed: int, part: bytes, *, sync: bool = False) -> None:
+        """Write an episode that was encoded, perhaps on another machine; else as `write`.
+
+        Args:
+            seed: Its seed.
+            part: What `encode` returned.
+            sync: Whether to wait until it is on the disk.
+
+        Raises:
+            RecordingError: If it cannot be written.
+        """
+        path = part_path(self.folder, seed)
+        with written_whole(path, RecordingError, parents=False, sync=sync) as partial:
+            partial.write_bytes(part)
 
     def encode(self, episode: PlayedEpisode) -> bytes:
         """Return what `write` writes."""
-        arrays = _arrays(episode)
+        attributes = {"action_split": self._split, "episode": json.dumps(self._about(episode))}
+        return self.encode_stored(Stored(attributes, _arrays(episode)))
+
+    def encode_stored(self, stored: Stored) -> bytes:
+        """Return the part of an episode that was joined already."""
+        arrays = stored.arrays
         about = {
-            "attributes": {
-                "action_split": self._split,
-                "episode": json.dumps(self._about(episode)),
-            },
+            "attributes": dict(stored.attributes),
             "arrays": [(name, rows.dtype.str, rows.shape) for name, rows in arrays.items()],
         }
         numbers = [rows.tobytes() for rows in arrays.values()]
@@ -187,6 +207,13 @@ def refuse_foreign(folder: Path) -> None:
                 f"{path} is no episode of this library, in a folder that is for such episodes only;"
                 " move it somewhere else"
             )
+
+
+def part_size(part: bytes) -> int:
+    """Return the `Stored.size` of an episode that was just encoded."""
+    about, numbers = part.split(b"\n", 3)[2:]
+    described = json.loads(about)
+    return _size(described["attributes"], len(described["arrays"]), len(numbers) - _CHECKSUM)
 
 
 def read_part(path: Path) -> tuple[dict[str, Any], Stored]:
@@ -256,7 +283,14 @@ def _arrays(episode: PlayedEpisode) -> dict[str, NDArray[Any]]:
         arrays.update({f"{STATES}{kind}/{name}": rows for name, rows in entries.items()})
     for name in ("rewards", "success", "terminated", "truncated"):
         arrays[name] = getattr(episode, name)
+    for name in ("actor", "corrections"):
+        if (rows := getattr(episode, name)) is not None:
+            arrays[name] = rows
     return arrays
+
+
+def _size(attributes: Mapping[str, str], arrays: int, numbers: int) -> int:
+    return numbers + arrays * _ARRAY_BYTES + sum(map(len, attributes.values())) + _GROUP_BYTES
 
 
 def _checksum(content: bytes) -> bytes:

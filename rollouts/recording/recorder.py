@@ -3,57 +3,62 @@
 from __future__ import annotations
 
 import glob
-import json
+import math
 import os
+import re
 import weakref
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Iterable
 from contextlib import suppress
+from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from robots import CONTROL_MODES, RecordingError, UnreadableFileError
-from robots.common.files import open_regular, read_text
-from robots.common.writing import PARTIAL, write_whole
-from robots.control_modes import plain_mode
-from rollouts.reading.guessed_robots import describe_guessed
-from rollouts.reading.provenance import describe_layout, describe_simulation, differences, listing
-from rollouts.reading.summary import MAX_JSON
+from robots import RecordingError, TaskError
+from robots.common.writing import PARTIAL
+from rollouts.reading.manifest import FILE_SIZE, file_path
+from rollouts.reading.provenance import describe_layout, listing
 from rollouts.recording.disk import claim, disk_errors
 from rollouts.recording.episode_files import (
     PartWriter,
     list_earlier_parts,
     list_parts,
     part_path,
+    part_size,
     read_part,
     refuse_foreign,
     seed_of,
 )
-from rollouts.recording.trajectory_writer import join, read_joined
+from rollouts.recording.header import describe_task, header_differences, recorded_control_mode
+from rollouts.recording.joined_files import JoinedFiles, OpenFile
+from rollouts.recording.trajectory_writer import read_groups
+from rollouts.sources.header import Source, combined, source_of
 from tasks import MultiRobotTask
 from tasks.episode import PlayedEpisode
-from tasks.native.format import observation_keys
-from tasks.registry import full_name
 
-__all__ = ["Recorder", "describe_layout"]
-
-# What may change from one resumption to the next, and what earlier versions did not write.
-NOT_COMPARED = ("source_type", "source_desc", "guessed")
+__all__ = ["FILE_SIZE", "Recorder", "describe_layout"]
 
 
-class _Entry(NamedTuple):
-    """An episode of the h5 file: its group there, and its json."""
+class _Part(NamedTuple):
+    """A finished episode that is not joined yet: its size (bytes), and what its header says."""
 
-    group: str
-    about: dict[str, Any]
+    size: int
+    source: Source
 
 
 class Recorder:
     """A recording that grows by whole episodes; whatever ends it, the finished ones stay.
 
-    Each finished episode is a file of its own in a folder beside the recording, until `close`
-    joins them in the order of their seeds. If the process is killed before, the next Recorder
-    that resumes the recording finds them there.
+    Each finished episode is a file of its own in a folder beside the recording. They are joined in
+    the order of their seeds by `close`, and before that as soon as they fill a file. If the process
+    is killed before, the next Recorder that resumes the recording finds them there.
+
+    A recording that does not fit into one file goes on in ``trajectory_0001.h5`` and so on, each a
+    recording by itself; see `rollouts.reading.manifest`. If `expect` was told which seeds come, the
+    files are the same in whichever order they come; they are full when the next episode would not
+    fit any more.
 
     In the h5 file ``traj_i`` holds the flat actions (T, A), env states (T + 1, k), rewards and
     flags (T,). Its attribute ``action_split`` is json: robot name → first and last + 1 action
@@ -61,12 +66,12 @@ class Recorder:
     `rollouts.reading.provenance`.
 
     Attributes:
-        path: The h5 file.
+        path: The first h5 file.
         json_path: The json file beside it.
         parts: The folder of finished episodes that are not joined yet.
         damaged: Episodes that were there and are damaged, by their files or groups, in words;
             they do not count as recorded.
-        writer: Writes one episode; may be handed to worker processes.
+        writer: Encodes one episode, or writes it; may be handed to worker processes.
     """
 
     def __init__(
@@ -78,28 +83,37 @@ class Recorder:
         resume: bool = False,
         source: str = "scripted",
         source_desc: str | None = None,
+        file_size: float = FILE_SIZE,
     ) -> None:
         """Begin a recording, or go on with one.
 
         Args:
-            path: Name of the h5 file; its folder is made.
+            path: Name of the first h5 file; its folder is made.
             task: The task whose episodes are recorded.
             overwrite: Whether a recording that is already there may be replaced.
             resume: Whether to keep the episodes that are already there.
             source: Where the actions come from, in ManiSkill's words (``source_type``).
             source_desc: The same in your own words.
+            file_size: Size at which a further h5 file is begun (MB); full ones stay as they are.
 
         Raises:
             RecordingError: If there is a recording already and neither ``overwrite`` nor
                 ``resume``, it is of something else or in use by another process, or the folder
                 cannot be written.
+            TaskError: If the size makes no sense.
             AssetError: If robot files cannot be found.
         """
+        if not 0 < file_size < math.inf:
+            raise TaskError(f"file_size is {file_size!r}; it must be MB, more than 0")
         self.path = Path(path)
         self.json_path = self.path.with_suffix(".json")
         self.parts = self.path.with_suffix(".parts")
         self.damaged: list[str] = []
-        self._header = _header(task, source, source_desc)
+        self._header, self._limit = describe_task(task, source, source_desc), file_size * 1e6
+        self._files = JoinedFiles(self.path, self._header)
+        self._waiting: dict[int, _Part] = {}  # by seed
+        self._coming: deque[int] = deque()
+        self._given_up = set[int]()
         with disk_errors(self.path):
             self.path.parent.mkdir(parents=True, exist_ok=True)
             if os.path.lexists(self.parts) and not self.parts.is_dir():
@@ -108,14 +122,15 @@ class Recorder:
             if lock is None:
                 raise RecordingError(f"another process is recording into {self.parts}")
             try:
-                self._joined = self._begin(overwrite=overwrite, resume=resume)
+                self._begin(overwrite=overwrite, resume=resume)
             except BaseException:
                 with suppress(OSError):  # not empty
                     self.parts.rmdir()
                 os.close(lock)
                 raise
         self._release = weakref.finalize(self, os.close, lock)
-        self.writer = PartWriter(self.parts.absolute(), self._header, _control_mode(task))
+        mode = recorded_control_mode(task)
+        self.writer = PartWriter(self.parts.absolute(), self._header, mode)
         self._closed = False
 
     def __enter__(self) -> Recorder:
@@ -142,7 +157,15 @@ class Recorder:
     @property
     def seeds(self) -> set[int]:
         """Seeds of all episodes recorded, those that worker processes wrote included."""
-        return {*self._joined, *(seed_of(part) for part in list_parts(self.parts))}
+        return {*self._files.seeds, *(seed_of(part) for part in list_parts(self.parts))}
+
+    def expect(self, seeds: Iterable[int]) -> None:
+        """Say which episodes will come, so that files do not depend on their order."""
+        self._coming = deque(sorted({*self._coming, *seeds}))
+
+    def give_up(self, seed: int) -> None:
+        """Say that an expected episode will not come; those after it are not kept waiting."""
+        self._given_up.add(seed)
 
     def add(self, episode: PlayedEpisode) -> None:
         """Write one episode; it is kept when this returns.
@@ -151,14 +174,21 @@ class Recorder:
             RecordingError: If it cannot be written; the episodes before it stay. Also if there
                 is one of that seed already, or the recording was closed.
         """
+        self.store(episode.seed, self.writer.encode(episode))
+
+    def store(self, seed: int, part: bytes) -> None:
+        """Write an episode that the `writer` encoded, perhaps elsewhere; else as `add`."""
         if self._closed:
             raise RecordingError(f"cannot write {self.path}: the recording was closed")
-        if episode.seed in self._joined or part_path(self.parts, episode.seed).exists():
-            raise RecordingError(f"{self.path} has an episode of seed {episode.seed} already")
-        self.writer.write(episode)
+        if seed in self._files.seeds or part_path(self.parts, seed).exists():
+            raise RecordingError(f"{self.path} has an episode of seed {seed} already")
+        self.writer.store(seed, part)
+        self._waiting[seed] = _Part(part_size(part), source_of(self._header))
+        while (full := self._full_file()) is not None:
+            self._fill_last(full)
 
     def close(self) -> None:
-        """Join the episodes into the h5 file and write the json; closing twice is allowed.
+        """Join the episodes into h5 files and write the json; closing twice is allowed.
 
         Raises:
             RecordingError: If they cannot be written; the finished episodes stay where they are.
@@ -171,22 +201,22 @@ class Recorder:
         finally:
             self._release()
 
-    def _begin(self, *, overwrite: bool, resume: bool) -> dict[int, _Entry]:
-        """Check and tidy what is there; returns the episodes of the h5 file by seed."""
-        for path in (self.path, self.json_path):
-            _expect_file_or_nothing(path)
+    def _begin(self, *, overwrite: bool, resume: bool) -> None:
+        """Check and tidy what is there."""
         refuse_foreign(self.parts)
         earlier = list_earlier_parts(self.parts)
-        there = [p for p in (self.path, *list_parts(self.parts), *earlier) if p.exists()]
+        joined = (*self._files.paths(), self._files.manifest, self.json_path)
+        there = [p for p in (*joined[:-1], *list_parts(self.parts), *earlier) if p.exists()]
         if there and not (overwrite or resume):
             raise RecordingError(
                 f"{there[0]} is there already; choose another name, or pass overwrite=True to"
                 " replace the recording or resume=True to go on with it"
             )
-        for left_over in (*self.parts.glob(f"*{PARTIAL}"), *self.path.parent.glob(self._partials)):
+        for left_over in self._left_over():
             left_over.unlink(missing_ok=True)
         if overwrite:
-            for path in (self.json_path, *there):
+            self._files.remove()
+            for path in there:
                 path.unlink(missing_ok=True)
         elif earlier:
             raise RecordingError(
@@ -194,126 +224,108 @@ class Recorder:
                 " library left when it was interrupted; go on with that version until it ends, or"
                 " choose another folder, or delete them to have them recorded again"
             )
-        joined = self._read_joined()
+        self._files.read()
+        self.damaged += self._files.damaged
         for part in list_parts(self.parts):
-            self._check_part(part, joined)
-        return joined
+            self._check_part(part)
 
-    @property
-    def _partials(self) -> str:
-        return f"{glob.escape(self.path.stem)}.*{PARTIAL}"
+    def _left_over(self) -> list[Path]:
+        """Return the files that a kill left half written."""
+        pattern, own = f"{glob.escape(self.path.stem)}*{PARTIAL}", re.escape(self.path.stem)
+        number = "(_[0-9]{4,})?" if self._files.manifest.exists() else ""
+        name = re.compile(rf"{own}{number}\..*{re.escape(PARTIAL)}")
+        beside = (path for path in self.path.parent.glob(pattern) if name.fullmatch(path.name))
+        return [*chain(self.parts.glob(f"*{PARTIAL}"), beside)]
 
-    def _read_joined(self) -> dict[int, _Entry]:
-        if not self.path.exists():
-            return {}
-        joined = read_joined(self.path)
-        self._expect_same(self.path, joined.header)
-        self.damaged += [f"{name} of {self.path}" for name in joined.damaged]
-        entries = {
-            about["episode_seed"]: _Entry(name, about) for name, about in joined.episodes.items()
-        }
-        return {seed: entries[seed] for seed in sorted(entries)}
-
-    def _check_part(self, part: Path, joined: Mapping[int, _Entry]) -> None:
+    def _check_part(self, part: Path) -> None:
         """Refuse a part of another recording; remove one that is damaged or already joined."""
         try:
-            header, _ = read_part(part)
+            header, stored = read_part(part)
         except RecordingError:  # by a power cut, say: its episode is recorded again
             self.damaged.append(str(part))
             part.unlink()
             return
-        self._expect_same(part, header)
-        if seed_of(part) in joined:
-            part.unlink()
-
-    def _expect_same(self, path: Path, header: Mapping[str, Any]) -> None:
-        found = differences(_compared(header), _compared(self._header))
+        found = header_differences(header, self._header)
         if found:
             raise RecordingError(
-                f"{path} was recorded with something else, so this recording cannot go on there"
+                f"{part} was recorded with something else, so this recording cannot go on there"
                 f" ({listing(found)}); choose another folder"
             )
+        if seed_of(part) in self._files.seeds:
+            part.unlink()
+        else:
+            self._waiting[seed_of(part)] = _Part(stored.size, source_of(header))
+
+    def _full_file(self, *, certain: bool = False) -> list[int] | None:
+        """Return the seeds of the next full file; None if there is not enough for one.
+
+        Args:
+            certain: Whether not to wait for those that are expected before.
+        """
+        lost = {seed for file in self._files.mending.values() for seed in file.lost}
+        waiting = {seed: part.size for seed, part in self._waiting.items() if seed not in lost}
+        sizes = {**self._files.last.sizes, **waiting}
+        if sum(sizes.values()) <= self._limit:
+            return None
+        missing = math.inf if certain else self._first_missing()
+        seeds, total = list[int](), 0
+        for seed in sorted(sizes):
+            if seed > missing:
+                return None
+            total += sizes[seed]
+            if seeds and total > self._limit:
+                return seeds
+            seeds.append(seed)
+        return None
+
+    def _first_missing(self) -> float:
+        """Return the least seed that is expected and has not come."""
+        came = self._waiting, self._files.seeds, self._given_up
+        while self._coming and any(self._coming[0] in seeds for seeds in came):
+            self._coming.popleft()
+        return self._coming[0] if self._coming else math.inf
+
+    def _fill_last(self, seeds: list[int]) -> None:
+        """Write the last file with some episodes, and begin another one."""
+        file, chosen = self._files.last, set(seeds)
+        spilt = [seed for seed in file.groups if seed not in chosen]
+        groups = [file.groups[seed] for seed in spilt]
+        path, about = file_path(self.path, file.number), combined(file.sources)
+        writer = replace(self.writer, header={**self._header, **about})
+        for seed, stored in zip(spilt, read_groups(path, groups) if spilt else (), strict=True):
+            writer.store(seed, writer.encode_stored(stored), sync=True)
+            self._waiting[seed] = _Part(stored.size, source_of(writer.header))
+        self._write(file, seeds, last=False)
+
+    def _write(self, file: OpenFile, seeds: Iterable[int], *, last: bool) -> None:
+        """Write a file and the manifest; then the parts that it was joined from are deleted."""
+        parts = {s: part_path(self.parts, s) for s in seeds if s not in file.groups}
+        places = {s: parts[s] if s in parts else file.groups[s] for s in sorted(seeds)}
+        sources = {self._waiting[seed].source for seed in parts}
+        self._files.write(file, places, sources, last=last)
+        self._files.write_manifest()
+        for seed, part in parts.items():
+            part.unlink(missing_ok=True)
+            self._waiting.pop(seed, None)
 
     def _join(self) -> None:
-        parts = {seed_of(part): part for part in list_parts(self.parts)}
-        numbered = [entry.group for entry in self._joined.values()]
-        in_order = numbered == [f"traj_{number}" for number in range(len(numbered))]
-        if parts or self.damaged or not in_order or not self.path.exists():
-            places = {**{seed: entry.group for seed, entry in self._joined.items()}, **parts}
-            seeds = sorted(places)
-            joined = join(self.path, self._header, [places[seed] for seed in seeds])
-            self._joined = {
-                seed: _Entry(*entry) for seed, entry in zip(seeds, joined.items(), strict=True)
-            }
-        abouts = enumerate(entry.about for entry in self._joined.values())
-        episodes = [{"episode_id": number, **about} for number, about in abouts]
-        text = json.dumps({**self._header, "episodes": episodes}, indent=1) + "\n"
-        if not self._json_says(text):
-            write_whole(self.json_path, text, RecordingError, parents=False)
-        for part in parts.values():
-            part.unlink(missing_ok=True)
+        for part in list_parts(self.parts):
+            if seed_of(part) not in self._waiting:  # a worker process wrote it
+                header, stored = read_part(part)
+                self._waiting[seed_of(part)] = _Part(stored.size, source_of(header))
+        for file in self._files.mending.values():
+            again = file.lost & self._waiting.keys()
+            if again:
+                self._write(file, {*file.groups, *again}, last=False)
+        certain = (
+            sum(part.size for part in self._waiting.values()) > 2 * self._limit
+        )  # not much waits for few that lack
+        while (full := self._full_file(certain=certain)) is not None:
+            self._fill_last(full)
+        last = self._files.last
+        if seeds := {*last.groups, *self._waiting}:
+            self._write(last, seeds, last=True)
+        else:
+            self._files.write_empty()
         with suppress(OSError):  # something else was put there meanwhile, and is not ours to delete
             self.parts.rmdir()
-
-    def _json_says(self, text: str) -> bool:
-        try:
-            return read_text(self.json_path, MAX_JSON) == text
-        except UnreadableFileError:
-            return False
-
-
-def _header(task: MultiRobotTask, source: str, source_desc: str | None) -> dict[str, Any]:
-    """Return what the json and the attributes of every file say about all episodes."""
-    name, guessed = full_name(type(task)), describe_guessed(task.scenario.layout)
-    return {
-        "env_info": {
-            "env_id": task.task_id,
-            **({"module": name.rpartition(":")[0]} if ":" in name else {}),
-            "env_kwargs": {
-                "obs_mode": "none",
-                "reward_mode": task.reward_mode,
-                "control_mode": plain_mode(task.control_mode),
-                "sim_backend": "physx_cpu",
-            },
-            "max_episode_steps": task.max_episode_steps,
-        },
-        "source_type": source,
-        "source_desc": source_desc,
-        "layout": describe_layout(task.layout),
-        "simulation": describe_simulation(task),
-        **({"guessed": guessed} if guessed else {}),
-    }
-
-
-def _compared(header: Mapping[str, Any]) -> dict[str, Any]:
-    about = {name: value for name, value in header.items() if name not in NOT_COMPARED}
-    if isinstance(info := about.get("env_info"), dict):
-        about["env_info"] = {name: value for name, value in info.items() if name != "module"}
-    return about
-
-
-def _expect_file_or_nothing(path: Path) -> None:
-    """Refuse a path at which there is something that is no file, before anything is recorded."""
-    if os.path.lexists(path) and path.exists():
-        try:
-            open_regular(path).close()
-        except UnreadableFileError as error:
-            raise RecordingError(f"cannot write {path}: {error.strerror}") from error
-
-
-def _control_mode(task: MultiRobotTask) -> str | dict[str, str]:
-    """Return the control mode as native writes it: by robot where there are several.
-
-    Where the arms of a robot have modes of their own, it is the mode by arm.
-    """
-    mode, keys = task.control_mode, observation_keys(task.layout)
-    if isinstance(mode, str):
-        return mode if None in keys.values() else {str(key): mode for key in keys.values()}
-    modes = {task.layout.arm_name(arm): own for arm, own in mode.items()}
-    by_arm = {
-        arm: modes.get(arm, modes.get(task.layout.owner(arm), CONTROL_MODES[0]))
-        for arm in task.layout.arms
-    }
-    if None in keys.values() or set(by_arm) != set(task.layout):
-        return by_arm
-    return {str(keys[robot]): own for robot, own in by_arm.items()}

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,11 +46,13 @@ class Joined:
     Attributes:
         header: What its episodes have in common.
         episodes: Its episodes' json by group.
+        sizes: Their `Stored.size`, likewise.
         damaged: The groups of episodes that are damaged.
     """
 
     header: dict[str, Any]
     episodes: dict[str, dict[str, Any]]
+    sizes: dict[str, int]
     damaged: tuple[str, ...]
 
 
@@ -61,23 +63,44 @@ def read_joined(path: Path) -> Joined:
         RecordingError: If it was not written here, or is damaged as a whole.
     """
     episodes: dict[str, dict[str, Any]] = {}
+    sizes: dict[str, int] = {}
     damaged: list[str] = []
     with damage_errors(lambda reason: _refusal(path, reason)), Hdf5File(path) as file:
-        header = {name: parse_json(text) for name, text in (file.texts() or {}).items()}
-        if "env_info" not in header:
-            raise FieldError("it does not say what was recorded")
+        header = _header(file)
         for name in file.members():
             if not _GROUP.fullmatch(name):
                 raise FieldError(f"{name} is no episode")
             try:
                 with damage_errors(RecordingError):
-                    episodes[name] = _read_episode(file, name).about
+                    stored = _read_episode(file, name)
+                    episodes[name], sizes[name] = stored.about, stored.size
             except RecordingError:
                 damaged.append(name)
         seeds = [about["episode_seed"] for about in episodes.values()]
         if len(set(seeds)) != len(seeds):
             raise FieldError("it holds two episodes of one seed")
-    return Joined(header, episodes, tuple(damaged))
+    return Joined(header, episodes, sizes, tuple(damaged))
+
+
+def read_header(path: Path) -> dict[str, Any]:
+    """Return what the episodes of a recording have in common.
+
+    Raises:
+        RecordingError: If it was not written here, or is damaged as a whole.
+    """
+    with damage_errors(lambda reason: _refusal(path, reason)), Hdf5File(path) as file:
+        return _header(file)
+
+
+def read_groups(path: Path, groups: Iterable[str]) -> Iterator[Stored]:
+    """Yield episodes of a recording that was written here.
+
+    Raises:
+        RecordingError: If one is damaged.
+    """
+    with damage_errors(lambda reason: _refusal(path, reason)), Hdf5File(path) as file:
+        for name in groups:
+            yield _read_episode(file, name)
 
 
 def join(
@@ -188,6 +211,13 @@ class _GroupWriter:
             space = self._spaces[rows.shape] = _HDF5.h5s.create_simple(rows.shape)
         dataset = _HDF5.h5d.create(group, name.encode(), kind, space, self._properties)
         dataset.write(_HDF5.h5s.ALL, _HDF5.h5s.ALL, rows, kind)
+
+
+def _header(file: Hdf5File) -> dict[str, Any]:
+    header = {name: parse_json(text) for name, text in (file.texts() or {}).items()}
+    if "env_info" not in header:
+        raise FieldError("it does not say what was recorded")
+    return header
 
 
 def _read_episode(file: Hdf5File, name: str) -> Stored:

@@ -16,7 +16,7 @@ from robots import TaskError, unknown_name_message
 from simulation import Camera, Simulation, State
 from simulation.cameras import TEXTURES, AnyCamera, RobotCamera
 from simulation.maths import Array, Floats, all_finite
-from tasks.engine.cameras import Size, expect_apart, place_name, resized
+from tasks.engine.cameras import Size, cameras_of, expect_apart, place_name, resized
 from tasks.engine.columns import (
     COLUMN_MODES,
     FILMED,
@@ -29,6 +29,7 @@ from tasks.engine.columns import (
 from tasks.engine.finite import NotFinite
 from tasks.native import controllers
 from tasks.native.format import native_joints, observation_keys
+from tasks.varying.noise import Noisy
 
 if TYPE_CHECKING:
     from simulation.rendering.pictures import Observers, View
@@ -114,29 +115,6 @@ def read_mode(name: str) -> ObservationMode:
     return ObservationMode(textures, flat="state" in forms, privileged=bool(forms))
 
 
-def cameras_of(layout: Layout, cameras: Iterable[Camera]) -> dict[str, AnyCamera]:
-    """Return every camera of a task under native's name: its own first, then each robot's.
-
-    Raises:
-        TaskError: If two have the same name.
-    """
-    found: dict[str, AnyCamera] = {}
-    for camera in cameras:
-        if camera.name in found:
-            raise TaskError(f"two cameras are called {camera.name!r}; names must differ")
-        found[camera.name] = camera
-    for robot, key in observation_keys(layout).items():
-        for mount in layout[robot].robot.cameras:
-            name = mount.name if key is None else f"{key}-{mount.name}"
-            if name in found:
-                raise TaskError(
-                    f"a camera of the task and one of the robot {robot!r} are called {name!r};"
-                    " give the task's another name"
-                )
-            found[name] = RobotCamera(robot, mount)
-    return found
-
-
 class Observer:
     """Puts observations together.
 
@@ -178,13 +156,20 @@ class Observer:
         if mode.columns:
             expect_apart(name for *_, name in self._picture_columns())
 
-    def observe(self, simulation: Simulation, state: State, parts: Mapping[str, Array]) -> Any:
+    def observe(
+        self,
+        simulation: Simulation,
+        state: State,
+        parts: Mapping[str, Array],
+        noisy: Noisy | None = None,
+    ) -> Any:
         """Return an observation of all environments.
 
         Args:
             simulation: The worlds.
             state: What they look like now.
             parts: What the task observes of them; see `tasks.MultiRobotTask.observe`.
+            noisy: What adds noise to named parts; None adds none.
 
         Raises:
             TaskError: If something that robots sense is not observed at all.
@@ -200,10 +185,12 @@ class Observer:
             return observed
         if not self.mode.privileged:
             parts = self._sensible(parts)
+        if noisy is not None:
+            parts = {name: noisy(name, values) for name, values in parts.items()}
         if not self.mode.textures:
-            return self._state(simulation, state, parts)
+            return self._state(simulation, state, parts, noisy)
         images = self._look(simulation)
-        seen = self._state(simulation, state, parts)
+        seen = self._state(simulation, state, parts, noisy)
         return {**images, "state": seen} if self.mode.flat else {**seen, **images}
 
     def senses(self, part: str) -> bool:
@@ -228,6 +215,10 @@ class Observer:
         self._rig = None
         if self._columns:
             self._columns.close()
+
+    def names(self, parts: Mapping[str, Array]) -> list[str]:
+        """Return the names of all that noise may be added to."""
+        return [*(f"{robot}.{joints}" for robot in self._robots for joints in JOINTS), *parts]
 
     def slices(
         self, simulation: Simulation, state: State, parts: Mapping[str, Array]
@@ -269,7 +260,13 @@ class Observer:
             for texture in self.mode.textures
         ]
 
-    def _state(self, simulation: Simulation, state: State, parts: Mapping[str, Array]) -> Any:
+    def _state(
+        self,
+        simulation: Simulation,
+        state: State,
+        parts: Mapping[str, Array],
+        noisy: Noisy | None,
+    ) -> Any:
         index = simulation.index
         robots = [
             [
@@ -278,6 +275,11 @@ class Observer:
             ]
             for name in self._robots
         ]
+        if noisy is not None:
+            robots = [
+                [noisy(f"{name}.{joints}", row) for joints, row in zip(JOINTS, own, strict=True)]
+                for name, own in zip(self._robots, robots, strict=True)
+            ]
         kept = controllers.entries(simulation)
         if kept:
             for entry, row in zip(kept, controllers.recall(simulation, kept), strict=True):

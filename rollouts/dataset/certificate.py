@@ -1,0 +1,210 @@
+"""A certificate: which files were played again, on what, and whether every bit was the same."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from robots import RecordingError, UnreadableFileError
+from robots.common.files import read_json
+from robots.common.writing import write_whole
+from rollouts.dataset.comparison import Replay
+from rollouts.reading.json_fields import FLAG, NAME, OBJECT, FieldError, Kind, fields, items, whole
+from rollouts.reading.manifest import spans_of
+from rollouts.reading.summary import MAX_JSON, MAX_SEED
+
+FORMAT = "robot-layouts certificate 1"
+FILE = "certificate.json"
+PACKAGES = ("robot-layouts", "sapien", "numpy", "torch")
+SHOWN = 100  # episodes that differ, or could not be played, that are listed
+
+_COUNT = whole(0, 2**53)
+_CERTIFICATE = fields(
+    {
+        "format": Kind(repr(FORMAT), lambda v: v == FORMAT),
+        "complete": FLAG,
+        "task": NAME,
+        "versions": OBJECT,
+        "files": items(OBJECT),
+        "episodes": _COUNT,
+        "checked": items(items(whole(0, MAX_SEED), 2)),
+        **dict.fromkeys(("equal", "steps", "successes"), _COUNT),
+        "differing": items(OBJECT),
+        "not_played": items(OBJECT),
+        "arm_contacts": fields({"episodes": _COUNT, "steps": _COUNT, "pairs": OBJECT}),
+    }
+)
+
+
+@dataclass
+class Certificate:
+    """What came of playing a recording again; it does not depend on who played.
+
+    Attributes:
+        task_id: Id of the task.
+        files: Name, size and SHA-256 of each h5 file and json.
+        episodes: How many episodes these hold.
+        versions: Of what played them.
+        checked: Seeds of the episodes that were played.
+        equal: How many of these were the same to the last bit.
+        steps: Their control steps.
+        successes: How many ended in success.
+        differing: Seed, step and array of those that were not the same, the first hundred.
+        not_played: Seed and reason of those that could not be played, likewise.
+        contact_episodes: Episodes in which arms touched each other.
+        contact_steps: Control steps in which they did.
+        pairs: The same by pair of links.
+    """
+
+    task_id: str
+    files: list[dict[str, Any]]
+    episodes: int
+    versions: dict[str, str] = field(default_factory=lambda: versions())
+    checked: set[int] = field(default_factory=set[int])
+    equal: int = 0
+    steps: int = 0
+    successes: int = 0
+    differing: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+    not_played: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+    contact_episodes: int = 0
+    contact_steps: int = 0
+    pairs: Counter[str] = field(default_factory=Counter[str])
+
+    @property
+    def complete(self) -> bool:
+        """Whether every episode was played."""
+        return len(self.checked) == self.episodes
+
+    @property
+    def holds(self) -> bool:
+        """Whether every episode was played, and was the same to the last bit."""
+        return self.complete and self.equal == self.episodes
+
+    def note(self, seed: int, replay: Replay) -> None:
+        """Count an episode."""
+        self.checked.add(seed)
+        self.steps += replay.steps
+        self.successes += replay.success
+        if replay.difference is None:
+            self.equal += 1
+        else:
+            _keep(self.differing, {"seed": seed, **vars(replay.difference)})
+        self.contact_episodes += bool(replay.touching)
+        self.contact_steps += replay.touching_steps
+        self.pairs.update(replay.touching)
+
+    def note_failure(self, seed: int, reason: str) -> None:
+        """Count an episode that could not be played."""
+        self.checked.add(seed)
+        _keep(self.not_played, {"seed": seed, "reason": reason})
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {
+            "format": FORMAT,
+            "complete": self.complete,
+            "holds": self.holds,
+            "task": self.task_id,
+            "versions": self.versions,
+            "files": self.files,
+            "episodes": self.episodes,
+            "checked": [list(span) for span in spans_of(sorted(self.checked))],
+            "equal": self.equal,
+            "steps": self.steps,
+            "successes": self.successes,
+            "differing": self.differing,
+            "not_played": self.not_played,
+            "arm_contacts": {
+                "episodes": self.contact_episodes,
+                "steps": self.contact_steps,
+                "pairs": dict(sorted(self.pairs.items())),
+            },
+        }
+
+    def write(self, path: Path) -> None:
+        """Write it.
+
+        Raises:
+            RecordingError: If it cannot be written.
+        """
+        write_whole(path, json.dumps(self.to_json(), indent=1) + "\n", RecordingError)
+
+    @staticmethod
+    def read(path: Path) -> Certificate:
+        """Read one.
+
+        Raises:
+            RecordingError: If it cannot be read, or is none.
+        """
+        try:
+            found = read_json(path, MAX_JSON)
+            _CERTIFICATE.expect(found, "")
+        except UnreadableFileError as error:
+            raise RecordingError(str(error)) from error
+        except FieldError as error:
+            raise RecordingError(f"{path} is no certificate: {error}") from error
+        return _from_json(found)
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that bits depend on, and the kind of machine."""
+    found = {"python": platform.python_version(), "machine": platform.machine()}
+    for package in PACKAGES:
+        with suppress(PackageNotFoundError):
+            found[package] = version(package)
+    return found
+
+
+def sentences(certificate: Certificate) -> Sequence[str]:
+    """Return what a certificate says, in words."""
+    c = certificate
+    lines = [
+        f"{c.equal} of {c.episodes} episodes equal to the last bit, {c.steps} steps, {c.successes}"
+        " successes",
+        f"arms touched in {c.contact_episodes} episodes"
+        + (f", {c.contact_steps} steps: {', '.join(c.pairs)}" if c.pairs else ""),
+    ]
+    if c.differing:
+        first = c.differing[0]
+        lines.append(
+            f"first difference: seed {first['seed']}, step {first['step']} in {first['array']}"
+        )
+    if c.not_played:
+        first = c.not_played[0]
+        lines.append(f"not played: seed {first['seed']}: {first['reason']}")
+    if not c.complete:
+        lines.append(f"not complete: {len(c.checked)} of {c.episodes} were played")
+    return lines
+
+
+def _keep(listed: list[dict[str, Any]], entry: dict[str, Any]) -> None:
+    """Keep the first hundred in the order of seeds."""
+    listed.append(entry)
+    listed.sort(key=lambda one: one["seed"])
+    del listed[SHOWN:]
+
+
+def _from_json(found: Mapping[str, Any]) -> Certificate:
+    contacts = found["arm_contacts"]
+    return Certificate(
+        found["task"],
+        found["files"],
+        found["episodes"],
+        found["versions"],
+        {seed for first, last in found["checked"] for seed in range(first, last + 1)},
+        found["equal"],
+        found["steps"],
+        found["successes"],
+        found["differing"],
+        found["not_played"],
+        contacts["episodes"],
+        contacts["steps"],
+        Counter(contacts["pairs"]),
+    )

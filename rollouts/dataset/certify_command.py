@@ -1,0 +1,97 @@
+"""``python -m rollouts certify``: every episode of a recording is played again, to the last bit."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from robots.common.commands import printable
+from rollouts.playing import command_options as workers
+from rollouts.playing.command_options import INTERRUPTED, stop_signals
+from rollouts.playing.replay_command import add_recording
+from tasks.cell_options import chosen_cell
+
+if TYPE_CHECKING:
+    from rollouts.dataset.certificate import Certificate
+    from rollouts.playing.executor import Event
+    from rollouts.progress import LiveLine
+
+DESCRIPTION = "play every episode again in worker processes, and certify that every bit is the same"
+EPILOG = (
+    "Compares states, rewards and flags of every step, and counts contacts between arms in every"
+    " step of physics. The same command goes on where it was stopped. With --ray, every machine"
+    " must find the recording at the same place. Exit code: 0 if everything is equal, 1 if not, 2"
+    " for bad usage, 130 if interrupted."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.epilog = EPILOG
+    add_recording(parser)
+    workers.add_arguments(parser)
+    parser.add_argument(
+        "--out", type=Path, metavar="JSON", help="the certificate (certificate.json beside it)"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command; returns its exit code.
+
+    Raises:
+        RobotLayoutsError: If it cannot be certified.
+    """
+    from robots import TaskError
+    from rollouts.dataset.certificate import sentences
+    from rollouts.dataset.certify import certificate_path, certify
+    from rollouts.playing.replay import find_official
+    from rollouts.progress import LiveLine
+    from tasks import get_task_class
+
+    path: Path | None = options.file
+    if path is None:
+        if options.task is None:
+            raise TaskError("neither a recording nor a task is given to certify")
+        path = find_official(get_task_class(options.task).task_id)
+    executor, line = workers.chosen_executor(options), LiveLine(unit="episodes")
+    status = _Status(line)
+    try:
+        with stop_signals(), line:
+            certificate = certify(
+                path,
+                executor,
+                options.out,
+                task_id=options.task,
+                cell=chosen_cell(options),
+                on_event=status.show,
+            )
+    except KeyboardInterrupt:
+        print("stopped; the same command goes on from there", file=sys.stderr)
+        return INTERRUPTED
+    print(printable(f"{options.out or certificate_path(path)}: {certificate.task_id}"))
+    for sentence in sentences(certificate):
+        print(printable(sentence))
+    return 0 if certificate.holds else 1
+
+
+class _Status:
+    """How far it is, and what happens on the way."""
+
+    def __init__(self, line: LiveLine) -> None:
+        self._line = line
+
+    def show(self, certificate: Certificate, event: Event | None) -> None:
+        """Tell how far it is."""
+        self._line.total = certificate.episodes
+        if event is None and certificate.checked:
+            self._line.say(f"{len(certificate.checked)} episodes were played before")
+        if event is not None and event.note is not None:
+            self._line.say(event.note)
+        if event is not None and event.died is not None:
+            self._line.say(f"{event.died}; another takes its place")
+        if event is not None and event.error is not None:
+            self._line.say(f"seed {event.seed} cannot be played: {event.error}")
+        done = len(certificate.checked)
+        self._line.update(done, f"certifying, {certificate.equal} equal")

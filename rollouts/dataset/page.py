@@ -1,0 +1,273 @@
+"""The report of a data set: one HTML page that needs nothing else."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from html import escape
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from rollouts.dataset.certificate import Certificate
+from rollouts.dataset.charts import histogram
+from rollouts.dataset.clearance import Clearances
+from rollouts.dataset.clips import Clip
+from rollouts.dataset.contents import Contents
+
+_CHARTS = 120  # of what was varied, at most
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a page is made of.
+
+    Attributes:
+        title: What it is of.
+        contents: What the recording holds.
+        layout: Where robots stood: for each its kind and base position (m).
+        certificate: What replays found, or None; of these very files.
+        clearances: How near robots came, or None.
+        clips: Clips of some episodes.
+        remarks: What is missing on the page and why, in words.
+    """
+
+    title: str
+    contents: Contents
+    layout: Mapping[str, tuple[str, Sequence[float]]] = field(default_factory=dict[str, Any])
+    certificate: Certificate | None = None
+    clearances: Clearances | None = None
+    clips: Sequence[Clip] = ()
+    remarks: Sequence[str] = ()
+
+
+def render(report: Report) -> str:
+    """Return the page."""
+    style = (files("rollouts.dataset") / "page.css").read_text(encoding="utf-8")
+    digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
+    policy = f"default-src 'none'; media-src data:; img-src data:; style-src 'sha256-{digest}'"
+    sections = "".join(
+        (
+            _lengths(report.contents),
+            _sources(report.contents),
+            _varied(report.contents),
+            _clearances(report),
+            _certificate(report.certificate),
+            _clips(report.clips),
+            _layout(report.layout),
+            _files(report),
+            _remarks(report.remarks),
+        )
+    )
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
+        f'<title>{escape(report.title)}</title>\n<link rel="icon" href="data:,">\n'
+        f"<style>{style}</style>\n</head>\n<body>\n{_header(report)}<main>\n{sections}</main>\n"
+        "</body>\n</html>\n"
+    )
+
+
+def _header(report: Report) -> str:
+    contents, c = report.contents, report.certificate
+    count, solved = len(contents.steps), int(contents.success.sum())
+    tiles = [
+        ("episodes", f"{count:,}", f"{int(contents.steps.sum()):,} steps", ""),
+        (
+            "success",
+            f"{solved / count:.1%}" if count else "–",
+            f"{count - solved:,} without",
+            "",
+        ),
+        ("on disk", f"{contents.megabytes:,.1f} MB", _plural(len(contents.files), "file"), ""),
+    ]
+    if c is None:
+        tiles.append(("certified", "–", "nobody has replayed it", ""))
+    else:
+        kind = "good" if c.holds else "bad"
+        tiles.append(("equal to the last bit", f"{c.equal:,} of {c.episodes:,}", "replayed", kind))
+        touched = f"{c.contact_episodes:,}"
+        note = "in every step of physics"
+        kind = "bad" if c.contact_episodes else "good"
+        tiles.append(("episodes in which arms touch", touched, note, kind))
+    if report.clearances is not None:
+        least = float(report.clearances.least.min())
+        note = f"in a sample of {_plural(len(report.clearances.places), 'episode')}"
+        tiles.append(("least clearance", f"{least * 1e3:.1f} mm".replace("-", "−"), note, ""))
+    shown = "".join(
+        f'<div class="tile"><dt>{escape(label)}</dt><dd class="value {kind}">{escape(value)}</dd>'
+        f'<dd class="note">{escape(note)}</dd></div>'
+        for label, value, note, kind in tiles
+    )
+    mode = contents.control_mode
+    words = mode if isinstance(mode, str) else ", ".join(f"{a} {m}" for a, m in mode.items())
+    return (
+        '<header><p class="kicker">robot-layouts, a data set</p>'
+        f"<h1>{escape(report.title)}</h1>"
+        f'<p class="note">{escape(contents.task_id)}, {escape(words)}</p>'
+        f'<dl class="tiles">{shown}</dl></header>\n'
+    )
+
+
+def _lengths(contents: Contents) -> str:
+    if not len(contents.steps):
+        return ""
+    chart = histogram(contents.steps.astype(float), ~contents.success, "control steps")
+    low, middle, high = np.percentile(contents.steps, (5, 50, 95))
+    words = f"Median {middle:.0f} steps; 5 % have at most {low:.0f}, 5 % at least {high:.0f}."
+    if not contents.success.all():
+        words += " Episodes without success are red."
+    return _section("Lengths", f"<p>{words}</p><figure>{chart}</figure>")
+
+
+def _sources(contents: Contents) -> str:
+    rows = [
+        (
+            name,
+            f"{facts.episodes:,}",
+            f"{facts.successes / facts.episodes:.1%}",
+            f"{facts.steps / facts.episodes:.1f}",
+        )
+        for name, facts in sorted(contents.sources.items(), key=lambda item: -item[1].episodes)
+    ]
+    return _section("Who acted", _table(("source", "episodes", "success", "steps, mean"), rows))
+
+
+def _varied(contents: Contents) -> str:
+    if not contents.drawn:
+        return ""
+    figures = [_axis(name, values, contents) for name, values in contents.drawn.items()]
+    left_out = len(figures) - _CHARTS
+    more = f"<p>{left_out} more are left out.</p>" if left_out > 0 else ""
+    words = "What was drawn for each episode; with its seed it comes back."
+    return _section(
+        "What was varied",
+        f'<p>{words}</p><div class="grid">{"".join(figures[:_CHARTS])}</div>{more}',
+    )
+
+
+def _axis(name: str, values: np.ndarray, contents: Contents) -> str:
+    there = np.isfinite(values)
+    chart = histogram(values[there], ~contents.success[there], name)
+    lacking = int((~there).sum())
+    note = f", not in {lacking:,} episodes" if lacking else ""
+    return f"<figure>{chart}<figcaption><b>{escape(name)}</b>{note}</figcaption></figure>"
+
+
+def _clearances(report: Report) -> str:
+    found = report.clearances
+    if found is None:
+        return ""
+    failed = ~report.contents.success[found.places]
+    chart = histogram(found.least * 1e3, failed, "least clearance, mm", lambda v: f"{v:.0f} mm")
+    words = (
+        "The least distance of links of different robots at any control step, in each of"
+        f" {_plural(len(found.places), 'episode')}, evenly chosen; it is negative where the convex"
+        " hulls of their shapes overlap. The simulation lets some links pass through each other"
+        " and counts no contact then: fingers and hands of robots of the same kind, as ManiSkill's"
+        " does."
+    )
+    return _section("Clearance between robots", f"<p>{words}</p><figure>{chart}</figure>")
+
+
+def _certificate(certificate: Certificate | None) -> str:
+    if certificate is None:
+        words = (
+            "There is no certificate of these files; <code>robot-layouts certify</code> makes one."
+        )
+        return _section("Certificate", f"<p>{words}</p>")
+    c = certificate
+    versions = ", ".join(f"{name} {version}" for name, version in c.versions.items())
+    rows = [
+        ("episodes played again", f"{len(c.checked):,} of {c.episodes:,}"),
+        ("equal to the last bit", f"{c.equal:,}"),
+        ("control steps", f"{c.steps:,}"),
+        ("episodes in which arms touch", f"{c.contact_episodes:,}"),
+        ("steps in which arms touch", f"{c.contact_steps:,}"),
+        ("played on", versions),
+    ]
+    rows += [("touched", f"{pair}: {count:,} steps") for pair, count in sorted(c.pairs.items())]
+    for entry in c.differing[:10]:
+        rows.append(("differs", f"seed {entry['seed']}, step {entry['step']}, {entry['array']}"))
+    for entry in c.not_played[:10]:
+        rows.append(("not played", f"seed {entry['seed']}: {entry['reason']}"))
+    return _section("Certificate", _table(("", ""), rows, text=2))
+
+
+def _clips(clips: Sequence[Clip]) -> str:
+    if not clips:
+        return ""
+    shown = "".join(
+        '<figure><video controls muted loop playsinline width="256" height="256"'
+        f' poster="data:image/jpeg;base64,{base64.b64encode(clip.poster).decode()}"'
+        f' src="data:video/mp4;base64,{base64.b64encode(clip.video).decode()}">'
+        f"</video><figcaption>{escape(_caption(clip))}</figcaption></figure>"
+        for clip in clips
+    )
+    return _section("Clips", f'<div class="grid">{shown}</div>')
+
+
+def _caption(clip: Clip) -> str:
+    return f"seed {clip.seed}" + (f", {clip.words}" if clip.words else "")
+
+
+def _layout(layout: Mapping[str, tuple[str, Sequence[float]]]) -> str:
+    if not layout:
+        return ""
+    rows = [
+        (place, robot, *(f"{value:.3f}" for value in position))
+        for place, (robot, position) in layout.items()
+    ]
+    return _section("Layout", _table(("place", "robot", "x (m)", "y (m)", "z (m)"), rows, text=2))
+
+
+def _files(report: Report) -> str:
+    sums = {
+        f["file"]: f["sha256"] for f in (report.certificate.files if report.certificate else ())
+    }
+    rows = [
+        (
+            file.name,
+            "–" if file.first is None else f"{file.first} to {file.last}",
+            f"{file.episodes:,}",
+            f"{file.megabytes:,.1f}",
+            sums.get(file.name, "–")[:16],
+        )
+        for file in report.contents.files
+    ]
+    names = ("file", "seeds", "episodes", "MB", "SHA-256 begins")
+    return _section("Files", _table(names, rows))
+
+
+def _remarks(remarks: Sequence[str]) -> str:
+    lines = "".join(f"<p>{escape(remark)}</p>" for remark in remarks)
+    return _section("Left out", lines) if lines else ""
+
+
+def _section(title: str, content: str) -> str:
+    return f"<section><h2>{escape(title)}</h2>{content}</section>\n"
+
+
+def _table(names: Sequence[str], rows: Iterable[Sequence[str]], *, text: int = 1) -> str:
+    """Return a table; the first columns hold text, the others numbers."""
+
+    def cell(tag: str, place: int, words: str) -> str:
+        kind = ' class="number"' if place >= text else ""
+        return f"<{tag}{kind}>{escape(words)}</{tag}>"
+
+    head = "".join(cell("th", i, name) for i, name in enumerate(names)) if any(names) else ""
+    body = "".join(
+        f"<tr>{''.join(cell('td', i, words) for i, words in enumerate(row))}</tr>" for row in rows
+    )
+    return (
+        f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
+        "</div>"
+    )
+
+
+def _plural(count: int, word: str) -> str:
+    return f"{count:,} {word}" + ("" if count == 1 else "s")

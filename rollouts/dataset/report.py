@@ -1,0 +1,130 @@
+"""Gathers what the report of a data set shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rollouts.dataset.certificate import Certificate
+from rollouts.dataset.certify import certificate_path
+from rollouts.dataset.clearance import Clearances, measure
+from rollouts.dataset.clips import Clip, chosen, film
+from rollouts.dataset.contents import Contents, read_contents
+from rollouts.dataset.page import Report
+from rollouts.playing.replay import open_recording, task_for
+from rollouts.reading.recording import all_files, first_file
+from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.video import video_problem
+
+Progress = Callable[[float, float, str], None]
+
+
+def make_report(
+    path: Path,
+    *,
+    task_id: str | None = None,
+    cell: Mapping[str, Any] | None = None,
+    clearances: int = 100,
+    clips: int = 4,
+    progress: Progress = lambda done, total, what: None,
+) -> Report:
+    """Return what is known of a data set.
+
+    Args:
+        path: The recording: an h5 file, a folder or a manifest.
+        task_id: Its task; ``module:Id`` for one of a module that no package lists.
+        cell: Where robots stood and which, where the file cannot say it; see `task_for`.
+        clearances: In how many episodes to measure how near robots came.
+        clips: How many episodes to film.
+        progress: Called with what is done, what there is to do, and what is going on.
+
+    Raises:
+        TrajectoryError: If it cannot be read.
+        RecordingError: If something that is no certificate is in its place.
+    """
+    count, remarks = len(all_files(path)), list[str]()
+    total = count + clearances + clips
+    contents = read_contents(path, lambda done, _: progress(done, total, "reading"))
+    if not len(contents.steps):
+        raise TrajectoryError(f"{path} holds no episodes; there is nothing to report")
+    done = count
+
+    def step(what: str) -> Callable[[], None]:
+        def advance() -> None:
+            nonlocal done
+            done += 1
+            progress(done, total, what)
+
+        return advance
+
+    with open_recording(path, task_id) as file:
+        near = _near(file, contents, clearances, cell or {}, remarks, step("measuring"))
+        films = _films(file, contents, clips, cell or {}, remarks, step("filming"))
+        described = file.layout or {}
+    return Report(
+        title=first_file(path).absolute().parent.name if first_file(path) != path else path.name,
+        contents=contents,
+        layout={name: (about["robot"], about["position"]) for name, about in described.items()},
+        certificate=_certificate(path, remarks),
+        clearances=near,
+        clips=films,
+        remarks=remarks,
+    )
+
+
+def _near(
+    file: TrajectoryFile,
+    contents: Contents,
+    count: int,
+    cell: Mapping[str, Any],
+    remarks: list[str],
+    step: Callable[[], None],
+) -> Clearances | None:
+    if not count:
+        return None
+    if find_spec("fcl") is None:
+        remarks.append("Clearances need python-fcl: pip install 'robot-layouts[checks]'.")
+        return None
+    last = len(contents.steps) - 1
+    places = sorted({round(x) for x in np.linspace(0, last, min(count, last + 1)).tolist()})
+    with closing(task_for(file, **cell)) as task:
+        found = measure(file, task, places, progress=step)
+    if found is None and len(file.layout or {}) > 1:
+        remarks.append("Clearances need recorded states.")
+    return found
+
+
+def _films(
+    file: TrajectoryFile,
+    contents: Contents,
+    count: int,
+    cell: Mapping[str, Any],
+    remarks: list[str],
+    step: Callable[[], None],
+) -> list[Clip]:
+    if not count:
+        return []
+    if problem := video_problem():
+        remarks.append(f"There are no clips: {problem}.")
+        return []
+    with closing(task_for(file, **cell, pictures=True)) as task:
+        return film(file, task, chosen(contents, count), step)
+
+
+def _certificate(path: Path, remarks: list[str]) -> Certificate | None:
+    """Return the certificate of these very files, as far as their sizes tell."""
+    place = certificate_path(path)
+    if not place.exists():
+        return None
+    found = Certificate.read(place)
+    sizes = {file["file"]: file["bytes"] for file in found.files}
+    here = [p for h5 in all_files(path) for p in (h5, h5.with_suffix(".json"))]
+    if sizes != {p.name: p.stat().st_size for p in here}:
+        remarks.append(f"{place.name} is of other files, and is not shown.")
+        return None
+    return found
