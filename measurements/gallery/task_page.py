@@ -37,7 +37,7 @@ from tasks.description import (
     observation_table,
     read_docstring,
 )
-from tasks.engine.observation import cameras_of
+from tasks.engine.cameras import cameras_of
 from tasks.registry import other_names
 
 UP = "../"  # from a page to the gallery's folder

@@ -204,7 +204,7 @@ class _Work:
             return
         from rollouts.export.drawing_job import DrawingCrew, DrawingJob
 
-        path = file.path.absolute()
+        path = Path(wanted.recording).absolute()
         job = DrawingJob(path, type(task), shots, last, wanted.layout, wanted.robots)
         numbers = [i for i in range(len(file)) if not wanted.only_successes or succeeded(file[i])]
         crew = DrawingCrew(job, executor, numbers, folder, lambda n: progress(n, len(file)), tell)

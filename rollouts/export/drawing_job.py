@@ -45,7 +45,7 @@ class DrawingJob:
     """Makes what draws the episodes of a recording, which are numbered as in the file.
 
     Attributes:
-        recording: The h5 file, where workers can read it.
+        recording: The h5 file or the recording's folder, where workers can read it.
         task: Class of the task that was recorded; loading it imports its module.
         shots: What is drawn of every moment.
         last: Whether the state after the last step is drawn as well.

@@ -13,9 +13,8 @@ from robots import TaskError, UnknownNameError
 from simulation.cameras import AnyCamera, RobotCamera
 from simulation.rendering.pictures import SIZE
 from tasks import MultiRobotTask
-from tasks.engine.cameras import Size, by_place, expect_apart, resized
+from tasks.engine.cameras import Size, by_place, cameras_of, expect_apart, resized
 from tasks.engine.columns import OVERVIEW, Viewpoint, overview
-from tasks.engine.observation import cameras_of
 
 ALL = "all"  # every camera of the task and its robots
 RGB, DEPTH = "rgb", "depth"

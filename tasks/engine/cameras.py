@@ -1,4 +1,4 @@
-"""What cameras are called by place, and cameras that take pictures of another size."""
+"""Which cameras a task has, what they are called, and cameras that take larger pictures."""
 
 from __future__ import annotations
 
@@ -6,14 +6,39 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from layouts import Layout
 from robots import TaskError
 from robots.common.bounds import checked_whole, shown
-from simulation.cameras import AnyCamera, RobotCamera
+from simulation.cameras import AnyCamera, Camera, RobotCamera
+from tasks.native.format import observation_keys
 
 Size = tuple[int, int]
 """Width and height of a picture (pixels)."""
 
 _MOST_PIXELS = 16384  # of a side, as of `simulation.Camera`
+
+
+def cameras_of(layout: Layout, cameras: Iterable[Camera]) -> dict[str, AnyCamera]:
+    """Return every camera of a task under native's name: its own first, then each robot's.
+
+    Raises:
+        TaskError: If two have the same name.
+    """
+    found: dict[str, AnyCamera] = {}
+    for camera in cameras:
+        if camera.name in found:
+            raise TaskError(f"two cameras are called {camera.name!r}; names must differ")
+        found[camera.name] = camera
+    for robot, key in observation_keys(layout).items():
+        for mount in layout[robot].robot.cameras:
+            name = mount.name if key is None else f"{key}-{mount.name}"
+            if name in found:
+                raise TaskError(
+                    f"a camera of the task and one of the robot {robot!r} are called {name!r};"
+                    " give the task's another name"
+                )
+            found[name] = RobotCamera(robot, mount)
+    return found
 
 
 def place_name(name: str, camera: AnyCamera) -> str:

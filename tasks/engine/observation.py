@@ -16,7 +16,7 @@ from robots import TaskError, unknown_name_message
 from simulation import Camera, Simulation, State
 from simulation.cameras import TEXTURES, AnyCamera, RobotCamera
 from simulation.maths import Array, Floats, all_finite
-from tasks.engine.cameras import Size, expect_apart, place_name, resized
+from tasks.engine.cameras import Size, cameras_of, expect_apart, place_name, resized
 from tasks.engine.columns import (
     COLUMN_MODES,
     FILMED,
@@ -113,29 +113,6 @@ def read_mode(name: str) -> ObservationMode:
             f" one of {', '.join(STATE_FORMS)}, each once"
         )
     return ObservationMode(textures, flat="state" in forms, privileged=bool(forms))
-
-
-def cameras_of(layout: Layout, cameras: Iterable[Camera]) -> dict[str, AnyCamera]:
-    """Return every camera of a task under native's name: its own first, then each robot's.
-
-    Raises:
-        TaskError: If two have the same name.
-    """
-    found: dict[str, AnyCamera] = {}
-    for camera in cameras:
-        if camera.name in found:
-            raise TaskError(f"two cameras are called {camera.name!r}; names must differ")
-        found[camera.name] = camera
-    for robot, key in observation_keys(layout).items():
-        for mount in layout[robot].robot.cameras:
-            name = mount.name if key is None else f"{key}-{mount.name}"
-            if name in found:
-                raise TaskError(
-                    f"a camera of the task and one of the robot {robot!r} are called {name!r};"
-                    " give the task's another name"
-                )
-            found[name] = RobotCamera(robot, mount)
-    return found
 
 
 class Observer:

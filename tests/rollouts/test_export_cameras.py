@@ -26,8 +26,11 @@ from rollouts.playing.events import Event
 from rollouts.playing.executor import ProcessExecutor
 from rollouts.reading.recorded_task import task_for
 from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.recording.recorder import Recorder
 from simulation import Camera
 from simulation.rendering.pictures import Observers, vulkan_problem
+from tasks import Normal, Randomization, Shift, Uniform, Whole
+from tasks.episode import play
 from tests.rollouts.clusters import running_cluster
 from tests.rollouts.recordings import edited, record
 
@@ -175,6 +178,30 @@ def test_where_no_replay_ends_pictures_are_of_the_recorded_states(tmp_path):
             task.set_state_dict(state_row(columns.states, t))
         (view,) = Observers(task.simulation, shots.cameras, ["rgb"]).look(0).values()
         np.testing.assert_array_equal(view.images["rgb"], picture)
+
+
+@drawn
+def test_worlds_that_vary_are_drawn_as_they_were(tmp_path):
+    varied = Randomization(
+        size={"cube": Uniform(0.6, 1.6)},
+        bases={"*": Shift(x=Uniform(-0.05, 0.05), yaw=Uniform(-0.1, 0.1))},
+        action_noise={"left.arm": Normal(0.1)},
+        action_delay=Whole(0, 2),
+    )
+    task = tasks.make(TASK, obs_mode="none", randomization=varied)
+    with Recorder(tmp_path / "varied.h5", task) as recorder:
+        recorder.add(play(task, 3, np.full((2, task.layout.action_dim), 0.5, np.float32)))
+    env = tasks.make(TASK, obs_mode="rgb+depth", camera_size=SIZE, randomization=varied)
+    with TrajectoryFile(tmp_path / "varied.h5") as file:
+        moments = list(observed(env, file[0]))
+        task = task_for(file, pictures=True)
+        shots = choose_shots(task, ["all"], size=SIZE, depth=True)
+        drawing = Drawing(task, ColumnReader(task).read(file[0]), shots, last=True)
+        for frame, moment in zip(drawing, moments, strict=True):
+            for channel, picture in frame.items():
+                wanted = moment[f"{channel.camera} {channel.texture}"]
+                np.testing.assert_array_equal(picture, wanted)
+    assert drawing.exact
 
 
 def flat(camera: str, value: int, moments: int = 2) -> tuple[Channel, np.ndarray]:
