@@ -36,14 +36,11 @@ from tasks.engine.remade import Remade
 from tasks.engine.returned import ReturnedArrays, ReturnedReward, expect_nothing, unchanged
 from tasks.engine.scenario import Scenario
 from tasks.engine.speeds import SpeedWatch
+from tasks.engine.varied import Varied
 from tasks.language.randomness import EpisodeRandom
 from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict
 from tasks.varying.distractors import add_distractors, area_of
-from tasks.varying.distributions import Distribution, Normal
-from tasks.varying.noise import noise
 from tasks.varying.varying import Varying
-
-_NORMAL = Normal(1.0)
 
 
 class _FreshScenario:
@@ -56,7 +53,7 @@ class _FreshScenario:
         )
 
 
-class MultiRobotTask(Declaration, Remade):
+class MultiRobotTask(Declaration, Varied, Remade):
     """A task that can be stepped: what users subclass, and what `tasks.make` returns.
 
     What a subclass sets and defines stands in `tasks.engine.declaration.Declaration`; what follows
@@ -189,44 +186,6 @@ class MultiRobotTask(Declaration, Remade):
         if self._simulation is None:
             raise SimulationError(f"this {type(self).__name__} is closed; make a new one")
         return self._simulation
-
-    def drawn(self, env: int = 0) -> dict[str, Any] | None:
-        """Return what was drawn for an environment's episode, by axis and name, as plain data.
-
-        Args:
-            env: The number of the environment.
-
-        Returns:
-            Such as ``{"mass": {"cube": 1.31}}``; see `tasks.Randomization`. None if nothing varies.
-        """
-        return None if self._varying is None else self._varying.drawn(env)
-
-    def standing(self, env: int = 0) -> Layout:
-        """Return the layout as robots stand in the present episode of an environment.
-
-        It is ``layout``, unless the bases of robots vary. What is planned is planned in this one.
-        """
-        return self.layout if self._varying is None else self._varying.layout(env)
-
-    def scale(self, body: str) -> Floats:
-        """Return the factor by which a body is larger than declared, (N,); 1 if sizes are fixed."""
-        if self._varying is None:
-            return np.ones(self.num_envs, np.float32)
-        return self._varying.scale(body)
-
-    def noise(self, name: str, width: int, drawn: Distribution = _NORMAL) -> Floats:
-        """Return noise for `observe`, a function of each episode's seed and step alone.
-
-        Args:
-            name: What it is for; another name draws other numbers.
-            width: How many numbers each environment gets.
-            drawn: What each is drawn from; if not given, of mean 0 and deviation 1.
-
-        Returns:
-            Shape (N, width).
-        """
-        streams = [rng.stream for rng in self._rngs]
-        return noise(streams, self._elapsed.tolist(), drawn, width, "observe", name)
 
     def close(self) -> None:
         """Let the worlds go; closing twice is allowed."""
