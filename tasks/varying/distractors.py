@@ -145,12 +145,16 @@ class Distractors(Group):
         """What is drawn: how many there are, and for each of them its rank, turn and colour."""
         own = {name: self.declared[name] for name in ("yaw", "red", "green", "blue")}
         chance = _Chance(rank=Uniform(0.0, 1.0), **own)
-        each = {distractor.name: chance for distractor in self.every()}
-        return {"count": self.declared["count"], **each}
+        return {"count": self.declared["count"], **dict.fromkeys(self.names_of_bodies, chance)}
+
+    @property
+    def names_of_bodies(self) -> list[str]:
+        """What all of them are called."""
+        return [f"distractor_{i}" for i in range(self.bodies or 0)]
 
     def every(self) -> list[Distractor]:
         """Return all of them, those that wait as well."""
-        return [_distractor(self, i) for i in range(self.bodies or 0)]
+        return [_distractor(self, *item) for item in enumerate(self.names_of_bodies)]
 
     def to_json(self) -> Any:
         """Return it as plain data, which `read` turns into an equal one."""
@@ -163,9 +167,8 @@ class Distractors(Group):
         return f"{kinds} of {self.bodies}, {super().__str__()}, gap {self.gap:g}"
 
 
-def _distractor(declared: Distractors, number: int) -> Distractor:
+def _distractor(declared: Distractors, number: int, name: str) -> Distractor:
     """Return one of them; its numbers are the declaration's, whatever the episode."""
-    name = f"distractor_{number}"
     size, first, second = (
         distribution.value(Stream(0).number("distractors", name, what))
         for what, distribution in (

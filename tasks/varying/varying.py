@@ -70,8 +70,8 @@ class Varying:
         """
         self._declared = declared = randomization.declared
         self._layout = simulation.layout
-        own = declared["distractors"].every() if "distractors" in declared else ()
-        offers = {**_OFFERED, **look_targets(cameras, {one.name for one in own})}
+        own = declared["distractors"].names_of_bodies if "distractors" in declared else ()
+        offers = {**_OFFERED, **look_targets(cameras, own)}
         self._targets = {
             axis: find.targets(axis, declared[axis], offered(simulation))
             for axis, offered in offers.items()
