@@ -39,8 +39,6 @@ def cover(covered: Iterable[Any], pattern: Pattern) -> None:
     image = RenderTexture2D(pattern_image(pattern), "r8g8b8a8unorm", _MIPMAPS)
     for material in covered:
         material.set_base_color_texture(image)
-        # SAPIEN looks for a material's first texture only once something else of it changes.
-        material.set_base_color([1.0, 1.0, 1.0, 1.0])
 
 
 def wrap(entity: sapien.Entity, shapes: tuple[Shape, ...]) -> list[Any]:

@@ -57,6 +57,19 @@ def test_they_stand_clear_of_everything_and_rest() -> None:
     assert len(counts) > 3
 
 
+def test_goals_are_spared() -> None:
+    """The region on the table that a cube is pushed to, 0.1 m in radius, touches nothing."""
+    nearby = Distractors(count=Whole(3, 3), x=Uniform(-0.1, 0.3), y=Uniform(-0.3, 0.3))
+    env = tasks.make("PushCube-v1", randomization=Randomization(distractors=nearby))
+    for seed in range(8):
+        env.reset(seed=seed)
+        state = env.simulation.read()
+        goal = state.position("goal_region")[0, :2]
+        ways = [state.position(name)[0, :2] - goal for name in NAMES[:3]]
+        assert min(map(np.linalg.norm, ways)) > 0.12
+        assert drawn(env)["count"] > 1
+
+
 def test_a_seed_brings_them_back_in_a_world_used_again_or_rebuilt() -> None:
     env, batch = made(SOME), made(SOME, 2)
     env.reset(seed=1)
