@@ -46,7 +46,7 @@ class Body:
     quaternion: Quaternion = IDENTITY
     anchored: bool = False
     marker: bool = False
-    scale: float = 1.0
+    scale: float = field(default=1.0, repr=False)
 
 
 @dataclass

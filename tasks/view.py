@@ -39,7 +39,7 @@ def task_cell(task: MultiRobotTask, title: str, motion: Motion | None = None) ->
         if (parts := body_parts(body.shapes))
     }
     start = {name: state.qpos(name)[0].astype(float) for name in task.layout}
-    return Cell(title, task.layout, things, motion, start)
+    return Cell(title, task.standing(), things, motion, start)
 
 
 def recorded_motion(

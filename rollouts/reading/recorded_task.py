@@ -79,8 +79,7 @@ def task_for(
         making |= _recorded(file, cls, {n: r for n, r in named.items() if r is not None})
     if "control_frequency" in (file.simulation or {}):
         making["control_frequency"] = file.simulation["control_frequency"]
-    varied = (file.simulation or {}).get("randomization")
-    making["randomization"] = None if varied is None else Randomization.from_json(varied)
+    making["randomization"] = _varied(file)
     task = make(
         file.task_id,
         obs_mode="none",
@@ -91,6 +90,17 @@ def task_for(
     file.expect(task.task_id, task.layout.action_dim)
     file.expect_world(task)
     return task
+
+
+def _varied(file: TrajectoryFile) -> Randomization | None:
+    """Return what varied in the worlds of a recording."""
+    described = (file.simulation or {}).get("randomization")
+    try:
+        return None if described is None else Randomization.from_json(described)
+    except RobotLayoutsError as error:
+        raise TrajectoryError(
+            f"{file.path} has a randomization that makes no sense here: {error}"
+        ) from error
 
 
 def _recorded(

@@ -36,14 +36,10 @@ from tasks.engine.remade import Remade
 from tasks.engine.returned import ReturnedArrays, ReturnedReward, expect_nothing, unchanged
 from tasks.engine.scenario import Scenario
 from tasks.engine.speeds import SpeedWatch
+from tasks.engine.varied import Varied
 from tasks.language.randomness import EpisodeRandom
 from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict
-from tasks.varying.distributions import Distribution, Normal
-from tasks.varying.noise import noise
-from tasks.varying.streams import Stream
 from tasks.varying.varying import Varying
-
-_NORMAL = Normal(1.0)
 
 
 class _FreshScenario:
@@ -56,7 +52,7 @@ class _FreshScenario:
         )
 
 
-class MultiRobotTask(Declaration, Remade):
+class MultiRobotTask(Declaration, Varied, Remade):
     """A task that can be stepped: what users subclass, and what `tasks.make` returns.
 
     What a subclass sets and defines stands in `tasks.engine.declaration.Declaration`; what follows
@@ -184,44 +180,6 @@ class MultiRobotTask(Declaration, Remade):
         if self._simulation is None:
             raise SimulationError(f"this {type(self).__name__} is closed; make a new one")
         return self._simulation
-
-    def drawn(self, env: int = 0) -> dict[str, Any] | None:
-        """Return what was drawn for an environment's episode, by axis and name, as plain data.
-
-        Args:
-            env: The number of the environment.
-
-        Returns:
-            Such as ``{"mass": {"cube": 1.31}}``; see `tasks.Randomization`. None if nothing varies.
-        """
-        return None if self._varying is None else self._varying.drawn(env)
-
-    def layout_of(self, seed: int) -> Layout:
-        """Return the layout as its robots stand in the episode of a seed.
-
-        It is ``layout``, unless the bases of robots vary.
-        """
-        return self.layout if self._varying is None else self._varying.layout(Stream(seed))
-
-    def scale(self, body: str) -> Floats:
-        """Return the factor by which a body is larger than declared, (N,); 1 if sizes are fixed."""
-        if self._varying is None:
-            return np.ones(self.num_envs, np.float32)
-        return self._varying.scale(body)
-
-    def noise(self, name: str, width: int, drawn: Distribution = _NORMAL) -> Floats:
-        """Return noise for `observe`, a function of each episode's seed and step alone.
-
-        Args:
-            name: What it is for; another name draws other numbers.
-            width: How many numbers each environment gets.
-            drawn: What each is drawn from; if not given, of mean 0 and deviation 1.
-
-        Returns:
-            Shape (N, width).
-        """
-        streams = [rng.stream for rng in self._rngs]
-        return noise(streams, self._elapsed.tolist(), drawn, width, "observe", name)
 
     def close(self) -> None:
         """Let the worlds go; closing twice is allowed."""
@@ -478,7 +436,7 @@ class MultiRobotTask(Declaration, Remade):
         try:
             if varying is None:
                 return self.observer.observe(self.simulation, state, parts)
-            noisy = varying.sensors(self.observer.names(parts), self._elapsed)
+            noisy = varying.sensors(lambda: self.observer.names(parts), self._elapsed)
             return varying.seen(self.observer.observe(self.simulation, state, parts, noisy), ids)
         except NotFinite:
             refuse_observation(state, parts, self, self._speeds, self._elapsed)

@@ -66,6 +66,7 @@ class SensorNoise:
     def __init__(self, declared: Mapping[str, Distribution]) -> None:
         """Take what is drawn, by patterns of names."""
         self._declared = declared
+        self._known = False
 
     def expect(self, parts: Sequence[str]) -> None:
         """Refuse patterns that no part of the observation matches.
@@ -73,9 +74,12 @@ class SensorNoise:
         Raises:
             UnknownNameError: If there is one.
         """
+        if self._known:
+            return
         for pattern in self._declared:
             if not any(matching(pattern, [part]) for part in parts):
                 raise UnknownNameError("part of the observation for sensor_noise", pattern, parts)
+        self._known = True
 
     def on(self, streams: Sequence[Stream], steps: Sequence[int]) -> Noisy:
         """Return what adds the noise of a moment; see `noise`."""

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
-from robots import TaskError, UnknownNameError
+from robots import RobotLayoutsError, TaskError, UnknownNameError
 from robots.common.bounds import shown
 from tasks.varying.axes import AXES, Shift
 from tasks.varying.distributions import Distribution
+from tasks.varying.files import read_data, write_data
 
 
 def _by_name() -> Any:
@@ -107,6 +110,31 @@ class Randomization:
             if name not in AXES:
                 raise UnknownNameError("axis of a randomization", name, AXES)
         return cls(**data)
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Randomization:
+        """Return the randomization in a file, YAML or json.
+
+        Raises:
+            TaskError: If the file cannot be read or describes none; the message names it.
+        """
+        data = read_data(path)
+        try:
+            return cls.from_json(data)
+        except RobotLayoutsError as error:
+            raise TaskError(f"{path}: {error}") from error
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write it to a file, whole or not at all, and return its path.
+
+        Args:
+            path: Where; json if it ends in ``.json``, else YAML.
+
+        Raises:
+            UnwritableFileError: If it cannot be written (also an ``OSError``).
+        """
+        write_data(path, self.to_json())
+        return Path(path)
 
     def __str__(self) -> str:
         """Show a line for each thing that varies."""

@@ -146,7 +146,7 @@ def test_bases_stand_where_they_were_drawn() -> None:
     turned = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]]) @ before
     expected = base + (0.03, -0.02, 0.01) + turned
     np.testing.assert_allclose(env.simulation.read().tcp_pose("arm")[0, :3], expected, atol=1e-6)
-    stands = env.layout_of(0)["arm"].base_position
+    stands = env.standing()["arm"].base_position
     np.testing.assert_allclose(stands, base + (0.03, -0.02, 0.01), atol=1e-12)
     assert env.layout == plain.layout
     solver = env.simulation.inverse_kinematics("arm")
