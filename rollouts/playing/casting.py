@@ -87,7 +87,7 @@ class Casting:
             return Player(seed, follow(()), 0, random_states(), str(error))
         to_the_end = self._cast.to_the_end
         states, reason = random_states(), planner.reason
-        return Player(seed, follow(plan), len(plan), states, reason, to_the_end)
+        return Player(seed, follow(plan), len(plan), states, reason, True, to_the_end)
 
 
 def _fresh(policy: Any) -> Any:

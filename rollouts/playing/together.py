@@ -61,6 +61,7 @@ class Player:
         most: Steps after which the episode ends.
         states: Where the random generators are when it acts.
         reason: Why it can but fail, if that is known.
+        blind: Whether the policy acts without looking, as a plan does; then it draws nothing.
         to_the_end: Whether it plays all its steps, those after a success or out of time included.
         takeover: May act in place of the policy: obs → action, or None to let the policy act.
         corrector: Says at every step what it would do: obs → action.
@@ -72,6 +73,7 @@ class Player:
     most: int
     states: tuple[Any, ...]
     reason: str = ""
+    blind: bool = False
     to_the_end: bool = False
     takeover: Policy | None = None
     corrector: Policy | None = None
@@ -191,6 +193,7 @@ def steps_together(env: MultiRobotTask, players: Sequence[Player]) -> Generator[
     yield
     reader = ActionReader(env.layout, 1)
     actions = np.zeros((env.num_envs, env.layout.action_dim), np.float32)
+    env.trust(actions)  # what is written there was checked
     while running := [i for i in ids if not players[i].over]:
         choices = _choices(players, running, observation, reader)
         for i, (action, _, _) in choices.items():
@@ -224,7 +227,9 @@ def _choices(
     choices: dict[int, tuple[Row, int, Row | None]] = {}
     for i in running:
         player = players[i]
-        if at_once and player.takeover is None and player.corrector is None:
+        if player.blind:
+            choices[i] = reader.read(player.policy(None))[0].copy(), 0, None
+        elif at_once and player.takeover is None and player.corrector is None:
             choices[i] = reader.read(at_once[i])[0].copy(), 0, None
         else:
             seen = _rows(observation, [i])

@@ -207,7 +207,16 @@ class Observer:
             self._columns.close()
 
     def names(self, parts: Mapping[str, Array]) -> list[str]:
-        """Return the names of all that noise may be added to."""
+        """Return the names of all that noise may be added to.
+
+        Raises:
+            TaskError: If the columns of datasets are observed, which have none.
+        """
+        if self.mode.columns:
+            raise TaskError(
+                f"sensor_noise is not added to obs_mode {self.mode.columns!r}; it is to"
+                f" {', '.join(STATE_FORMS)} and what is observed beside images"
+            )
         return [*(f"{robot}.{joints}" for robot in self._robots for joints in JOINTS), *parts]
 
     def slices(

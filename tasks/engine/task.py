@@ -436,7 +436,7 @@ class MultiRobotTask(Declaration, Varied, Remade):
         try:
             if varying is None:
                 return self.observer.observe(self.simulation, state, parts)
-            noisy = varying.sensors(self.observer.names(parts), self._elapsed)
+            noisy = varying.sensors(lambda: self.observer.names(parts), self._elapsed)
             return varying.seen(self.observer.observe(self.simulation, state, parts, noisy), ids)
         except NotFinite:
             refuse_observation(state, parts, self, self._speeds, self._elapsed)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -145,19 +145,22 @@ class Varying:
         if waiting:
             simulation.coast(waiting)
 
-    def sensors(self, parts: Sequence[str], elapsed: NDArray[np.int32]) -> Noisy | None:
+    def sensors(
+        self, parts: Callable[[], Sequence[str]], elapsed: NDArray[np.int32]
+    ) -> Noisy | None:
         """Return what adds the noise of this moment to parts of observations; None if none is.
 
         Args:
-            parts: The names of all that is observed.
+            parts: Returns the names of all that is observed.
             elapsed: Control steps that each environment has taken, (N,).
 
         Raises:
             UnknownNameError: If noise was declared for a part that there is not.
+            TaskError: If what is observed has no parts.
         """
         if "sensor_noise" not in self._declared:
             return None
-        self._sensors.expect(parts)
+        self._sensors.expect(parts())
         return self._sensors.on(self._streams, elapsed.tolist())
 
     def seen(self, observation: Any, env_ids: Sequence[int]) -> Any:

@@ -8,6 +8,7 @@ import pytest
 
 from robots import RecordingError
 from rollouts import evaluate, record
+from rollouts.__main__ import main
 from rollouts.playing.ray_executor import RayExecutor
 from rollouts.playing.replay import replay, task_for
 from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
@@ -59,11 +60,25 @@ def test_a_header_that_makes_no_sense_is_refused(tmp_path: Path) -> None:
     from tests.rollouts.recordings import edited
 
     with edited(path) as file:
-        about = json.loads(file.attrs["simulation"])
+        about = json.loads(str(file.attrs["simulation"]))
         about["randomization"]["mass"]["cube"] = {"uniform": [2, 1]}
         file.attrs["simulation"] = json.dumps(about)
     with TrajectoryFile(path) as file, pytest.raises(TrajectoryError, match="wrong way round"):
         task_for(file)
+
+
+def test_commands_take_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    VARIED.save(tmp_path / "varied.yaml")
+    words = ["--task", TASK, "--episodes", "1", "--workers", "0", "--randomization"]
+    out = tmp_path / "out"
+    assert main(["record", *words, str(tmp_path / "varied.yaml"), "--out", str(out)]) == 0
+    assert same_files(out / FILE, recorded(tmp_path / "here", range(1), workers=0))
+    assert main(["replay", str(out)]) == 0
+    assert "in 1 all states are equal" in capsys.readouterr().out
+    assert main(["evaluate", *words, str(tmp_path / "varied.yaml")]) == 0
+    (tmp_path / "wrong.yaml").write_text("mas: {}")
+    assert main(["evaluate", *words, str(tmp_path / "wrong.yaml")]) == 1
+    assert "Did you mean 'mass'" in capsys.readouterr().err
 
 
 def test_policies_are_judged_in_worlds_that_vary() -> None:
@@ -82,5 +97,5 @@ def test_worlds_are_the_same_whoever_plays(tmp_path: Path) -> None:
         assert same_files(recorded(tmp_path / str(workers), seeds, workers=workers), expected)
     with running_cluster() as nodes:
         nodes.grow(2)
-        executor = RayExecutor(nodes.address)
+        executor = RayExecutor(str(nodes.address))
         assert same_files(recorded(tmp_path / "ray", seeds, executor=executor), expected)

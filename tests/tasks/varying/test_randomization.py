@@ -5,7 +5,9 @@ import json
 import pickle
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import tasks
 from robots import TaskError, UnknownNameError
@@ -180,3 +182,36 @@ def test_every_front_passes_it_on() -> None:
     agents = tasks.parallel_env("PickCube-v1", randomization=randomization)
     assert float(agents.reset(seed=5)[1]["arm"]["drawn/mass/cube"]) == mass
     agents.close()
+
+
+def test_columns_of_datasets_take_no_noise() -> None:
+    noise = Randomization(sensor_noise={"arm.qpos": Normal(0.01)})
+    with pytest.raises(TaskError, match="sensor_noise is not added to obs_mode 'lerobot'"):
+        tasks.make("PickCube-v1", randomization=noise, obs_mode="lerobot")
+
+
+def test_a_task_shows_what_varies() -> None:
+    assert "varies       mass" in repr(tasks.make("PickCube-v1", randomization=MASS))
+    assert "varies" not in repr(tasks.make("PickCube-v1", randomization=Randomization()))
+
+
+def test_a_task_may_draw_noise_when_it_observes() -> None:
+    """It is a function of the episode, the step and the name, whatever was done before."""
+    env, other = tasks.make("PickCube-v1", 2), tasks.make("PickCube-v1")
+    still = np.zeros((1, 8), np.float32)
+
+    def drawn(seed: int, steps: int, name: str = "goal") -> NDArray[np.float32]:
+        other.reset(seed=seed)
+        for _ in range(steps):
+            other.step(still)
+        return other.noise(name, 3)[0]
+
+    env.reset(seed=6)
+    env.step(np.zeros((2, 8), np.float32))
+    found = env.noise("goal", 3)
+    np.testing.assert_array_equal(found, [drawn(6, 1), drawn(7, 1)])
+    others = [drawn(6, 2), drawn(7, 0), drawn(6, 1, "cube"), drawn(8, 1)]
+    assert all((found[0] != row).all() for row in others)
+    many = np.concatenate([drawn(seed, 0) for seed in range(100)])
+    assert abs(many.mean()) < 0.25
+    assert abs(many.std() - 1) < 0.15
