@@ -35,7 +35,8 @@ def main(arguments: list[str] | None = None) -> int:
 
     bench = commands.add_parser("bench", help="record and certify; what more would take")
     bench.add_argument("--varied", action="store_true", help="in worlds that vary in five axes")
-    bench.add_argument("--workers", type=one_or_more, default=2, metavar="W", help="(%(default)s)")
+    words = "processes that play (0: this one, whose processor time is known)"
+    bench.add_argument("--workers", type=zero_or_more, default=0, metavar="W", help=words)
     bench.set_defaults(run=_bench)
     copies = commands.add_parser("memory", help="memory and time of many copies")
     copies.set_defaults(run=_memory)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -10,7 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from rollouts.dataset.certify import certify
-from rollouts.playing.executor import ProcessExecutor
+from rollouts.playing.executor import choose_executor
 from rollouts.reading.recording import all_files, open_trajectories
 from rollouts.recording.record import record
 from tasks import Randomization
@@ -24,15 +23,11 @@ class Cost:
 
     Attributes:
         seconds: On the clock (s).
-        processor: Processor time of this process and of those that it waited for (s).
+        processor: Processor time of this process alone (s).
     """
 
     seconds: float
     processor: float
-
-    def rate(self, count: int) -> str:
-        """Say how much of it one of so many things took."""
-        return f"{self.processor / count * 1e3:.1f} ms of a processor, {count / self.seconds:.2f}/s"
 
 
 @dataclass(frozen=True)
@@ -44,7 +39,7 @@ class Costs:
         episodes: How many.
         steps: Control steps of all of them.
         successes: How many succeeded.
-        workers: Processes that played.
+        workers: Processes that played; 0: this one.
         bytes: Size of all files.
         files: How many h5 files.
         record: Recording them.
@@ -69,15 +64,24 @@ class Costs:
     equal: int
     contact_episodes: int
 
+    def each(self, cost: Cost) -> float:
+        """Return how long an episode kept one process busy (s).
+
+        If this process played, it is processor time, else the clock's.
+        """
+        whole = cost.seconds * self.workers if self.workers else cost.processor
+        return whole / self.episodes
+
     def __str__(self) -> str:
         """Say it in lines."""
-        size = self.bytes / self.episodes
+        size, unit = self.bytes / self.episodes, "worker" if self.workers else "processor"
         lines = [
             f"{self.task}: {self.episodes} episodes, {self.successes} successes,"
             f" {self.steps / self.episodes:.1f} steps on average, {self.workers} workers",
-            f"record: {self.record.rate(self.episodes)}; {size / 1e3:.1f} kB an episode",
-            f"certify: {self.certify.rate(self.episodes)}; {self.equal} equal, arms touched in"
-            f" {self.contact_episodes}",
+            f"record: {self.each(self.record) * 1e3:.0f} ms of a {unit} an episode,"
+            f" {size / 1e3:.1f} kB",
+            f"certify: {self.each(self.certify) * 1e3:.0f} ms of a {unit} an episode; {self.equal}"
+            f" equal, arms touched in {self.contact_episodes}",
             f"open {self.files} files: {self.open.seconds * 1e3:.0f} ms; resume:"
             f" {self.resume.seconds:.1f} s",
         ]
@@ -112,7 +116,7 @@ def measure(
         task_id: The task.
         episodes: How many.
         folder: Where to.
-        workers: How many processes play.
+        workers: How many processes play; 0: this one.
         file_size: See `rollouts.recording.recorder.Recorder` (MB).
         randomization: What varies, or None.
         progress: Called after each episode with what is going on.
@@ -123,18 +127,18 @@ def measure(
             task_id,
             range(episodes),
             folder,
-            ProcessExecutor(workers),
+            choose_executor(workers),
             file_size=file_size,
             randomization=randomization,
-            on_event=lambda summary, event: progress("recording"),
+            on_event=lambda summary, event: event and progress("recording"),
         )
 
     _, recording = timed(make)
     found, certifying = timed(
         lambda: certify(
             folder,
-            ProcessExecutor(workers),
-            on_event=lambda certificate, event: progress("certifying"),
+            choose_executor(workers),
+            on_event=lambda certificate, event: event and progress("certifying"),
         )
     )
     _, opening = timed(lambda: _open(folder))
@@ -159,14 +163,9 @@ def measure(
 
 def timed(work: Callable[[], Made]) -> tuple[Made, Cost]:
     """Do something, and return what came of it and what it took."""
-    began, before = time.perf_counter(), _processor()
+    began, before = time.perf_counter(), time.process_time()
     made = work()
-    return made, Cost(time.perf_counter() - began, _processor() - before)
-
-
-def _processor() -> float:
-    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(one.ru_utime + one.ru_stime for one in used)
+    return made, Cost(time.perf_counter() - began, time.process_time() - before)
 
 
 def _open(folder: Path) -> None:

@@ -120,14 +120,14 @@ def _make(
             executor(),
             layout=layout,
             randomization=Randomization.from_json(FIVE),
-            on_event=lambda summary, event: progress(f"recording {folder}"),
+            on_event=lambda summary, event: event and progress(f"recording {folder}"),
         )
     )
     found, certifying = timed(
         lambda: certify(
             folder,
             executor(),
-            on_event=lambda certificate, event: progress(f"certifying {folder}"),
+            on_event=lambda certificate, event: event and progress(f"certifying {folder}"),
         )
     )
     page = folder / "report.html"

@@ -17,7 +17,7 @@ from robots.common.files import read_json
 from robots.common.writing import write_whole
 from rollouts.dataset.comparison import Replay
 from rollouts.reading.json_fields import FLAG, NAME, OBJECT, FieldError, Kind, fields, items, whole
-from rollouts.reading.manifest import spans_of
+from rollouts.reading.manifest import MOST_EPISODES, spans_of
 from rollouts.reading.summary import MAX_JSON, MAX_SEED
 
 FORMAT = "robot-layouts certificate 1"
@@ -33,7 +33,7 @@ _CERTIFICATE = fields(
         "task": NAME,
         "versions": OBJECT,
         "files": items(OBJECT),
-        "episodes": _COUNT,
+        "episodes": whole(0, MOST_EPISODES),
         "checked": items(items(whole(0, MAX_SEED), 2)),
         **dict.fromkeys(("equal", "steps", "successes"), _COUNT),
         "differing": items(OBJECT),
@@ -150,6 +150,8 @@ class Certificate:
             raise RecordingError(str(error)) from error
         except FieldError as error:
             raise RecordingError(f"{path} is no certificate: {error}") from error
+        if sum(last - first + 1 for first, last in found["checked"]) > found["episodes"]:
+            raise RecordingError(f"{path} is no certificate: it checked more than there is")
         return _from_json(found)
 
 

@@ -33,6 +33,7 @@ SUFFIX = ".manifest.json"
 FILE_NUMBER = "file_number"  # what all files but the first say in json and attributes
 FILE_SIZE = 200.0  # MB, at which another file is begun; some 6,000 episodes, opened in 0.15 s
 MOST_FILES = 10_000
+MOST_EPISODES = 10**7  # of all files: a few bytes of ranges must not become gigabytes of seeds
 _BLOCK = 2**20  # bytes
 _MOST_BYTES = 2**53
 
@@ -195,6 +196,8 @@ def spans_of(seeds: Iterable[int]) -> tuple[Span, ...]:
 def _entries(path: Path, files: list[Mapping[str, Any]]) -> Iterable[FileEntry]:
     if len(files) > MOST_FILES:
         raise FieldError(f"it lists {len(files)} files; {MOST_FILES} are the most")
+    if (count := sum(file["episodes"] for file in files)) > MOST_EPISODES:
+        raise FieldError(f"it lists {count:,} episodes; {MOST_EPISODES:,} are the most")
     for number, file in enumerate(files):
         if file["file"] != file_path(path, number).name:
             raise FieldError(

@@ -145,6 +145,15 @@ def test_something_else_in_the_place_of_the_certificate_stays(copy):
     assert read(copy) == {"mine": 1}
 
 
+def test_a_certificate_of_more_than_there_is(copy):
+    certify(copy, InProcessExecutor())
+    about = read(copy)
+    about["checked"] = [[0, 2**32 - 1]]
+    (copy / "certificate.json").write_text(json.dumps(about))
+    with pytest.raises(RecordingError, match="it checked more than there is"):
+        certify(copy, InProcessExecutor())
+
+
 def test_arms_that_touch_are_counted(tmp_path):
     near = face_to_face({"left": "panda_wristcam", "right": "panda_wristcam"}, spacing=1.26)  # m
     env = tasks.make("TwoRobotPickCube-v1", layout=near, check_layout=False, obs_mode="none")

@@ -1,5 +1,6 @@
 """A recording of several files is read, replayed and exported as one."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -109,6 +110,15 @@ def test_a_manifest_of_other_episodes_is_refused(copy):
         open_trajectories(copy)
     manifest.write_text(text.replace("trajectory_0001.h5", "../other.h5"))
     with pytest.raises(TrajectoryError, match=r"must be 'trajectory_0001\.h5'"):
+        open_trajectories(copy)
+
+
+def test_a_manifest_of_very_many_episodes_takes_no_memory(copy):
+    manifest = manifest_path(copy / "trajectory.h5")
+    about = json.loads(manifest.read_text())
+    about["files"][1] |= {"episodes": 2**32 - 9, "seeds": [[9, 2**32 - 1]]}
+    manifest.write_text(json.dumps(about))
+    with pytest.raises(TrajectoryError, match=r"lists 4,294,967,\d+ episodes; 10,000,000 are"):
         open_trajectories(copy)
 
 

@@ -284,6 +284,30 @@ def test_a_recording_that_is_killed_again_and_again(tmp_path):
 
 
 @pytest.mark.long
+def test_a_recording_of_many_files_that_is_killed_again_and_again(tmp_path):
+    """Its files are those of one that nobody disturbed, with another number of workers."""
+    out, undisturbed = tmp_path / "killed", tmp_path / "undisturbed"
+    episodes, size = 300, {"file_size": 0.5}
+    for patience in (random.uniform(0, 1.5) for _ in range(6)):
+        before = set(out.glob("*/*.part"))
+        process = start(*arguments(out, episodes, 2, **size))
+        deadline = time.monotonic() + 180
+        while not set(out.glob("*/*.part")) - before:
+            assert time.monotonic() < deadline, "nothing is recorded"
+        time.sleep(patience)
+        process.kill()
+        process.communicate()
+        wait_until_nobody_is_left(process)
+    for folder, workers in ((out, 2), (undisturbed, 0)):
+        assert main(arguments(folder, episodes, workers, **size)) == 0
+    names = sorted(path.name for path in undisturbed.iterdir())
+    assert len(names) > 7
+    assert sorted(path.name for path in out.iterdir()) == names
+    for name in names:
+        assert (out / name).read_bytes() == (undisturbed / name).read_bytes(), name
+
+
+@pytest.mark.long
 def test_a_full_disk_ends_it_with_what_is_finished(tmp_path):
     disk = tmp_path / "disk"
     disk.mkdir()
