@@ -23,6 +23,7 @@ from rollouts.teleop.stopwatch import QUICK, Stopwatch, gizmo_node
 from tasks.description import read_docstring
 from tasks.view import live_thing, task_cell
 
+LONGEST_UNSEEN = 0.1  # s between pictures while late steps are caught up
 IDLE = 0.25  # s between looks at what the page should say while nothing happens
 GIZMO_SIZE = 0.2  # m
 FIELD_OF_VIEW = np.radians(60)  # from the upper to the lower edge
@@ -47,7 +48,7 @@ class TeleopPage:
         """
         self._server, self._session = server, session
         self._waiting: SimpleQueue[Callable[[], None]] = SimpleQueue()
-        self._said = 0.0  # when
+        self._said = self._drawn = 0.0  # when
         self._pace, self._seats = Pace(session.seconds), Seats(session.arms)
         task = session.task
         server.scene.set_up_direction("+z")
@@ -86,8 +87,9 @@ class TeleopPage:
     def _step(self) -> None:
         self._session.step()
         self._pace.stepped()
-        if self._pace.behind:  # it catches up first; the picture of the last step is shown
-            return
+        if self._pace.behind and monotonic() - self._drawn < LONGEST_UNSEEN:
+            return  # it catches up first
+        self._drawn = monotonic()
         with self._server.atomic():
             self._show_world()
             for arm, pose in self._session.targets.items():

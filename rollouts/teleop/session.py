@@ -8,7 +8,7 @@ from enum import Enum
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from kinematics.rotations import Floats, multiply, quaternion_about
 from robots import RecordingError, TaskError, UnknownNameError
@@ -88,7 +88,7 @@ class Session:
         """Time from one step to the next (s)."""
         return 1 / self.task.scenario.control_frequency
 
-    def aim(self, arm: str, pose: Floats) -> None:
+    def aim(self, arm: str, pose: ArrayLike) -> None:
         """Say where the TCP of an arm is to be.
 
         Args:
@@ -108,7 +108,7 @@ class Session:
             raise TaskError(f"the quaternion for {arm} has the length {length:.6g}; it must be 1")
         self.targets[arm] = pose
 
-    def shift(self, arm: str, way: Floats | None = None, turn: Floats | None = None) -> None:
+    def shift(self, arm: str, way: ArrayLike | None = None, turn: ArrayLike | None = None) -> None:
         """Move and turn the place where the TCP of an arm is to be.
 
         Args:
@@ -125,7 +125,8 @@ class Session:
         if way is not None:
             pose[:3] += way
         if turn is not None and (angle := float(np.linalg.norm(turn))):
-            pose[3:] = multiply(quaternion_about((turn / angle).tolist(), angle), pose[3:])
+            axis = (np.array(turn, float) / angle).tolist()
+            pose[3:] = multiply(quaternion_about(axis, angle), pose[3:])
             pose[3:] /= np.linalg.norm(pose[3:])
         self.aim(arm, pose)
 
