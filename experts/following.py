@@ -242,8 +242,9 @@ def _check_task(task: MultiRobotTask, motion: Motion) -> None:
     if task.num_envs != 1:
         raise TaskError(f"a motion is followed in 1 environment; the task has {task.num_envs}")
     state = task.simulation.read()
+    standing = task.standing()
     for name, placement in motion.layout.items():
-        own = task.layout.get(name)
+        own = standing.get(name)
         if own is None or own.robot.joints != placement.robot.joints:
             raise TaskError(
                 f"the motion moves {name!r}, a {placement.robot.name}; the task has"

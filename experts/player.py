@@ -59,7 +59,7 @@ class Player:
             self._posture = _Posture(alone, task.layout, robot)
         if any(waypoint.at is not None for waypoint in waypoints):
             self._reach = task.simulation.point_reach(robot)
-            self._base = np.array(task.layout.arm(robot).base_position)
+            self._base = scene.base(robot)
         self._goal = self._driver.arm(scene.qpos(robot))
         self._gripper = OPEN
         self._current: Waypoint | None = None

@@ -6,8 +6,6 @@ from collections.abc import Callable, Sequence
 from math import pi
 from typing import Any
 
-import numpy as np
-
 from experts.geometry import gripper_facing, heading
 from experts.script import Pose, Scene, Waypoint
 from kinematics.rotations import Floats
@@ -38,14 +36,13 @@ def reaching(
         as_it_is: Whether it may also stay turned as it is.
         **others: Other fields of `experts.script.Waypoint`.
     """
-    placement = task.layout.arm(robot)
-    arm, base = placement.robot, np.array(placement.base_position)
+    arm = task.layout.arm(robot).robot
     if len(arm.arm_joints) < POSE_JOINTS or arm.tcp_position_links:
         return Waypoint(name, at=place, **others)
 
     def poses(scene: Scene) -> list[Pose]:
         point = place(scene)
-        ahead = heading(base, point)
+        ahead = heading(scene.base(robot), point)
         own = [(point, scene.tcp(robot)[1])] if as_it_is else []
         return [*own, *((point, gripper_facing(ahead, lean)) for lean in leans)]
 

@@ -31,7 +31,7 @@ class Scene:
     def __init__(self, task: MultiRobotTask) -> None:
         """Look at the first world of a task as it is now."""
         self._state: State = task.simulation.read()
-        self._layout = task.layout
+        self._layout = task.standing()
         world = task.simulation.worlds[0]
         self.design: Any = world.design
         self.bodies: tuple[Body, ...] = tuple(world.bodies.values())
@@ -39,6 +39,10 @@ class Scene:
     def body(self, name: str) -> Pose:
         """Return the pose of a body."""
         return _split(self._state.pose(name)[0])
+
+    def base(self, robot: str) -> Floats:
+        """Return where the base of a robot or a limb stands, (3,)."""
+        return np.array(self._layout.arm(robot).base_position)
 
     def tcp(self, robot: str) -> Pose:
         """Return the pose of a robot's tool centre point.

@@ -48,9 +48,9 @@ class Ways:
     """Finds ways for the arms of a task, given where the others are and go."""
 
     def __init__(self, task: MultiRobotTask) -> None:
-        """Take a task: its layout, and its bodies as scenes show them."""
-        self._layout = task.layout
-        self._alone = Cell(task.layout)
+        """Take a task: where its robots stand, and its bodies as scenes show them."""
+        self._layout = task.standing()
+        self._alone = Cell(self._layout)
         self._columns = {arm: self._columns_of(arm) for arm in task.layout.arms}
         self._graspers = [
             arm for arm, place in task.layout.arms.items() if place.robot.fingers is not None

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from robots import TaskError
 from rollouts.playing import command_options as workers
 from rollouts.playing.command_options import INTERRUPTED, one_or_more, stop_signals, zero_or_more
+from rollouts.sources.policies import find_policy
 from tasks.cell_options import add_cell_options, chosen_cell
 
 if TYPE_CHECKING:
@@ -67,21 +66,6 @@ def run(options: argparse.Namespace) -> int:
         return INTERRUPTED
     print(found)
     return 0
-
-
-def find_policy(name: str) -> Any:
-    """Return what ``MODULE:NAME`` names, or the word ``"expert"`` as it is.
-
-    Raises:
-        TaskError: If it cannot be imported.
-    """
-    if ":" not in name:
-        return name
-    module, _, attribute = name.partition(":")
-    try:
-        return getattr(import_module(module), attribute)
-    except (ImportError, AttributeError) as error:
-        raise TaskError(f"no policy {name!r}: {error}") from error
 
 
 class _Status:

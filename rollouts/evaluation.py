@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from copy import deepcopy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from statistics import mean
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import torch
 
 from experts import find_expert
-from experts.registry import Expert
 from robots import TaskError
 from robots.common.bounds import checked_whole
+from rollouts.playing.casting import Cast, Casting
 from rollouts.playing.executor import (
     EPISODE_SECONDS,
     Event,
@@ -23,20 +22,17 @@ from rollouts.playing.executor import (
     modules_of,
     play_all,
 )
-from rollouts.playing.plan_conversion import Planner
-from rollouts.playing.randomness import random_states, seed_all
 from rollouts.playing.seeds import checked_seeds
-from rollouts.playing.together import Player, is_batched, play_together
+from rollouts.playing.together import grouped, one_by_one, play_together
+from rollouts.sources.policies import EXPERT, check_policy
 from tasks import MultiRobotTask, Scenario, get_task_class
-from tasks.episode import Policy, Score, follow
+from tasks.episode import Policy, Score
 from tasks.registry import make_scenario
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from tasks.engine.making import MakingFields
-
-EXPERT = "expert"
 
 _SHOWN = 10  # seeds that a text names
 
@@ -153,28 +149,20 @@ def evaluate(
     num_envs = min(num_envs, len(seeds))
     name, scenario = _name(policy), make_scenario(cls, num_envs, **making)
     scenario.check(cls.reward_modes)
-    together = {seeds[i]: tuple(seeds[i : i + num_envs]) for i in range(0, len(seeds), num_envs)}
-    if callable(policy):
-        job = EvaluationJob(cls, scenario, policy, together=together)
-    else:
-        job = EvaluationJob(cls, scenario, expert=find_expert(cls.task_id), together=together)
+    together = grouped(seeds, num_envs)
+    expert = find_expert(cls.task_id) if isinstance(policy, str) else None
+    cast = Cast(None if expert else policy, expert)
+    job = EvaluationJob(cls, scenario, cast, together)
     scores: dict[int, Score] = {}
     with closing(play_all(executor, job, list(together))) as events:
         for event in events:
-            for single in _one_by_one(event):
+            for single in one_by_one(event):
                 on_event(single)
                 if single.seed is not None and isinstance(single.result, Score):
                     scores[single.seed] = single.result
             if event.error is not None:
                 _raise(event.error, [event.seed] if event.seed is None else together[event.seed])
     return Evaluation(cls.task_id, name, {seed: scores[seed] for seed in seeds})
-
-
-def _one_by_one(event: Event) -> list[Event]:
-    """Return an event for each episode if it is of episodes that were played at once."""
-    if not isinstance(event.result, dict):
-        return [event]
-    return [replace(event, seed=seed, result=score) for seed, score in event.result.items()]
 
 
 def _raise(error: Exception, seeds: Sequence[int | None]) -> NoReturn:
@@ -193,21 +181,19 @@ class EvaluationJob:
     Attributes:
         task: Class of the task.
         scenario: How to make it.
-        policy: Who plays, a `Policy`; None if the expert does.
-        expert: An expert, or None.
+        cast: Who plays.
         together: Seeds that are played at once, by the first of them.
     """
 
     task: type[MultiRobotTask]
     scenario: Scenario
-    policy: Any = None
-    expert: Expert | None = None
+    cast: Cast
     together: Mapping[int, tuple[int, ...]] = field(default_factory=dict[int, tuple[int, ...]])
 
     @property
     def modules(self) -> tuple[str, ...]:
         """What other machines may need to play it."""
-        return modules_of(self.task, self.policy, self.expert)
+        return modules_of(self.task, *self.cast.members)
 
     def __call__(self) -> Callable[[int], dict[int, Score]]:
         """Make the task in a worker, and return what plays the episodes of a seed and others."""
@@ -219,39 +205,20 @@ class _Play:
     """Plays episodes in the worlds of one task, which are built anew for each."""
 
     def __init__(self, job: EvaluationJob) -> None:
-        self._job = job
-        self._env = self._planning = job.task(job.scenario)
-        self._planner: Planner | None = None
-        if job.expert is not None:
-            if self._env.num_envs > 1:
-                self._planning = job.task(replace(job.scenario, num_envs=1))
-            self._planner = Planner(self._planning, job.expert)
+        self._together, self._env = job.together, job.task(job.scenario)
+        self._casting = Casting(job.cast, self._env)
 
     def __call__(self, seed: int) -> dict[int, Score]:
         """Play the episodes of a seed and of those that are played together with it."""
-        players = [self._player(seed) for seed in self._job.together[seed]]
+        players = [self._casting(seed) for seed in self._together[seed]]
         with torch.no_grad():
             play_together(self._env, players)
         return {player.seed: player.score for player in players}
 
     def close(self) -> None:
         """Let the worlds go."""
-        for own in (self._env, self._planning, self._planner):
-            if own is not None:
-                own.close()
-
-    def _player(self, seed: int) -> Player:
-        """Return who plays the episode of a seed; the random generators begin with it."""
-        seed_all(seed)
-        if self._planner is None:
-            policy = self._job.policy
-            policy = policy if is_batched(policy) else deepcopy(policy)
-            return Player(seed, policy, self._env.max_episode_steps, random_states())
-        try:
-            plan = self._planner(seed)
-        except TaskError as error:
-            return Player(seed, follow(()), 0, random_states(), str(error))
-        return Player(seed, follow(plan), len(plan), random_states(), self._planner.reason)
+        self._env.close()
+        self._casting.close()
 
 
 def _name(policy: Policy | str) -> str:
@@ -262,10 +229,7 @@ def _name(policy: Policy | str) -> str:
     """
     if isinstance(policy, str) and policy == EXPERT:
         return EXPERT
-    if not callable(policy):
-        raise TaskError(
-            f"policy is {policy!r}; it must be callable, obs → action, or the word {EXPERT!r}"
-        )
+    check_policy(policy)
     return getattr(policy, "__qualname__", type(policy).__qualname__)
 
 

@@ -39,6 +39,8 @@ from numpy.typing import NDArray
 
 from simulation.cameras import AnyCamera, View
 from simulation.maths import Flags, Floats
+from simulation.parts import Part as Part
+from simulation.variation import Variation
 from simulation.world import Placements, World
 
 Rows = Mapping[str, Floats]
@@ -75,22 +77,6 @@ class Pair(NamedTuple):
     robot: str
     link: str
     body: str
-
-
-class Part(NamedTuple):
-    """A link of a robot, or a body of its own.
-
-    Attributes:
-        robot: The robot's name in the layout, or None.
-        name: Name of the link or the body.
-    """
-
-    robot: str | None
-    name: str
-
-    def __str__(self) -> str:
-        """Return ``robot.link``, or the body's name."""
-        return self.name if self.robot is None else f"{self.robot}.{self.name}"
 
 
 class Overlap(NamedTuple):
@@ -224,6 +210,14 @@ class Backend(Protocol):
 
     def clear(self, env_ids: Sequence[int]) -> None:
         """Begin a reset: zero all velocities and forces, and put anchored bodies back."""
+        ...
+
+    def vary(self, variations: Mapping[int, Variation]) -> None:
+        """Let worlds differ from what was built, from a reset on.
+
+        Args:
+            variations: How each does, by its number; always of the same parts.
+        """
         ...
 
     def place(self, placements: Placements) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -175,3 +175,29 @@ class Floor(Shape):
     size: Annotated[int, Within(1, FAR, "m", "whole number")] = 100
     tile: Length = 4.0
     collides: bool = field(default=False, kw_only=True)
+
+
+SIZED = (Box, Sphere, Cylinder, Capsule, Mesh)
+"""Shapes that can be larger or smaller."""
+
+
+def scaled(shape: Shape, factor: float) -> Shape:
+    """Return a shape of a body that is larger by a factor, its place in the body with it.
+
+    Raises:
+        SimulationError: If the shape has no size, as a plane has none.
+    """
+    x, y, z = shape.position
+    moved = replace(shape, position=(x * factor, y * factor, z * factor))
+    match moved:
+        case Box(half_size=(a, b, c)):
+            return replace(moved, half_size=(a * factor, b * factor, c * factor))
+        case Sphere():
+            return replace(moved, radius=moved.radius * factor)
+        case Cylinder() | Capsule():
+            radius, half_length = moved.radius * factor, moved.half_length * factor
+            return replace(moved, radius=radius, half_length=half_length)
+        case Mesh(scale=(a, b, c)):
+            return replace(moved, scale=(a * factor, b * factor, c * factor))
+        case _:
+            raise SimulationError(f"a {type(shape).__name__} has no size that could be changed")

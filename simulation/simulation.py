@@ -21,6 +21,7 @@ from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, substeps
 from simulation.readout import Moment, ReadoutIndex
 from simulation.sapien3.backend import SapienBackend
 from simulation.state import State
+from simulation.variation import Variation
 from simulation.world import Placements, World
 
 
@@ -110,6 +111,22 @@ class Simulation:
         """
         self._backend.step(self._drive(action, joint_positions, env_ids), self.substeps)
 
+    def rest(self, state: State, env_ids: Sequence[int]) -> None:
+        """Drive all joints of worlds to where they are, until a step drives them elsewhere.
+
+        Args:
+            state: The worlds as they are now; it stays the present one.
+            env_ids: Which worlds.
+        """
+        self.drive_targets[env_ids] = state.joint_positions[env_ids]
+        self._backend.drive(self.drive_targets, env_ids)
+        self._backend.drive_velocities(np.zeros_like(self.drive_targets), env_ids)
+
+    def coast(self, env_ids: Sequence[int]) -> None:
+        """Advance worlds by one control step without driving them anew."""
+        self._change()
+        self._backend.step(env_ids, self.substeps)
+
     def timed_step(
         self, action: NDArray[np.float32], clock: Callable[[], float] = perf_counter
     ) -> float:
@@ -131,6 +148,11 @@ class Simulation:
         self._change()
         self._fresh.update(env_ids)
         self._backend.clear(env_ids)
+
+    def vary(self, variations: Mapping[int, Variation]) -> None:
+        """Let worlds differ from what was built; see `simulation.backend.Backend.vary`."""
+        self._change()
+        self._backend.vary(variations)
 
     def hold(self, state: State) -> None:
         """End a reset: targets that control modes remember are where the robots are now."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import hypot, isfinite
 from typing import Any, Literal, get_args
@@ -15,7 +15,7 @@ from robots import SimulationError, UnknownNameError
 from robots.common.bounds import checked_choice, shown
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
-from simulation.shapes import Shape
+from simulation.shapes import Shape, scaled
 
 BodyKind = Literal["dynamic", "kinematic", "static"]
 _KINDS = get_args(BodyKind)
@@ -35,6 +35,8 @@ class Body:
         quaternion: How it is turned there, wxyz.
         anchored: Whether every reset puts it back there.
         marker: Whether it is there for people only: cameras that observe do not see it.
+        scale: Factor by which ``shapes`` are larger than the task declared them; wherever the task
+            puts it, its lowest point is where that of the declared body would be.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Body:
     quaternion: Quaternion = IDENTITY
     anchored: bool = False
     marker: bool = False
+    scale: float = field(default=1.0, repr=False)
 
 
 @dataclass
@@ -83,6 +86,7 @@ class World:
         visuals: Whether what pictures need is built.
         bodies: Body by name.
         design: Geometry drawn for the coming episodes, if the task draws any.
+        scales: Factor on the size of bodies, by name; 1 for those that are left out.
     """
 
     def __init__(
@@ -108,6 +112,7 @@ class World:
         self.visuals = visuals
         self.bodies: dict[str, Body] = {}
         self.design: Any = None
+        self.scales: Mapping[str, float] = {}
         self._number = number
         self._placements = Placements() if placements is None else placements
 
@@ -139,7 +144,10 @@ class World:
         if name in self.bodies:
             raise SimulationError(f"this world already has a body called {name!r}")
         self._pose(name, position, quaternion)
-        body = Body(name, shapes, kind, position, quaternion, anchored, marker)
+        scale = self.scales.get(name, 1.0)
+        if scale != 1.0:
+            shapes = tuple(scaled(shape, scale) for shape in shapes)
+        body = Body(name, shapes, kind, position, quaternion, anchored, marker, scale)
         self.bodies[name] = body
         return body
 

@@ -1,4 +1,4 @@
-"""``--layout`` and ``--robots``: which robots stand where, on the command line of a task."""
+"""``--layout`` and ``--robots``, ``--randomization``: the worlds of a task on a command line."""
 
 from __future__ import annotations
 
@@ -10,14 +10,20 @@ from robots import RobotDescriptor, TaskError
 from robots.common.commands import notice, program
 from robots.named import is_path, named_robot
 from tasks.language.needs import ACT, HOLD
+from tasks.varying.randomization import Randomization
 
 
-def add_cell_options(parser: argparse.ArgumentParser, *, robots: bool = True) -> None:
-    """Add the options of a command that say which robots stand where; see `chosen_cell`.
+def add_cell_options(
+    parser: argparse.ArgumentParser, *, robots: bool = True, varying: bool = True
+) -> None:
+    """Add the options of a command that say which robots stand where, and what varies.
+
+    They are read by `chosen_cell`.
 
     Args:
         parser: The command's.
         robots: Whether to add ``--robots``, which some commands read themselves.
+        varying: Whether to add ``--randomization``; recordings say themselves what varied.
     """
     add = parser.add_argument
     add("--layout", metavar="FILE", help="other places for the robots: a layout in YAML")
@@ -33,6 +39,12 @@ def add_cell_options(parser: argparse.ArgumentParser, *, robots: bool = True) ->
         choices=(HOLD, ACT),
         help="what robots of the layout do that have no place in the task (refuse them)",
     )
+    if varying:
+        add(
+            "--randomization",
+            metavar="FILE",
+            help="what varies from episode to episode: a tasks.Randomization in YAML or json",
+        )
 
 
 def chosen_cell(options: argparse.Namespace) -> dict[str, Any]:
@@ -48,6 +60,8 @@ def chosen_cell(options: argparse.Namespace) -> dict[str, Any]:
         chosen["robots"] = chosen_robots(options.robots)
     if options.bystanders is not None:
         chosen["bystanders"] = options.bystanders
+    if getattr(options, "randomization", None) is not None:
+        chosen["randomization"] = Randomization.load(options.randomization)
     return chosen
 
 

@@ -66,6 +66,9 @@ class PlayedEpisode(Episode):
         seconds: Time that the steps took, without reading the states (s).
         source: Who acted, as plain data that json can hold; None if nobody says.
         drawn: What was varied in its world, likewise; None if nothing was.
+        actor: Who acted at each step where several did, (T,) uint8: the number of one of the
+            ``"actors"`` of ``source``; else None.
+        corrections: What a corrector would have done at each step, (T, A), or None.
     """
 
     states: States
@@ -76,6 +79,8 @@ class PlayedEpisode(Episode):
     seconds: float
     source: Mapping[str, Any] | None = None
     drawn: Mapping[str, Any] | None = None
+    actor: NDArray[np.uint8] | None = None
+    corrections: NDArray[np.float32] | None = None
 
     @property
     def solved(self) -> bool:
@@ -202,4 +207,5 @@ def play(
         terminated=terminated,
         truncated=truncated,
         seconds=seconds,
+        drawn=task.drawn(),
     )

@@ -36,7 +36,7 @@ def task_cell(task: MultiRobotTask, title: str, motion: Motion | None = None) ->
     drawn = {name: live_thing(task, name) for name in world.bodies}
     things = {name: thing for name, thing in drawn.items() if thing is not None}
     start = {name: state.qpos(name)[0].astype(float) for name in task.layout}
-    return Cell(title, task.layout, things, motion, start)
+    return Cell(title, task.standing(), things, motion, start)
 
 
 def live_thing(task: MultiRobotTask, name: str) -> Thing | None:

@@ -55,6 +55,9 @@ from tasks.language.randomness import EpisodeRandom
 from tasks.language.shaping import closeness, letting_go, stillness
 from tasks.language.stacking import diagonal, distance_to_top, is_at_rest, lies_on
 from tasks.registry import register_task
+from tasks.varying.axes import Shift
+from tasks.varying.distributions import Choice, Fixed, LogUniform, Normal, Uniform, Whole
+from tasks.varying.randomization import Randomization
 
 __all__ = [
     "Area",
@@ -63,6 +66,7 @@ __all__ = [
     "Box",
     "Camera",
     "Capsule",
+    "Choice",
     "Color",
     "Compound",
     "Cube",
@@ -73,28 +77,35 @@ __all__ = [
     "EpisodeRandom",
     "FACE_UP",
     "Finish",
+    "Fixed",
     "Friction",
     "GREEN",
     "Goal",
     "Info",
+    "LogUniform",
     "Mesh",
     "MultiRobotTask",
     "Needs",
+    "Normal",
     "POLISHED",
     "Peg",
     "PhysicsSettings",
     "Plane",
     "Quaternion",
     "RED",
+    "Randomization",
     "Scenario",
     "Shape",
+    "Shift",
     "Sphere",
     "State",
     "TARGET_HEIGHT",
     "Table",
     "Target",
     "Vector3",
+    "Uniform",
     "WHITE",
+    "Whole",
     "WideTable",
     "World",
     "add_goal",

@@ -63,20 +63,19 @@ def stand_up(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
         TaskError: If the arm has no fingers, or cannot reach the peg.
     """
     need_fingers(task, "standing a peg up", ARM)
-    base = np.array(task.layout.arm(ARM).base_position)
     return first_success(
-        task, seed, lambda scene: [_StandUp(style, base, scene).script() for style in STYLES]
+        task, seed, lambda scene: [_StandUp(style, scene).script() for style in STYLES]
     )
 
 
 class _StandUp:
     """One way to stand the peg up, worked out from how it lies."""
 
-    def __init__(self, style: Style, base: Floats, scene: Scene) -> None:
+    def __init__(self, style: Style, scene: Scene) -> None:
         self.style = style
         self.middle, quaternion = scene.body(PEG)
         axis = rotate(quaternion, _PEG_AXIS)
-        outward = np.sign(axis @ (self.middle - base))
+        outward = np.sign(axis @ (self.middle - scene.base(ARM)))
         self.held_side = -outward * style.end  # of the peg's own x axis
         self.to_held = self.held_side * axis
         self.direction = heading(np.zeros(3), outward * axis)

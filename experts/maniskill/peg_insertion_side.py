@@ -66,11 +66,12 @@ def insert_peg(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
         TaskError: If the arm has no fingers, or cannot reach what it should.
     """
     need_fingers(task, "inserting a peg", ARM)
-    base = np.array(task.layout.arm(ARM).base_position)
     return first_success(
         task,
         seed,
-        lambda scene: [_Insertion(style, scene.design, base).script() for style in STYLES],
+        lambda scene: [
+            _Insertion(style, scene.design, scene.base(ARM)).script() for style in STYLES
+        ],
     )
 
 

@@ -72,9 +72,8 @@ def pull(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
         TaskError: If the arm has no fingers, or cannot reach the tool.
     """
     need_fingers(task, "pulling with a tool", ARM)
-    base = np.array(task.layout.arm(ARM).base_position)
     return first_success(
-        task, seed, lambda scene: [_Pull(style, base).script() for style in STYLES]
+        task, seed, lambda scene: [_Pull(style, scene.base(ARM)).script() for style in STYLES]
     )
 
 

@@ -69,7 +69,7 @@ class _Pusher:
         self._task, self._scene = task, scene
         self._kinematics = task.simulation.inverse_kinematics(ARM)
         self._driver = ArmDriver(task.layout.arm(ARM).robot)
-        self._base = np.array(task.layout.arm(ARM).base_position)
+        self._base = scene.base(ARM)
         self._contacts = contacts()
         self._planner = PushPlanner(
             BODY, self._contacts, _planar(scene, OUTLINE), self._base[:2], random

@@ -54,19 +54,16 @@ def slide(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
     Raises:
         TaskError: If the arm cannot reach the cube.
     """
-    base = np.array(task.layout.arm(ARM).base_position)
-    return first_success(
-        task, seed, lambda scene: [_script(style, base, scene) for style in STYLES]
-    )
+    return first_success(task, seed, lambda scene: [_script(style, scene) for style in STYLES])
 
 
-def _script(style: Style, base: Floats, scene: Scene) -> Script:
+def _script(style: Style, scene: Scene) -> Script:
     cube, target = scene.body(CUBE)[0], scene.body(TARGET)[0]
     way = np.array([*(target - cube)[:2], 0.0])
     start = cube - style.gap * way / np.linalg.norm(way)
     start[2] = style.height
     shares = np.arange(style.legs + 1) / style.legs
-    outward = way if way @ (cube - base) > 0 else -way
+    outward = way if way @ (cube - scene.base(ARM)) > 0 else -way
     through = partial(_through, direction=heading(np.zeros(3), outward))
     return {
         ARM: (

@@ -90,9 +90,12 @@ def hand_over(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
         TaskError: If an arm has no fingers, or cannot reach what it should.
     """
     need_fingers(task, "the hand-over", GIVER, TAKER)
-    ends = [np.array(task.layout.arm(place).base_position) for place in (GIVER, TAKER)]
     return first_success(
-        task, seed, lambda scene: [_HandOver(style, *ends).script() for style in STYLES]
+        task,
+        seed,
+        lambda scene: [
+            _HandOver(style, scene.base(GIVER), scene.base(TAKER)).script() for style in STYLES
+        ],
     )
 
 

@@ -97,14 +97,15 @@ def stack_for_two(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
         task,
         seed,
         lambda scene: [
-            {LAYER: _lay(task, style), STACKER: _stack(task, style)} for style in STYLES
+            {LAYER: _lay(task, style, scene), STACKER: _stack(task, style, scene)}
+            for style in STYLES
         ],
     )
 
 
-def _lay(task: MultiRobotTask, style: Style) -> tuple[Waypoint, ...]:
+def _lay(task: MultiRobotTask, style: Style, first: Scene) -> tuple[Waypoint, ...]:
     """The right arm brings the green cube and makes room."""
-    base, other = _base(task, LAYER), _base(task, STACKER)
+    base, other = first.base(LAYER), first.base(STACKER)
     at_target = partial(_at_target, style=style, base=base)
 
     def grips(scene: Scene) -> list[Pose]:
@@ -140,9 +141,9 @@ def _lay(task: MultiRobotTask, style: Style) -> tuple[Waypoint, ...]:
     )
 
 
-def _stack(task: MultiRobotTask, style: Style) -> tuple[Waypoint, ...]:
+def _stack(task: MultiRobotTask, style: Style, first: Scene) -> tuple[Waypoint, ...]:
     """The left arm picks the blue cube, waits, and lays it on the green one."""
-    base, other = _base(task, STACKER), _base(task, LAYER)
+    base, other = first.base(STACKER), first.base(LAYER)
 
     def on_top(scene: Scene) -> Floats:
         return _at_target(scene, style, other) + ON_TOP
@@ -191,10 +192,6 @@ def _stack(task: MultiRobotTask, style: Style) -> tuple[Waypoint, ...]:
         Waypoint("over", over, CLOSED, after=left),
         *stack,
     )
-
-
-def _base(task: MultiRobotTask, robot: str) -> Floats:
-    return np.array(task.layout.arm(robot).base_position)
 
 
 def _at_target(scene: Scene, style: Style, base: Floats) -> Floats:

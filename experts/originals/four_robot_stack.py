@@ -67,14 +67,15 @@ def stack_for_four(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
         TaskError: If an arm has no fingers, or cannot reach what it should.
     """
     need_fingers(task, "stacking cubes", *ORDER)
-    bases = {place: np.array(task.layout.arm(place).base_position) for place in ORDER}
-    return first_success(task, seed, lambda scene: [_script(task, s, bases) for s in STYLES])
+    return first_success(task, seed, lambda scene: [_script(task, s, scene) for s in STYLES])
 
 
-def _script(task: MultiRobotTask, style: Style, bases: dict[str, Floats]) -> Script:
+def _script(task: MultiRobotTask, style: Style, scene: Scene) -> Script:
     places = list(ORDER)
     return {
-        place: _stack(task, style, place, level, bases[place], places[level - 1] if level else None)
+        place: _stack(
+            task, style, place, level, scene.base(place), places[level - 1] if level else None
+        )
         for level, place in enumerate(places)
     }
 

@@ -60,15 +60,17 @@ def pass_on(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
     Raises:
         TaskError: If a robot cannot reach what it should.
     """
-    return first_success(task, seed, lambda scene: [_script(style, task) for style in STYLES])
+    return first_success(
+        task, seed, lambda scene: [_script(style, task, scene) for style in STYLES]
+    )
 
 
-def _script(style: Style, task: MultiRobotTask) -> Script:
+def _script(style: Style, task: MultiRobotTask, scene: Scene) -> Script:
     zones = [np.array([*zone, 0.0]) for zone in find_zones(task.layout)]
     names = list(task.layout.arms)
     script: dict[str, tuple[Waypoint, ...]] = {}
     for i, name in enumerate(names):
-        part = _Part(style, task, name, zones[i - 1], zones[i])
+        part = _Part(style, task, name, scene.base(name), zones[i - 1], zones[i])
         script[name] = part.waypoints(after=names[i - 1] if i else None)
     return script
 
@@ -77,10 +79,16 @@ class _Part:
     """One robot's part of the way: an arc about its base, from the zone before to its own."""
 
     def __init__(
-        self, style: Style, task: MultiRobotTask, robot: str, start: Floats, end: Floats
+        self,
+        style: Style,
+        task: MultiRobotTask,
+        robot: str,
+        base: Floats,
+        start: Floats,
+        end: Floats,
     ) -> None:
         self._style, self._robot = style, robot
-        self._base = base = np.array(task.layout.arm(robot).base_position)
+        self._base = base
         self._go = partial(reaching, task, robot, leans=LEANS, as_it_is=False, gripper=CLOSED)
         self._start = heading(base, start)
         self._sweep = remainder(heading(base, end) - self._start, 2 * pi)

@@ -62,13 +62,11 @@ def push_and_pick(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
         TaskError: If the picker has no fingers, or an arm cannot reach what it should.
     """
     need_fingers(task, "picking the cube", PICKER)
-    forward = heading(*(np.array(task.layout.arm(name).base_position) for name in (PUSHER, PICKER)))
-    return first_success(
-        task, seed, lambda scene: [_script(style, forward, scene) for style in STYLES]
-    )
+    return first_success(task, seed, lambda scene: [_script(style, scene) for style in STYLES])
 
 
-def _script(style: Style, forward: float, scene: Scene) -> Script:
+def _script(style: Style, scene: Scene) -> Script:
+    forward = heading(scene.base(PUSHER), scene.base(PICKER))
     ahead = np.array([np.cos(forward), np.sin(forward), 0.0])
     aside = np.array([-ahead[1], ahead[0], 0.0])
     start, _ = scene.body(CUBE)

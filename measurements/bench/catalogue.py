@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import torch
 
-from measurements.bench import episodes, processes, steps
+from measurements.bench import episodes, processes, steps, varying
 from measurements.bench.measurement import BenchmarkError, Measurement
 from measurements.bench.report import Report, machine
 from measurements.bench.settings import Benchmark, Settings
@@ -18,6 +18,7 @@ from rollouts.progress import LiveLine
 BENCHMARKS: Mapping[str, Benchmark] = {
     "step": Benchmark("a step of one environment", steps.step),
     "reset": Benchmark("a reset of one environment", episodes.reset),
+    "varying": Benchmark("resets and steps of worlds that vary", varying.varying),
     "environments": Benchmark("a step by number of environments", steps.environments),
     "workers": Benchmark("rate by number of worker processes", processes.workers),
     "robots": Benchmark("a step by number of robots, of one kind and mixed", steps.robots),

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots import RobotDescriptor
+from rollouts.export.credits import Credits
 from rollouts.reading.trajectory import Trajectory, TrajectoryError
 from tasks import MultiRobotTask
 from tasks.engine.columns import placed_bodies
@@ -36,6 +39,10 @@ class Columns:
         rewards: Shape (T,), or None if the recording holds none.
         success: Shape (T,), or None if the recording holds none.
         done: Whether the episode ended with the step, (T,); always at its last step.
+        source: Who acted; see `rollouts.reading.trajectory.Trajectory`.
+        actor: Who acted at each step, (T,): a number of `rollouts.export.credits.Credits.actors`;
+            None if there are not several.
+        corrections: What a corrector would have done, (T, A); None unless all episodes hold it.
     """
 
     episode_id: int
@@ -48,6 +55,9 @@ class Columns:
     rewards: Floats | None
     success: Flags | None
     done: Flags
+    source: Mapping[str, Any] | None = None
+    actor: NDArray[np.int64] | None = None
+    corrections: Floats | None = None
 
     def __len__(self) -> int:
         """Return the number of steps T."""
@@ -59,6 +69,7 @@ class ColumnReader:
 
     Attributes:
         task: The task they were recorded in.
+        credits: Who acted in them, or None.
         action_names: ``place.joint`` of each action number, ``place.group`` where one number
             drives a whole group.
         joint_names: ``place.joint`` of each joint.
@@ -66,9 +77,14 @@ class ColumnReader:
         body_names: ``body.x`` to ``body.qz`` of each body.
     """
 
-    def __init__(self, task: MultiRobotTask) -> None:
-        """Take the names from a task and its robots."""
-        self.task = task
+    def __init__(self, task: MultiRobotTask, credits: Credits | None = None) -> None:
+        """Take the names from a task and its robots.
+
+        Args:
+            task: The task that was recorded.
+            credits: Who acted in the recording; None: nobody says.
+        """
+        self.task, self.credits = task, credits
         placements = task.layout.items()
         self.action_names = [
             f"{place}.{name}" for place, p in placements for name in action_names(p.robot)
@@ -104,6 +120,9 @@ class ColumnReader:
             rewards=trajectory.rewards,
             success=trajectory.success,
             done=_done(trajectory),
+            source=trajectory.source,
+            actor=self.credits.numbers(trajectory) if self.credits else None,
+            corrections=trajectory.corrections if self.credits and self.credits.corrected else None,
         )
 
     def tcp_poses(self, columns: Columns) -> dict[str, Floats]:

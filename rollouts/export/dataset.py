@@ -14,6 +14,7 @@ from layouts import Layout
 from layouts.placement import RobotLike
 from robots import MissingPackageError, TaskError, UnknownNameError
 from rollouts.export.columns import ColumnReader, Columns, succeeded
+from rollouts.export.credits import Credits
 from rollouts.export.folder import new_folder, refuse_used
 from rollouts.reading.recorded_task import task_class, task_for
 from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
@@ -94,7 +95,7 @@ def export(wanted: Export, progress: Progress = lambda done, total: None) -> Exp
             raise TrajectoryError(f"{file.path} holds no episodes; there is nothing to export")
         task_class(file, wanted.task)
         task = task_for(file, layout=wanted.layout, robots=wanted.robots, pictures=wanted.video)
-        reader = ColumnReader(task)
+        reader = ColumnReader(task, Credits(file))
         episodes = steps = 0
         with new_folder(out) as folder, _writer(wanted, folder, file, reader) as add:
             for i, trajectory in enumerate(file):
@@ -113,7 +114,7 @@ def _writer(
     wanted: Export, folder: Path, file: TrajectoryFile, reader: ColumnReader
 ) -> Generator[AddEpisode]:
     """Yield a function that writes an episode and tells how many pictures it has drawn."""
-    origin = _origin(file)
+    origin = _origin(file, reader)
     if wanted.format == "robomimic":
         from rollouts.export.robomimic import RobomimicWriter
 
@@ -160,10 +161,12 @@ def _part(progress: Progress, done: int, pictures: int, total: int) -> Callable[
     return lambda drawn: progress(done + drawn / pictures, total)
 
 
-def _origin(file: TrajectoryFile) -> dict[str, Any]:
+def _origin(file: TrajectoryFile, reader: ColumnReader) -> dict[str, Any]:
+    actors = reader.credits.actors if reader.credits else []
     return {
         "task_id": file.task_id,
         "control_mode": file.control_mode,
         "source_type": file.source_type,
         "layout": file.layout,
+        **({"actors": actors} if actors else {}),
     }

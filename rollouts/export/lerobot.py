@@ -140,7 +140,8 @@ class LeRobotWriter(DatasetWriter):
             self._write_rows()
         for key, values in numbers.items():
             self._numbers.setdefault(key, []).append(values)
-        self._origins.append({"episode_id": columns.episode_id, "seed": columns.seed})
+        said = {"source": columns.source} if columns.source is not None else {}
+        self._origins.append({"episode_id": columns.episode_id, "seed": columns.seed, **said})
         self._frames += steps
 
     def _frame_features(
@@ -158,10 +159,13 @@ class LeRobotWriter(DatasetWriter):
             ("action", reader.action_names, columns.actions),
             *((key, self._names(key), rows[:-1]) for key, rows in observed.items()),
         ]
+        if columns.corrections is not None:
+            vectors.append(("corrections", reader.action_names, columns.corrections))
         scalars: list[tuple[str, Number | None]] = [
             ("next.reward", columns.rewards),
             ("next.success", columns.success),
             ("next.done", columns.done),
+            ("actor", columns.actor),
             ("timestamp", (frames / self._fps).astype(np.float32)),
             ("frame_index", frames),
             ("episode_index", whole + number),

@@ -51,6 +51,12 @@ class RobomimicWriter(DatasetWriter):
         demo["dones"] = columns.done.astype(np.int64)
         if columns.rewards is not None:
             demo["rewards"] = columns.rewards
+        if columns.source is not None:
+            demo.attrs["source"] = json.dumps(columns.source)
+        if columns.actor is not None:
+            demo["actor"] = columns.actor
+        if columns.corrections is not None:
+            demo["corrections"] = columns.corrections
         tcp_poses = self._reader.tcp_poses(columns)
         observed = robomimic_columns(columns.qpos, columns.qvel, tcp_poses, columns.bodies)
         for key, rows in observed.items():

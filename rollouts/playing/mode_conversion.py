@@ -65,16 +65,25 @@ class Attempt(NamedTuple):
         actions: What was done, a row for each step.
         solved: Whether the task was solved after the last.
         states: After what stands for each step of the recording.
+        steps: Which step of the recording each action stands for.
     """
 
     actions: list[NDArray[np.float32]]
     solved: bool
     states: list[State]
+    steps: list[int]
 
 
 def converted(
     source: MultiRobotTask, seed: int, actions: NDArray[np.float32], task: MultiRobotTask
 ) -> NDArray[np.float32]:
+    """Return the actions, (T', A'), of `converted_steps`, whose arguments are the same."""
+    return converted_steps(source, seed, actions, task)[0]
+
+
+def converted_steps(
+    source: MultiRobotTask, seed: int, actions: NDArray[np.float32], task: MultiRobotTask
+) -> tuple[NDArray[np.float32], NDArray[np.intp]]:
     """Return actions for a task that move its robots as some moved those of another.
 
     Nothing is promised of where they end: play them and look.
@@ -86,11 +95,11 @@ def converted(
         task: The task in another control mode, with one environment; both are stepped.
 
     Returns:
-        Shape (T', A').
+        The actions, (T', A'), and the step that each stands for, (T',).
     """
     recorded = followed(source, seed, actions)
     drives = drives_of(source, task)
-    found = Attempt([], False, [])
+    found = Attempt([], False, [], [])
     random = np.random.default_rng(seed)  # the same actions whenever the episode is converted
     ways = _WAYS if recorded.solved else _WAYS[:1]
     if _lost_turns(recorded, task):  # it may do without them, but learning does not bring them
@@ -101,12 +110,16 @@ def converted(
             tried = {d: d.strayed(course, random, way.shake) for d, course in courses.items()}
             found = _attempt(tried, task, seed, len(actions), way)
             if found.solved:
-                return np.array(found.actions, np.float32)
+                return _arrays(found)
             courses = {
                 drive: drive.learnt(course, list(map(drive.where, found.states)), way.share)
                 for drive, course in courses.items()
             }
-    return np.array(found.actions, np.float32)
+    return _arrays(found)
+
+
+def _arrays(found: Attempt) -> tuple[NDArray[np.float32], NDArray[np.intp]]:
+    return np.array(found.actions, np.float32), np.array(found.steps, np.intp)
 
 
 def why_lost(
@@ -168,6 +181,7 @@ def _attempt(
     task.reset(seed, options=REBUILT)
     actions: list[NDArray[np.float32]] = []
     states: list[State] = []
+    stands_for: list[int] = []
     solved = False
     for step in range(steps + _SETTLING):
         if solved and (step >= steps or way.shake):
@@ -175,12 +189,13 @@ def _attempt(
         for _ in range(way.most):
             action, enough = _action(courses, task, min(step, steps - 1))
             actions.append(action)
+            stands_for.append(min(step, steps - 1))
             solved = bool(task.advance(action[None])[-1]["success"][0])
             if enough or (solved and way.shake):
                 break
         if step < steps:
             states.append(task.simulation.read())
-    return Attempt(actions, solved, states)
+    return Attempt(actions, solved, states, stands_for)
 
 
 def _action(

@@ -70,6 +70,7 @@ class Replayed:
         compared: Whether the file holds states to compare with.
         difference: Where the states part, or None.
         exact: Whether the states must be equal to the last bit.
+        varied_alike: Whether what varies in its world was drawn here as it was recorded.
     """
 
     episode_id: int
@@ -80,11 +81,12 @@ class Replayed:
     compared: bool
     difference: StateDifference | None
     exact: bool
+    varied_alike: bool = True
 
     @property
     def agrees(self) -> bool:
-        """Whether success is as recorded, and states are where they must be."""
-        if self.recorded not in (None, self.success):
+        """Whether success and world are as recorded, and states are where they must be."""
+        if self.recorded not in (None, self.success) or not self.varied_alike:
             return False
         return not (self.exact and self.difference)
 
@@ -170,6 +172,7 @@ def replay(task: MultiRobotTask, trajectory: Trajectory, start: Start = "seed") 
         compared=compared,
         difference=first_difference(trajectory.states or {}, episode.states) if compared else None,
         exact=start == "seed" and trajectory.rebuilt,
+        varied_alike=trajectory.drawn in (None, episode.drawn),
     )
 
 

@@ -53,7 +53,7 @@ def add_recording(parser: argparse.ArgumentParser) -> None:
         help="its task, MODULE:ID for one of your own; without FILE, find its official one in"
         " $MS_ASSET_DIR/demos",
     )
-    add_cell_options(parser)
+    add_cell_options(parser, varying=False)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -115,6 +115,8 @@ def _sentences(found: Sequence[Replayed], start: str) -> list[str]:
         f"{same} of {len(found)} episodes end as recorded; in {equal} all states are equal to the"
         " last bit."
     ]
+    if other := [str(episode.episode_id) for episode in found if not episode.varied_alike]:
+        lines.append(f"Their worlds do not vary here as recorded: episodes {', '.join(other)}.")
     if start == "state":
         lines.append("From a state no replay is exact: PhysX's memory is not part of a state.")
     elif any(episode.difference and not episode.exact for episode in found):

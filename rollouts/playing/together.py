@@ -2,24 +2,58 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from math import fsum
-from typing import Any
+from time import perf_counter
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
-from robots import TaskError
+from robots import ActionError, TaskError
+from rollouts.playing.events import Event
 from rollouts.playing.randomness import random_states, set_random_states
 from tasks import MultiRobotTask
 from tasks.engine.actions import ActionReader
-from tasks.episode import REBUILT, Policy, Score
+from tasks.episode import REBUILT, PlayedEpisode, Policy, Score, States
+
+Row = NDArray[np.float32]
+
+
+class BatchError(TaskError):
+    """A batched policy did not return one action for each observation."""
+
+
+class Step(NamedTuple):
+    """A step of an episode.
+
+    Attributes:
+        action: What was carried out, (A,).
+        turn: 0 if the policy acted, 1 if another took over.
+        correction: What the corrector would have done, (A,), or None.
+        reward: What the step was worth.
+        success: Whether the task was solved after it.
+        terminated: Whether it ended the episode.
+        truncated: Whether time was over.
+        seconds: Time that it took (s).
+    """
+
+    action: Row
+    turn: int
+    correction: Row | None
+    reward: float
+    success: bool
+    terminated: bool
+    truncated: bool
+    seconds: float
 
 
 @dataclass
 class Player:
-    """Who plays the episode of a seed.
+    """Who plays the episode of a seed, and what came of it.
 
     Attributes:
         seed: The seed.
@@ -27,8 +61,11 @@ class Player:
         most: Steps after which the episode ends.
         states: Where the random generators are when it acts.
         reason: Why it can but fail, if that is known.
-        rewards: Of the steps so far.
-        success: Whether the last one was a success.
+        blind: Whether the policy acts without looking, as a plan does; then it draws nothing.
+        to_the_end: Whether it plays all its steps, those after a success or out of time included.
+        takeover: May act in place of the policy: obs → action, or None to let the policy act.
+        corrector: Says at every step what it would do: obs → action.
+        steps: The steps so far.
     """
 
     seed: int
@@ -36,49 +73,143 @@ class Player:
     most: int
     states: tuple[Any, ...]
     reason: str = ""
-    rewards: list[float] = field(default_factory=list[float])
-    success: bool = False
+    blind: bool = False
+    to_the_end: bool = False
+    takeover: Policy | None = None
+    corrector: Policy | None = None
+    steps: list[Step] = field(default_factory=list[Step])
+
+    @property
+    def over(self) -> bool:
+        """Whether its episode is over."""
+        if len(self.steps) >= self.most:
+            return True
+        ended = bool(self.steps) and (self.steps[-1].terminated or self.steps[-1].truncated)
+        return ended and not self.to_the_end
 
     @property
     def score(self) -> Score:
         """How its episode went."""
-        reason = "" if self.success else self.reason
-        return Score(self.success, fsum(self.rewards), len(self.rewards), reason)
+        success = bool(self.steps) and self.steps[-1].success
+        total = fsum(step.reward for step in self.steps)
+        return Score(success, total, len(self.steps), "" if success else self.reason)
+
+    def episode(self, states: States, drawn: dict[str, Any] | None) -> PlayedEpisode:
+        """Return what happened.
+
+        Args:
+            states: Those of its environment, each entry (T + 1, k), or with more rows after these.
+            drawn: What was varied in its world.
+
+        Raises:
+            TaskError: If it took no step.
+        """
+        if not self.steps:
+            raise TaskError(self.reason or "an episode needs at least one action")
+        moments = len(self.steps) + 1
+        corrections = [s.correction for s in self.steps if s.correction is not None]
+        return PlayedEpisode(
+            seed=self.seed,
+            actions=np.stack([step.action for step in self.steps]),
+            states={
+                kind: {name: rows[:moments] for name, rows in entries.items()}
+                for kind, entries in states.items()
+            },
+            rewards=np.array([step.reward for step in self.steps], np.float32),
+            success=np.array([step.success for step in self.steps]),
+            terminated=np.array([step.terminated for step in self.steps]),
+            truncated=np.array([step.truncated for step in self.steps]),
+            seconds=fsum(step.seconds for step in self.steps),
+            drawn=drawn,
+            actor=np.array([step.turn for step in self.steps], np.uint8),
+            corrections=np.stack(corrections) if corrections else None,
+        )
+
+
+def grouped(seeds: Sequence[int], size: int) -> dict[int, tuple[int, ...]]:
+    """Return which seeds are played at once, by the first of them."""
+    return {seeds[i]: tuple(seeds[i : i + size]) for i in range(0, len(seeds), size)}
+
+
+def one_by_one(event: Event) -> list[Event]:
+    """Return an event for each episode if it is of episodes that were played at once."""
+    if not isinstance(event.result, dict):
+        return [event]
+    return [replace(event, seed=seed, result=result) for seed, result in event.result.items()]
 
 
 def play_together(env: MultiRobotTask, players: Sequence[Player]) -> None:
+    """Play an episode for each player until all are over; see `steps_together`."""
+    for _ in steps_together(env, players):
+        pass
+
+
+def record_together(env: MultiRobotTask, players: Sequence[Player]) -> list[PlayedEpisode]:
+    """Play an episode for each player, as `steps_together` does, and keep what happens.
+
+    Raises:
+        TaskError: Also if a player takes no step.
+    """
+    happening = steps_together(env, players)
+    next(happening)
+    tape = env.begin_tape()
+    env.write_tape(tape)
+    for _ in happening:
+        env.write_tape(tape)
+    states = tape.read()
+    return [
+        player.episode(
+            {
+                kind: {name: rows[:, i] for name, rows in entries.items()}
+                for kind, entries in states.items()
+            },
+            env.drawn(i),
+        )
+        for i, player in enumerate(players)
+    ]
+
+
+def steps_together(env: MultiRobotTask, players: Sequence[Player]) -> Generator[None]:
     """Play an episode for each player, from freshly built worlds, until all are over.
 
     Every player sees its own environment alone, and draws from generators that are its own, so
-    that nothing depends on who plays beside it. One that is marked as `batched` is called once
-    for all of them.
+    that nothing depends on who plays beside it. A policy that is marked as `batched` is called
+    once for all of them.
 
     Args:
         env: The task, with at least as many environments as players.
-        players: Who plays; it is noted in them what comes of it.
+        players: Who plays, one after the other in the environments; it is noted in them what
+            comes of it.
+
+    Yields:
+        Nothing: once after the reset, and once after every step.
 
     Raises:
-        TaskError: If the actions of a batched policy are not one for each environment.
+        BatchError: If the actions of a batched policy are not one for each environment.
         ActionError: If an action has the wrong shape or numbers that are not finite.
     """
     ids = list(range(len(players)))
     observation, _ = env.reset([player.seed for player in players], REBUILT, ids)
+    yield
     reader = ActionReader(env.layout, 1)
     actions = np.zeros((env.num_envs, env.layout.action_dim), np.float32)
-    running = [i for i in ids if players[i].most > 0]
-    while running:
-        act = _act_at_once if is_batched(players[0].policy) else _act
-        for i, action in act(players, running, observation).items():
-            actions[i] = reader.read(action)[0]
+    env.trust(actions)  # what is written there was checked
+    while running := [i for i in ids if not players[i].over]:
+        choices = _choices(players, running, observation, reader)
+        for i, (action, _, _) in choices.items():
+            actions[i] = action
         everywhere = len(running) == env.num_envs
+        began = perf_counter()
         observation, rewards, terminated, truncated, info = env.step(
             actions, None if everywhere else running
         )
-        over = (terminated | truncated).tolist()
+        seconds = (perf_counter() - began) / len(running)
+        came = (rewards, info["success"], terminated, truncated)
+        rows = list(zip(*(of_all.tolist() for of_all in came), strict=True))
         for i in running:
-            players[i].rewards.append(rewards[i].item())
-            players[i].success = bool(info["success"][i])
-        running = [i for i in running if not over[i] and len(players[i].rewards) < players[i].most]
+            reward, success, ended, late = rows[i]
+            players[i].steps.append(Step(*choices[i], reward, bool(success), ended, late, seconds))
+        yield
 
 
 def is_batched(policy: object) -> bool:
@@ -86,25 +217,69 @@ def is_batched(policy: object) -> bool:
     return getattr(policy, "batched", False) is True
 
 
-def _act(players: Sequence[Player], running: Sequence[int], observation: Any) -> dict[int, Any]:
-    actions: dict[int, Any] = {}
+def _choices(
+    players: Sequence[Player], running: Sequence[int], observation: Any, reader: ActionReader
+) -> Mapping[int, tuple[Row, int, Row | None]]:
+    """Return what is carried out in each environment, whose turn it is, and its correction."""
+    at_once: dict[int, Any] = {}
+    if is_batched(players[0].policy):
+        at_once = _act_at_once(players[0].policy, running, observation)
+    choices: dict[int, tuple[Row, int, Row | None]] = {}
     for i in running:
         player = players[i]
-        if len(players) > 1:
-            set_random_states(player.states)
-        actions[i] = player.policy(_rows(observation, [i]))
-        if len(players) > 1:
-            player.states = random_states()
-    return actions
+        if player.blind:
+            choices[i] = reader.read(player.policy(None))[0].copy(), 0, None
+        elif at_once and player.takeover is None and player.corrector is None:
+            choices[i] = reader.read(at_once[i])[0].copy(), 0, None
+        else:
+            seen = _rows(observation, [i])
+            with _own_generators(player, shared=len(players) > 1):
+                proposed = at_once[i] if at_once else player.policy(seen)
+                choices[i] = _choice(player, proposed, seen, reader)
+    return choices
 
 
-def _act_at_once(
-    players: Sequence[Player], running: Sequence[int], observation: Any
-) -> dict[int, Any]:
-    actions = players[0].policy(_rows(observation, running))
-    if len(actions) != len(running):
-        raise TaskError(
-            f"a batched policy returned {len(actions)} actions for {len(running)} observations"
+def _choice(
+    player: Player, proposed: Any, seen: Any, reader: ActionReader
+) -> tuple[Row, int, Row | None]:
+    action, turn, correction = reader.read(proposed)[0].copy(), 0, None
+    if player.takeover is not None and (instead := player.takeover(seen)) is not None:
+        action, turn = _read(instead, reader, "takeover"), 1
+    if player.corrector is not None:
+        correction = _read(player.corrector(seen), reader, "corrector")
+    return action, turn, correction
+
+
+def _read(action: Any, reader: ActionReader, whose: str) -> Row:
+    try:
+        return reader.read(action)[0].copy()
+    except ActionError as error:
+        raise ActionError(f"of the {whose}: {error}") from error
+
+
+@contextmanager
+def _own_generators(player: Player, *, shared: bool) -> Generator[None]:
+    """Let the random generators go on where the player's were, if others draw from them, too."""
+    if not shared:
+        yield
+        return
+    set_random_states(player.states)
+    yield
+    player.states = random_states()
+
+
+def _act_at_once(policy: Policy, running: Sequence[int], observation: Any) -> dict[int, Any]:
+    actions = policy(_rows(observation, running))
+    try:
+        count = len(actions)
+    except TypeError:
+        raise BatchError(
+            f"a batched policy returned {actions!r} for {len(running)} observations; it must"
+            " return an action for each"
+        ) from None
+    if count != len(running):
+        raise BatchError(
+            f"a batched policy returned {count} actions for {len(running)} observations"
         )
     return dict(zip(running, actions, strict=True))
 

@@ -12,7 +12,16 @@ from numpy.typing import NDArray
 
 CHECKSUM = "checksum"  # attribute of an episode's group in the h5 file
 STATES = "env_states/"
-ARRAYS = ("actions", STATES.rstrip("/"), "rewards", "success", "terminated", "truncated")
+ARRAYS = (
+    "actions",
+    STATES.rstrip("/"),
+    "rewards",
+    "success",
+    "terminated",
+    "truncated",
+    "actor",
+    "corrections",
+)
 TEXTS = ("action_split", "episode")
 
 

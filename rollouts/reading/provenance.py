@@ -44,7 +44,9 @@ LAYOUT = maybe(
         )
     )
 )
-SIMULATION = maybe(fields({}, {"physics": maybe(OBJECT), "control_frequency": NUMBER}))
+SIMULATION = maybe(
+    fields({}, {"physics": maybe(OBJECT), "control_frequency": NUMBER, "randomization": OBJECT})
+)
 
 _SHOWN = 4  # differences that a message names
 _ABSENT = "nothing"
@@ -92,11 +94,15 @@ def _describe_group(group: JointGroup) -> dict[str, Any]:
 
 
 def describe_simulation(task: MultiRobotTask) -> dict[str, Any]:
-    """Return a task's physics settings (None: SAPIEN's own) and control frequency (Hz)."""
-    physics = task.scenario.physics
+    """Return a task's physics settings (None: SAPIEN's own) and control frequency (Hz).
+
+    And what varies in its worlds, if anything does.
+    """
+    physics, randomization = task.scenario.physics, task.scenario.randomization
     return {
         "physics": None if physics is None else asdict(physics),
         "control_frequency": task.scenario.control_frequency,
+        **({"randomization": randomization.to_json()} if randomization else {}),
     }
 
 

@@ -13,6 +13,7 @@ from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
 from tasks import MultiRobotTask, get_task_class, make
 from tasks.language.needs import ACT, HOLD
 from tasks.native.format import mode_by_arm
+from tasks.varying.randomization import Randomization
 
 MOST_ROBOTS = 64  # each takes memory, whoever wrote the file
 
@@ -78,6 +79,7 @@ def task_for(
         making |= _recorded(file, cls, {n: r for n, r in named.items() if r is not None})
     if "control_frequency" in (file.simulation or {}):
         making["control_frequency"] = file.simulation["control_frequency"]
+    making["randomization"] = _varied(file)
     task = make(
         file.task_id,
         obs_mode="none",
@@ -88,6 +90,17 @@ def task_for(
     file.expect(task.task_id, task.layout.action_dim)
     file.expect_world(task)
     return task
+
+
+def _varied(file: TrajectoryFile) -> Randomization | None:
+    """Return what varied in the worlds of a recording."""
+    described = (file.simulation or {}).get("randomization")
+    try:
+        return None if described is None else Randomization.from_json(described)
+    except RobotLayoutsError as error:
+        raise TrajectoryError(
+            f"{file.path} has a randomization that makes no sense here: {error}"
+        ) from error
 
 
 def _recorded(

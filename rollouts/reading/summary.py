@@ -42,7 +42,9 @@ _EPISODE = {
     "success": maybe(either(FLAG, NUMBER)),
 }
 # What only a recording of this library says, and not every one.
-_ABOUT = {"source": maybe(OBJECT), "drawn": maybe(OBJECT)}
+_ACTOR = fields({"kind": NAME, "name": TEXT}, {"sha256": maybe(TEXT)})
+_SOURCE = fields({"kind": NAME}, {"actors": items(_ACTOR), "corrects": _ACTOR})
+_ABOUT = {"source": maybe(_SOURCE), "drawn": maybe(OBJECT)}
 # An episode's own note in a recording of this library, which becomes its entry in the json.
 OWN_EPISODE = fields({**_EPISODE, "episode_seed": _SEED, "elapsed_steps": _STEPS}, _ABOUT)
 _SUMMARY = fields(

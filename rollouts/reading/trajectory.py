@@ -37,9 +37,9 @@ from tasks.native.controllers import CONTROLLER
 __all__ = ["Trajectory", "TrajectoryError", "TrajectoryFile", "expect_file"]
 
 _FLAGS = ("success", "terminated", "truncated")
-_COLUMNS = ("rewards", *_FLAGS)
+_COLUMNS = ("rewards", *_FLAGS, "actor")
 
-Number = TypeVar("Number", np.float32, np.bool_)
+Number = TypeVar("Number", np.float32, np.bool_, np.uint8)
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,9 @@ class Trajectory:
             last bit; where worlds are reused, they also depend on the episodes before.
         source: Who acted; None if the file does not say.
         drawn: What was varied in its world, by axis; None if nothing was.
+        actor: Who acted at each step where several did, (T,) uint8: the number of one of the
+            ``"actors"`` of ``source``; else None.
+        corrections: What a corrector would have done at each step, (T, A), or None.
     """
 
     episode_id: int
@@ -75,6 +78,8 @@ class Trajectory:
     rebuilt: bool = False
     source: Mapping[str, Any] | None = None
     drawn: Mapping[str, Any] | None = None
+    actor: NDArray[np.uint8] | None = None
+    corrections: NDArray[np.float32] | None = None
 
     @property
     def solved(self) -> bool | None:
@@ -99,6 +104,7 @@ class TrajectoryFile(Sequence[Trajectory]):
             files.
         action_split: Robot name → slice of the flat action; None in native's files.
         seeds: Reset seed of each episode, or None.
+        sources: Who acted in each episode, or None; see `Trajectory`.
     """
 
     def __init__(self, path: str | PathLike[str]) -> None:
@@ -123,6 +129,7 @@ class TrajectoryFile(Sequence[Trajectory]):
         self.max_episode_steps, self.source_type = summary.max_episode_steps, summary.source_type
         self._entries = summary.episodes
         self.seeds = tuple(entry.seed for entry in self._entries)
+        self.sources = tuple(entry.source for entry in self._entries)
         with self._damage("this h5 file"):
             self._file = Hdf5File(self.path)
             described = self._file.texts(names=("layout", "simulation", "guessed")) or {}
@@ -163,6 +170,18 @@ class TrajectoryFile(Sequence[Trajectory]):
         if isinstance(index, slice):
             return [self._read(entry) for entry in self._entries[index]]
         return self._read(self._entries[index])
+
+    @property
+    def corrected(self) -> bool:
+        """Whether there are episodes, and all hold what a corrector would have done.
+
+        Raises:
+            TrajectoryError: If the file is damaged.
+        """
+        if not all(source and "corrects" in source for source in self.sources):
+            return False
+        name = "corrections"
+        return bool(self) and all(name in self._shapes(e, (name,)) for e in self._entries)
 
     def expect(self, task_id: str, action_dim: int) -> None:
         """Refuse a file of another task, or of robots that take other actions.
@@ -232,6 +251,8 @@ class TrajectoryFile(Sequence[Trajectory]):
             rebuilt=entry.rebuilt,
             source=entry.source,
             drawn=entry.drawn,
+            actor=_column(arrays, "actor", np.uint8),
+            corrections=_column(arrays, "corrections", np.float32),
         )
 
     def _texts(self, entry: Entry) -> dict[str, str]:
@@ -272,8 +293,10 @@ class TrajectoryFile(Sequence[Trajectory]):
         return shape
 
     def _expect_shapes(self, entry: Entry, shapes: Shapes) -> None:
-        steps, _ = self._action_shape(entry, shapes)
+        steps, numbers = self._action_shape(entry, shapes)
         for name, shape in shapes.items():
+            if name == "corrections" and shape != (steps, numbers):
+                self._refuse(entry, f"{name} has shape {shape}, not ({steps}, {numbers})")
             if name in _COLUMNS and shape != (steps,):
                 self._refuse(entry, f"{name} has shape {shape}, not ({steps},)")
             if not f"{name}/".startswith(STATES):
@@ -291,6 +314,10 @@ class TrajectoryFile(Sequence[Trajectory]):
         for name, rows in arrays.items():
             if not np.isfinite(rows).all():
                 self._refuse(entry, f"its {name} are not all finite")
+        actors = len((entry.source or {}).get("actors", ()))
+        actor = arrays.get("actor")
+        if actor is not None and (actor.dtype != np.uint8 or (actor >= actors).any()):
+            self._refuse(entry, f"its actor is not at each step one of the {actors} of its source")
 
     def _refuse(self, entry: Entry, why: str) -> NoReturn:
         raise TrajectoryError(f"{entry.group} of {self.path} cannot be played: {why}")

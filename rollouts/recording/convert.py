@@ -8,11 +8,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from rollouts.playing.mode_conversion import converted, why_lost
+import numpy as np
+from numpy.typing import NDArray
+
+from rollouts.playing.mode_conversion import converted_steps, why_lost
 from rollouts.playing.replay import FILE, task_for
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.trajectory import Trajectory, TrajectoryFile
 from rollouts.recording.recorder import Recorder
-from tasks.episode import play
+from tasks.episode import PlayedEpisode, play
 
 
 @dataclass
@@ -61,6 +64,8 @@ def convert(
 ) -> Conversion:
     """Record the successful episodes of a recording in another control mode.
 
+    Who acted is kept; what a corrector would have done is not, as nobody played it.
+
     Args:
         file: The recording.
         mode: The other mode, or one by arm.
@@ -97,10 +102,10 @@ def convert(
                 elif episode.seed in there:
                     found.kept.append(episode.seed)
                 else:
-                    actions = converted(source, episode.seed, episode.actions, task)
+                    actions, steps = converted_steps(source, episode.seed, episode.actions, task)
                     played = play(task, episode.seed, actions)
                     if played.solved:
-                        recorder.add(played)
+                        recorder.add(_signed(played, episode, steps))
                         found.kept.append(episode.seed)
                     else:
                         found.lost.append(episode.seed)
@@ -109,3 +114,15 @@ def convert(
                         )
                 on_episode()
     return found
+
+
+def _signed(played: PlayedEpisode, episode: Trajectory, steps: NDArray[np.intp]) -> PlayedEpisode:
+    """Write into an episode who acted in the one that it was made from.
+
+    Args:
+        played: The episode.
+        episode: The one that it was made from.
+        steps: Which step of that each of its own stands for.
+    """
+    actor = None if episode.actor is None else episode.actor[steps]
+    return replace(played, source=episode.source, actor=actor)

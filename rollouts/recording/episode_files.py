@@ -46,7 +46,7 @@ _CHECKSUM = 4  # bytes
 _MAX_PART = MAX_BYTES + 2**24  # bytes
 
 _ARRAY_NAME = re.compile(
-    r"(actions|rewards|success|terminated|truncated"
+    r"(actions|rewards|success|terminated|truncated|actor|corrections"
     r"|env_states(/[^/\0]+){2}|env_states/controller(/[^/\0]+){1,3})"
 )
 _CONTENT = fields(
@@ -57,7 +57,7 @@ _CONTENT = fields(
 )
 _ARRAY = (
     Kind("the name of an array", lambda v: isinstance(v, str) and bool(_ARRAY_NAME.fullmatch(v))),
-    Kind("a kind of numbers", lambda v: v in ("<f4", "<f8", "|b1")),
+    Kind("a kind of numbers", lambda v: v in ("<f4", "<f8", "|b1", "|u1")),
     items(whole(0, MAX_BYTES)),
 )
 
@@ -256,6 +256,9 @@ def _arrays(episode: PlayedEpisode) -> dict[str, NDArray[Any]]:
         arrays.update({f"{STATES}{kind}/{name}": rows for name, rows in entries.items()})
     for name in ("rewards", "success", "terminated", "truncated"):
         arrays[name] = getattr(episode, name)
+    for name in ("actor", "corrections"):
+        if (rows := getattr(episode, name)) is not None:
+            arrays[name] = rows
     return arrays
 
 

@@ -1,4 +1,4 @@
-"""Records episodes that an expert plays, and goes on where it stopped."""
+"""Records episodes that an expert, a policy or several in turn play; goes on where it stopped."""
 
 from __future__ import annotations
 
@@ -11,30 +11,39 @@ from typing import Any
 import torch
 
 import tasks
-from experts import find_expert
-from experts.registry import Expert
 from layouts import Layout
 from layouts.placement import RobotLike
-from robots import RecordingError
+from robots import RecordingError, TaskError
+from robots.common.bounds import checked_whole
+from rollouts.playing.casting import Cast, Casting
 from rollouts.playing.executor import (
     EPISODE_SECONDS,
     Event,
     Executor,
+    WorkerError,
     WorkersDied,
     choose_executor,
     modules_of,
     play_all,
 )
-from rollouts.playing.plan_conversion import Planner
 from rollouts.playing.seeds import checked_seeds
+from rollouts.playing.together import BatchError, grouped, one_by_one, record_together
+from rollouts.playing.transport import as_ours
 from rollouts.reading.provenance import describe_layout, differences, listing
 from rollouts.recording.episode_files import PartWriter
 from rollouts.recording.recorder import Recorder
+from rollouts.recording.signing import Actors
+from rollouts.sources.policies import EXPERT
 from tasks import MultiRobotTask, Scenario
-from tasks.episode import Score, play
+from tasks.episode import Policy, Score
 from tasks.registry import make_scenario
+from tasks.varying.randomization import Randomization
 
 FILE = "trajectory.h5"
+
+
+Recorded = tuple[Score, bytes]
+"""How an episode went, and what is to be stored of it."""
 
 
 @dataclass(frozen=True)
@@ -44,51 +53,81 @@ class EpisodeJob:
     Attributes:
         task: Class of the task.
         scenario: How to make it.
-        expert: Who plays.
+        cast: Who plays.
+        actors: Who that is, as the recording keeps it.
         writer: What encodes finished episodes.
+        together: Seeds that are played at once, by the first of them.
     """
 
     task: type[MultiRobotTask]
     scenario: Scenario
-    expert: Expert
+    cast: Cast
+    actors: Actors
     writer: PartWriter
+    together: Mapping[int, tuple[int, ...]]
 
     @property
     def modules(self) -> tuple[str, ...]:
         """What other machines may need to play it."""
-        return modules_of(self.task, self.expert)
+        return modules_of(self.task, *self.cast.members)
 
-    def __call__(self) -> Callable[[int], tuple[Score, bytes]]:
-        """Make the task in a worker, and return what plays and encodes the episode of a seed.
+    def __call__(self) -> Callable[[int], dict[int, Recorded | str]]:
+        """Make the task in a worker, and return what plays and encodes the episodes of seeds.
 
         Raises:
             RecordingError: If the robot files of this machine are not those of the recording.
         """
         torch.set_num_threads(1)  # the tensors are small, and other workers want the cores
-        return _Player(self)
+        return _Play(self)
 
 
-class _Player:
-    """Plays episodes in one world, which is built anew for each, and encodes them."""
+class _Play:
+    """Plays episodes in worlds that are built anew for each, and encodes them."""
 
     def __init__(self, job: EpisodeJob) -> None:
-        self._env, self._writer = job.task(job.scenario), job.writer
+        self._job, self._env = job, job.task(job.scenario)
         self._expect_same_robots()
-        self._plan = Planner(self._env, job.expert)
+        self._casting = Casting(job.cast, self._env)
 
-    def __call__(self, seed: int) -> tuple[Score, bytes]:
-        """Play and encode the episode of a seed."""
-        episode = play(self._env, seed, self._plan(seed))
-        reason = "" if episode.solved else self._plan.reason
-        return replace(episode.score, reason=reason), self._writer.encode(episode)
+    def __call__(self, seed: int) -> dict[int, Recorded | str]:
+        """Play and encode the episodes of a seed and of those that are played together with it.
+
+        Returns:
+            How each went, or in words why it could not be played.
+        """
+        seeds = self._job.together[seed]
+        try:
+            return self._play(seeds)
+        except BatchError:
+            raise
+        except Exception:
+            if len(seeds) == 1:
+                raise
+        return {seed: self._alone(seed) for seed in seeds}  # one of them must not cost the others
 
     def close(self) -> None:
         """Let the worlds go."""
         self._env.close()
-        self._plan.close()
+        self._casting.close()
+
+    def _play(self, seeds: Sequence[int]) -> dict[int, Recorded | str]:
+        players = [self._casting(seed) for seed in seeds]
+        with torch.no_grad():
+            episodes = record_together(self._env, players)
+        return {
+            player.seed: (player.score, self._job.writer.encode(self._job.actors.sign(episode)))
+            for player, episode in zip(players, episodes, strict=True)
+        }
+
+    def _alone(self, seed: int) -> Recorded | str:
+        try:
+            return self._play([seed])[seed]
+        except Exception as error:
+            return str(as_ours(error))
 
     def _expect_same_robots(self) -> None:
-        found = differences(self._writer.header["layout"], describe_layout(self._env.layout))
+        header = self._job.writer.header
+        found = differences(header["layout"], describe_layout(self._env.layout))
         if found:
             raise RecordingError(
                 f"a worker would record something else than this recording is of ({listing(found)})"
@@ -130,6 +169,12 @@ def record(
     layout: Layout | None = None,
     robots: RobotLike | Mapping[str, RobotLike] | None = None,
     bystanders: str | None = None,
+    policy: Policy | str = EXPERT,
+    takeover: Policy | str | None = None,
+    corrector: Policy | str | None = None,
+    obs_mode: str = "state",
+    num_envs: int = 1,
+    randomization: Randomization | None = None,
     on_event: Callable[[Summary, Event | None], None] = lambda summary, event: None,
 ) -> Summary:
     """Record the episodes of some seeds; those that are in the folder already are kept.
@@ -148,37 +193,60 @@ def record(
         layout: Where robots stand, if not where the task's own do; see `tasks.make`.
         robots: Other robots for some places; see `tasks.make`.
         bystanders: What robots do that have no place in the task; see `tasks.Scenario`.
+        policy: ``"expert"``, whose plan for each seed is carried out to its end, or who acts at
+            every step: maps the observation, (1, D) float32 if ``obs_mode`` is ``"state"``, to the
+            action, (A,) or (1, A); an episode ends with the first step that is terminated or
+            truncated. Or ``"module:name"``, which is imported. As in `rollouts.evaluate`, a copy
+            plays each episode, and the random generators of Python, NumPy and torch start from
+            its seed.
+        takeover: May act in the place of the policy, at any step: maps the observation to an
+            action, or to None, which lets the policy act. The policy is asked at every step. Or
+            ``"module:name"``.
+        corrector: Asked at every step what it would do: maps the observation to an action, which
+            is recorded beside the one that is carried out. Or ``"module:name"``.
+        obs_mode: What they observe; see `tasks.make`. Observations are not recorded.
+        num_envs: How many episodes each process plays at once, in environments of one task. What
+            is recorded is the same, and so it is with a policy whose attribute ``batched`` is True
+            if each row of its actions follows from that row of the observations alone; see
+            `rollouts.evaluate`.
+        randomization: What varies from episode to episode, if not what the task says.
         on_event: Called once at the start without an event, and after every event.
 
     Raises:
         UnknownNameError: If there is no such task.
-        TaskError: If the task has no expert, a number makes no sense, or a seed is there twice.
-        RecordingError: If the folder cannot be written or holds a recording of something else;
-            the finished episodes are kept.
+        TaskError: If the task has no expert, a policy cannot be imported or called, a number makes
+            no sense, or a seed is there twice.
+        RecordingError: If the folder cannot be written or holds a recording of something else, or
+            a policy's file cannot be read; the finished episodes are kept.
         WorkerError: If workers cannot be started, die again and again, or end before all is
             played; they are kept, too.
         KeyboardInterrupt: If interrupted; they are kept, too.
     """
     executor = choose_executor(workers, executor, episode_timeout)
-    cls, expert = tasks.get_task_class(task_id), find_expert(task_id)
-    seeds = checked_seeds(seeds)
+    cls, seeds = tasks.get_task_class(task_id), checked_seeds(seeds)
+    checked_whole("num_envs", num_envs, 1, None, TaskError)
+    cast, actors = Actors.cast(cls, policy, takeover, corrector)
     cell: dict[str, Any] = {"layout": layout, "robots": robots, "bystanders": bystanders}
-    scenario = make_scenario(cls, control_mode=control_mode, **cell)
-    description = f"{getattr(expert, '__module__', '')}:{getattr(expert, '__qualname__', expert)}"
+    if randomization is not None:
+        cell["randomization"] = randomization
+    scenario = make_scenario(cls, control_mode=control_mode, obs_mode=obs_mode, **cell)
     env = cls(scenario)
     summary = Summary()
-    with Recorder(folder / FILE, env, resume=True, source_desc=description) as recorder:
+    with Recorder(folder / FILE, env, resume=True, **actors.header) as recorder:
         env.close()
         summary.damaged, there = recorder.damaged, recorder.seeds
         missing = [seed for seed in seeds if seed not in there]
         summary.already, summary.recorded = len(seeds) - len(missing), len(there)
         on_event(summary, None)
-        job = EpisodeJob(cls, scenario, expert, recorder.writer)
+        together = grouped(missing, num_envs)
+        at_once = replace(scenario, num_envs=max(map(len, together.values()), default=1))
+        job = EpisodeJob(cls, at_once, cast, actors, recorder.writer, together)
         try:
-            with closing(play_all(executor, job, missing)) as events:
+            with closing(play_all(executor, job, list(together))) as events:
                 for event in events:
-                    _note(summary, event, recorder.writer)
-                    on_event(summary, event)
+                    for single in _one_by_one(event, together):
+                        _note(summary, single, recorder.writer)
+                        on_event(summary, single)
         finally:  # an interrupt may come between writing and counting
             summary.recorded = len(recorder)
     return summary
@@ -189,6 +257,18 @@ def where_died(event: Event) -> str:
     return f"{event.died} " + (
         "before it could play anything" if event.seed is None else f"at seed {event.seed}"
     )
+
+
+def _one_by_one(event: Event, together: Mapping[int, Sequence[int]]) -> list[Event]:
+    """Return an event for each episode if it is of episodes that were played at once."""
+    if event.error is not None and event.seed is not None:
+        return [replace(event, seed=seed) for seed in together[event.seed]]
+    return [
+        replace(single, result=None, error=WorkerError(single.result))
+        if isinstance(single.result, str)
+        else single
+        for single in one_by_one(event)
+    ]
 
 
 def _note(summary: Summary, event: Event, writer: PartWriter) -> None:

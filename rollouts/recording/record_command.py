@@ -1,4 +1,4 @@
-"""``python -m rollouts record``: an expert's episodes become a data set."""
+"""``python -m rollouts record``: episodes of an expert or a policy become a data set."""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ if TYPE_CHECKING:
     from rollouts.progress import LiveLine
     from rollouts.recording.record import Summary
 
-DESCRIPTION = "let an expert play episodes in worker processes, and record them"
+DESCRIPTION = "let an expert or a policy play episodes in worker processes, and record them"
 EPILOG = (
     "The same command goes on where it was stopped or killed. Exit code: 0 if every episode was"
-    " recorded, 1 if not, 2 for bad usage, 130 if interrupted."
+    " recorded, 1 if not, 2 for bad usage, 130 if interrupted. A policy maps an observation to an"
+    " action; see rollouts.record. Episodes of other seeds may come from others: each says who"
+    " acted."
 )
 
 
@@ -33,6 +35,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     workers.add_arguments(parser)
     add("--seed", type=zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
     add("--out", type=Path, required=True, metavar="DIR", help="folder of trajectory.h5 and .json")
+    add(
+        "--policy",
+        default="expert",
+        metavar="MODULE:NAME",
+        help="a policy that can be imported, asked at every step; by default the task's expert",
+    )
+    add(
+        "--takeover",
+        metavar="MODULE:NAME",
+        help="acts in the policy's place at the steps for which it returns an action, not None",
+    )
+    add(
+        "--corrector",
+        metavar="MODULE:NAME",
+        help="says at every step what it would do, which is recorded beside what is done",
+    )
+    add(
+        "--obs-mode",
+        default="state",
+        metavar="MODE",
+        help="what they observe: state, state_dict, rgb and others (%(default)s)",
+    )
+    add(
+        "--num-envs",
+        type=one_or_more,
+        default=1,
+        metavar="N",
+        help="episodes that each process plays at once (%(default)s)",
+    )
     add_cell_options(parser)
     workers.add_control_mode(parser)
 
@@ -58,6 +89,11 @@ def run(options: argparse.Namespace) -> int:
                 options.out,
                 executor,
                 control_mode=options.control_mode,
+                policy=options.policy,
+                takeover=options.takeover,
+                corrector=options.corrector,
+                obs_mode=options.obs_mode,
+                num_envs=options.num_envs,
                 **chosen_cell(options),
                 on_event=status.show,
             )

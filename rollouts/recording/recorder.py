@@ -30,6 +30,7 @@ from rollouts.recording.episode_files import (
     seed_of,
 )
 from rollouts.recording.trajectory_writer import join, read_joined
+from rollouts.sources.header import Source, combined, source_of
 from tasks import MultiRobotTask
 from tasks.episode import PlayedEpisode
 from tasks.native.format import observation_keys
@@ -100,6 +101,8 @@ class Recorder:
         self.parts = self.path.with_suffix(".parts")
         self.damaged: list[str] = []
         self._header = _header(task, source, source_desc)
+        self._sources: set[Source] = set()  # of the episodes that are there already
+        self._left: set[int] = set()  # seeds of those that are not joined yet
         with disk_errors(self.path):
             self.path.parent.mkdir(parents=True, exist_ok=True)
             if os.path.lexists(self.parts) and not self.parts.is_dir():
@@ -208,6 +211,8 @@ class Recorder:
             return {}
         joined = read_joined(self.path)
         self._expect_same(self.path, joined.header)
+        if joined.episodes:
+            self._sources.add(source_of(joined.header))
         self.damaged += [f"{name} of {self.path}" for name in joined.damaged]
         entries = {
             about["episode_seed"]: _Entry(name, about) for name, about in joined.episodes.items()
@@ -225,6 +230,9 @@ class Recorder:
         self._expect_same(part, header)
         if seed_of(part) in joined:
             part.unlink()
+        else:
+            self._sources.add(source_of(header))
+            self._left.add(seed_of(part))
 
     def _expect_same(self, path: Path, header: Mapping[str, Any]) -> None:
         found = differences(_compared(header), _compared(self._header))
@@ -236,18 +244,21 @@ class Recorder:
 
     def _join(self) -> None:
         parts = {seed_of(part): part for part in list_parts(self.parts)}
+        if not self._sources or parts.keys() - self._left:
+            self._sources.add(source_of(self._header))
+        header = {**self._header, **combined(self._sources)}
         numbered = [entry.group for entry in self._joined.values()]
         in_order = numbered == [f"traj_{number}" for number in range(len(numbered))]
         if parts or self.damaged or not in_order or not self.path.exists():
             places = {**{seed: entry.group for seed, entry in self._joined.items()}, **parts}
             seeds = sorted(places)
-            joined = join(self.path, self._header, [places[seed] for seed in seeds])
+            joined = join(self.path, header, [places[seed] for seed in seeds])
             self._joined = {
                 seed: _Entry(*entry) for seed, entry in zip(seeds, joined.items(), strict=True)
             }
         abouts = enumerate(entry.about for entry in self._joined.values())
         episodes = [{"episode_id": number, **about} for number, about in abouts]
-        text = json.dumps({**self._header, "episodes": episodes}, indent=1) + "\n"
+        text = json.dumps({**header, "episodes": episodes}, indent=1) + "\n"
         if not self._json_says(text):
             write_whole(self.json_path, text, RecordingError, parents=False)
         for part in parts.values():

@@ -23,7 +23,9 @@ from simulation.sapien3.contacts import (
 from simulation.sapien3.inverse_kinematics import InverseKinematics
 from simulation.sapien3.point_reach import PointReach
 from simulation.sapien3.pose_follower import JOINTS_OF_A_POSE, NearestFollower, PoseFollower
+from simulation.sapien3.varied import vary
 from simulation.sapien3.world import BuiltWorld, build_world
+from simulation.variation import Variation
 from simulation.world import Placements, World
 
 _STILL = np.zeros(3, np.float32)
@@ -77,6 +79,11 @@ class SapienBackend:
         for i in env_ids:
             self.worlds[i].clear()
 
+    def vary(self, variations: Mapping[int, Variation]) -> None:
+        """Let worlds differ from what was built; see `Backend`."""
+        for i, variation in variations.items():
+            vary(self.worlds[i], variation)
+
     def place(self, placements: Placements) -> None:
         """Stand robots and move bodies; see `Backend`."""
         for name, rows in placements.robots.items():
@@ -84,7 +91,7 @@ class SapienBackend:
                 self.worlds[i].robots[name].reset(qpos)
         for name, rows in placements.bodies.items():
             for i, pose in rows.items():
-                self.worlds[i].set_pose(name, pose)
+                self.worlds[i].place(name, pose)
 
     def drive(self, targets: Floats, env_ids: Sequence[int]) -> None:
         """Set drive targets; see `Backend`."""

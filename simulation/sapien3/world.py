@@ -10,6 +10,7 @@ import sapien.physx as physx
 
 from layouts import Layout
 from robots import SimulationError
+from simulation.parts import Part
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
 from simulation.sapien3.blueprint import Blueprint, read_blueprint
 from simulation.sapien3.collision import add_collision
@@ -49,6 +50,7 @@ class BuiltWorld:
         articulations: The robots' articulations, in layout order.
         bodies: Body by name.
         studio: Its cameras and lights, once a picture was taken.
+        built: What varied parts were built with; see `simulation.sapien3.varied`.
     """
 
     def __init__(
@@ -92,6 +94,7 @@ class BuiltWorld:
             self.robots[name] = SimulatedRobot(self.scene, name, placement, blueprint, number)
         self.articulations = [robot.articulation for robot in self.robots.values()]
         self.bodies: dict[str, BuiltBody] = {}
+        self.built: dict[tuple[Part, str], Any] = {}
         self.studio: Any = None  # as long as this world lives, also in a fork
 
     def add(self, body: Body) -> BuiltBody:
@@ -110,6 +113,8 @@ class BuiltWorld:
             if body.kind == "static"
             else physx.PhysxRigidDynamicComponent
         )
+        if body.scale != 1.0:
+            pose = _on_its_place(body, component, pose)
         built = self.bodies[body.name] = BuiltBody(body, entity, component, pose)
         return built
 
@@ -154,6 +159,14 @@ class BuiltWorld:
         """Move a body to a position (m) and quaternion (wxyz), (7,)."""
         self.bodies[name].entity.set_pose(sapien.Pose(row[:3], row[3:]))
 
+    def place(self, name: str, row: list[float]) -> None:
+        """Move a body to where the task wants it; see `simulation.world.Body.scale`."""
+        self.set_pose(name, row)
+        body = self.bodies[name]
+        if body.declared.scale != 1.0:
+            pose = sapien.Pose(row[:3], row[3:])
+            body.entity.set_pose(_on_its_place(body.declared, body.component, pose))
+
 
 def build_world(world: World, blueprints: dict[str, Blueprint]) -> BuiltWorld:
     """Build what a task declared; see `BuiltWorld` for the arguments and errors."""
@@ -162,6 +175,15 @@ def build_world(world: World, blueprints: dict[str, Blueprint]) -> BuiltWorld:
         built.add(body)
     built.settle()
     return built
+
+
+def _on_its_place(body: Body, component: Any, pose: sapien.Pose) -> sapien.Pose:
+    """Return a pose at which a body that stands at ``pose`` has its lowest point as declared."""
+    if not component.collision_shapes:
+        return pose
+    lowest = float(component.compute_global_aabb_tight()[0][2])
+    x, y, z = (float(value) for value in pose.p)
+    return sapien.Pose([x, y, z + (z - lowest) * (body.scale - 1) / body.scale], pose.q)
 
 
 def _draw(entity: sapien.Entity, shapes: tuple[Shape, ...]) -> None:

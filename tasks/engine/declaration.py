@@ -14,6 +14,7 @@ from simulation.maths import Array, Floats
 from tasks.language.bodies import Declared, Table, WideTable, declared_bodies
 from tasks.language.needs import Needs
 from tasks.language.randomness import EpisodeRandom
+from tasks.varying.randomization import Randomization
 
 Info = dict[str, Any]
 
@@ -42,6 +43,7 @@ class Declaration:
         needs: What places need of their robots, by place, ``"*"`` for all others; see
             `tasks.Needs`.
         physics: Solver settings; None keeps SAPIEN's own defaults.
+        randomization: What varies from episode to episode; None for nothing.
         max_episode_steps: Control steps until an episode is truncated.
         reward_modes: Reward modes, the default first.
         max_reward: What ``normalized_dense`` divides the dense reward by.
@@ -62,6 +64,7 @@ class Declaration:
     robot_counts: ClassVar[range | None] = None
     needs: ClassVar[Mapping[str, Needs]] = {}
     physics: ClassVar[PhysicsSettings | None] = None
+    randomization: ClassVar[Randomization | None] = None
     max_episode_steps: int
     reward_modes: ClassVar[tuple[str, ...]] = ()
     max_reward: ClassVar[float] = 1.0

@@ -16,6 +16,7 @@ from robots.common.bounds import checked_flag, checked_number, checked_numbers, 
 from simulation import Camera, PhysicsSettings
 from tasks.engine.declaration import DENSE_MODES, Declaration
 from tasks.language.bodies import Body, Table, WideTable
+from tasks.varying.randomization import Randomization
 
 HOOKS = {
     "design": ("rng",),
@@ -145,6 +146,11 @@ def _check_numbers(cls: type[Declaration]) -> None:
     if not (cls.physics is None or isinstance(cls.physics, PhysicsSettings)):
         raise TaskError(
             f"{task}.physics is {shown(cls.physics)}; tasks.PhysicsSettings or None is needed"
+        )
+    if not (cls.randomization is None or isinstance(cls.randomization, Randomization)):
+        raise TaskError(
+            f"{task}.randomization is {shown(cls.randomization)}; a tasks.Randomization or None is"
+            " needed"
         )
     sensed = cls.sensed
     if not isinstance(sensed, tuple) or not all(isinstance(x, str) for x in sensed):

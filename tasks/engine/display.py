@@ -44,6 +44,11 @@ def task_rows(task: Task) -> dict[str, str]:
         "control": str(task.control_mode),
         "observation": observed,
         "reward": task.reward_mode,
+        **(
+            {"varies": ", ".join(varied.declared)}
+            if (varied := task.scenario.randomization)
+            else {}
+        ),
     }
 
 

@@ -8,6 +8,7 @@ from typing import TypedDict
 from layouts import Layout
 from layouts.placement import RobotLike
 from simulation import Camera, PhysicsSettings
+from tasks.varying.randomization import Randomization
 
 
 class ScenarioFields(TypedDict, total=False):
@@ -23,6 +24,7 @@ class ScenarioFields(TypedDict, total=False):
     simulator: str
     check_layout: bool
     bystanders: str | None
+    randomization: Randomization | None
 
 
 class MakingFields(ScenarioFields, total=False):

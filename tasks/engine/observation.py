@@ -20,6 +20,7 @@ from tasks.engine.columns import COLUMN_MODES, FILMED, ColumnObserver, Viewpoint
 from tasks.engine.finite import NotFinite
 from tasks.native import controllers
 from tasks.native.format import native_joints, observation_keys
+from tasks.varying.noise import Noisy
 
 if TYPE_CHECKING:
     from simulation.rendering.pictures import Observers, View
@@ -147,13 +148,20 @@ class Observer:
         self._rig: _CameraRig | None = None
         self._columns = ColumnObserver(layout, mode.columns, viewpoint) if mode.columns else None
 
-    def observe(self, simulation: Simulation, state: State, parts: Mapping[str, Array]) -> Any:
+    def observe(
+        self,
+        simulation: Simulation,
+        state: State,
+        parts: Mapping[str, Array],
+        noisy: Noisy | None = None,
+    ) -> Any:
         """Return an observation of all environments.
 
         Args:
             simulation: The worlds.
             state: What they look like now.
             parts: What the task observes of them; see `tasks.MultiRobotTask.observe`.
+            noisy: What adds noise to named parts; None adds none.
 
         Raises:
             TaskError: If something that robots sense is not observed at all.
@@ -165,12 +173,14 @@ class Observer:
             return self._columns.observe(simulation, state)
         if not self.mode.privileged:
             parts = self._sensible(parts)
+        if noisy is not None:
+            parts = {name: noisy(name, values) for name, values in parts.items()}
         if not self.mode.textures:
-            return self._state(simulation, state, parts)
+            return self._state(simulation, state, parts, noisy)
         if self._rig is None:
             self._rig = _CameraRig(simulation, self.cameras, self.mode.textures)
         images = self._rig.look()
-        seen = self._state(simulation, state, parts)
+        seen = self._state(simulation, state, parts, noisy)
         return {**images, "state": seen} if self.mode.flat else {**seen, **images}
 
     def senses(self, part: str) -> bool:
@@ -196,6 +206,19 @@ class Observer:
         if self._columns:
             self._columns.close()
 
+    def names(self, parts: Mapping[str, Array]) -> list[str]:
+        """Return the names of all that noise may be added to.
+
+        Raises:
+            TaskError: If the columns of datasets are observed, which have none.
+        """
+        if self.mode.columns:
+            raise TaskError(
+                f"sensor_noise is not added to obs_mode {self.mode.columns!r}; it is to"
+                f" {', '.join(STATE_FORMS)} and what is observed beside images"
+            )
+        return [*(f"{robot}.{joints}" for robot in self._robots for joints in JOINTS), *parts]
+
     def slices(
         self, simulation: Simulation, state: State, parts: Mapping[str, Array]
     ) -> dict[str, slice]:
@@ -219,7 +242,13 @@ class Observer:
 
     # -- inside ------------------------------------------------------------------------------
 
-    def _state(self, simulation: Simulation, state: State, parts: Mapping[str, Array]) -> Any:
+    def _state(
+        self,
+        simulation: Simulation,
+        state: State,
+        parts: Mapping[str, Array],
+        noisy: Noisy | None,
+    ) -> Any:
         index = simulation.index
         robots = [
             [
@@ -228,6 +257,11 @@ class Observer:
             ]
             for name in self._robots
         ]
+        if noisy is not None:
+            robots = [
+                [noisy(f"{name}.{joints}", row) for joints, row in zip(JOINTS, own, strict=True)]
+                for name, own in zip(self._robots, robots, strict=True)
+            ]
         kept = controllers.entries(simulation)
         if kept:
             for entry, row in zip(kept, controllers.recall(simulation, kept), strict=True):

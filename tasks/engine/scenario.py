@@ -17,6 +17,7 @@ from simulation.physics import substeps
 from tasks.engine.bystanders import BYSTANDERS
 from tasks.engine.display import scenario_html, scenario_text
 from tasks.engine.observation import read_mode
+from tasks.varying.randomization import Randomization
 
 SIMULATORS = ("sapien3",)
 RENDER_MODES = (None, "rgb_array")
@@ -53,6 +54,8 @@ class Scenario:
         bystanders: What the layout's robots do that have no place in the task: ``"hold"`` still and
             take no action number, or ``"act"``, with action numbers of their own. None refuses
             them.
+        randomization: What varies from episode to episode; None for nothing. See
+            `tasks.Randomization`.
         check_layout: Whether to refuse a layout whose robots collide; the task's own layout is
             never checked.
     """
@@ -70,6 +73,7 @@ class Scenario:
     cameras: Sequence[Camera] = field(default_factory=list[Camera])
     simulator: str = "sapien3"
     bystanders: str | None = None
+    randomization: Randomization | None = None
     check_layout: bool = True
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -108,6 +112,11 @@ class Scenario:
         if not (self.physics is None or isinstance(self.physics, PhysicsSettings)):
             raise TaskError(
                 f"physics is a {type(self.physics).__name__}; PhysicsSettings or None is needed"
+            )
+        if not (self.randomization is None or isinstance(self.randomization, Randomization)):
+            raise TaskError(
+                f"randomization is {shown(self.randomization)}; a tasks.Randomization or None is"
+                " needed"
             )
         for name, choices in (
             ("simulator", SIMULATORS),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -36,8 +36,10 @@ from tasks.engine.remade import Remade
 from tasks.engine.returned import ReturnedArrays, ReturnedReward, expect_nothing, unchanged
 from tasks.engine.scenario import Scenario
 from tasks.engine.speeds import SpeedWatch
+from tasks.engine.varied import Varied
 from tasks.language.randomness import EpisodeRandom
 from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict
+from tasks.varying.varying import Varying
 
 
 class _FreshScenario:
@@ -45,10 +47,12 @@ class _FreshScenario:
 
     def __get__(self, instance: object, owner: type[MultiRobotTask]) -> Scenario:
         """Return it; a task that was made has its own as an attribute."""
-        return Scenario(layout=owner.layout, physics=owner.physics)
+        return Scenario(
+            layout=owner.layout, physics=owner.physics, randomization=owner.randomization
+        )
 
 
-class MultiRobotTask(Declaration, Remade):
+class MultiRobotTask(Declaration, Varied, Remade):
     """A task that can be stepped: what users subclass, and what `tasks.make` returns.
 
     What a subclass sets and defines stands in `tasks.engine.declaration.Declaration`; what follows
@@ -118,6 +122,7 @@ class MultiRobotTask(Declaration, Remade):
         self.moving = self._everywhere
         self.memory = Memory()
         self._expect_returns(own.__name__)
+        self._varying: Varying | None = None
         self._simulation: Simulation | None = Simulation(
             self.layout,
             self._build_world,
@@ -127,6 +132,11 @@ class MultiRobotTask(Declaration, Remade):
             visuals=scenario.draws,
         )
         self._speeds = SpeedWatch(self._simulation)
+        if scenario.randomization:
+            self._varying = Varying(scenario.randomization, self._simulation)
+            self._draw(self._everywhere)
+            if self._varying.rebuilds:
+                self._simulation.rebuild(self._everywhere, self._build_again)
         self._camera: Any = None
         self._responds = type(self).respond is not Declaration.respond
         self.start = self._begin(list(range(self.num_envs)), reconfigured=True)
@@ -209,11 +219,17 @@ class MultiRobotTask(Declaration, Remade):
         for i, own_seed in zip(ids, seeds, strict=True):
             if own_seed is not None:
                 self._rngs[i].restart(own_seed)
-            elif reconfigure:
+                continue
+            self._rngs[i].resets += 1
+            if reconfigure:
                 self._rngs[i].reseed_for_rebuild()
+        self._draw(ids)
+        again = self._varying is not None and self._varying.rebuilds
         if reconfigure:
             self.simulation.rebuild(ids, self._build_world)
-        return self._begin(ids, reconfigured=reconfigure)
+        elif again:
+            self.simulation.rebuild(ids, self._build_again)
+        return self._begin(ids, reconfigured=reconfigure or again)
 
     def step(
         self, action: Any, env_ids: Sequence[int] | None = None
@@ -249,14 +265,17 @@ class MultiRobotTask(Declaration, Remade):
     ) -> tuple[Any, Floats, NDArray[np.bool_], NDArray[np.bool_], Info]:
         """Do what `step` does, and return NumPy arrays where it returns tensors."""
         flat = self._reader.read(action)
-        if env_ids is None:
-            self.moving = self._everywhere
-            self.simulation.step(flat, self._state.joint_positions)
+        ids = None if env_ids is None else checked_ids(env_ids, self.num_envs)
+        self.moving = self._everywhere if ids is None else ids
+        if self._varying is None:
+            self.simulation.step(flat, self._state.joint_positions, ids)
+        else:
+            before = self._state.joint_positions
+            self._varying.step(self.simulation, flat, before, self.moving, self._elapsed)
+        if ids is None:
             self._elapsed += 1
         else:
-            self.moving = checked_ids(env_ids, self.num_envs)
-            self.simulation.step(flat, self._state.joint_positions, self.moving)
-            self._elapsed[self.moving] += 1
+            self._elapsed[ids] += 1
         state = self._read()
         self._speeds.look(state, self.moving, self._elapsed)
         if self._responds:
@@ -265,7 +284,7 @@ class MultiRobotTask(Declaration, Remade):
             state = self._read()
         info = self._info(state)
         self.observer.changed(self.moving)
-        obs = self._observation(state, info)
+        obs = self._observation(state, info, self.moving)
         reward = self._reward(state, flat, info)
         truncated = self._elapsed >= self.max_episode_steps
         return obs, reward, info["success"].copy(), truncated, info
@@ -338,11 +357,28 @@ class MultiRobotTask(Declaration, Remade):
     def _build_world(self, world: World, index: int) -> None:
         rng = self._rngs[index]
         world.design = self.design(rng)
+        if self._varying is not None:
+            self._varying.describe(world, index)
         expect_nothing(self, "build", self.build(world))
         rng.restart_numpy()
 
+    def _build_again(self, world: World, index: int) -> None:
+        """Build the same world with what varies, which leaves the task's draws as they are."""
+        assert self._varying is not None
+        world.design = self.simulation.worlds[index].design
+        self._varying.describe(world, index)
+        expect_nothing(self, "build", self.build(world))
+
+    def _draw(self, ids: Iterable[int]) -> None:
+        """Draw what varies in the coming episodes."""
+        if self._varying is not None:
+            for i in ids:
+                self._varying.begin(i, self._rngs[i].stream)
+
     def _begin(self, ids: list[int], *, reconfigured: bool) -> tuple[Any, Info]:
         self.simulation.clear(ids)
+        if self._varying is not None:
+            self._varying.apply(self.simulation, ids)
         for i in ids:  # all that is placed here reaches the simulator in one go
             world = self.simulation.worlds[i]
             expect_nothing(self, "reset_robots", self.reset_robots(world, self._rngs[i]))
@@ -353,12 +389,16 @@ class MultiRobotTask(Declaration, Remade):
         self._speeds.begin(ids)
         state = self._read()
         self.simulation.hold(state)
+        if self._varying is not None:
+            self._varying.rest(self.simulation, state, ids)
         self.memory.renew(self._remembered.checked(self.remember(state)), ids)
         expect_nothing(self, "begin_episodes", self.begin_episodes(state, ids))
         info = self._info(state)
         check_info(type(self).__name__, info)
         self.observer.changed(ids)
-        obs = self._observation(state, info)
+        obs = self._observation(state, info, ids)
+        if self._varying is not None:
+            info |= self._varying.info()
         return _tensors(obs), {**_tensors(info), "reconfigure": reconfigured}
 
     def _describe_observation(self) -> None:
@@ -386,13 +426,18 @@ class MultiRobotTask(Declaration, Remade):
         judged = self._judged.checked(self.evaluate(state))
         return {ELAPSED: self._elapsed.copy(), **judged}
 
-    def _observation(self, state: State, info: Info) -> Any:
+    def _observation(self, state: State, info: Info, ids: Sequence[int]) -> Any:
+        """Return what is observed of all environments, of which those in ``ids`` have moved."""
         mode = self.observer.mode
         if mode.nothing:
             return {}
         parts = {} if mode.columns else self._observed.checked(self.observe(state, info))
+        varying = self._varying
         try:
-            return self.observer.observe(self.simulation, state, parts)
+            if varying is None:
+                return self.observer.observe(self.simulation, state, parts)
+            noisy = varying.sensors(lambda: self.observer.names(parts), self._elapsed)
+            return varying.seen(self.observer.observe(self.simulation, state, parts, noisy), ids)
         except NotFinite:
             refuse_observation(state, parts, self, self._speeds, self._elapsed)
 

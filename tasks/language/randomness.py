@@ -12,6 +12,7 @@ from torch import Tensor
 
 from layouts import Layout
 from robots import TaskError
+from tasks.varying.streams import Stream
 
 
 class FirstSeeds:
@@ -54,11 +55,13 @@ class EpisodeRandom:
 
     Attributes:
         seed: What both streams last began with.
+        resets: How many resets without a seed came since then.
         numpy: Stream for joint noise.
         torch: Stream for objects and goals.
     """
 
     seed: int
+    resets: int
     numpy: np.random.RandomState
     torch: torch.Generator
 
@@ -68,10 +71,16 @@ class EpisodeRandom:
         self._seeds = np.random.RandomState(0)
         self.restart(seed)
 
+    @property
+    def stream(self) -> Stream:
+        """Where the numbers of the present episode come from that are not the task's own."""
+        return Stream(self.seed, self.resets)
+
     def restart(self, seed: int) -> None:
         """Start both streams anew, as an explicit seed does."""
         self._seeds.seed(seed)  # a new stream costs fifty times as much
         self.seed = self._numpy_seed = seed
+        self.resets = 0
         self.restart_numpy()
         self.torch.manual_seed(seed)
 

@@ -30,3 +30,37 @@ class Wanders:
 
 def fails(obs):
     return {}["no such key"]
+
+
+@dataclass
+class Leans:
+    """Depends on nothing but each observation, for one or for many at once."""
+
+    batched: bool = False
+
+    def __call__(self, obs):
+        return torch.tanh(obs[:, :ACTIONS] * 3)
+
+
+LEANS = Leans()
+
+
+def meddles(obs):
+    """Takes over at about every other step."""
+    return np.full(ACTIONS, 0.25, np.float32) if random.random() < 0.5 else None
+
+
+def quiet(obs):
+    """Could take over, and does not, whatever it draws."""
+    random.random()
+    assert len(obs) == 1
+
+
+def fails_at_times(obs):
+    if random.random() < 0.004:
+        raise ValueError("not this one")
+    return still(obs)
+
+
+def too_few(count, obs):
+    return None if count is None else np.zeros((count, ACTIONS), np.float32)

@@ -32,7 +32,7 @@ from tests.rollouts.plays import (
     cannot_prepare,
     dies_before_it_is_ready,
 )
-from tests.rollouts.policies import Wanders
+from tests.rollouts.policies import LEANS, Wanders, meddles
 from tests.rollouts.test_executor import squares
 from tests.rollouts.test_record import arguments, recorded_directly, start, wait_for_parts
 from tests.rollouts.test_recorder import same_files
@@ -176,6 +176,14 @@ def test_a_recording_on_a_cluster_is_stopped_and_goes_on(nodes, tmp_path):
 def test_a_policy_does_as_well_there_as_here(nodes):
     there = evaluate(Wanders(), TASK, range(6), executor=RayExecutor(nodes.address))
     assert there.scores == evaluate(Wanders(), TASK, range(6), executor=Here()).scores
+
+
+@pytest.mark.long
+def test_a_policy_and_who_helps_it_are_recorded_there_as_here(nodes, tmp_path):
+    given = {"policy": Wanders(), "takeover": meddles, "corrector": LEANS, "num_envs": 2}
+    record(TASK, range(5), tmp_path / "there", RayExecutor(nodes.address), **given)
+    record(TASK, range(5), tmp_path / "here", workers=0, **given)
+    assert same_files(tmp_path / "there" / FILE, tmp_path / "here" / FILE)
 
 
 @pytest.mark.long

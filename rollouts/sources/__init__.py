@@ -1,0 +1,1 @@
+"""Where recorded actions come from: experts, policies, people, and several of them in turn."""

@@ -1,0 +1,59 @@
+"""Policies by name: ``module:name``, imported from a module of the user's own."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from robots import TaskError, closest_match
+from robots.common.catalogue import reason
+
+EXPERT = "expert"
+
+
+def find_policy(name: str, what: str = "policy") -> Any:
+    """Return what ``MODULE:NAME`` names, or the word ``"expert"`` as it is.
+
+    Args:
+        name: The name.
+        what: What is looked for, in a word that an error uses.
+
+    Raises:
+        TaskError: If it cannot be imported.
+    """
+    if name == EXPERT and what == "policy":
+        return name
+    module, _, attribute = name.partition(":")
+    if not module or not attribute:
+        word = f", or the word {EXPERT!r}" if what == "policy" else ""
+        raise TaskError(f"{what} is {name!r}; it must be MODULE:NAME, something callable{word}")
+    try:
+        found: Any = import_module(module)
+    except (Exception, SystemExit) as error:  # whatever the user's own code does
+        raise TaskError(f"no {what} {name!r}: {reason(error)}") from error
+    for part in attribute.split("."):
+        if not hasattr(found, part):
+            match = closest_match(part, dir(found))
+            hint = f". Did you mean {match!r}?" if match else ""
+            raise TaskError(
+                f"no {what} {name!r}: module {module!r} has no attribute {attribute!r}{hint}"
+            )
+        found = getattr(found, part)
+    return check_policy(found, what)
+
+
+def check_policy(policy: Any, what: str = "policy") -> Any:
+    """Return what gives actions, or refuse what cannot.
+
+    Raises:
+        TaskError: If it is not callable, or a class.
+    """
+    if isinstance(policy, type):
+        raise TaskError(
+            f"{what} is the class {policy.__qualname__}; give an instance of it, such as"
+            f" {policy.__qualname__}()"
+        )
+    if not callable(policy):
+        word = f", or the word {EXPERT!r}" if what == "policy" else ""
+        raise TaskError(f"{what} is {policy!r}; it must be callable, obs → action{word}")
+    return policy

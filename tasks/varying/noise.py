@@ -1,0 +1,96 @@
+"""Noise of sensors and actions: a function of the episode, the step and what it is added to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from robots import UnknownNameError
+from simulation.maths import Array, Floats
+from tasks.varying.distributions import Distribution
+from tasks.varying.streams import Stream
+from tasks.varying.targets import Target, matching
+
+Noisy = Callable[[str, Array], Array]
+"""Returns a named part of an observation, (N, k) or (N,), with its noise."""
+
+
+def noise(
+    streams: Sequence[Stream],
+    steps: Sequence[int],
+    drawn: Distribution,
+    width: int,
+    *names: str,
+) -> Floats:
+    """Return noise for N environments, (N, width) float32.
+
+    Args:
+        streams: Where the numbers of each environment's episode come from.
+        steps: How many control steps each has taken.
+        drawn: What each number is drawn from.
+        width: How many numbers each gets.
+        names: What they are for.
+    """
+    rows = [
+        [drawn.value(u) for u in stream.numbers(width, *names, step)]
+        for stream, step in zip(streams, steps, strict=True)
+    ]
+    return np.array(rows, np.float32).reshape(len(streams), width)
+
+
+class ActionNoise:
+    """What is added to the numbers of actions."""
+
+    def __init__(self, targets: Mapping[str, Target]) -> None:
+        """Take what is drawn for which numbers, by name; of the same number the last one counts."""
+        owners = {number: name for name, target in targets.items() for number in target.means}
+        self._parts = {
+            name: ([n for n in target.means if owners[n] == name], target)
+            for name, target in targets.items()
+        }
+
+    def added(self, actions: Floats, streams: Sequence[Stream], steps: Sequence[int]) -> Floats:
+        """Return actions, (N, A), with their noise."""
+        noisy = actions.copy()
+        for name, (numbers, target) in self._parts.items():
+            own = [target.means.index(number) for number in numbers]
+            drawn = noise(streams, steps, target.takes, len(target.means), "action_noise", name)
+            noisy[:, numbers] += drawn[:, own]
+        return noisy
+
+
+class SensorNoise:
+    """What is added to the named parts of observations."""
+
+    def __init__(self, declared: Mapping[str, Distribution]) -> None:
+        """Take what is drawn, by patterns of names."""
+        self._declared = declared
+        self._known = False
+
+    def expect(self, parts: Sequence[str]) -> None:
+        """Refuse patterns that no part of the observation matches.
+
+        Raises:
+            UnknownNameError: If there is one.
+        """
+        if self._known:
+            return
+        for pattern in self._declared:
+            if not any(matching(pattern, [part]) for part in parts):
+                raise UnknownNameError("part of the observation for sensor_noise", pattern, parts)
+        self._known = True
+
+    def on(self, streams: Sequence[Stream], steps: Sequence[int]) -> Noisy:
+        """Return what adds the noise of a moment; see `noise`."""
+
+        def noisy(name: str, values: Array) -> Array:
+            patterns = [p for p in self._declared if matching(p, [name])]
+            if not patterns:
+                return values
+            drawn, rows = self._declared[patterns[-1]], np.asarray(values)
+            width = 1 if rows.ndim == 1 else rows.shape[1]
+            added = noise(streams, steps, drawn, width, "sensor_noise", name)
+            return rows + added.reshape(rows.shape)
+
+        return noisy

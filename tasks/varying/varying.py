@@ -1,0 +1,226 @@
+"""Draws what varies in a task's worlds, and lets them differ by it."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from layouts import Layout
+from robots.descriptor import Vector3
+from simulation import Simulation, State, World
+from simulation.maths import Floats
+from simulation.variation import Variation
+from tasks.varying import targets as find
+from tasks.varying.axes import AXES, Group
+from tasks.varying.bases import shifted
+from tasks.varying.delays import ActionDelay, ObservationDelay
+from tasks.varying.noise import ActionNoise, Noisy, SensorNoise
+from tasks.varying.randomization import Randomization
+from tasks.varying.streams import Stream
+
+DRAWN = "drawn"  # what the names of what was drawn begin with in ``info``
+
+_OFFERED = {  # what there is to vary, by name
+    "mass": find.heavy_parts,
+    "friction": find.rough_parts,
+    "size": find.sized_bodies,
+    "stiffness": find.driven_joints,
+    "damping": find.driven_joints,
+    "joint_friction": find.driven_joints,
+    "bases": find.standing_robots,
+    "action_noise": find.action_numbers,
+}
+_AT_EVERY_STEP = ("action_noise", "sensor_noise")
+
+
+class Varying:
+    """What varies in N worlds, and what was last drawn for each of them.
+
+    Attributes:
+        rebuilds: Whether every reset builds worlds anew, since something varies that cannot be
+            changed in place.
+    """
+
+    def __init__(self, randomization: Randomization, simulation: Simulation) -> None:
+        """Look up what the names of a randomization mean.
+
+        Raises:
+            UnknownNameError: If one means nothing.
+        """
+        self._declared = declared = randomization.declared
+        self._layout = simulation.layout
+        self._targets = {
+            axis: find.targets(axis, declared[axis], offered(simulation))
+            for axis, offered in _OFFERED.items()
+            if axis in declared
+        }
+        self.rebuilds = any(AXES[axis].rebuilds for axis in declared)
+        count = simulation.num_envs
+        self._streams = [Stream(0)] * count
+        self._drawn: list[dict[str, Any]] = [{} for _ in range(count)]
+        self._noise = ActionNoise(self._targets.get("action_noise", {}))
+        self._sensors = SensorNoise(declared.get("sensor_noise", {}))
+        self._sending = ActionDelay(count) if "action_delay" in declared else None
+        self._seeing = ObservationDelay(count) if "observation_delay" in declared else None
+
+    # -- drawing -----------------------------------------------------------------------------
+
+    def begin(self, env: int, stream: Stream) -> None:
+        """Draw what varies in the coming episode of an environment."""
+        self._streams[env] = stream
+        drawn = self._drawn[env] = self._draw(stream)
+        if self._sending is not None:
+            self._sending.begin(env, drawn["action_delay"])
+        if self._seeing is not None:
+            self._seeing.begin(env, drawn["observation_delay"])
+
+    def drawn(self, env: int) -> dict[str, Any]:
+        """Return what was drawn for an environment, by axis and name, as plain data."""
+        return copy.deepcopy(self._drawn[env])
+
+    def info(self) -> dict[str, NDArray[np.float32]]:
+        """Return what was drawn for all environments, (N,) each: ``drawn/mass/cube``."""
+        rows = [dict(_leaves(DRAWN, drawn)) for drawn in self._drawn]
+        return {name: np.array([row[name] for row in rows], np.float32) for name in rows[0]}
+
+    def layout(self, env: int) -> Layout:
+        """Return the layout as robots stand in the present episode of an environment."""
+        return self._standing(self._drawn[env])
+
+    def scale(self, body: str) -> Floats:
+        """Return the factor on the size of a body in each environment, (N,)."""
+        scales = [self._scales(drawn).get(body, 1.0) for drawn in self._drawn]
+        return np.array(scales, np.float32)
+
+    # -- worlds ------------------------------------------------------------------------------
+
+    def describe(self, world: World, env: int) -> None:
+        """Say what cannot be changed in a world once it is built."""
+        drawn = self._drawn[env]
+        world.scales = self._scales(drawn)
+        if "gravity" in drawn:
+            gravity = _of_strength(world.physics.gravity, drawn["gravity"])
+            world.physics = replace(world.physics, gravity=gravity)
+
+    def apply(self, simulation: Simulation, env_ids: Sequence[int]) -> None:
+        """Let worlds differ by what was drawn; their reset has begun."""
+        simulation.vary({env: self._variation(self._drawn[env]) for env in env_ids})
+
+    # -- steps -------------------------------------------------------------------------------
+
+    def rest(self, simulation: Simulation, state: State, env_ids: Sequence[int]) -> None:
+        """End a reset: joints are held where they are until an action arrives."""
+        if self._sending is not None:
+            simulation.rest(state, env_ids)
+
+    def step(
+        self,
+        simulation: Simulation,
+        actions: Floats,
+        joint_positions: Floats,
+        env_ids: Sequence[int],
+        elapsed: NDArray[np.int32],
+    ) -> None:
+        """Advance worlds by one control step, by what arrives of their actions.
+
+        Args:
+            simulation: The worlds.
+            actions: What is asked of all environments, (N, A).
+            joint_positions: Before the step, (N, dof) (rad, m).
+            env_ids: Which move.
+            elapsed: Control steps that each has taken, (N,).
+        """
+        waiting: list[int] = []
+        if self._sending is not None:
+            actions, waiting = self._sending.arriving(actions, env_ids)
+        actions = self._noise.added(actions, self._streams, elapsed.tolist())
+        moving = [env for env in env_ids if env not in waiting]
+        if moving:
+            simulation.step(actions, joint_positions, moving)
+        if waiting:
+            simulation.coast(waiting)
+
+    def sensors(
+        self, parts: Callable[[], Sequence[str]], elapsed: NDArray[np.int32]
+    ) -> Noisy | None:
+        """Return what adds the noise of this moment to parts of observations; None if none is.
+
+        Args:
+            parts: Returns the names of all that is observed.
+            elapsed: Control steps that each environment has taken, (N,).
+
+        Raises:
+            UnknownNameError: If noise was declared for a part that there is not.
+            TaskError: If what is observed has no parts.
+        """
+        if "sensor_noise" not in self._declared:
+            return None
+        self._sensors.expect(parts())
+        return self._sensors.on(self._streams, elapsed.tolist())
+
+    def seen(self, observation: Any, env_ids: Sequence[int]) -> Any:
+        """Return observations as old as they are seen; see `ObservationDelay.seen`."""
+        return observation if self._seeing is None else self._seeing.seen(observation, env_ids)
+
+    # -- inside ------------------------------------------------------------------------------
+
+    def _draw(self, stream: Stream) -> dict[str, Any]:
+        drawn: dict[str, Any] = {}
+        for axis, declared in self._declared.items():
+            if axis in _AT_EVERY_STEP:
+                continue
+            if AXES[axis].named:
+                named = self._targets[axis].items()
+                drawn[axis] = {name: _value(t.takes, stream, axis, name) for name, t in named}
+            else:
+                drawn[axis] = _value(declared, stream, axis)
+        return drawn
+
+    def _variation(self, drawn: Mapping[str, Any]) -> Variation:
+        factors = {
+            axis: self._each(drawn, axis)
+            for axis in ("mass", "friction", "stiffness", "damping", "joint_friction")
+        }
+        standing = self._standing(drawn) if "bases" in drawn else {}
+        bases = {name: (p.base_position, p.base_quaternion) for name, p in standing.items()}
+        return Variation(**factors, bases=bases)
+
+    def _standing(self, drawn: Mapping[str, Any]) -> Layout:
+        return shifted(self._layout, drawn["bases"]) if "bases" in drawn else self._layout
+
+    def _scales(self, drawn: Mapping[str, Any]) -> dict[str, float]:
+        return self._each(drawn, "size")
+
+    def _each(self, drawn: Mapping[str, Any], axis: str) -> dict[Any, Any]:
+        """Return what was drawn for each single thing."""
+        values, named = drawn.get(axis, {}), self._targets.get(axis, {})
+        return {thing: values[name] for name, target in named.items() for thing in target.means}
+
+
+def _value(takes: Any, stream: Stream, *names: str) -> Any:
+    """Return what is drawn for a name: a number, or those of a group by field."""
+    if isinstance(takes, Group):
+        fields = takes.declared.items()
+        return {name: _value(drawn, stream, *names, name) for name, drawn in fields}
+    return takes.value(stream.number(*names))
+
+
+def _of_strength(gravity: Vector3, strength: float) -> Vector3:
+    """Return a vector in the direction of another, or downwards if that is none (m/s²)."""
+    length = float(np.linalg.norm(gravity))
+    x, y, z = gravity if length else (0.0, 0.0, -1.0)
+    share = strength / (length or 1.0)
+    return x * share, y * share, z * share
+
+
+def _leaves(name: str, tree: Any) -> Iterator[tuple[str, float]]:
+    if isinstance(tree, Mapping):
+        for key, part in tree.items():
+            yield from _leaves(f"{name}/{key}", part)
+    else:
+        yield name, tree

@@ -1,0 +1,101 @@
+"""Recordings of worlds that vary: the same whoever plays, and brought back by seed and header."""
+
+import json
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from robots import RecordingError
+from rollouts import evaluate, record
+from rollouts.__main__ import main
+from rollouts.playing.ray_executor import RayExecutor
+from rollouts.playing.replay import replay, task_for
+from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.recording.record import FILE
+from tests.rollouts.clusters import running_cluster
+from tests.rollouts.test_recorder import same_files
+from tests.tasks.varying.declarations import TASK, VARIED
+
+
+def recorded(folder: Path, seeds: range, **arguments: object) -> Path:
+    summary = record(TASK, seeds, folder, randomization=VARIED, **arguments)  # type: ignore[arg-type]
+    assert not summary.failed
+    return folder / FILE
+
+
+def test_a_recording_brings_its_worlds_back(tmp_path: Path) -> None:
+    path = recorded(tmp_path, range(2), workers=0)
+    with TrajectoryFile(path) as file, closing(task_for(file)) as env:
+        assert env.scenario.randomization == VARIED
+        for episode in file:
+            assert episode.solved
+            replayed = replay(env, episode)
+            assert replayed.agrees
+            assert replayed.difference is None
+            assert episode.drawn == env.drawn()
+            assert episode.drawn is not None
+            assert {*episode.drawn} == {*VARIED.to_json().keys() - {"action_noise", "sensor_noise"}}
+
+
+def test_what_was_drawn_is_compared(tmp_path: Path) -> None:
+    path = recorded(tmp_path, range(1), workers=0)
+    summary = json.loads(path.with_suffix(".json").read_text())
+    summary["episodes"][0]["drawn"]["mass"]["cube"] += 1e-9
+    path.with_suffix(".json").write_text(json.dumps(summary))
+    with TrajectoryFile(path) as file, closing(task_for(file)) as env:
+        replayed = replay(env, file[0])
+        assert replayed.difference is None
+        assert not replayed.agrees
+
+
+def test_a_recording_does_not_go_on_in_other_worlds(tmp_path: Path) -> None:
+    recorded(tmp_path, range(1), workers=0)
+    with pytest.raises(RecordingError, match="randomization"):
+        record(TASK, range(2), tmp_path, workers=0)
+
+
+def test_a_header_that_makes_no_sense_is_refused(tmp_path: Path) -> None:
+    path = recorded(tmp_path, range(1), workers=0)
+    from tests.rollouts.recordings import edited
+
+    with edited(path) as file:
+        about = json.loads(str(file.attrs["simulation"]))
+        about["randomization"]["mass"]["cube"] = {"uniform": [2, 1]}
+        file.attrs["simulation"] = json.dumps(about)
+    with TrajectoryFile(path) as file, pytest.raises(TrajectoryError, match="wrong way round"):
+        task_for(file)
+
+
+def test_commands_take_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    VARIED.save(tmp_path / "varied.yaml")
+    words = ["--task", TASK, "--episodes", "1", "--workers", "0", "--randomization"]
+    out = tmp_path / "out"
+    assert main(["record", *words, str(tmp_path / "varied.yaml"), "--out", str(out)]) == 0
+    assert same_files(out / FILE, recorded(tmp_path / "here", range(1), workers=0))
+    assert main(["replay", str(out)]) == 0
+    assert "in 1 all states are equal" in capsys.readouterr().out
+    assert main(["evaluate", *words, str(tmp_path / "varied.yaml")]) == 0
+    (tmp_path / "wrong.yaml").write_text("mas: {}")
+    assert main(["evaluate", *words, str(tmp_path / "wrong.yaml")]) == 1
+    assert "Did you mean 'mass'" in capsys.readouterr().err
+
+
+def test_policies_are_judged_in_worlds_that_vary() -> None:
+    alone = evaluate("expert", TASK, range(2), workers=0, randomization=VARIED)
+    plain = evaluate("expert", TASK, range(2), workers=0)
+    assert alone.success_rate == 1.0
+    assert alone.scores != plain.scores
+
+
+@pytest.mark.long
+def test_worlds_are_the_same_whoever_plays(tmp_path: Path) -> None:
+    """In this process, in 1, 2 and 8 workers, and on a Ray cluster."""
+    seeds = range(8)
+    expected = recorded(tmp_path / "here", seeds, workers=0)
+    for workers in (1, 2, 8):
+        assert same_files(recorded(tmp_path / str(workers), seeds, workers=workers), expected)
+    with running_cluster() as nodes:
+        nodes.grow(2)
+        executor = RayExecutor(str(nodes.address))
+        assert same_files(recorded(tmp_path / "ray", seeds, executor=executor), expected)
