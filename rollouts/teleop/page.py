@@ -85,13 +85,20 @@ class TeleopPage:
     # -- what happens ------------------------------------------------------------------------
 
     def _step(self) -> None:
-        self._session.step()
+        try:
+            self._session.step()
+        except RobotLayoutsError as error:  # of a policy
+            self._session.stop()
+            self._note.text = f"Stopped: {error}"
+            return
         self._pace.stepped()
         if self._pace.behind and monotonic() - self._drawn < LONGEST_UNSEEN:
             return  # it catches up first
         self._drawn = monotonic()
         with self._server.atomic():
             self._show_world()
+            if not self._session.by_hand:  # gizmos stay at the grippers, where they can be taken
+                self._show_targets()
             for arm, pose in self._session.targets.items():
                 x, y, z = pose[:3].tolist()
                 self._stopwatch.stepped(arm, (x, y, z))
@@ -152,27 +159,39 @@ class TeleopPage:
 
     def _drag(self, client: int, arm: str, phase: str, pose: Floats) -> None:
         if phase == "start":
-            self._seats.take(client, arm)
+            self._take(client, arm)
         elif phase == "update" and self._seats.owns(client, arm):
             pose[3:] /= np.linalg.norm(pose[3:])
             self._session.aim(arm, pose)
         elif phase == "end" and not self._seats.owns(client, arm):
             self._show_targets()
 
+    def _take(self, client: int, arm: str) -> None:
+        """Let a browser steer an arm; if a policy has acted so far, people steer now."""
+        self._seats.take(client, arm)
+        if not self._session.by_hand:
+            self._session.take_over()
+            self._show_targets()
+
+    def _give_back(self, _: int) -> None:
+        self._session.give_back()
+
     def _jog(self, client: int, jog: Jog) -> None:
         arm = self._seats.arm_of(client)
+        self._session.take_over()
         way, turn = jog.scaled(self._key_step.value / 1000, np.radians(self._key_turn.value))
         self._session.shift(arm, way, turn)
         self._show_targets()
 
     def _toggle(self, client: int, arm: str | None = None) -> None:
         if arm is not None:
-            self._seats.take(client, arm)
+            self._take(client, arm)
         arm = self._seats.arm_of(client)
+        self._session.take_over()
         self._session.grip(arm, not self._session.closed[arm])
 
     def _let_go(self, client: int, arm: str) -> None:
-        self._seats.take(client, arm)
+        self._take(client, arm)
         self._session.let_go(arm)
         self._show_targets()
 
@@ -261,7 +280,8 @@ class TeleopPage:
         _write(
             self._status,
             f"Seed {session.seed}: {session.phase.value}, step {steps}"
-            f" ({steps * session.seconds:.1f} s), {solved}",
+            f" ({steps * session.seconds:.1f} s), {solved}"
+            + ("" if session.by_hand else "\nThe policy acts; take an arm to steer."),
         )
         speed = f"Time runs at {self._pace.speed:.0%} of real time"
         lost = f"; it stood still for {self._pace.lost:.1f} s" if self._pace.lost else ""
@@ -298,6 +318,8 @@ class TeleopPage:
         self._add_button("Keep (M)", self._keep)
         self._add_button("Discard (X)", self._discard)
         self._add_button("Next seed (N)", self._skip)
+        if session.has_policy:
+            self._add_button("Back to the policy (B)", self._give_back)
         self._arm_texts: dict[str, Text] = {}
         for arm in session.arms:
             self._build_arm(arm)
@@ -319,7 +341,7 @@ class TeleopPage:
         robot = self._session.task.layout.arm(arm).robot.name
         with gui.add_folder(f"{printable(arm)} ({robot})"):
             self._arm_texts[arm] = Text(gui, "")
-            self._add_button("Take", lambda client: self._seats.take(client, arm))
+            self._add_button("Take", lambda client: self._take(client, arm))
             if arm in self._session.steering.with_gripper:
                 self._add_button("Open or close (G)", lambda client: self._toggle(client, arm))
             self._add_button("Stay where it is", lambda client: self._let_go(client, arm))
@@ -345,8 +367,10 @@ class TeleopPage:
             ("G", "Open or close the gripper", self._toggle),
         ):
             self._add_key(key, label, act)
+        if self._session.has_policy:
+            self._add_key("B", "Back to the policy", self._give_back)
         for number, arm in enumerate(self._session.arms[:9], start=1):
-            act = lambda client, arm=arm: self._seats.take(client, arm)  # noqa: E731
+            act = lambda client, arm=arm: self._take(client, arm)  # noqa: E731
             self._add_key(str(number), f"Take {printable(arm)}", act)
 
     def _add_key(
