@@ -22,7 +22,8 @@ LONGEST_STEP = 0.4  # of a joint, per iteration (rad or m)
 NEAR_ENOUGH = 1e-3, 1e-2  # m and rad
 
 _APPROACHES = 4  # steps of `approach`
-_PLACE_DAMPING, _TURN_DAMPING = 0.005, 0.1  # m, rad; the place must hardly give way
+_PLACE_DAMPING, _TURN_DAMPING, _NO_DAMPING = 0.005, 0.1, 1e-4  # m, rad
+_AT = 1e-4  # rad, m; so near to a limit a joint is at it
 _HOMEWARD = 0.02  # of the way to its posture, in each of them
 
 _SWEEPS = 30  # over all joints, of the search for the farthest place
@@ -141,13 +142,14 @@ def approach(
     for _ in range(_APPROACHES):
         errors, slopes = _errors(tree, goal, rows, free)
         at = rows[0, free]
-        way, aside = _by_priority(errors[0], slopes[0], rest - at)
-        # A joint at a limit that it is drawn beyond leaves the way to the others.
-        stuck = ((at <= low) & (way + aside < 0)) | ((at >= high) & (way + aside > 0))
-        if stuck.any():
-            way, aside = _by_priority(errors[0], np.where(stuck, 0.0, slopes[0]), rest - at)
-            aside = np.where(stuck, 0.0, aside)
-        at = at + _share(way, at, low, high) * way
+        # A joint at a limit that it is drawn beyond leaves the way to the others: of the two ways,
+        # each asks for itself, so that the second never hinders the first.
+        way, _ = _by_priority(errors[0], slopes[0], rest - at)
+        kept = _inward(way, at, low, high)
+        way, aside = _by_priority(errors[0], slopes[0] * kept, rest - at)
+        kept = kept & _inward(aside, at, low, high)
+        _, aside = _by_priority(errors[0], slopes[0] * kept, rest - at)
+        at, aside = np.clip(at + way, low, high), aside * kept
         at = at + _share(aside, at, low, high) * aside
         rows[0, free] = np.clip(at, low, high)
     return rows[0]
@@ -155,16 +157,23 @@ def approach(
 
 def _by_priority(errors: Floats, slopes: Floats, homeward: Floats) -> tuple[Floats, Floats]:
     """Return the way that mends the place; and one that mends what else it can, a bit homeward."""
-    way, spare = _mended(errors[:3], slopes[:3], np.eye(slopes.shape[1]), _PLACE_DAMPING)
-    aside, left = _mended(errors[3:] - slopes[3:] @ way, slopes[3:], spare, _TURN_DAMPING)
-    return way, aside + left @ (_HOMEWARD * homeward)
+    free = np.eye(slopes.shape[1])
+    way = _back(slopes[:3], _PLACE_DAMPING) @ errors[:3]
+    spare = free - _back(slopes[:3], _NO_DAMPING) @ slopes[:3]
+    turning = slopes[3:] @ spare
+    back = _back(turning, _TURN_DAMPING)
+    aside = back @ (errors[3:] - slopes[3:] @ way)
+    return way, aside + (spare - back @ turning) @ (_HOMEWARD * homeward)
 
 
-def _mended(errors: Floats, slopes: Floats, spare: Floats, damping: float) -> tuple[Floats, Floats]:
-    """Return the way within what is spare that mends errors, and what is still spare then."""
-    own = slopes @ spare
-    back = own.T @ np.linalg.inv(own @ own.T + damping**2 * np.eye(len(errors)))
-    return back @ errors, spare - back @ own
+def _back(slopes: Floats, damping: float) -> Floats:
+    """Return what turns errors into the way that mends them by damped least squares."""
+    return slopes.T @ np.linalg.inv(slopes @ slopes.T + damping**2 * np.eye(len(slopes)))
+
+
+def _inward(way: Floats, at: Floats, low: Floats, high: Floats) -> NDArray[np.bool_]:
+    """Return which joints a way does not draw beyond a limit that they are at."""
+    return ~(((at <= low + _AT) & (way < 0)) | ((at >= high - _AT) & (way > 0)))
 
 
 def _share(way: Floats, at: Floats, low: Floats, high: Floats) -> float:

@@ -7,6 +7,7 @@ from contextlib import closing
 from pathlib import Path
 
 from layouts.view_command import add_server_options
+from robots import TaskError
 from rollouts.playing import command_options as workers
 from rollouts.playing.command_options import stop_signals, zero_or_more
 from tasks.cell_options import add_cell_options, chosen_cell
@@ -32,6 +33,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help=f"folder of trajectory.h5 and .json ({FOLDER}/TASK)",
     )
+    add(
+        "--policy",
+        metavar="MODULE:NAME",
+        help="acts until somebody takes an arm; obs → action, as evaluate has it",
+    )
     add_cell_options(parser)
     workers.add_control_mode(parser)
     add_server_options(parser)
@@ -50,18 +56,20 @@ def run(options: argparse.Namespace) -> int:
     import tasks
     from rollouts.recording.record import FILE
     from rollouts.recording.recorder import Recorder
+    from rollouts.sources.policies import find_policy
     from rollouts.teleop.page import serve
     from rollouts.teleop.session import Session
 
+    policy = None if options.policy is None else find_policy(options.policy)
+    if isinstance(policy, str):
+        raise TaskError("an expert's plan is made for what it does itself; --policy needs a policy")
     task = tasks.make(options.task, control_mode=options.control_mode, **chosen_cell(options))
     folder = options.out or FOLDER / task.task_id
-    recorder = Recorder(
-        folder / FILE, task, resume=True, source="human", source_desc="rollouts teleop"
-    )
+    recorder = Recorder(folder / FILE, task, resume=True, source="human", source_desc="browser")
     with closing(task), recorder, stop_signals():
         for what in recorder.damaged:
             print(f"{what} is damaged and does not count as recorded", flush=True)
-        session = Session(task, recorder, options.seed)
+        session = Session(task, recorder, options.seed, policy=policy, policy_name=options.policy)
         try:
             serve(session, options.host, options.port, lambda line: print(line, flush=True))
         except KeyboardInterrupt:

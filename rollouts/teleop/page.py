@@ -11,22 +11,20 @@ import numpy as np
 
 from kinematics.rotations import Floats
 from layouts.viewer.page import tell
-from layouts.viewer.scene import COARSE, Scene
 from layouts.viewer.server import serving
 from layouts.viewer.text import Text, printable
 from robots import RobotLayoutsError
 from rollouts.teleop.keys import KEYS, KEYS_TEXT, Jog
 from rollouts.teleop.pace import Pace
+from rollouts.teleop.picture import Picture
 from rollouts.teleop.seats import Seats
 from rollouts.teleop.session import Phase, Session
 from rollouts.teleop.stopwatch import QUICK, Stopwatch, gizmo_node
 from tasks.description import read_docstring
-from tasks.view import live_thing, task_cell
 
+LONGEST_UNSEEN = 0.1  # s between pictures while late steps are caught up
 IDLE = 0.25  # s between looks at what the page should say while nothing happens
 GIZMO_SIZE = 0.2  # m
-FIELD_OF_VIEW = np.radians(60)  # from the upper to the lower edge
-VIEW, NEAREST = (0.9, -0.55, 0.6), 0.9  # from the TCPs to the camera: direction, and least way (m)
 UNDO = 1.0  # s that the key takes back
 SLOW = 0.98  # of real time; below that the page says so
 _GIZMO_TEXT = "The coloured axes at each gripper move and turn where it is to go."
@@ -47,23 +45,14 @@ class TeleopPage:
         """
         self._server, self._session = server, session
         self._waiting: SimpleQueue[Callable[[], None]] = SimpleQueue()
-        self._said = 0.0  # when
+        self._said = self._drawn = 0.0  # when
         self._pace, self._seats = Pace(session.seconds), Seats(session.arms)
-        task = session.task
-        server.scene.set_up_direction("+z")
-        cell = task_cell(task, task.task_id)
-        self._scene = Scene(server.scene, cell, drawn=("meshes", COARSE))
-        camera = server.initial_camera
-        camera.fov = FIELD_OF_VIEW
-        camera.position, camera.look_at = viewpoint(session)
-        self._shapes = {name: body.shapes for name, body in self._bodies.items()}
-        self._shown: dict[str, Floats] = {}
+        self._picture = Picture(server, session)
         self._gizmos = {arm: self._add_gizmo(arm) for arm in session.arms}
-        self._build(cell.title, cell.notes)
+        self._build()
         session.on_replay = self._show_replay
         server.on_client_connect(self._greet)
         server.on_client_disconnect(self._bid_farewell)
-        self._show_world()
         self._show_targets()
 
     def run(self) -> NoReturn:
@@ -84,12 +73,20 @@ class TeleopPage:
     # -- what happens ------------------------------------------------------------------------
 
     def _step(self) -> None:
-        self._session.step()
-        self._pace.stepped()
-        if self._pace.behind:  # it catches up first; the picture of the last step is shown
+        try:
+            self._session.step()
+        except RobotLayoutsError as error:  # of a policy
+            self._session.stop()
+            self._note.text = f"Stopped: {error}"
             return
+        self._pace.stepped()
+        if self._pace.behind and monotonic() - self._drawn < LONGEST_UNSEEN:
+            return  # it catches up first
+        self._drawn = monotonic()
         with self._server.atomic():
-            self._show_world()
+            self._picture.show()
+            if not self._session.by_hand:  # gizmos stay at the grippers, where they can be taken
+                self._show_targets()
             for arm, pose in self._session.targets.items():
                 x, y, z = pose[:3].tolist()
                 self._stopwatch.stepped(arm, (x, y, z))
@@ -150,27 +147,39 @@ class TeleopPage:
 
     def _drag(self, client: int, arm: str, phase: str, pose: Floats) -> None:
         if phase == "start":
-            self._seats.take(client, arm)
+            self._take(client, arm)
         elif phase == "update" and self._seats.owns(client, arm):
             pose[3:] /= np.linalg.norm(pose[3:])
             self._session.aim(arm, pose)
         elif phase == "end" and not self._seats.owns(client, arm):
             self._show_targets()
 
+    def _take(self, client: int, arm: str) -> None:
+        """Let a browser steer an arm; if a policy has acted so far, people steer now."""
+        self._seats.take(client, arm)
+        if not self._session.by_hand:
+            self._session.take_over()
+            self._show_targets()
+
+    def _give_back(self, _: int) -> None:
+        self._session.give_back()
+
     def _jog(self, client: int, jog: Jog) -> None:
         arm = self._seats.arm_of(client)
+        self._session.take_over()
         way, turn = jog.scaled(self._key_step.value / 1000, np.radians(self._key_turn.value))
         self._session.shift(arm, way, turn)
         self._show_targets()
 
     def _toggle(self, client: int, arm: str | None = None) -> None:
         if arm is not None:
-            self._seats.take(client, arm)
+            self._take(client, arm)
         arm = self._seats.arm_of(client)
+        self._session.take_over()
         self._session.grip(arm, not self._session.closed[arm])
 
     def _let_go(self, client: int, arm: str) -> None:
-        self._seats.take(client, arm)
+        self._take(client, arm)
         self._session.let_go(arm)
         self._show_targets()
 
@@ -213,38 +222,9 @@ class TeleopPage:
 
     # -- what is shown -----------------------------------------------------------------------
 
-    @property
-    def _bodies(self) -> Any:
-        return self._session.task.simulation.worlds[0].bodies
-
     def _show_anew(self) -> None:
-        """Show a world that was built anew, whose bodies may have other shapes."""
-        for name, body in self._bodies.items():
-            if body.shapes != self._shapes.get(name):
-                thing = live_thing(self._session.task, name)
-                if thing is not None:
-                    self._scene.draw(name, thing)
-                self._shapes[name] = body.shapes
-        self._shown.clear()
-        self._show_world()
+        self._picture.show_anew()
         self._show_targets()
-
-    def _show_world(self) -> None:
-        """Show where robots and bodies are; what has not moved is not sent again."""
-        state = self._session.task.simulation.read()
-        for name in self._session.task.layout:
-            if self._moved(f"base of {name}", base := state.base_pose(name)[0]):
-                self._scene.stand(name, base.astype(float))
-            if self._moved(f"joints of {name}", qpos := state.qpos(name)[0]):
-                self._scene.pose(name, qpos.astype(float))
-        for name in self._scene.things:
-            if self._moved(f"body {name}", pose := state.pose(name)[0]):
-                self._scene.place(name, pose.astype(float))
-
-    def _moved(self, what: str, now: Floats) -> bool:
-        before = self._shown.get(what)
-        self._shown[what] = now.copy()
-        return before is None or not np.array_equal(before, now)
 
     def _show_targets(self) -> None:
         for arm, pose in self._session.targets.items():
@@ -259,7 +239,8 @@ class TeleopPage:
         _write(
             self._status,
             f"Seed {session.seed}: {session.phase.value}, step {steps}"
-            f" ({steps * session.seconds:.1f} s), {solved}",
+            f" ({steps * session.seconds:.1f} s), {solved}"
+            + ("" if session.by_hand else "\nThe policy acts; take an arm to steer."),
         )
         speed = f"Time runs at {self._pace.speed:.0%} of real time"
         lost = f"; it stood still for {self._pace.lost:.1f} s" if self._pace.lost else ""
@@ -281,14 +262,14 @@ class TeleopPage:
 
     # -- the panel ---------------------------------------------------------------------------
 
-    def _build(self, title: str, notes: list[str]) -> None:
+    def _build(self) -> None:
         gui, session = self._server.gui, self._session
         # viser's own share button would put the page on the internet, at one click.
         gui.configure_theme(show_logo=False, show_share_button=False)
         gui.main_panel.dock_right()
-        Text(gui, title, bold=True)
+        Text(gui, session.task.task_id, bold=True)
         Text(gui, read_docstring(type(session.task)).summary)
-        for note in notes:
+        for note in self._picture.notes:
             Text(gui, note)
         self._status, self._note = Text(gui, ""), Text(gui, "")
         self._run = self._add_button("Start (P)", self._start_or_stop)
@@ -296,6 +277,8 @@ class TeleopPage:
         self._add_button("Keep (M)", self._keep)
         self._add_button("Discard (X)", self._discard)
         self._add_button("Next seed (N)", self._skip)
+        if session.has_policy:
+            self._add_button("Back to the policy (B)", self._give_back)
         self._arm_texts: dict[str, Text] = {}
         for arm in session.arms:
             self._build_arm(arm)
@@ -303,7 +286,7 @@ class TeleopPage:
             self._clock, self._count = Text(gui, ""), Text(gui, "")
             self._stopwatch = Stopwatch(self._server, session.arms)
             quick = gui.add_checkbox(QUICK, False)
-            quick.on_update(lambda event: self._scene.hurry(event.target.value))
+            quick.on_update(lambda event: self._picture.hurry(event.target.value))
         with gui.add_folder("Back to an earlier step"):
             self._build_undo(gui)
         with gui.add_folder("Keys"):
@@ -317,7 +300,7 @@ class TeleopPage:
         robot = self._session.task.layout.arm(arm).robot.name
         with gui.add_folder(f"{printable(arm)} ({robot})"):
             self._arm_texts[arm] = Text(gui, "")
-            self._add_button("Take", lambda client: self._seats.take(client, arm))
+            self._add_button("Take", lambda client: self._take(client, arm))
             if arm in self._session.steering.with_gripper:
                 self._add_button("Open or close (G)", lambda client: self._toggle(client, arm))
             self._add_button("Stay where it is", lambda client: self._let_go(client, arm))
@@ -343,8 +326,10 @@ class TeleopPage:
             ("G", "Open or close the gripper", self._toggle),
         ):
             self._add_key(key, label, act)
+        if self._session.has_policy:
+            self._add_key("B", "Back to the policy", self._give_back)
         for number, arm in enumerate(self._session.arms[:9], start=1):
-            act = lambda client, arm=arm: self._seats.take(client, arm)  # noqa: E731
+            act = lambda client, arm=arm: self._take(client, arm)  # noqa: E731
             self._add_key(str(number), f"Take {printable(arm)}", act)
 
     def _add_key(
@@ -361,14 +346,6 @@ class TeleopPage:
 
     async def _bid_farewell(self, client: Any) -> None:
         self._waiting.put(lambda: self._seats.leave(client.client_id))
-
-
-def viewpoint(session: Session) -> tuple[Floats, Floats]:
-    """Return where the camera is at first, and what it looks at: the TCPs; each (3,) (m, world)."""
-    places = np.array([pose[:3] for pose in session.targets.values()])
-    middle = places.mean(axis=0)
-    distance = NEAREST + 1.2 * float(np.linalg.norm(np.ptp(places, axis=0)))
-    return middle + distance * np.array(VIEW) / np.linalg.norm(VIEW), middle
 
 
 def serve(

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import replace
 from enum import Enum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from kinematics.rotations import Floats, multiply, quaternion_about
 from robots import RecordingError, TaskError, UnknownNameError
 from rollouts.recording.recorder import Recorder
+from rollouts.sources.actors import PERSON, Actor, actor_of, episode_source
+from rollouts.sources.policies import check_policy
 from rollouts.teleop.steering import Steering
 from tasks import MultiRobotTask
-from tasks.episode import REBUILT, PlayedEpisode, play
+from tasks.episode import REBUILT, PlayedEpisode, Policy, play
 
-PERSON: Mapping[str, Any] = {"kind": "person", "name": "browser"}
+SOMEBODY = Actor(PERSON, "browser")
 _UNIT = 1e-6  # by how much a quaternion may be longer or shorter than 1
 
 
@@ -35,6 +38,7 @@ class _Moment(NamedTuple):
     targets: dict[str, Floats]
     closed: dict[str, bool]
     reference: Floats
+    by_hand: bool
 
 
 class Session:
@@ -53,6 +57,7 @@ class Session:
         observation: What the task last returned.
         targets: By arm, where its TCP is to be: position (m, world), quaternion (wxyz), (7,).
         closed: By arm, whether its gripper is to be closed.
+        by_hand: Whether people steer; else the policy does.
         on_replay: Called with the number of steps played again, and how many there are.
         kept: Seeds of the episodes kept so far, by whether they were solved.
     """
@@ -62,6 +67,9 @@ class Session:
         task: MultiRobotTask,
         recorder: Recorder | None = None,
         seed: int = 0,
+        *,
+        policy: Policy | None = None,
+        policy_name: str | None = None,
     ) -> None:
         """Begin an episode.
 
@@ -69,11 +77,17 @@ class Session:
             task: A task with one environment.
             recorder: Where episodes are kept; None if they are only returned.
             seed: Of the first episode, or of one of the next if that is recorded already.
+            policy: Acts until a person takes over; each episode has a copy as it was passed.
+            policy_name: Where it was imported from, ``module:name``; None: where it is defined.
 
         Raises:
             TaskError: If the task has several environments, or no arm can be steered.
         """
         self.task, self._recorder = task, recorder
+        self._passed = None if policy is None else check_policy(policy)
+        self._actors = [SOMEBODY]
+        if policy is not None:
+            self._actors.insert(0, actor_of(policy, policy_name))
         self.on_replay: Callable[[int, int], None] = lambda done, steps: None
         self.kept: dict[int, bool] = {}
         self._begin(self._free_seed(seed))
@@ -88,7 +102,7 @@ class Session:
         """Time from one step to the next (s)."""
         return 1 / self.task.scenario.control_frequency
 
-    def aim(self, arm: str, pose: Floats) -> None:
+    def aim(self, arm: str, pose: ArrayLike) -> None:
         """Say where the TCP of an arm is to be.
 
         Args:
@@ -108,7 +122,7 @@ class Session:
             raise TaskError(f"the quaternion for {arm} has the length {length:.6g}; it must be 1")
         self.targets[arm] = pose
 
-    def shift(self, arm: str, way: Floats | None = None, turn: Floats | None = None) -> None:
+    def shift(self, arm: str, way: ArrayLike | None = None, turn: ArrayLike | None = None) -> None:
         """Move and turn the place where the TCP of an arm is to be.
 
         Args:
@@ -125,7 +139,8 @@ class Session:
         if way is not None:
             pose[:3] += way
         if turn is not None and (angle := float(np.linalg.norm(turn))):
-            pose[3:] = multiply(quaternion_about((turn / angle).tolist(), angle), pose[3:])
+            axis = (np.array(turn, float) / angle).tolist()
+            pose[3:] = multiply(quaternion_about(axis, angle), pose[3:])
             pose[3:] /= np.linalg.norm(pose[3:])
         self.aim(arm, pose)
 
@@ -159,11 +174,39 @@ class Session:
     def step(self) -> None:
         """Take one control step towards what people ask for."""
         targets = {arm: pose.copy() for arm, pose in self.targets.items()}
-        self._moments.append(_Moment(targets, dict(self.closed), self.steering.reference.copy()))
-        action = self.steering.action(self.targets, self.closed)
+        reference = self.steering.reference.copy()
+        moment = _Moment(targets, dict(self.closed), reference, self.by_hand)
+        action = self.steering.action(targets, self.closed) if self.by_hand else self._advised()
         self._do(action)
+        if not self.by_hand:
+            self.targets = {arm: self.steering.tcp(arm) for arm in self.arms}
+        self._moments.append(moment)
         self.actions.append(action)
         self._successes.append(self.success)
+
+    def take_over(self) -> None:
+        """Let people steer from where the policy has brought the arms."""
+        if not self.by_hand:
+            self.by_hand = True
+            self.steering.begin_anew()
+            self.targets = {arm: self.steering.tcp(arm) for arm in self.arms}
+            if self.actions:
+                self.closed = self.steering.closed(self.actions[-1])
+
+    def give_back(self) -> None:
+        """Let the policy act again.
+
+        Raises:
+            TaskError: If there is none.
+        """
+        if self._passed is None:
+            raise TaskError("there is no policy to give the arms to")
+        self.by_hand = False
+
+    @property
+    def has_policy(self) -> bool:
+        """Whether there is a policy that acts until a person takes over."""
+        return self._passed is not None
 
     def undo(self, step: int) -> None:
         """Go back to an earlier moment of the episode, exactly, and stop there.
@@ -190,6 +233,7 @@ class Session:
         self.phase = Phase.STOPPED if actions else Phase.READY
         self.targets = {arm: pose.copy() for arm, pose in moment.targets.items()}
         self.closed, self.steering.reference = dict(moment.closed), moment.reference.copy()
+        self.by_hand = moment.by_hand
 
     def keep(self) -> PlayedEpisode:
         """Record the episode, and begin the next one.
@@ -225,6 +269,7 @@ class Session:
     def _begin(self, seed: int) -> None:
         self.observation, _ = self.task.reset(seed, options=REBUILT)
         self.seed, self.phase, self.success = seed, Phase.READY, False
+        self.by_hand, self._policy = self._passed is None, deepcopy(self._passed)
         self.actions: list[NDArray[np.float32]] = []
         self._moments: list[_Moment] = []
         self._successes: list[bool] = []
@@ -235,6 +280,17 @@ class Session:
     def _do(self, action: NDArray[np.float32]) -> None:
         self.observation, _, _, _, info = self.task.step(action[None])
         self.success = bool(info["success"])
+
+    def _advised(self) -> NDArray[np.float32]:
+        """Return what the policy does."""
+        assert self._policy is not None
+        action = np.asarray(self._policy(self.observation), np.float32)
+        if action.size != self.task.layout.action_dim or not np.isfinite(action).all():
+            raise TaskError(
+                f"the policy gave an action of shape {action.shape}; it must be"
+                f" {self.task.layout.action_dim} finite numbers"
+            )
+        return action.reshape(-1)
 
     def _played_again(self) -> PlayedEpisode:
         states, done = self.task.get_state_dict(), iter(range(len(self.actions) + 1))
@@ -251,7 +307,9 @@ class Session:
                 f"the episode of seed {self.seed} came out different when it was played again, so"
                 " it is not kept: something else than seed and actions decides what happens"
             )
-        return replace(episode, source=dict(PERSON))
+        turns = np.array([m.by_hand * (len(self._actors) - 1) for m in self._moments], np.uint8)
+        source, actor = episode_source(self._actors, turns)
+        return replace(episode, source=source, actor=actor)
 
     def _free_seed(self, seed: int) -> int:
         taken = self._recorder.seeds if self._recorder is not None else self.kept

@@ -142,9 +142,24 @@ class Steering:
         self.turned = tuple(name for name, arm in self._arms.items() if arm.turns)
         if not self.arms:
             raise TaskError(f"{task.task_id} has no arm that can be steered in this control mode")
-        self._begun = task.simulation.read().joint_positions[0].astype(float)
+        self.begin_anew()
+
+    def begin_anew(self) -> None:
+        """Take all joints where they are now, after somebody else has moved them."""
+        self._begun = self._task.simulation.read().joint_positions[0].astype(float)
         self.reference = self._begun.copy()
         self._speed = np.zeros_like(self.reference)
+
+    def closed(self, action: NDArray[np.float32]) -> dict[str, bool]:
+        """Return by arm whether an action closes its gripper."""
+        return {
+            name: any(
+                np.abs(action[g.numbers] - _gripper_number(g, True)).sum()
+                < np.abs(action[g.numbers] - _gripper_number(g, False)).sum()
+                for g in arm.grippers
+            )
+            for name, arm in self._arms.items()
+        }
 
     def tcp(self, arm: str) -> Floats:
         """Return where an arm's TCP is: position (m, world), quaternion (wxyz), (7,)."""

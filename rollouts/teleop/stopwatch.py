@@ -31,6 +31,9 @@ if (!window.dragsSeen) {
     if (place) place.textContent =
       `From drag to picture: ${at(0.5)} ms (median), ${at(0.95)} ms (95 %), of ${seen.length}`;
   };
+  document.addEventListener("change", (event) => {  // else the box would keep all keys to itself
+    if (event.target.type === "checkbox") event.target.blur();
+  });
   const canvas = document.createElement("canvas").getContext("webgl");
   const about = canvas?.getExtension("WEBGL_debug_renderer_info");
   const renderer = about ? canvas.getParameter(about.UNMASKED_RENDERER_WEBGL) : "";

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from kinematics.rotations import multiply, quaternion_about, rotate
-from rollouts.teleop.page import FIELD_OF_VIEW, GIZMO_SIZE, viewpoint
+from rollouts.teleop.page import GIZMO_SIZE
+from rollouts.teleop.picture import FIELD_OF_VIEW, viewpoint
 from rollouts.teleop.session import Session
 from rollouts.teleop.stopwatch import HTML_ID, QUICK
 from tests.pages import wait_until

@@ -219,3 +219,39 @@ def test_no_step_is_left_out():
     steps = run_until(70.0)
     assert pace.lost == pytest.approx(3.0 - MOST_BEHIND, abs=0.06)
     assert steps * 0.05 + pace.lost == pytest.approx(10.0, abs=0.06)
+
+
+def rises(observation):
+    return np.array([[0, -0.3, 0, 0, 0, 0, 0, -1]], np.float32)
+
+
+def test_a_person_takes_over_from_a_policy_and_gives_back(pick, tmp_path):
+    with Recorder(tmp_path / FILE, pick) as recorder:
+        session = Session(pick, recorder, policy=rises, policy_name="mylab:rises")
+        go_on(session, 8)
+        session.take_over()
+        assert session.closed == {"arm": True}
+        assert missed(session, "arm")[0] < 1e-6
+        session.shift("arm", np.array([0.0, 0.05, 0.0]))
+        go_on(session, 12)
+        assert missed(session, "arm")[0] < 0.005
+        session.give_back()
+        go_on(session, 5)
+        session.undo(10)
+        assert session.by_hand
+        session.undo(4)
+        assert not session.by_hand
+        go_on(session, 2)
+        session.take_over()
+        go_on(session, 3)
+        session.keep()
+        go_on(session, 2)
+        assert session.keep().source["kind"] == "policy"
+    with pytest.raises(TaskError, match="there is no policy to give the arms to"):
+        Session(pick).give_back()
+    with TrajectoryFile(tmp_path / FILE) as file:
+        mixed = file[0]
+        assert mixed.source["kind"] == "mixed"
+        assert [actor["name"] for actor in mixed.source["actors"]] == ["mylab:rises", "browser"]
+        assert mixed.actor.tolist() == [0] * 6 + [1] * 3
+        assert replay(pick, mixed).difference is None
