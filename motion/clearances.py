@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinematics.rotations import Floats
 from motion.cell import Cell
@@ -75,6 +76,11 @@ class Keeping:
         """
         chosen = self._moved_by(moving) & ~self._moved_by(ignored)
         return self._checker(chosen if timed else chosen & ~self._timed)
+
+    @property
+    def standing(self) -> NDArray[np.intp]:
+        """The pairs in which nothing moves as it was told, (m, 2)."""
+        return self._pairs[~self._timed]
 
     def between(self, some: Collection[str], others: Collection[str]) -> Checker:
         """Return what tells whether two groups of robots keep clear of each other."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from kinematics.rotations import Floats
+from motion.barriers import CUT_OFF
 from motion.paths import Path
 from motion.query import Query
 from motion.spaces import Space
@@ -23,7 +24,16 @@ def carried_out(query: Query, accelerations: Floats, *, synchronised: bool) -> T
     Raises:
         NoPlanError: If there is no motion, or none was found.
     """
-    ends = query.ends()
+    try:
+        return _to_ends(query, query.ends(), accelerations, synchronised=synchronised)
+    except NoPlanError as error:
+        if error.reason != CUT_OFF:
+            raise
+        ends = query.reachable_ends()
+        return _to_ends(query, ends, accelerations, synchronised=synchronised)
+
+
+def _to_ends(query: Query, ends: Floats, accelerations: Floats, *, synchronised: bool) -> Traffic:
     if not synchronised and len(query.robots) > 1:
         traffic = _each_alone(query, ends, accelerations)
         if traffic is not None:

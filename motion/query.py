@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 
 from kinematics.rotations import Floats
+from motion.barriers import Barriers
 from motion.cell import Cell
 from motion.clearances import Keeping
 from motion.ends import find_ends
-from motion.goals import Target
+from motion.goals import Target, different
 from motion.paths import Path
 from motion.priorities import coordinated
 from motion.search import connect
@@ -81,6 +82,44 @@ class Query:
         self.keeping.relax(ends[0], self.traffic.end)
         return ends
 
+    def reachable_ends(self) -> Floats:
+        """Return what `ends` does, of postures that are not known to be cut off from the start.
+
+        Raises:
+            NoPlanError: If there are none; all of a goal are cut off, or all others collide.
+        """
+        end = self.traffic.end
+        ends = find_ends(
+            [self._reachable(target) for target in self.targets],
+            self.keeping,
+            self.traffic.positions(end),
+            end,
+        )
+        self.keeping.relax(ends[0], end)
+        return ends
+
+    def _reachable(self, target: Target) -> Target:
+        """Return a target without the postures that are cut off.
+
+        Raises:
+            NoPlanError: If all are.
+        """
+        postures = different(np.concatenate([target.candidates, target.others()]))
+        goals = np.tile(self.start, (len(postures), 1))
+        goals[:, target.moving] = postures
+        barriers = list(map(self.barriers.before, goals))
+        kept = [barrier is None for barrier in barriers]
+        if barriers[0] is not None and not any(kept):
+            raise barriers[0].refusal()
+        none = np.empty((0, len(target.moving)))
+        return replace(target, candidates=postures[kept], others=lambda: none)
+
+    @cached_property
+    def barriers(self) -> Barriers:
+        """What may cut goals off from the start."""
+        moving = np.concatenate([target.moving for target in self.targets])
+        return Barriers(self.cell, self.keeping.standing, self.start, moving)
+
     def path(
         self, ends: Floats, when: float | None = None, robots: Collection[str] | None = None
     ) -> tuple[Space, Path]:
@@ -110,6 +149,7 @@ class Query:
             self.keeping.checker(chosen, ignored, timed=when is not None),
             self.progress,
             when=when,
+            barriers=self.barriers,
         )
         free = space.are_free(ends[:, moving])
         points = self._points(space, list(ends[free][:, moving])) if free.any() else None

@@ -43,7 +43,7 @@ def connect(
 
     Raises:
         MissingPackageError: If OMPL is not installed.
-        NoPlanError: If the time given is over.
+        NoPlanError: If all goals are cut off from the start, or the time given is over.
     """
     for goal in goals:
         if space.edge_free(start, goal, COARSE) and space.edge_free(start, goal, resolution):
@@ -54,6 +54,8 @@ def connect(
         points = _rrt_connect(space, start, goals, seed + 1000 * attempt, longest, looked_at)
         if points is not None and space.path_free(points, resolution):
             return points
+        if attempt == 0:
+            space.expect_connected(goals)
         looked_at = COARSE if points is None else resolution
     return None
 

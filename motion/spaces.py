@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ from robots.common.commands import notice
 from robots.common.errors import NoPlanError
 
 if TYPE_CHECKING:
+    from motion.barriers import Barriers
     from motion.cell import Cell
     from motion.collisions import Checker
 
@@ -70,6 +71,7 @@ class Space:
         progress: What counts the checks.
         purpose: What is being done, in words.
         when: The time at which obstacles that move are looked at (s).
+        barriers: What may cut goals off.
     """
 
     cell: Cell
@@ -82,6 +84,7 @@ class Space:
     progress: Progress
     purpose: str = "searching"
     when: float | None = None
+    barriers: Barriers | None = None
     _known: dict[tuple[bytes, bytes, Resolution], bool] = field(default_factory=dict, repr=False)
 
     def whole(self, places: Floats) -> Floats:
@@ -120,6 +123,15 @@ class Space:
             self.edge_free(a, b, resolution) for a, b in zip(points[:-1], points[1:], strict=True)
         )
 
+    def expect_connected(self, goals: Sequence[Floats]) -> None:
+        """Refuse goals all of which are cut off from the start, as far as that can be proven.
+
+        Raises:
+            NoPlanError: If they are.
+        """
+        if self.barriers is not None:
+            self.barriers.expect_one_reachable(self.whole(np.array(goals)))
+
     def blend_free(self, path: Path, corner: int, resolution: Resolution, pieces: int = 6) -> bool:
         """Tell whether the curve around one point of a path is free.
 
@@ -150,6 +162,7 @@ class Space:
             self.progress,
             f"planning {', '.join(robots)}",
             self.when,
+            self.barriers,
         )
 
     def columns(self, robots: Iterable[str]) -> NDArray[np.intp]:

@@ -92,8 +92,8 @@ class NoPlanError(RobotLayoutsError, RuntimeError):
 
         Args:
             message: What was asked, what stands in the way, and what would help.
-            reason: ``"start in collision"``, ``"goal in collision"``, ``"unreachable"`` or
-                ``"not found"``.
+            reason: ``"start in collision"``, ``"goal in collision"``, ``"unreachable"``,
+                ``"cut off"`` (something is in the way, whichever way round) or ``"not found"``.
             missing: How far a goal that is unreachable stays away (m).
         """
         super().__init__(message)
