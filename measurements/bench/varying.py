@@ -42,6 +42,7 @@ def varying(settings: Settings) -> Measurement:
         ("reset", PLAIN): timed_resets(plain.reset, clock),
         ("reset", REBUILD): timed_resets(lambda seed: plain.reset(seed, options=REBUILT), clock),
         ("step", PLAIN): _steps_of(plain, settings),
+        ("step", REBUILD): _steps_of(plain, settings),
     }
     for axis, alone in ALONE.items():
         making: dict[str, Any] = {**settings.making, "randomization": alone}
