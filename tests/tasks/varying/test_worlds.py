@@ -147,6 +147,22 @@ def test_a_reset_begins_from_what_was_declared() -> None:
         assert ratio == pytest.approx(drawn["mass"]["cube"])
 
 
+@pytest.mark.parametrize(
+    ("mass", "hand"),
+    [
+        ({"left": 2.0, "left.panda_hand": 3.0}, 3.0),
+        ({"left.panda_hand": 3.0, "left": 2.0}, 2.0),
+        ({"left": 2.0, "left.panda_hand": 3.0, "*": 4.0}, 4.0),
+        ({"*": 4.0, "left.*": 5.0}, 5.0),
+        ({"left.panda_h*": 6.0}, 6.0),
+    ],
+)
+def test_of_several_names_the_last_one_counts(mass: dict[str, float], hand: float) -> None:
+    env, plain = made(Randomization.from_json({"mass": mass})), made(None)
+    found, declared = (physical(one)["left.panda_hand mass"][0] for one in (env, plain))
+    assert found / declared == pytest.approx(hand)
+
+
 def test_other_environments_go_on_as_they_are() -> None:
     env, undisturbed = made(VARIED, 2), made(VARIED, 2)
     for one in (env, undisturbed):
