@@ -90,6 +90,14 @@ class RobotCamera:
 
 AnyCamera = Camera | RobotCamera
 
+
+def camera_name(camera: AnyCamera) -> str:
+    """Return a camera's name; of one that rides on a robot, after the robot's: ``left.hand``."""
+    if isinstance(camera, RobotCamera):
+        return f"{camera.robot}.{camera.mount.name}"
+    return camera.name
+
+
 Texture = NDArray[np.uint8] | NDArray[np.int16]  # (H, W, 3) or (H, W, 1)
 
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from robots.descriptor import Vector3
-from simulation.cameras import AnyCamera, RobotCamera
 from simulation.parts import Part
 
 LIGHTS = ("side", "top", "ambient")
@@ -97,7 +96,7 @@ class Looks:
     Always of the same things: each is set from what was built, not from what was set before.
 
     Attributes:
-        cameras: How cameras are off their places, by `camera_name`.
+        cameras: How cameras are off their places, by `simulation.cameras.camera_name`.
         lights: By their names in `LIGHTS`.
         paints: By link or body.
         patterns: By body.
@@ -110,10 +109,3 @@ class Looks:
 
 
 AS_DECLARED = Looks()
-
-
-def camera_name(camera: AnyCamera) -> str:
-    """Return a camera's name; of one that rides on a robot, after the robot's: ``left.hand``."""
-    if isinstance(camera, RobotCamera):
-        return f"{camera.robot}.{camera.mount.name}"
-    return camera.name

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +12,9 @@ from numpy.typing import NDArray
 from robots import MissingPackageError, TaskError, UnknownNameError
 from robots.common.bounds import checked_whole
 from robots.common.writing import written_whole
-from simulation.cameras import AnyCamera, Camera, RobotCamera
-from simulation.looks import camera_name
+from simulation.cameras import AnyCamera, Camera, RobotCamera, camera_name
 from simulation.rendering.pictures import FIELD_OF_VIEW
-from tasks.engine.observation import cameras_of
+from tasks.engine.cameras import cameras_of, resized
 from tasks.engine.task import MultiRobotTask
 
 SUPPORTED = (".png", ".jpg", ".webp")
@@ -119,11 +117,8 @@ def _camera(task: MultiRobotTask, name: str | None) -> AnyCamera:
 
 def _enlarged(camera: AnyCamera) -> AnyCamera:
     """Return a camera with pictures as high as those of a preview, and as wide for their height."""
-    if isinstance(camera, RobotCamera):
-        mount = camera.mount
-        width = round(mount.width * _HEIGHT / mount.height)
-        return replace(camera, mount=replace(mount, width=width, height=_HEIGHT))
-    return replace(camera, width=round(camera.width * _HEIGHT / camera.height), height=_HEIGHT)
+    lens = camera.mount if isinstance(camera, RobotCamera) else camera
+    return resized(camera, (round(lens.width * _HEIGHT / lens.height), _HEIGHT))
 
 
 def _grid(pictures: list[Picture]) -> Picture:

@@ -11,8 +11,8 @@ import torch
 
 from robots import SimulationError
 from robots.descriptor import Vector3
-from simulation.cameras import AnyCamera, RobotCamera, View
-from simulation.looks import AS_DECLARED, LIGHTS, Looks, camera_name
+from simulation.cameras import AnyCamera, RobotCamera, View, camera_name
+from simulation.looks import AS_DECLARED, LIGHTS, Looks
 from simulation.rotations import quaternion
 from simulation.sapien3.device import expect_render_device
 from simulation.sapien3.dressing import (

@@ -9,7 +9,7 @@ from typing import Any
 from layouts import Layout
 from robots import TaskError
 from robots.common.bounds import checked_whole, shown
-from simulation.cameras import AnyCamera, Camera, RobotCamera
+from simulation.cameras import AnyCamera, Camera, RobotCamera, camera_name
 from tasks.native.format import observation_keys
 
 Size = tuple[int, int]
@@ -39,16 +39,6 @@ def cameras_of(layout: Layout, cameras: Iterable[Camera]) -> dict[str, AnyCamera
                 )
             found[name] = RobotCamera(robot, mount)
     return found
-
-
-def place_name(name: str, camera: AnyCamera) -> str:
-    """Return what a camera is called by place: ``base_camera``, ``left.hand_camera``.
-
-    Args:
-        name: Its name in observations, which is native's.
-        camera: The camera.
-    """
-    return f"{camera.robot}.{camera.mount.name}" if isinstance(camera, RobotCamera) else name
 
 
 def resized(camera: AnyCamera, size: Size | None) -> AnyCamera:
@@ -82,7 +72,7 @@ def by_place(cameras: Mapping[str, AnyCamera]) -> dict[str, AnyCamera]:
     Raises:
         TaskError: If two are called the same then.
     """
-    names = [place_name(name, camera) for name, camera in cameras.items()]
+    names = list(map(camera_name, cameras.values()))
     expect_apart(names)
     return dict(zip(names, cameras.values(), strict=True))
 

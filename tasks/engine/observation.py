@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from layouts import Layout
 from robots import TaskError, unknown_name_message
 from simulation import Camera, Simulation, State
-from simulation.cameras import TEXTURES, AnyCamera, RobotCamera
+from simulation.cameras import TEXTURES, AnyCamera, RobotCamera, camera_name
 from simulation.maths import Array, Floats, all_finite
-from tasks.engine.cameras import Size, cameras_of, expect_apart, place_name, resized
+from tasks.engine.cameras import Size, cameras_of, expect_apart, resized
 from tasks.engine.columns import (
     COLUMN_MODES,
     FILMED,
@@ -263,7 +263,7 @@ class Observer:
             (
                 name,
                 texture,
-                picture_column(str(self.mode.columns), place_name(name, camera), texture),
+                picture_column(str(self.mode.columns), camera_name(camera), texture),
             )
             for name, camera in self.cameras.items()
             for texture in self.mode.textures

@@ -11,7 +11,7 @@ from layouts import Layout
 from robots import TaskError, UnknownNameError
 from robots.common.bounds import shown
 from simulation import Camera, Simulation
-from simulation.cameras import AnyCamera, RobotCamera
+from simulation.cameras import AnyCamera, RobotCamera, camera_name
 from simulation.looks import (
     LIGHTS,
     PATTERNS,
@@ -20,7 +20,6 @@ from simulation.looks import (
     Paint,
     Pattern,
     Shift,
-    camera_name,
 )
 from simulation.parts import Part
 from tasks.varying.distributions import Choice, Distribution, LogUniform, Whole
