@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from experts.player import BlockedError, Player, StuckError
 from experts.script import Scene, Script
+from experts.touching import ArmWatch
 from experts.ways import Ways, without_planner
 from robots import TaskError, UnknownNameError
 from simulation.overlaps import RobotsAlone
@@ -67,9 +68,7 @@ class Rehearsal:
             check_layout=False,  # it was checked when the task was made
         )
         self.task = type(task)(scenario)
-        self._many = len(self.task.layout.arms) > 1
-        if self._many:
-            self.task.simulation.watch_arms()
+        self._watch = ArmWatch(self.task) if len(self.task.layout.arms) > 1 else None
         self._alone = RobotsAlone(self.task.layout, scenario.physics)
 
     def begin(self, seed: int) -> Scene:
@@ -88,7 +87,7 @@ class Rehearsal:
             Whether the task is solved then, and which arms touched in it, in words.
         """
         *_, info = self.task.step(action)
-        touching = self.task.simulation.arms_touching(0) if self._many else []
+        touching = self._watch.touching() if self._watch is not None else []
         return bool(info["success"][0]), ", ".join(f"{a} touches {b}" for a, b in touching[:1])
 
     def play(self, script: Script, *, around: bool = False) -> Attempt:

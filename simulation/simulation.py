@@ -36,6 +36,7 @@ class Simulation:
         index: Where each frame and joint stands in a read-out.
         drive_targets: What the joints were last driven to, robots in layout order, joints in the
             descriptors', (N, dof) (rad, m).
+        links_pass: See `simulation.World`.
         modes: What drives the robots, if their control modes ask for more than joint positions.
     """
 
@@ -48,6 +49,7 @@ class Simulation:
         *,
         control_frequency: float = 20.0,
         visuals: bool = False,
+        links_pass: bool = False,
         backend: Callable[[], Backend] = SapienBackend,
     ) -> None:
         """Build the worlds.
@@ -59,6 +61,7 @@ class Simulation:
             physics: Solver settings; None keeps SAPIEN's own defaults.
             control_frequency: Control steps per second (Hz).
             visuals: Whether to build what pictures need.
+            links_pass: See `simulation.World`.
             backend: Makes what simulates them.
 
         Raises:
@@ -69,6 +72,7 @@ class Simulation:
         self.layout, self.num_envs = layout, num_envs
         self._everywhere: Sequence[int] = range(num_envs)
         self._physics, self._visuals = physics, visuals
+        self.links_pass = links_pass
         self._backend = backend()
         self._moment = Moment(self._backend)
         self._latest: State | None = None  # of this moment, if control modes look at it
@@ -331,6 +335,7 @@ class Simulation:
             visuals=self._visuals,
             number=index,
             placements=self._placements,
+            links_pass=self.links_pass,
         )
         build(world, index)
         return world

@@ -87,6 +87,8 @@ class World:
         bodies: Body by name.
         design: Geometry drawn for the coming episodes, if the task draws any.
         scales: Factor on the size of bodies, by name; 1 for those that are left out.
+        links_pass: Whether links of two robots pass through each other where the robots' files let
+            them pass through some of their own, as in ManiSkill; else robots always collide.
     """
 
     def __init__(
@@ -97,6 +99,7 @@ class World:
         visuals: bool = False,
         number: int = 0,
         placements: Placements | None = None,
+        links_pass: bool = False,
     ) -> None:
         """Begin without bodies.
 
@@ -106,6 +109,7 @@ class World:
             visuals: Whether to build what pictures need (a Vulkan driver must be present).
             number: Its number among the worlds of a simulation.
             placements: Where that simulation looks for what is placed.
+            links_pass: See the attribute.
         """
         self.layout = layout
         self.physics = SAPIEN_DEFAULTS if physics is None else physics
@@ -113,6 +117,7 @@ class World:
         self.bodies: dict[str, Body] = {}
         self.design: Any = None
         self.scales: Mapping[str, float] = {}
+        self.links_pass = links_pass
         self._number = number
         self._placements = Placements() if placements is None else placements
 

@@ -18,6 +18,7 @@ from typing import Any
 import torch
 
 from experts import find_expert
+from experts.touching import ArmWatch
 from layouts import Layout
 from measurements.experts.cells import TASKS, other_layout
 from measurements.experts.table import markdown
@@ -112,15 +113,15 @@ def _other(others: Seen, task_id: str, number: int) -> Seen:
 def _play(task: MultiRobotTask, episodes: Seen, seeds: int) -> Iterable[int]:
     """Play the seeds that are missing and yield each one."""
     expert = find_expert(task.task_id)
-    task.simulation.watch_arms()
+    arms = ArmWatch(task)
     with closing(task):
         for seed in range(seeds):
             if str(seed) not in episodes:
-                episodes[str(seed)] = _episode(task, seed, expert)
+                episodes[str(seed)] = _episode(task, seed, expert, arms)
             yield seed
 
 
-def _episode(task: MultiRobotTask, seed: int, expert: Any) -> Seen:
+def _episode(task: MultiRobotTask, seed: int, expert: Any, arms: ArmWatch) -> Seen:
     """Return what came of an expert's plan: success, steps, the arms that touched, and why."""
     try:
         plan = expert(task, seed)
@@ -129,7 +130,7 @@ def _episode(task: MultiRobotTask, seed: int, expert: Any) -> Seen:
     touching: dict[str, None] = {}
 
     def watch() -> None:
-        touching.update(dict.fromkeys(f"{a}, {b}" for a, b in task.simulation.arms_touching(0)))
+        touching.update(dict.fromkeys(f"{a}, {b}" for a, b in arms.touching()))
 
     played = play(task, seed, plan, watch)
     return {

@@ -11,6 +11,7 @@ from typing import Any
 
 import torch
 
+from experts.touching import ArmWatch
 from rollouts.dataset.certificate import FILE, Certificate
 from rollouts.dataset.comparison import Replay, play_again
 from rollouts.playing.executor import Event, Executor, modules_of, play_all
@@ -64,11 +65,11 @@ class _Certifier:
     def __init__(self, job: CertifyJob) -> None:
         self._file = open_recording(job.path, job.task_id)
         self._task = task_for(self._file, **job.cell)
-        self._task.simulation.watch_arms()
+        self._arms = ArmWatch(self._task)
         self._places = {seed: place for place, seed in enumerate(self._file.seeds)}
 
     def __call__(self, seed: int) -> Replay:
-        return play_again(self._task, self._file[self._places[seed]])
+        return play_again(self._task, self._file[self._places[seed]], self._arms)
 
     def close(self) -> None:
         self._task.close()

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from experts.touching import ArmWatch
 from rollouts.reading.episode_checksum import STATES
 from rollouts.reading.trajectory import Trajectory, TrajectoryError
 from tasks import MultiRobotTask
@@ -60,12 +61,13 @@ class Replay:
     touching_steps: int
 
 
-def play_again(task: MultiRobotTask, trajectory: Trajectory) -> Replay:
+def play_again(task: MultiRobotTask, trajectory: Trajectory, arms: ArmWatch) -> Replay:
     """Play the actions of an episode, compare all that was recorded, and count touching arms.
 
     Args:
-        task: A task with one environment that `MultiRobotTask.simulation` watches the arms of.
+        task: A task with one environment.
         trajectory: The episode.
+        arms: Watches its arms.
 
     Raises:
         TrajectoryError: If it cannot be played exactly.
@@ -79,7 +81,7 @@ def play_again(task: MultiRobotTask, trajectory: Trajectory) -> Replay:
 
     def watch() -> None:
         nonlocal steps
-        pairs = {", ".join(sorted(map(str, pair))) for pair in task.simulation.arms_touching(0)}
+        pairs = {", ".join(sorted(map(str, pair))) for pair in arms.touching()}
         touching.update(pairs)
         steps += bool(pairs)
 

@@ -59,13 +59,17 @@ class Blueprint:
     overlaps: dict[str, int] | None = None
     checked: bool = False
 
-    def build(self, scene: sapien.Scene, pose: sapien.Pose, number: int = 0) -> Any:
+    def build(
+        self, scene: sapien.Scene, pose: sapien.Pose, number: int = 0, *, links_pass: bool = False
+    ) -> Any:
         """Build an articulation in a scene and return it.
 
         Args:
             scene: SAPIEN's scene.
             pose: Of its base.
-            number: Which of the scene's robots it is; links of different robots always collide.
+            number: Which of the scene's robots it is.
+            links_pass: Whether its links pass through those of other robots where SAPIEN's loader
+                lets them: it numbers the pairs that may overlap in each robot from 1.
 
         Raises:
             AssetError: If SAPIEN left out a collision shape.
@@ -75,9 +79,12 @@ class Blueprint:
         for link in self.builder.link_builders:
             for record in link.visual_records:
                 record.material = _copied(record.material)
-        if self.overlaps is not None:
-            for link in self.builder.link_builders:
+        for link in self.builder.link_builders:
+            if self.overlaps is not None:
                 link.collision_groups = [1, 1, self.overlaps.get(link.name, 0), number + 1]
+            else:
+                own = 0 if links_pass else number + 1
+                link.collision_groups = [*link.collision_groups[:3], own]
         articulation = self.builder.build()
         self.builder.set_scene(None)  # else it would keep the scene alive
         articulation.set_root_pose(pose)

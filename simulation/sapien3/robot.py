@@ -48,6 +48,8 @@ class SimulatedRobot:
         placement: Placement,
         blueprint: Blueprint,
         number: int = 0,
+        *,
+        links_pass: bool = False,
     ) -> None:
         """Build it in ``scene``, stand it at its placement and set its drives.
 
@@ -57,6 +59,7 @@ class SimulatedRobot:
             placement: What it is and where it stands.
             blueprint: What `simulation.sapien3.blueprint.read_blueprint` made of it.
             number: Which of the scene's robots it is.
+            links_pass: See `simulation.World`.
 
         Raises:
             AssetError: If SAPIEN left out a collision shape.
@@ -65,7 +68,9 @@ class SimulatedRobot:
         descriptor = placement.robot
         self.name, self.descriptor = name, descriptor
         self.base_pose = sapien.Pose(list(placement.base_position), list(placement.base_quaternion))
-        self.articulation: Any = blueprint.build(scene, self.base_pose, number)
+        self.articulation: Any = blueprint.build(
+            scene, self.base_pose, number, links_pass=links_pass
+        )
         self.links = {link.name: link for link in self.articulation.links}
         self.joints: list[Any] = list(self.articulation.active_joints)
         self.active_index = _active_index(descriptor, [joint.name for joint in self.joints])

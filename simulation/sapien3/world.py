@@ -62,6 +62,7 @@ class BuiltWorld:
         *,
         visuals: bool = False,
         blueprints: dict[str, Blueprint] | None = None,
+        links_pass: bool = False,
     ) -> None:
         """Build the robots of a layout.
 
@@ -71,6 +72,7 @@ class BuiltWorld:
             visuals: Whether to build what pictures need (a Vulkan driver must be present).
             blueprints: What was read of the robots for an earlier world that is like this one,
                 by name; what is missing is read and added.
+            links_pass: See `simulation.World`.
 
         Raises:
             AssetError: If a robot's files cannot be found.
@@ -93,7 +95,9 @@ class BuiltWorld:
             if name not in blueprints:
                 blueprints[name] = read_blueprint(placement.robot, visuals=visuals)
             blueprint = blueprints[name]
-            self.robots[name] = SimulatedRobot(self.scene, name, placement, blueprint, number)
+            self.robots[name] = SimulatedRobot(
+                self.scene, name, placement, blueprint, number, links_pass=links_pass
+            )
         self.articulations = [robot.articulation for robot in self.robots.values()]
         self.bodies: dict[str, BuiltBody] = {}
         self.built: dict[tuple[Part, str], Any] = {}
@@ -173,7 +177,13 @@ class BuiltWorld:
 
 def build_world(world: World, blueprints: dict[str, Blueprint]) -> BuiltWorld:
     """Build what a task declared; see `BuiltWorld` for the arguments and errors."""
-    built = BuiltWorld(world.layout, world.physics, visuals=world.visuals, blueprints=blueprints)
+    built = BuiltWorld(
+        world.layout,
+        world.physics,
+        visuals=world.visuals,
+        blueprints=blueprints,
+        links_pass=world.links_pass,
+    )
     for body in world.bodies.values():
         built.add(body)
     built.settle()

@@ -132,6 +132,7 @@ class MultiRobotTask(Declaration, Varied, Remade):
             scenario.physics,
             control_frequency=scenario.control_frequency,
             visuals=scenario.draws,
+            links_pass=own.native_id is not None,
         )
         self._speeds = SpeedWatch(self._simulation)
         if scenario.randomization:

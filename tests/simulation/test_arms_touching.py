@@ -59,3 +59,16 @@ def test_limbs_of_one_robot_are_arms():
 def test_it_must_be_looked_at_before():
     with pytest.raises(SimulationError, match=r"call watch_arms\(\) before"):
         Simulation(single({"arm": "panda"}), empty, 1).arms_touching(0)
+
+
+@pytest.mark.parametrize("links_pass", [False, True])
+def test_hands_of_two_robots_collide_unless_they_are_to_pass_as_in_maniskill(links_pass):
+    """Both hands are in each other, as are other links that never pass."""
+    facing = face_to_face({"left": "panda", "right": "panda"}, spacing=1.2)
+    simulation = Simulation(facing, empty, 1, links_pass=links_pass)
+    simulation.watch_arms()
+    posture = [0.0, 0.41, 0.0, -2.05, 0.0, 2.46, 0.785, 0.04, 0.04]
+    step(simulation, dict.fromkeys(facing, posture))
+    touching = [{part.name for part in pair} for pair in simulation.arms_touching(0)]
+    assert {"panda_link6", "panda_link7"} in touching
+    assert ({"panda_hand"} in touching) != links_pass
