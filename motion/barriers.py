@@ -45,15 +45,15 @@ class Barrier:
         joint: The joint.
         value: The value (rad, or m if the joint slides).
         unit: That of the value.
-        bodies: What overlaps there, somewhere at least: a link of the robot, and what is in its
-            way; as in `motion.collisions.Contact`.
+        bodies: What overlaps there, one or another: links of the robot, each with what is in its
+            way; names as in `motion.collisions.Contact`.
     """
 
     robot: str
     joint: str
     value: float
     unit: str
-    bodies: tuple[str, str]
+    bodies: tuple[tuple[str, str], ...]
 
     def refusal(self) -> NoPlanError:
         """Return what to raise where this leaves no way."""
@@ -61,10 +61,11 @@ class Barrier:
 
     def __str__(self) -> str:
         """Say what would have to happen, and why it cannot."""
-        one, other = (name.removeprefix(f"{self.robot}/") for name in self.bodies)
+        own = f"{self.robot}/"
+        overlaps = [" is in ".join(name.removeprefix(own) for name in b) for b in self.bodies]
         return (
-            f"its {self.joint} would have to pass {self.value:.3g} {self.unit}, where {one} is in"
-            f" {other} whatever its other joints do"
+            f"its {self.joint} would have to pass {self.value:.3g} {self.unit}, where"
+            f" {' or '.join(overlaps)} whatever its other joints do"
         )
 
 
@@ -120,9 +121,9 @@ class Barriers:
             for value in _between(self._start[gate.joint], goal[gate.joint])
         ]
         for gate, value in self._deepest(self._closed(self._closed(looks, 1), SAMPLES)):
-            bodies = self._shut(gate, value)
-            if bodies is not None:
-                return self._barrier(gate, value, bodies)
+            overlapping = self._shut(gate, value)
+            if overlapping:
+                return self._barrier(gate, value, overlapping)
         return None
 
     def expect_one_reachable(self, goals: Floats) -> None:
@@ -253,26 +254,29 @@ class Barriers:
         """Return how far two solids are apart (m); negative if they overlap."""
         return self._measure.between(self._sieve.chains.places(state[None])[:, 0], *pair)[0]
 
-    def _shut(self, gate: _Gate, value: float) -> _Pair | None:
-        """Return solids that overlap at a value, if some do wherever the joints before are."""
-        boxes, last = [gate.ranges], gate.pairs[0]
+    def _shut(self, gate: _Gate, value: float) -> list[_Pair]:
+        """Return solids one pair of which overlaps at a value, wherever the joints before are.
+
+        None are returned if that is not proven.
+        """
+        boxes, shut = [gate.ranges], dict[_Pair, None]()
         for _ in range(BOXES):
             if not boxes:
-                return last
+                return list(shut)
             box = boxes.pop()
             state, ways = self._middle(gate, value, box)
             nearest = np.inf
-            for pair in sorted(gate.pairs, key=lambda pair: pair != last):
+            for pair in sorted(gate.pairs, key=lambda pair: pair not in shut):
                 gap = self._gap(state, pair)
                 nearest = min(nearest, gap)
                 if gap + ways[self._parts[pair[0]], self._parts[pair[1]]] < -SURE:
-                    last = pair
+                    shut[pair] = None
                     break
             else:
                 if nearest > 0.0 or not len(box):
-                    return None
+                    return []
                 boxes += _halves(box)
-        return None
+        return []
 
     def _middle(self, gate: _Gate, value: float, box: Floats) -> tuple[Floats, Floats]:
         """Return the state in the middle of a box, and how far parts move from there to its sides.
@@ -283,12 +287,18 @@ class Barriers:
         middle[gate.before], (low[gate.before], high[gate.before]) = box.mean(axis=1), box.T
         return middle, self._travel.between(low, high) / 2
 
-    def _barrier(self, gate: _Gate, value: float, pair: _Pair) -> Barrier:
+    def _barrier(self, gate: _Gate, value: float, pairs: Sequence[_Pair]) -> Barrier:
         robot, tree, own = self._owner(gate.joint)
-        solids = sorted((self._cell.solids[i] for i in pair), key=lambda s: s.mover != robot)
         unit = "m" if tree.slides[tree.drivers == own].any() else "rad"
-        one, other = (solid.name for solid in solids)
-        return Barrier(robot, tree.coordinates[own], value, unit, (one, other))
+        names = dict.fromkeys(self._names(pair, robot) for pair in pairs)
+        return Barrier(robot, tree.coordinates[own], float(value), unit, tuple(names))
+
+    def _names(self, pair: _Pair, robot: str) -> tuple[str, str]:
+        """Return the names of two solids, first that of the robot's own, or the one carried."""
+        moved = [self._cell.solids[i].mover == robot for i in pair]
+        depths = [len(self._chains_of[self._parts[i]]) for i in pair]
+        first = int(np.lexsort((depths, moved))[-1])
+        return self._cell.solids[pair[first]].name, self._cell.solids[pair[1 - first]].name
 
     @cached_property
     def _joint_of(self) -> NDArray[np.intp]:

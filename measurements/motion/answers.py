@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from measurements.robots.record import versions_of
+from motion.barriers import CUT_OFF
 
 PATIENCE = {2: 5.0, 3: 5.0, 4: 5.0}  # s of processor time within which a plan counts as solved
 LONGEST = 30.0  # s, the same for more arms
@@ -34,6 +35,7 @@ COLUMNS = (
     "robots touched",
     "farthest from the plan mm",
     "an arm finds no way even alone",
+    "cut off, recognised",
     "wrongly said to be infeasible",
     "infeasible, recognised",
 )
@@ -73,7 +75,9 @@ def page(shown: Mapping[str, Any]) -> Iterator[str]:
     yield "column beside it says how far any link was from where the plan had it."
     yield ""
     yield "*An arm finds no way even alone*: the planner says so; some random postures lie in"
-    yield "pockets, such as beyond the floor for an upper arm that turns half way round at most."
+    yield "pockets. *Cut off, recognised*: the planner proves that there is no way, as where a goal"
+    yield "lies beyond the floor for an upper arm that turns half way round at most; these queries"
+    yield "count in no other column."
     yield "*Wrongly said to be infeasible*: a goal that stands for a free posture is said to be out"
     yield "of reach or in collision. *Infeasible, recognised*: two more queries per cell, in which"
     yield "one arm's goal is out of its reach or inside something, and how many of them were"
@@ -107,7 +111,8 @@ def markdown(record: Sequence[Seen]) -> Iterator[str]:
 
 def _row(arms: int, every: Sequence[Seen]) -> str:
     hopeless = [s for s in every if s["goal"] in INFEASIBLE]
-    seen = [s for s in every if s["goal"] not in INFEASIBLE]
+    asked = [s for s in every if s["goal"] not in INFEASIBLE]
+    seen = [s for s in asked if s.get("reason") != CUT_OFF]
     solved = [s for s in seen if s["solved"]]
     seconds = np.array([s["seconds"] for s in seen])
     in_time = sum(s["seconds"] <= PATIENCE.get(arms, LONGEST) for s in solved)
@@ -122,7 +127,7 @@ def _row(arms: int, every: Sequence[Seen]) -> str:
         _share(len(solved), len(seen)),
         _share(len(solved), len(seen) - alone),
         _share(in_time, len(seen)),
-        *(f"{np.quantile(seconds, q):.2f}" for q in (0.5, 0.9, 0.99, 1.0)),
+        *(f"{np.quantile(seconds, q):.2f}" if seen else "" for q in (0.5, 0.9, 0.99, 1.0)),
         _share(sum(s["certified"] for s in checked), len(checked)),
         sum(s["collisions"] for s in checked),
         f"{1e3 * min(clearances):.1f}" if clearances else "",
@@ -130,6 +135,7 @@ def _row(arms: int, every: Sequence[Seen]) -> str:
         sum(bool(s["touching"]) for s in tried),
         f"{1e3 * max(strays):.1f}" if strays else "",
         alone,
+        len(asked) - len(seen),
         sum(s.get("reason") in REASONS for s in seen),
         f"{sum(s.get('reason') == INFEASIBLE[s['goal']] for s in hopeless)} of {len(hopeless)}",
     ]

@@ -105,13 +105,14 @@ def test_the_table_counts_every_miss():
         LINE | SOLVED | {"seconds": 0.1, "executed": False, "touching": []},
         LINE | REFUSED | {"seconds": 0.3, "reason": "not found", "message": ALONE},
         LINE | REFUSED | {"reason": "unreachable"},
+        LINE | REFUSED | {"reason": "cut off"},
         LINE | REFUSED | {"reason": "unreachable", "goal": "out of reach"},
         LINE | REFUSED | {"reason": "not found", "goal": "in collision"},
     ]
     row = list(markdown(record))[-1]
     assert row == (
         "| 2 | 5 | 60.0% | 75.0% | 60.0% | 0.10 | 0.22 | 0.29 | 0.30 | 100.0% | 0 | 12.3"
-        " | 2 of 3 | 1 | 2.1 | 1 | 1 | 1 of 2 |"
+        " | 2 of 3 | 1 | 2.1 | 1 | 1 | 1 | 1 of 2 |"
     )
 
 
