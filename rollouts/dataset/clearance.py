@@ -1,8 +1,7 @@
 """How near different robots came to each other in recorded episodes.
 
-Distances are those of the convex hulls of collision shapes, whatever the simulation lets overlap:
-SAPIEN, as it is used by ManiSkill, lets links of two robots pass through each other where the
-robots' SRDF lets links of those two groups overlap in one robot, as it does fingers.
+Distances are those of the convex hulls of collision shapes, whatever the simulation lets overlap;
+see `simulation.World`.
 """
 
 from __future__ import annotations

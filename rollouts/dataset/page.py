@@ -167,9 +167,7 @@ def _clearances(report: Report) -> str:
     words = (
         "The least distance of links of different robots at any control step, in each of"
         f" {_plural(len(found.places), 'episode')}, evenly chosen; it is negative where the convex"
-        " hulls of their shapes overlap. The simulation lets some links pass through each other"
-        " and counts no contact then: fingers and hands of robots of the same kind, as ManiSkill's"
-        " does."
+        " hulls of their shapes overlap, as those of hands can in clones of ManiSkill's tasks."
     )
     return _section("Clearance between robots", f"<p>{words}</p><figure>{chart}</figure>")
 
