@@ -150,6 +150,8 @@ class TestDependencies:
 # Imported inside functions only, after its extra was found to be installed.
 LOADED_WITH_ITS_EXTRA = {
     "rollouts/export/lerobot.py",
+    "rollouts/export/lerobot_files.py",
+    "rollouts/export/lerobot_pictures.py",
     "tasks/fronts/parallel.py",
     "tasks/fronts/sb3.py",
 }
