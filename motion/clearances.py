@@ -12,12 +12,14 @@ from motion.cell import Cell
 from motion.collisions import Checker, Flags
 from robots.common.errors import NoPlanError
 
+OWN = 5e-4  # m, between links of one robot, so that none grazes another between two looks
+
 
 class Keeping:
     """The pairs of bodies that count while some robots move, each with its clearance.
 
-    Links of one robot only have to stay apart; so do bodies that are nearer than the clearance
-    where a motion begins or ends.
+    Links of one robot keep `OWN` apart. Bodies that are nearer where a motion begins or ends only
+    have to stay apart.
     """
 
     def __init__(
@@ -36,7 +38,7 @@ class Keeping:
         solids = cell.solids
         self._movers = np.array([solid.mover for solid in solids])[self._pairs]
         own = (self._movers[:, 0] == self._movers[:, 1]) & (self._movers[:, 0] != "")
-        self._apart = np.where(own, 0.0, clearance)
+        self._apart = np.where(own, OWN, clearance)
         moved = [s.mover in timed or cell.parts[s.part].track is not None for s in solids]
         self._overlaps: dict[tuple[str, ...], Checker] = {}
         one, other = np.array(moved, bool)[self._pairs].T

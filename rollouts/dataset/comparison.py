@@ -77,17 +77,17 @@ def play_again(task: MultiRobotTask, trajectory: Trajectory, arms: ArmWatch) -> 
             f"episode {trajectory.episode_id} cannot be played exactly: it needs the seed of its"
             " reset, which must have built the world anew, and states to compare with"
         )
-    touching, steps = Counter[str](), 0
+    moments: list[set[str]] = []
 
     def watch() -> None:
-        nonlocal steps
-        pairs = {", ".join(sorted(map(str, pair))) for pair in arms.touching()}
-        touching.update(pairs)
-        steps += bool(pairs)
+        moments.append({", ".join(sorted(map(str, pair))) for pair in arms.touching()})
 
     played = play(task, trajectory.seed, trajectory.actions, watch)
+    steps = moments[1:]  # the first is that after the reset
+    touching = Counter(pair for pairs in steps for pair in pairs)
+    differs = difference(trajectory, played)
     return Replay(
-        len(played.actions), played.solved, difference(trajectory, played), dict(touching), steps
+        len(played.actions), played.solved, differs, dict(touching), sum(map(bool, steps))
     )
 
 

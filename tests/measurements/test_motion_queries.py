@@ -57,7 +57,7 @@ def test_arms_come_from_urdfs_of_one_arm(tmp_path):
 
 
 def test_a_motion_on_which_robots_meet_is_seen_to_touch():
-    layout = face_to_face({"left": "panda", "right": "panda"}, spacing=0.9)
+    layout = face_to_face({"left": "panda", "right": "panda"}, spacing=1.35)
     stage = Stage(layout, "pd_joint_pos")
     ahead = {name: p.start_qpos + LEANING for name, p in layout.items()}
     times, share = np.array([0.0, 1.0]), np.array([0.0, 1.0])[:, None]

@@ -163,15 +163,22 @@ def test_links_of_two_robots_collide_whatever_each_allows(tmp_path):
     assert frozenset({"l0", "l2"}) in touching
 
 
-def test_a_robot_that_says_nothing_keeps_the_groups_of_native_s_loader(tmp_path):
+def test_a_robot_that_says_nothing_keeps_the_groups_of_native_s_loader(
+    tmp_path,
+):
     urdf = tmp_path / "toy.urdf"
     urdf.write_text(toy())
     urdf.with_suffix(".srdf").write_text(
         robot('<disable_collisions link1="base" link2="hand" reason="Default"/>')
     )
-    for allowed, expected in ((None, {(1, 1, 1, 0), (1, 1, 0, 0)}), ((), {(1, 1, 0, 1)})):
+    for allowed, links_pass, expected in (
+        (None, True, {(1, 1, 1, 0), (1, 1, 0, 0)}),
+        (None, False, {(1, 1, 1, 1), (1, 1, 0, 1)}),
+        ((), True, {(1, 1, 0, 1)}),
+    ):
         changed = replace(descriptor(urdf), allowed_collisions=allowed)
-        links = BuiltWorld(Layout({"toy": Placement(changed)})).robots["toy"].links.values()
+        world = BuiltWorld(Layout({"toy": Placement(changed)}), links_pass=links_pass)
+        links = world.robots["toy"].links.values()
         groups = [shape.get_collision_groups() for link in links for shape in link.collision_shapes]
         assert set(map(tuple, groups)) == expected
 

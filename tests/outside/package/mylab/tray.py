@@ -25,7 +25,7 @@ def around_a_tray(robots, *, spacing=1.5):
     names = list(robots)
     layout = face_to_face({name: robots[name] for name in names[:2]}, spacing=spacing)
     more = {
-        name: Placement(robots[name], position=(-0.75 * number, 0.0, 0.0))
+        name: Placement(robots[name], position=(-0.9 * number, 0.0, 0.0))
         for number, name in enumerate(names[2:], start=1)
     }
     return Layout({**layout, **more})
