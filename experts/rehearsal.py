@@ -68,7 +68,8 @@ class Rehearsal:
             check_layout=False,  # it was checked when the task was made
         )
         self.task = type(task)(scenario)
-        self._watch = ArmWatch(self.task) if len(self.task.layout.arms) > 1 else None
+        several = len(self.task.layout.arms) > 1
+        self._watch = ArmWatch(self.task, strict=False) if several else None
         self._alone = RobotsAlone(self.task.layout, scenario.physics)
 
     def begin(self, seed: int) -> Scene:

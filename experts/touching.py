@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from layouts import Layout
 from motion.cell import cell_of
+from motion.collisions import Checker
 from robots.bodies.hulls import require_packages
 from robots.common.errors import MissingPackageError
 from simulation.parts import Part
@@ -15,14 +17,30 @@ class ArmWatch:
     Every contact counts that physics reports. In clones of ManiSkill's tasks, physics lets some
     links of two robots pass through each other, such as the fingers of two Pandas (see
     `simulation.World`); there overlaps of their shapes count, too, as they are when it is asked.
-    That takes python-fcl; where it is not installed, they are not seen.
     """
 
-    def __init__(self, task: MultiRobotTask) -> None:
-        """Watch a task from now on."""
+    def __init__(self, task: MultiRobotTask, *, strict: bool = True) -> None:
+        """Watch a task from now on.
+
+        Args:
+            task: A task with one environment.
+            strict: Whether to refuse where overlaps count and python-fcl, which measures them, is
+                not installed. Otherwise they are not seen there.
+
+        Raises:
+            MissingPackageError: If it is refused.
+        """
         self._task = task
+        self._checker: tuple[Layout, Checker] | None = None
+        self._measures = task.simulation.links_pass and len(task.layout) > 1
+        if self._measures:
+            try:
+                require_packages()
+            except MissingPackageError:
+                if strict:
+                    raise
+                self._measures = False
         task.simulation.watch_arms()
-        self._measures = task.simulation.links_pass and len(task.layout) > 1 and _can_measure()
 
     def touching(self) -> list[tuple[Part, Part]]:
         """Return which links of different arms touch, or have touched since it was last asked."""
@@ -30,21 +48,19 @@ class ArmWatch:
         return [*found, *self._overlapping()] if self._measures else found
 
     def _overlapping(self) -> list[tuple[Part, Part]]:
-        checker = cell_of(self._task.standing()).checker(own=None)
         joints = self._task.simulation.read().joint_positions[0]
         return [
             (_part(contact.names[0], contact.owners[0]), _part(contact.names[1], contact.owners[1]))
-            for contact in checker.contacts(joints)
+            for contact in self._current_checker().contacts(joints)
         ]
+
+    def _current_checker(self) -> Checker:
+        """Return the checker for where robots stand, which is made once per standing."""
+        standing = self._task.standing()
+        if self._checker is None or self._checker[0] is not standing:
+            self._checker = standing, cell_of(standing).checker(own=None)
+        return self._checker[1]
 
 
 def _part(name: str, robot: str) -> Part:
     return Part(robot, name.removeprefix(f"{robot}/"))
-
-
-def _can_measure() -> bool:
-    try:
-        require_packages()
-    except MissingPackageError:
-        return False
-    return True

@@ -55,11 +55,12 @@ class TestWheel:
     def test_is_typed(self, wheel, room):
         assert f"{room}/py.typed" in wheel.namelist()
 
-    def test_carries_what_the_report_page_is_made_of(self, wheel):
+    def test_carries_what_pages_are_made_of(self, wheel):
         names = {
             f"parity/report/templates/report.{suffix}" for suffix in ("html.jinja", "css", "js")
         }
-        assert names <= {*wheel.namelist()}
+        sheets = {"robots/common/palette.css", "rollouts/dataset/page.css"}
+        assert names | sheets <= {*wheel.namelist()}
 
     def test_carries_the_asset_manifest_unchanged(self, wheel):
         manifest = (ROOT / "assets_cache" / "manifest.json").read_bytes()

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any
 
 from parity.show.embedding import Embedded
 from robots import MissingPackageError
+from robots.common.style import read_style, source_hash
 
 
 def render(context: Mapping[str, Any], fitted: Mapping[str, Embedded]) -> str:
@@ -29,8 +29,9 @@ def render(context: Mapping[str, Any], fitted: Mapping[str, Embedded]) -> str:
     folder = files("parity.report") / "templates"
     parts = {
         name: (folder / f"report.{suffix}").read_text(encoding="utf-8")
-        for name, suffix in (("page", "html.jinja"), ("style", "css"), ("script", "js"))
+        for name, suffix in (("page", "html.jinja"), ("script", "js"))
     }
+    style = read_style("parity.report", "templates/report.css")
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
@@ -39,9 +40,9 @@ def render(context: Mapping[str, Any], fitted: Mapping[str, Embedded]) -> str:
         {
             **context,
             "tasks": shown,
-            "style": parts["style"],
+            "style": style,
             "script": parts["script"],
-            "policy": _policy(parts["style"], parts["script"]),
+            "policy": _policy(style, parts["script"]),
         }
     )
 
@@ -66,9 +67,5 @@ def _data_address(kind: str, content: bytes) -> str:
 
 def _policy(style: str, script: str) -> str:
     """Return a policy under which a browser loads nothing but what the page itself carries."""
-    allowed = {
-        name: base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-        for name, text in (("style-src", style), ("script-src", script))
-    }
-    own = "; ".join(f"{name} 'sha256-{digest}'" for name, digest in allowed.items())
+    own = f"style-src {source_hash(style)}; script-src {source_hash(script)}"
     return f"default-src 'none'; img-src data:; media-src data: blob:; {own}; form-action 'none'"

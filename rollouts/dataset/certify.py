@@ -53,6 +53,7 @@ class CertifyJob:
         """Open the recording and make its task in a worker.
 
         Raises:
+            MissingPackageError: If it takes python-fcl to see which arms touch.
             TrajectoryError: If that is impossible here.
         """
         torch.set_num_threads(1)

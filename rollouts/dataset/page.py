@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
+from robots.common.style import read_style, source_hash
 from rollouts.dataset.certificate import Certificate
 from rollouts.dataset.charts import histogram
 from rollouts.dataset.clearance import Clearances
@@ -46,9 +45,8 @@ class Report:
 
 def render(report: Report) -> str:
     """Return the page."""
-    style = (files("rollouts.dataset") / "page.css").read_text(encoding="utf-8")
-    digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
-    policy = f"default-src 'none'; media-src data:; img-src data:; style-src 'sha256-{digest}'"
+    style = read_style("rollouts.dataset", "page.css")
+    policy = f"default-src 'none'; media-src data:; img-src data:; style-src {source_hash(style)}"
     sections = "".join(
         (
             _lengths(report.contents),

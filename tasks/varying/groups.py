@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
@@ -43,12 +44,24 @@ class Limits:
             raise TaskError(f"{what} is drawn from {drawn}; it takes Whole(low, high)")
         lowest, highest = drawn.bounds
         if lowest < self.low or highest > self.high:
-            ends = [f"{self.low:g}", f"{self.high:g}"]
             raise TaskError(
-                f"{what} may be {lowest:g} … {highest:g}, drawn from {drawn}; it must stay within"
-                f" {' … '.join(ends)} ({self.unit})"
+                f"{what} {_reach(drawn)}; it must stay within"
+                f" {self.low:g} … {self.high:g} ({self.unit}){_remedy(drawn)}"
             )
         return drawn
+
+
+def _reach(drawn: Distribution) -> str:
+    """Say what a distribution may draw."""
+    lowest, highest = drawn.bounds
+    if isinstance(drawn, Fixed):
+        return f"is {lowest:g}"
+    return f"may be {lowest:g} … {highest:g}, drawn from {drawn}"
+
+
+def _remedy(drawn: Distribution) -> str:
+    unbounded = any(math.isinf(bound) for bound in drawn.bounds)
+    return ": give it bounds, Normal(std, mean, low, high)" if unbounded else ""
 
 
 class Group:

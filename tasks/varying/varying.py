@@ -81,6 +81,7 @@ class Varying:
         count = simulation.num_envs
         self._streams = [Stream(0)] * count
         self._drawn: list[dict[str, Any]] = [{} for _ in range(count)]
+        self._standing = [self._layout] * count
         self._noise = ActionNoise(self._targets.get("action_noise", {}))
         self._sensors = SensorNoise(declared.get("sensor_noise", {}))
         self._sending = ActionDelay(count) if "action_delay" in declared else None
@@ -95,6 +96,8 @@ class Varying:
         """Draw what varies in the coming episode of an environment."""
         self._streams[env] = stream
         drawn = self._drawn[env] = self._draw(stream)
+        if "bases" in drawn:
+            self._standing[env] = shifted(self._layout, drawn["bases"])
         if self._sending is not None:
             self._sending.begin(env, drawn["action_delay"])
         if self._seeing is not None:
@@ -111,7 +114,7 @@ class Varying:
 
     def layout(self, env: int) -> Layout:
         """Return the layout as robots stand in the present episode of an environment."""
-        return self._standing(self._drawn[env])
+        return self._standing[env]
 
     def scale(self, body: str) -> Floats:
         """Return the factor on the size of a body in each environment, (N,)."""
@@ -130,7 +133,7 @@ class Varying:
 
     def apply(self, simulation: Simulation, env_ids: Sequence[int]) -> None:
         """Let worlds differ by what was drawn; their reset has begun."""
-        simulation.vary({env: self._variation(self._drawn[env]) for env in env_ids})
+        simulation.vary({env: self._variation(env) for env in env_ids})
 
     def scatter(self, simulation: Simulation, state: State, env_ids: Sequence[int]) -> bool:
         """Put distractors where they are clear of everything, and tell whether there are any."""
@@ -210,19 +213,17 @@ class Varying:
                 drawn[axis] = _value(declared, stream, axis)
         return drawn
 
-    def _variation(self, drawn: Mapping[str, Any]) -> Variation:
+    def _variation(self, env: int) -> Variation:
+        drawn = self._drawn[env]
         factors = {
             axis: self._each(drawn, axis)
             for axis in ("mass", "friction", "stiffness", "damping", "joint_friction")
         }
-        standing = self._standing(drawn) if "bases" in drawn else {}
+        standing = self._standing[env] if "bases" in drawn else {}
         bases = {name: (p.base_position, p.base_quaternion) for name, p in standing.items()}
         paints = self._scattering.paints(drawn["distractors"]) if self._scattering else {}
         seen = looks(lambda axis: self._each(drawn, axis), paints)
         return Variation(**factors, bases=bases, looks=seen)
-
-    def _standing(self, drawn: Mapping[str, Any]) -> Layout:
-        return shifted(self._layout, drawn["bases"]) if "bases" in drawn else self._layout
 
     def _scales(self, drawn: Mapping[str, Any]) -> dict[str, float]:
         return self._each(drawn, "size")

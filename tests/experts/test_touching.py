@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,8 @@ import pytest
 
 from experts.touching import ArmWatch
 from layouts import face_to_face
-from tasks import get_task_class
+from robots import MissingPackageError
+from tasks import Randomization, get_task_class
 
 HANDS = [0.0, 0.41, 0.0, -2.05, 0.0, 2.46, 0.785, 0.04, 0.04]  # in each other, 1.2 m apart
 
@@ -32,4 +34,31 @@ def test_hands_in_each_other_are_seen_in_clones_as_in_other_tasks(task_id):
     task.step(np.zeros((1, 16), np.float32))
     found = watch.touching()
     assert any({part.name for part in pair} == {"panda_hand"} for pair in found)
+    task.close()
+
+
+def test_without_what_measures_overlaps_a_strict_watch_is_refused(monkeypatch):
+    cls = get_task_class("TwoRobotPickCube-v1")
+    task = cls(replace(cls.scenario, obs_mode="none"))
+    monkeypatch.setitem(sys.modules, "fcl", None)
+    with pytest.raises(MissingPackageError, match=r"robot-layouts\[checks\]"):
+        ArmWatch(task)
+    assert ArmWatch(task, strict=False).touching() == []
+    task.close()
+
+
+def test_overlaps_are_measured_where_robots_stand_in_the_present_episode():
+    cls = get_task_class("TwoRobotPickCube-v1")
+    apart = Randomization(bases={"left": {"x": -0.3}})
+    facing = face_to_face({"left": "panda", "right": "panda"}, spacing=1.2)
+    task = cls(
+        replace(
+            cls.scenario, layout=facing, obs_mode="none", check_layout=False, randomization=apart
+        )
+    )
+    task.reset(seed=0)
+    for name in facing:
+        task.simulation.worlds[0].stand(name, HANDS)
+    watch = ArmWatch(task)
+    assert watch.touching() == []
     task.close()

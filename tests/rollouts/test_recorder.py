@@ -22,6 +22,7 @@ from rollouts.recording.episode_files import part_path, read_part
 from rollouts.recording.recorder import Recorder
 from tasks.episode import PlayedEpisode, play
 from tests.rollouts.hand_overs import TASK, plan, task
+from tests.rollouts.kills import Kill, Killed
 from tests.rollouts.recordings import edited
 
 SEEDS = (0, 3)
@@ -220,36 +221,21 @@ def test_a_recording_goes_on_whatever_moment_it_was_killed_at(tmp_path, push_t, 
         (os, "fsync"),
     ]
 
-    class Killed(BaseException):
-        pass
-
     stops = 0
     while True:
         path = write(tmp_path / f"{stops}" / "killed.h5", env, episodes[:5])
-        remaining = stops
-
-        def stop_or(call):
-            def replacement(*arguments, **keywords):
-                nonlocal remaining
-                remaining -= 1
-                if remaining < 0:
-                    raise Killed
-                return call(*arguments, **keywords)
-
-            return replacement
-
+        kill = Kill(stops)
         with monkeypatch.context() as patch, suppress(Killed):
             recorder = Recorder(path, env, resume=True)
             for episode in episodes[5:]:
                 recorder.add(episode)
-            for owner, name in calls:
-                patch.setattr(owner, name, stop_or(getattr(owner, name)))
+            kill.watch(patch, calls)
             recorder.close()
         with Recorder(path, env, resume=True) as again:
             assert again.seeds == set(range(12)), f"after {stops} calls"
         assert same_files(path, whole), f"after {stops} calls"
         assert not again.parts.exists()
-        if remaining > 0:
+        if kill.remaining > 0:
             break
         stops += 1
     assert stops >= 5

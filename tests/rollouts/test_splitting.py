@@ -15,6 +15,7 @@ from rollouts.reading.manifest import manifest_path, read_manifest, spans_of
 from rollouts.reading.trajectory import TrajectoryFile
 from rollouts.recording import joined_files
 from rollouts.recording.recorder import Recorder
+from tests.rollouts.kills import Kill, Killed
 from tests.rollouts.test_recorder import short_episode
 
 SIZE = 0.03  # MB; four or five episodes of 3 steps
@@ -214,29 +215,14 @@ def test_a_kill_at_any_moment_loses_nothing(tmp_path, push_t, straight, monkeypa
     calls = [(os, "replace"), (Path, "unlink"), (Path, "rmdir"), (os, "fsync")]
     order = [*range(3, COUNT), 0, 1, 2]
 
-    class Killed(BaseException):
-        pass
-
     stops = 0
     while True:
         path = write(tmp_path / f"{stops}" / "trajectory.h5", env, [episodes[i] for i in order[:9]])
         first = {order[i] for i in range(9)}
-        remaining, kept = stops, set(first)
-
-        def stop_or(call):
-            def replacement(*arguments, **keywords):
-                nonlocal remaining
-                remaining -= 1
-                if remaining < 0:
-                    raise Killed
-                return call(*arguments, **keywords)
-
-            return replacement
-
+        kill, kept = Kill(stops), set(first)
         with monkeypatch.context() as patch, suppress(Killed):
             recorder = Recorder(path, env, resume=True, file_size=SIZE)
-            for owner, name in calls:
-                patch.setattr(owner, name, stop_or(getattr(owner, name)))
+            kill.watch(patch, calls)
             for i in order[9:]:
                 recorder.add(episodes[i])
                 kept.add(i)
@@ -251,7 +237,7 @@ def test_a_kill_at_any_moment_loses_nothing(tmp_path, push_t, straight, monkeypa
         listed = [seed for seeds in seeds_by_file(path) for seed in seeds]
         assert sorted(listed) == list(range(COUNT)), f"after {stops} calls"
         assert not again.parts.exists()
-        if remaining > 0:
+        if kill.remaining > 0:
             break
         stops += 1
     assert stops >= 20
