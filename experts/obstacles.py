@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 
@@ -24,10 +25,17 @@ def obstacles(scene: Scene) -> dict[str, Obstacle]:
         scene: The scene.
     """
     return {
-        body.name: Obstacle(f"the {body.name}", shapes, pose_matrix(*scene.body(body.name)))
+        body.name: obstacle.moved(pose_matrix(*scene.body(body.name)))
         for body in scene.bodies
-        if (shapes := tuple(_shapes(body)))
+        if (obstacle := _obstacle(body)) is not None
     }
+
+
+@lru_cache(maxsize=256)
+def _obstacle(body: Body) -> Obstacle | None:
+    """Return a body anywhere, so that what is prepared for its shapes is so once; None of none."""
+    shapes = tuple(_shapes(body))
+    return Obstacle(f"the {body.name}", shapes) if shapes else None
 
 
 def _shapes(body: Body) -> Iterator[Floats]:

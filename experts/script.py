@@ -40,6 +40,10 @@ class Scene:
         """Return the pose of a body."""
         return _split(self._state.pose(name)[0])
 
+    def scale(self, name: str) -> float:
+        """Return how much larger a body is in this episode than it was declared, as a factor."""
+        return next(body.scale for body in self.bodies if body.name == name)
+
     def base(self, robot: str) -> Floats:
         """Return where the base of a robot or a limb stands, (3,)."""
         return np.array(self._layout.arm(robot).base_position)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -159,10 +160,8 @@ class _Query:
         self.start = everywhere[0, columns]
         self._allowed = _Allowed(cell, self._whole)
         self.at_body = self._look(self._allowed, everywhere[0], leaving=True)
-        checker = self._allowed.checker()
-        free = checker.free(everywhere)
-        free[0] = True
-        self.everywhere = everywhere[free]
+        later = [state for state in everywhere[1:] if self._forbidden(self._allowed, state) is None]
+        self.everywhere = np.stack([everywhere[0], *later])
         self.trouble = ""
 
     def at(self, goal: Floats) -> _Place | None:
@@ -172,10 +171,14 @@ class _Query:
         states[:, self.columns] = goal
         at_body = self._look(allowed, states[0], leaving=False)
         self._look(allowed, states[-1], leaving=False)
-        place = _Place(self, goal, allowed, self.at_body or at_body)
-        contact = next((c for state in states if (c := place.contact(state)) is not None), None)
+        found = (self._forbidden(allowed, state) for state in states)
+        contact = next((contact for contact in found if contact is not None), None)
         self.trouble = str(contact or "")
-        return place if contact is None else None
+        return _Place(self, goal, allowed, self.at_body or at_body) if contact is None else None
+
+    def _forbidden(self, allowed: _Allowed, state: Floats) -> Contact | None:
+        """Return a contact in a state that is not allowed, or None."""
+        return next((c for c in self._whole.contacts(state) if allowed.forbids(c)), None)
 
     def _look(self, allowed: _Allowed, state: Floats, *, leaving: bool) -> bool:
         """Allow what may be nearer than usual in a state; return whether the hand is at a body.
@@ -198,41 +201,41 @@ class _Query:
 
 
 class _Allowed:
-    """How far bodies have to be apart, by pairs."""
+    """What may be nearer than usual, by the names of two bodies."""
 
-    def __init__(self, cell: Cell, whole: Checker, apart: Floats | None = None) -> None:
-        """Begin with what a checker asks."""
+    def __init__(
+        self, cell: Cell, whole: Checker, nearer: Mapping[frozenset[str], float] | None = None
+    ) -> None:
+        """Begin with what a checker asks, or with what is allowed already."""
         self._cell, self._whole = cell, whole
-        self.apart = whole.apart.copy() if apart is None else apart
-        names = [solid.name for solid in cell.solids]
-        self._names = [frozenset((names[a], names[b])) for a, b in whole.pairs.tolist()]
+        self._nearer = dict(nearer or {})
 
     def copy(self) -> _Allowed:
         """Return a copy, to allow more."""
-        return _Allowed(self._cell, self._whole, self.apart.copy())
+        return _Allowed(self._cell, self._whole, self._nearer)
 
     def touch(self, contact: Contact) -> None:
-        """Leave out the pairs of two bodies."""
-        self._set(contact, -np.inf)
+        """Let two bodies overlap."""
+        self._nearer[frozenset(contact.names)] = -np.inf
 
     def near(self, contact: Contact) -> None:
         """Let two bodies be as near as they like, as long as they do not overlap."""
-        self._set(contact, 0.0)
+        self._nearer.setdefault(frozenset(contact.names), 0.0)
 
-    def checker(self) -> Checker:
-        """Return what tells whether all else is apart."""
-        return Checker(self._cell, *self.counted())
+    def forbids(self, contact: Contact) -> bool:
+        """Whether two bodies that the checker calls too near may not be so."""
+        return contact.distance < self._nearer.get(frozenset(contact.names), np.inf)
 
     def counted(self) -> tuple[NDArray[np.intp], Floats]:
-        """Return the pairs that count, and how far each has to be apart."""
-        counts = self.apart > -np.inf
-        return self._whole.pairs[counts], self.apart[counts]
-
-    def _set(self, contact: Contact, apart: float) -> None:
-        names = frozenset(contact.names)
-        for i, pair in enumerate(self._names):
-            if pair == names:
-                self.apart[i] = min(self.apart[i], apart)
+        """Return the pairs that count, and how far each has to be apart, (m, 2) and (m,) (m)."""
+        names = np.array([solid.name for solid in self._cell.solids])[self._whole.pairs]
+        apart = self._whole.apart.copy()
+        for bodies, distance in self._nearer.items():
+            one, other = bodies if len(bodies) > 1 else (*bodies, *bodies)
+            theirs = ((names == one) & (names[:, ::-1] == other)).any(axis=1)
+            apart[theirs] = np.minimum(apart[theirs], distance)
+        counts = apart > -np.inf
+        return self._whole.pairs[counts], apart[counts]
 
 
 class _Place:
@@ -240,25 +243,26 @@ class _Place:
 
     def __init__(self, query: _Query, goal: Floats, allowed: _Allowed, at_body: bool) -> None:
         self.goal, self._start = goal, query.start
-        ends = np.stack([self._start, goal])
-        self._checker = _AmongMoving(
-            query.cell, *allowed.counted(), query.columns, query.everywhere
+        self._query, self._allowed = query, allowed
+        self._only_straight = at_body and bool(np.abs(goal - self._start).max() < SHORT)
+
+    @cached_property
+    def _space(self) -> Space:
+        query = self._query
+        ends = np.stack([self._start, self.goal])
+        checker = _AmongMoving(
+            query.cell, *self._allowed.counted(), query.columns, query.everywhere
         )
-        self._space = Space(
+        return Space(
             query.cell,
             (query.robot,),
             query.columns,
             query.everywhere[0],
             _bounds(query.cell.limits[query.columns], ends),
-            np.ones(len(goal)),
-            self._checker,
+            np.ones(len(self.goal)),
+            checker,
             _Budget(),
         )
-        self._only_straight = at_body and bool(np.abs(goal - self._start).max() < SHORT)
-
-    def contact(self, state: Floats) -> Contact | None:
-        """Return which two bodies are too near in a state of the whole cell, or None."""
-        return self._checker.contact(state)
 
     @property
     def is_straight_free(self) -> bool:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import combinations
+from itertools import product
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from kinematics.rotations import Floats, pose_matrix
 from layouts import Layout
@@ -237,35 +237,27 @@ class Bodies:
     # -- pairs -------------------------------------------------------------------------------
 
     @cached_property
-    def counted_pairs(self) -> tuple[tuple[int, int], ...]:
-        """The pairs of solids that may not touch, whoever moves."""
-        own = {name: 0 for name in self.robots}
-        first = 0
-        for name, model in self.models.items():
-            own[name] = first
-            first += len(model.hulls)
-        links, others = range(first), range(first, len(self.solids))
-        pairs = [
-            (own[name] + a, own[name] + b)
-            for name, model in self.models.items()
-            for a, b in model.self_pairs
+    def counted_pairs(self) -> NDArray[np.intp]:
+        """The pairs of solids that may not touch, whoever moves, (m, 2)."""
+        firsts = np.cumsum([0, *(len(model.hulls) for model in self.models.values())])
+        links, others = range(firsts[-1]), range(firsts[-1], len(self.solids))
+        owners = np.repeat(np.arange(len(self.models)), np.diff(firsts))
+        moved = np.array([bool(solid.mover) for solid in self.solids])
+        within = [
+            np.array([*model.self_pairs], np.intp).reshape(-1, 2) + first
+            for model, first in zip(self.models.values(), firsts, strict=False)
         ]
-        pairs += [
-            (a, b)
-            for a, b in combinations(links, 2)
-            if self.solids[a].owner != self.solids[b].owner
-        ]
-        pairs += [(a, b) for a in links for b in others if b not in self._touchable.get(a, ())]
-        pairs += [
-            (a, b)
-            for a, b in combinations(others, 2)
-            if self.solids[a].mover or self.solids[b].mover
-        ]
-        return tuple(pair for pair in pairs if self._apart(*pair))
-
-    def _apart(self, a: int, b: int) -> bool:
-        """Whether two solids move against each other."""
-        return self.solids[a].part != self.solids[b].part
+        across = _pairs_of(links)
+        across = across[owners[across[:, 0]] != owners[across[:, 1]]]
+        besides = np.array([*product(links, others)], np.intp).reshape(-1, 2)
+        if self._touchable:
+            held = [b not in self._touchable.get(a, ()) for a, b in besides.tolist()]
+            besides = besides[held]
+        among = _pairs_of(others)
+        among = among[moved[among].any(axis=1)]
+        pairs = np.concatenate([*within, across, besides, among])
+        parts = np.array([solid.part for solid in self.solids], np.intp)
+        return pairs[parts[pairs[:, 0]] != parts[pairs[:, 1]]]  # what moves against each other
 
     @cached_property
     def _touchable(self) -> dict[int, set[int]]:
@@ -297,6 +289,11 @@ class Bodies:
             if tree.carrier(body) in hand or int(tree.drivers[body]) in drivers:
                 hand.add(body)
         return {self._part_of[robot, body] for body in hand}
+
+
+def _pairs_of(solids: range) -> NDArray[np.intp]:
+    """Return all pairs of some solids, each once, (m, 2)."""
+    return solids.start + np.stack(np.triu_indices(len(solids), 1), axis=-1)
 
 
 def checked_table(table: Sequence[float] | None) -> Rectangle | None:

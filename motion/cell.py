@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from kinematics.rotations import inverse_pose
 from layouts import Layout
@@ -54,15 +54,16 @@ class Cell(Bodies):
         own = None if own is None else _distance("own", own)
         movers = {self.layout.owner(name) for name in (self.robots if moving is None else moving)}
         excepted = [tuple(self._named(name) for name in pair) for pair in except_]
-        apart = {
-            (a, b): own if self._is_own(a, b) else clearance
-            for a, b in self.counted_pairs
-            if not movers.isdisjoint((self.solids[a].mover, self.solids[b].mover))
-            and not any(self._is((a, b), names) for names in excepted)
-        }
-        counted = {pair: distance for pair, distance in apart.items() if distance is not None}
-        pairs = np.array([*counted], np.intp).reshape(-1, 2)
-        return Checker(self, pairs, np.array([*counted.values()], float))
+        moves = np.array([solid.mover in movers for solid in self.solids], bool)
+        pairs = self.counted_pairs[moves[self.counted_pairs].any(axis=1)]
+        counts = np.ones(len(pairs), bool)
+        for one, other in excepted:
+            first, second = self._are(one)[pairs], self._are(other)[pairs]
+            counts &= ~((first & second[:, ::-1]).any(axis=1))
+        pairs, is_own = pairs[counts], self._are_own(pairs[counts])
+        if own is None:
+            return Checker(self, pairs[~is_own], clearance)
+        return Checker(self, pairs, np.where(is_own, own, clearance))
 
     def grasped(self, place: str, obstacle: Obstacle, qpos: ArrayLike | None = None) -> Held:
         """Return a body as it is held by an arm that grasps it where it is.
@@ -83,20 +84,19 @@ class Cell(Bodies):
             return Held(place, obstacle)  # says what is wrong
         return Held(place, obstacle.moved(inverse_pose(tcp) @ obstacle.poses(None, 1)[0]))
 
-    def _is_own(self, a: int, b: int) -> bool:
-        """Whether one robot moves two solids."""
-        return self.solids[a].mover == self.solids[b].mover
+    def _are_own(self, pairs: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Tell which pairs of solids one robot moves, (m,)."""
+        movers = np.array([solid.mover for solid in self.solids])
+        return movers[pairs[:, 0]] == movers[pairs[:, 1]]
+
+    def _are(self, name: str) -> NDArray[np.bool_]:
+        """Tell which solids a name stands for, (solids,)."""
+        return np.array([name in (solid.owner, solid.name) for solid in self.solids], bool)
 
     def _named(self, name: str) -> str:
         if name not in self.names:
             raise UnknownNameError("body of this cell", name, self.names)
         return name
-
-    def _is(self, pair: Sequence[int], names: Sequence[str]) -> bool:
-        """Whether two solids are those that two names stand for."""
-        one, other = ({self.solids[i].owner, self.solids[i].name} for i in pair)
-        first, second = names
-        return (first in one and second in other) or (second in one and first in other)
 
 
 def cell_of(

@@ -153,7 +153,9 @@ class Obstacle:
 
     def moved(self, pose: ArrayLike | Track) -> Obstacle:
         """Return the same body elsewhere, at a pose, (4, 4) (m), or along a track."""
-        return replace(self, pose=pose)
+        body = replace(self, pose=pose)
+        vars(body)["hulls"] = self.hulls  # computed once, and shared with what is known of them
+        return body
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from kinematics.rotations import Floats, transform
 from motion.bodies import WORLD, Bodies, Solid
 from motion.chains import Chains
 from motion.spheres import BALLS, Cluster, clusters_of
+from robots.bodies.hulls import Hull
 
 Indices = NDArray[np.intp]
 
@@ -334,31 +336,73 @@ def _gather(bodies: Bodies, solids: list[int], chains: Chains) -> _Clusters:
     links: dict[tuple[str, int], list[int]] = {}
     for i in solids:
         links.setdefault((bodies.solids[i].name, bodies.solids[i].part), []).append(i)
-    gathered = [
-        (chains.rows[part], _moved(cluster, bodies.solids[own[0]].offset), np.array(own), link)
-        for link, ((_, part), own) in enumerate(links.items())
-        for cluster in clusters_of(tuple(bodies.solids[i].hull for i in own))
+    placed = [_placed((), np.eye(4).tobytes())]  # of none, so that there is one at least
+    placed += [
+        _placed(tuple(bodies.solids[i].hull for i in own), bodies.solids[own[0]].offset.tobytes())
+        for own in links.values()
     ]
-    count = len(gathered)
+    counts = [len(clusters.radii) for clusters in placed[1:]]
+    solid = np.concatenate(
+        [
+            np.array(own, np.intp)[clusters.hulls]
+            for own, clusters in zip([[0], *links.values()], placed, strict=True)
+        ]
+    )
+    features = np.concatenate([clusters.features for clusters in placed])
+    return _Clusters(
+        rows=np.repeat(np.array([chains.rows[part] for _, part in links], np.intp), counts),
+        around=np.concatenate([clusters.around for clusters in placed]),
+        radii=np.concatenate([clusters.radii for clusters in placed]),
+        balls=np.concatenate([clusters.balls for clusters in placed]),
+        inner=np.concatenate([clusters.inner for clusters in placed]),
+        features=features @ _PRODUCT,
+        solids=solid,
+        whole=(solid == solid[:, :1]).all(axis=1),
+        links=np.repeat(np.arange(len(links)), counts),
+    )
+
+
+class _Placed(NamedTuple):
+    """The clusters of one link, in the frame of its part; see `_Clusters`.
+
+    Attributes:
+        around: (C, 4, 1).
+        radii: (C,).
+        balls: (C, 4, BALLS).
+        inner: (C, BALLS).
+        features: x of those within, (C, BALLS, 6).
+        hulls: The hull of each of those, by its place among the link's, (C, BALLS).
+    """
+
+    around: Floats
+    radii: Floats
+    balls: Floats
+    inner: Floats
+    features: Floats
+    hulls: Indices
+
+
+@lru_cache(maxsize=4096)
+def _placed(hulls: tuple[Hull, ...], offset: bytes) -> _Placed:
+    """Return the clusters of the hulls of a link.
+
+    Args:
+        hulls: The hulls.
+        offset: Pose of their frame in that of their part, (4, 4) (m), as bytes.
+    """
+    pose = np.frombuffer(offset).reshape(4, 4)
+    clusters = [_moved(cluster, pose) for cluster in (clusters_of(hulls) if hulls else ())]
+    count = len(clusters)
     around, balls = np.ones((count, 4, 1)), np.ones((count, 4, BALLS))
-    features, solid = np.ones((count, BALLS, 6)), np.empty((count, BALLS), np.intp)
-    for i, (_, cluster, own, _) in enumerate(gathered):
+    features, own = np.ones((count, BALLS, 6)), np.empty((count, BALLS), np.intp)
+    for i, cluster in enumerate(clusters):
         around[i, :3, 0], balls[i, :3] = cluster.middle, cluster.middles.T
         features[i, :, :3], features[i, :, 3] = cluster.middles, cluster.radii
         squares = (cluster.middles**2).sum(axis=1)
         features[i, :, 4] = squares * (1 - _RELATIVE) - cluster.radii**2
-        solid[i] = own[cluster.hulls]
-    return _Clusters(
-        rows=np.array([row for row, *_ in gathered], np.intp),
-        around=around,
-        radii=np.array([cluster.radius for _, cluster, *_ in gathered]),
-        balls=balls,
-        inner=features[..., 3].copy(),
-        features=features @ _PRODUCT,
-        solids=solid,
-        whole=(solid == solid[:, :1]).all(axis=1),
-        links=np.array([link for _, _, _, link in gathered], np.intp),
-    )
+        own[i] = cluster.hulls
+    radii = np.array([cluster.radius for cluster in clusters], float)
+    return _Placed(around, radii, balls, features[..., 3].copy(), features, own)
 
 
 def _moved(cluster: Cluster, pose: Floats) -> Cluster:
@@ -383,13 +427,18 @@ def _sides(solid: Solid) -> Floats | None:
 
     None if it moves, is a robot's, or has too many.
     """
-    from scipy.spatial import ConvexHull
-
     if solid.part != WORLD or solid.name != solid.owner:
         return None
-    corners = transform(solid.offset, solid.hull.corners)
-    hull: Any = ConvexHull(corners)
-    normals = np.unique(np.round(hull.equations[:, :3], 9), axis=0)
+    return _sides_of(solid.hull, solid.offset.tobytes())
+
+
+@lru_cache(maxsize=256)
+def _sides_of(hull: Hull, offset: bytes) -> Floats | None:
+    from scipy.spatial import ConvexHull
+
+    corners = transform(np.frombuffer(offset).reshape(4, 4), hull.corners)
+    found: Any = ConvexHull(corners)
+    normals = np.unique(np.round(found.equations[:, :3], 9), axis=0)
     if len(normals) > MOST_SIDES:
         return None
     normals /= np.linalg.norm(normals, axis=1)[:, None]

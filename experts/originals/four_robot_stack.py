@@ -42,6 +42,8 @@ class Style:
         clearance: How high above its place it is before it is lowered (m).
         home: Whether an arm that has let go returns to where it started, not just out of the way.
         patient: Whether an arm takes its cube only when the arm before it has let go.
+        turn: What the arm before must have done when the next brings its cube.
+        ready: How near an arm must come to the place above its cube before it goes down (rad).
     """
 
     tilt: float | None = radians(20)
@@ -49,10 +51,14 @@ class Style:
     clearance: float = 0.05
     home: bool = False
     patient: bool = False
+    turn: str = "rise"
+    ready: float = 0.1
 
 
 STYLES = (
     Style(),
+    Style(turn="retreat", ready=0.03),
+    Style(ready=0.03),
     Style(tilt=radians(30)),
     Style(tilt=radians(10)),
     Style(tilt=radians(25), clearance=0.07, waiting=0.16),
@@ -103,17 +109,20 @@ def _stack(
     """
     level = list(ORDER).index(robot)
     cube = f"cube_{robot}"
-    goal = np.array([0.0, 0.0, (2 * level + 1) * CUBE_HALF_SIZE])
+
+    def goal(scene: Scene) -> Floats:
+        scales = [scene.scale(f"cube_{place}") for place in list(ORDER)[: level + 1]]
+        return np.array([0.0, 0.0, (2 * sum(scales[:-1]) + scales[-1]) * CUBE_HALF_SIZE])
 
     def lift(scene: Scene) -> list[Pose]:
         x, y, _ = scene.body(cube)[0]
         return held_at(scene, robot, cube, np.array([x, y, style.waiting]))
 
     def place(scene: Scene, up: float, yaws: Sequence[float] = (0.0,)) -> list[Pose]:
-        return held_at(scene, robot, cube, goal + (0.0, 0.0, up), yaws)
+        return held_at(scene, robot, cube, goal(scene) + (0.0, 0.0, up), yaws)
 
     def in_place(scene: Scene) -> bool:
-        return bool(np.abs(scene.body(cube)[0] - goal).max() < IN_PLACE)
+        return bool(np.abs(scene.body(cube)[0] - goal(scene)).max() < IN_PLACE)
 
     def rise(scene: Scene) -> list[Pose]:
         return [backed_off(scene.tcp(robot), 0.08)]
@@ -124,14 +133,14 @@ def _stack(
         return [(position + 0.25 * outward / np.linalg.norm(outward), quaternion)]
 
     if style.tilt is None:
-        grips = grips_to(task, robot, cube, lambda scene: goal, style.clearance)
+        grips = grips_to(task, robot, cube, goal, style.clearance)
         over = partial(place, up=style.clearance, yaws=PLACE_YAWS)
         over = lowerable(task, robot, over, style.clearance)
     else:
         grips = partial(_grip, cube=cube, base=base, tilt=style.tilt)
         over = partial(place, up=style.clearance, yaws=YAWS)
-    turn = (f"{list(ORDER)[level - 1]}.rise",) if level else ()
-    above, *picking = pick(robot, cube, grips)
+    turn = (f"{list(ORDER)[level - 1]}.{style.turn}",) if level else ()
+    above, *picking = pick(robot, cube, grips, ready=style.ready)
     return (
         replace(above, after=turn if style.patient else ()),
         *picking,

@@ -101,9 +101,7 @@ def _between_robots(layout: Layout) -> Callable[[NDArray[np.float64]], NDArray[n
     from motion.collisions import Checker
 
     cell = Cell(layout)
-    movers = [solid.mover for solid in cell.solids]
-    apart = [
-        bool(movers[a] and movers[b]) and movers[a] != movers[b] for a, b in cell.counted_pairs
-    ]
-    pairs = np.array([*cell.counted_pairs], np.intp)[np.array(apart, bool)].reshape(-1, 2)
+    movers = np.array([solid.mover for solid in cell.solids])[cell.counted_pairs]
+    between = (movers != "").all(axis=1) & (movers[:, 0] != movers[:, 1])
+    pairs = cell.counted_pairs[between]
     return Checker(cell, pairs, np.zeros(len(pairs))).distance

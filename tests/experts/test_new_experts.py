@@ -6,6 +6,7 @@ import pytest
 
 import tasks
 from experts import find_expert
+from experts.script import Scene
 from layouts import Layout
 from robots import TaskError
 from tasks.episode import play
@@ -77,3 +78,13 @@ def test_arms_that_stand_elsewhere_are_planned_for():
     nearer = replace(layout["left"], position=(0.05, -0.65, 0.0))
     env = tasks.make("TwoRobotLiftBar-v1", layout=Layout({**layout, "left": nearer}))
     assert play(env, 0, find_expert("TwoRobotLiftBar-v1")(env, 0)).solved
+
+
+@pytest.mark.parametrize("factor", [0.95, 1.05])
+def test_four_arms_stack_cubes_of_another_size(factor: float):
+    larger = tasks.Randomization(size={"cube_*": factor})
+    env = tasks.make("FourRobotStack-v1", obs_mode="none", randomization=larger)
+    env.reset(seed=3)
+    assert Scene(env).scale("cube_west") == factor
+    assert play(env, 3, find_expert(env.task_id)(env, 3)).solved
+    env.close()

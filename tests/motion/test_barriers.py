@@ -55,7 +55,7 @@ def test_a_goal_beyond_the_floor_is_cut_off():
         " where upper_arm_link is in table whatever its other joints do"
     )
     with pytest.raises(NoPlanError, match=message) as error:
-        plan(raised(), goals={"arm": behind(cell)[:6]}, table=TABLE)
+        plan(raised(), goals={"arm": behind(cell)[:6]}, table=TABLE, patience=60)
     assert error.value.reason == "cut off"
 
 

@@ -100,3 +100,10 @@ def test_a_track_stands_still_beyond_its_ends():
 def test_what_is_no_obstacle_is_refused_in_words(make, words):
     with pytest.raises(LayoutError, match=words):
         make()
+
+
+def test_a_body_that_is_moved_keeps_what_is_known_of_its_shapes():
+    crate = box("crate", (0.1, 0.2, 0.3))
+    elsewhere = crate.moved(pose_matrix((1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)))
+    assert elsewhere.hulls is crate.hulls
+    assert elsewhere.poses(None, 1)[0][0, 3] == 1.0
