@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 from layouts import Layout
 from motion.cell import cell_of
 from motion.collisions import Checker
@@ -9,6 +11,11 @@ from robots.bodies.hulls import require_packages
 from robots.common.errors import MissingPackageError
 from simulation.parts import Part
 from tasks import MultiRobotTask
+
+_UNSEEN = (
+    "hands of robots that overlap are not seen, so plans may be others than elsewhere: python-fcl"
+    " is not installed; pip install 'robot-layouts[checks]'"
+)
 
 
 class ArmWatch:
@@ -25,7 +32,7 @@ class ArmWatch:
         Args:
             task: A task with one environment.
             strict: Whether to refuse where overlaps count and python-fcl, which measures them, is
-                not installed. Otherwise they are not seen there.
+                not installed. Otherwise a warning says that they are not seen there.
 
         Raises:
             MissingPackageError: If it is refused.
@@ -40,6 +47,7 @@ class ArmWatch:
                 if strict:
                     raise
                 self._measures = False
+                warnings.warn(_UNSEEN, RuntimeWarning, stacklevel=2)
         task.simulation.watch_arms()
 
     def touching(self) -> list[tuple[Part, Part]]:
