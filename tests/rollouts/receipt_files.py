@@ -1,0 +1,29 @@
+"""Receipts to verify, and to change by hand."""
+
+import json
+from pathlib import Path
+
+from rollouts import evaluate
+from rollouts.playing.executor import choose_executor
+from rollouts.receipts import Verification, verify
+from tests.rollouts.policies import LEANS, TASK
+
+HERE = choose_executor(0)
+
+
+def written(tmp_path, name="receipt.json", policy=LEANS, seeds=range(3), **details) -> Path:
+    details = {"workers": 0, "max_episode_steps": 10, **details}
+    evaluate(policy, TASK, seeds, receipt=tmp_path / name, **details)
+    return tmp_path / name
+
+
+def again(receipt, **details) -> Verification:
+    return verify(receipt, HERE, **details)
+
+
+def edit(path: Path, change) -> Path:
+    """Change a receipt by hand."""
+    about = json.loads(path.read_text())
+    change(about)
+    path.write_text(json.dumps(about))
+    return path
