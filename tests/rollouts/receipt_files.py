@@ -4,21 +4,20 @@ import json
 from pathlib import Path
 
 from rollouts import evaluate
-from rollouts.playing.executor import choose_executor
 from rollouts.receipts import Verification, verify
 from tests.rollouts.policies import LEANS, TASK
 
-HERE = choose_executor(0)
 
-
-def written(tmp_path, name="receipt.json", policy=LEANS, seeds=range(3), **details) -> Path:
+def written(
+    tmp_path, name="receipt.json", policy=LEANS, seeds=range(3), task=TASK, **details
+) -> Path:
     details = {"workers": 0, "max_episode_steps": 10, **details}
-    evaluate(policy, TASK, seeds, receipt=tmp_path / name, **details)
+    evaluate(policy, task, seeds, receipt=tmp_path / name, **details)
     return tmp_path / name
 
 
 def again(receipt, **details) -> Verification:
-    return verify(receipt, HERE, **details)
+    return verify(receipt, workers=0, **details)
 
 
 def edit(path: Path, change) -> Path:

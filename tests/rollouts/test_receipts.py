@@ -65,6 +65,14 @@ def test_who_plays_makes_no_difference(tmp_path, who):
     assert other.read_bytes() == alone.read_bytes()
 
 
+def test_episodes_of_different_lengths_that_are_played_at_once(tmp_path):
+    plays = {"policy": "expert", "seeds": range(3), "max_episode_steps": None}
+    alone = written(tmp_path, task="PickCube-v1", **plays)
+    assert len({episode.steps for episode in Receipt.read(alone).episodes}) > 1
+    other = written(tmp_path, "other.json", task="PickCube-v1", num_envs=3, **plays)
+    assert other.read_bytes() == alone.read_bytes()
+
+
 def test_the_order_of_seeds_is_that_of_the_receipt(receipt, tmp_path):
     turned = Receipt.read(written(tmp_path, seeds=[2, 0, 1], workers=1))
     assert [episode.seed for episode in turned.episodes] == [2, 0, 1]
