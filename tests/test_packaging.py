@@ -59,7 +59,7 @@ class TestWheel:
         names = {
             f"parity/report/templates/report.{suffix}" for suffix in ("html.jinja", "css", "js")
         }
-        sheets = {"robots/common/palette.css", "rollouts/dataset/page.css"}
+        sheets = {f"robots/common/{name}.css" for name in ("palette", "page")}
         assert names | sheets <= {*wheel.namelist()}
 
     def test_carries_the_asset_manifest_unchanged(self, wheel):
