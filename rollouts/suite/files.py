@@ -74,29 +74,18 @@ def _suite(data: Any, folder: Path) -> Suite:
         for number, entry in enumerate(entries, 1)
         for case in _cases(entry, shared, folder, number)
     ]
-    return Suite(name, tuple(cases), read_policies(top.get("policies", {})))
+    return Suite(name, tuple(cases), _policies(top.get("policies", {})))
 
 
-def read_policies(given: Any) -> dict[str, str]:
-    """Return who plays, by the task's id; ``others`` stands for all that are not named.
-
-    Args:
-        given: A mapping from tasks to ``module:name`` or ``"expert"``, or one name for all.
-
-    Raises:
-        TaskError: If it is none, or a task is unknown or there twice.
-    """
-    if isinstance(given, str):
-        return {OTHERS: given}
-    found: dict[str, str] = {}
-    for task, policy in _mapping(given, "policies").items():
-        key = task if task == OTHERS else get_task_class(task).task_id
+def _policies(given: Any) -> dict[str, str]:
+    """Return who plays, as written; tasks are looked up when it is played."""
+    found = _mapping(given, "policies")
+    for task, policy in found.items():
         if not isinstance(policy, str):
             raise TaskError(f"the policy of {task} is {shown(policy)}; it must be MODULE:NAME")
-        if key in found:
-            raise TaskError(f"the policy of {key} is given twice")
-        found[key] = policy
-    return found
+        if task != OTHERS:
+            get_task_class(task)
+    return dict(found)
 
 
 def _cases(entry: Any, shared: Mapping[str, Any], folder: Path, number: int) -> Sequence[Case]:

@@ -52,14 +52,17 @@ class Case:
         """Refuse what cannot be made.
 
         Raises:
-            UnknownNameError: If there is no such task, or no such place in it.
-            TaskError: If seeds, name or modes make no sense.
+            UnknownNameError: If there is no such task.
+            TaskError: If seeds, name or modes make no sense, or the task cannot be played in the
+                layout.
         """
         cls = get_task_class(self.task)
         object.__setattr__(self, "task", full_name(cls))
         object.__setattr__(self, "seeds", read_seeds(self.seeds))
         object.__setattr__(self, "name", checked_name("a case", self.name or cls.task_id))
-        make_scenario(cls, **self.making).check(cls.reward_modes)
+        scenario = make_scenario(cls, **self.making)
+        scenario.check(cls.reward_modes)
+        cls.built_layout(scenario)  # refuses a layout that lacks the task's places
 
     @property
     def making(self) -> MakingFields:
