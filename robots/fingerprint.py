@@ -27,17 +27,30 @@ def asset_fingerprint(source: UrdfSource) -> str:
     Raises:
         AssetError: If a file cannot be had or read.
     """
+    lines = (f"{digest}  {name}\n" for name, digest in _checksums(source))
+    return hashlib.sha256("".join(lines).encode()).hexdigest()
+
+
+def asset_checksums(source: UrdfSource) -> dict[str, str]:
+    """Return the SHA-256, in hex, of each of these files, by its path relative to the URDF.
+
+    Raises:
+        AssetError: If a file cannot be had or read.
+    """
+    return dict(_checksums(source))
+
+
+def _checksums(source: UrdfSource) -> list[tuple[str, str]]:
     urdf = source.locate()
-    digest = hashlib.sha256()
     try:
         contents = [(urdf, read_written(urdf))]
         contents += ((path, read_regular(path, MAX_MESH_BYTES)) for path in _beside(urdf))
-        for path, data in contents:
-            name = Path(os.path.relpath(path, urdf.parent)).as_posix()
-            digest.update(f"{hashlib.sha256(data).hexdigest()}  {name}\n".encode())
     except UnreadableFileError as error:
         raise AssetError(str(error)) from error
-    return digest.hexdigest()
+    return [
+        (Path(os.path.relpath(path, urdf.parent)).as_posix(), hashlib.sha256(data).hexdigest())
+        for path, data in contents
+    ]
 
 
 def _beside(urdf: Path) -> list[Path]:

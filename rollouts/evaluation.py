@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass, field
+from errno import EISDIR
+from os import PathLike
+from pathlib import Path
 from statistics import mean
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any
 
-import torch
-
-from experts import find_expert
 from robots import TaskError
 from robots.common.bounds import checked_whole
-from rollouts.playing.casting import Cast, Casting
-from rollouts.playing.executor import (
-    EPISODE_SECONDS,
-    Event,
-    Executor,
-    choose_executor,
-    modules_of,
-    play_all,
-)
+from robots.common.writing import writing_errors
+from rollouts.playing.casting import Cast, cast_of
+from rollouts.playing.evaluation_job import EvaluationJob, scores_of
+from rollouts.playing.executor import EPISODE_SECONDS, Event, Executor, choose_executor
 from rollouts.playing.seeds import checked_seeds
-from rollouts.playing.together import grouped, one_by_one, play_together
-from rollouts.sources.policies import EXPERT, check_policy
-from tasks import MultiRobotTask, Scenario, get_task_class
+from rollouts.playing.together import grouped
+from rollouts.receipts.evaluated import describe_job, receipt_of
+from rollouts.receipts.receipt import Receipt
+from rollouts.sources.policies import EXPERT
+from tasks import get_task_class
 from tasks.episode import Policy, Score
 from tasks.registry import make_scenario
 
@@ -45,11 +41,13 @@ class Evaluation:
         task: The task's id.
         policy: Who played, in words.
         scores: Seed → how its episode went, in the order in which the seeds were given.
+        receipt: The receipt, if one was asked for.
     """
 
     task: str
     policy: str
     scores: Mapping[int, Score]
+    receipt: Receipt | None = field(default=None, compare=False)
 
     @property
     def success_rate(self) -> float:
@@ -102,6 +100,7 @@ def evaluate(
     workers: int | None = None,
     executor: Executor | None = None,
     episode_timeout: float | None = EPISODE_SECONDS,
+    receipt: str | PathLike[str] | None = None,
     on_event: Callable[[Event], None] = lambda event: None,
     **making: Unpack[MakingFields],
 ) -> Evaluation:
@@ -115,9 +114,9 @@ def evaluate(
     Args:
         policy: Maps the observation, (1, D) float32 if ``obs_mode`` is ``"state"``, to the action,
             (A,) or (1, A). It can be pickled, unless ``workers`` is 0; what `copy.deepcopy` does
-            not copy, such as a function, is not copied for each episode. Or ``"expert"``, which
-            makes a plan for each seed and carries it out; where it finds none, the episode is a
-            failure of 0 steps, whose reason is given.
+            not copy, such as a function, is not copied for each episode. Or where one is imported
+            from, ``"module:name"``. Or ``"expert"``, which makes a plan for each seed and carries
+            it out; where it finds none, the episode is a failure of 0 steps, whose reason is given.
         task: Id of the task.
         seeds: Which episodes, each once.
         num_envs: How many episodes each process plays at once, in environments of one task. The
@@ -131,6 +130,7 @@ def evaluate(
         episode_timeout: Seconds that an episode, or those played at once, may take in a worker
             until that is ended and they are played again, three times in all; None if they may
             take for ever.
+        receipt: File to write a receipt to, json that `rollouts.receipts.verify` plays again.
         on_event: Called with each event of the executor, to show progress.
         making: Arguments of `tasks.make`, such as ``robots`` and ``obs_mode``.
 
@@ -138,6 +138,9 @@ def evaluate(
         UnknownNameError: If the task, a place, a robot or a field is unknown.
         TaskError: If the task cannot be made like that or has no expert, a number makes no sense,
             or there are no seeds or one is there twice.
+        UnwritableFileError: If the receipt cannot be written.
+        AssetError: If the receipt needs robot files that cannot be found.
+        ReceiptError: If it needs files of the policy that cannot be read.
         WorkerError: If the policy raised something, cannot be sent to the workers, or they die of
             it again and again.
     """
@@ -147,90 +150,34 @@ def evaluate(
         raise TaskError("no seeds were given; an evaluation plays one or more")
     checked_whole("num_envs", num_envs, 1, None, TaskError)
     num_envs = min(num_envs, len(seeds))
-    name, scenario = _name(policy), make_scenario(cls, num_envs, **making)
+    (cast, imported), scenario = cast_of(policy, cls), make_scenario(cls, num_envs, **making)
     scenario.check(cls.reward_modes)
-    together = grouped(seeds, num_envs)
-    expert = find_expert(cls.task_id) if isinstance(policy, str) else None
-    cast = Cast(None if expert else policy, expert)
-    job = EvaluationJob(cls, scenario, cast, together)
-    scores: dict[int, Score] = {}
-    with closing(play_all(executor, job, list(together))) as events:
-        for event in events:
-            for single in one_by_one(event):
-                on_event(single)
-                if single.seed is not None and isinstance(single.result, Score):
-                    scores[single.seed] = single.result
-            if event.error is not None:
-                _raise(event.error, [event.seed] if event.seed is None else together[event.seed])
-    return Evaluation(cls.task_id, name, {seed: scores[seed] for seed in seeds})
+    job = EvaluationJob(cls, scenario, cast, grouped(seeds, num_envs), receipt is not None)
+    if receipt is None:
+        scores = scores_of(executor, job, on_event)
+        return Evaluation(cls.task_id, _name(cast), {seed: scores[seed] for seed in seeds})
+    described = _described(job, imported, receipt)
+    found = scores_of(executor, job, on_event)
+    written = receipt_of(described, job, {seed: found[seed] for seed in seeds})
+    written.write(receipt)
+    scores = {e.seed: Score(e.success, e.total, e.steps, e.reason) for e in written.episodes}
+    return Evaluation(cls.task_id, _name(cast), scores, written)
 
 
-def _raise(error: Exception, seeds: Sequence[int | None]) -> NoReturn:
-    """Raise an error that says at which seeds it happened."""
-    which = (
-        f"seed {seeds[0]}" if len(seeds) == 1 else f"one of the seeds {', '.join(map(str, seeds))}"
-    )
-    error.args = (f"{which}: {error}", *error.args[1:])
-    raise error
+def _described(job: EvaluationJob, name: str | None, path: str | PathLike[str]) -> dict[str, Any]:
+    """Return what is played for a receipt, and see, before anything is, that it can be written."""
+    with writing_errors(path):
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        if Path(path).is_dir():
+            raise IsADirectoryError(EISDIR, "it is a folder; a receipt is a file")
+    return describe_job(job, name)
 
 
-@dataclass(frozen=True)
-class EvaluationJob:
-    """Everything but the seed that decides an episode; can be pickled.
-
-    Attributes:
-        task: Class of the task.
-        scenario: How to make it.
-        cast: Who plays.
-        together: Seeds that are played at once, by the first of them.
-    """
-
-    task: type[MultiRobotTask]
-    scenario: Scenario
-    cast: Cast
-    together: Mapping[int, tuple[int, ...]] = field(default_factory=dict[int, tuple[int, ...]])
-
-    @property
-    def modules(self) -> tuple[str, ...]:
-        """What other machines may need to play it."""
-        return modules_of(self.task, *self.cast.members)
-
-    def __call__(self) -> Callable[[int], dict[int, Score]]:
-        """Make the task in a worker, and return what plays the episodes of a seed and others."""
-        torch.set_num_threads(1)  # as many everywhere, so that sums are the same
-        return _Play(self)
-
-
-class _Play:
-    """Plays episodes in the worlds of one task, which are built anew for each."""
-
-    def __init__(self, job: EvaluationJob) -> None:
-        self._together, self._env = job.together, job.task(job.scenario)
-        self._casting = Casting(job.cast, self._env)
-
-    def __call__(self, seed: int) -> dict[int, Score]:
-        """Play the episodes of a seed and of those that are played together with it."""
-        players = [self._casting(seed) for seed in self._together[seed]]
-        with torch.no_grad():
-            play_together(self._env, players)
-        return {player.seed: player.score for player in players}
-
-    def close(self) -> None:
-        """Let the worlds go."""
-        self._env.close()
-        self._casting.close()
-
-
-def _name(policy: Policy | str) -> str:
-    """Return who plays, in words.
-
-    Raises:
-        TaskError: If it is nobody.
-    """
-    if isinstance(policy, str) and policy == EXPERT:
+def _name(cast: Cast) -> str:
+    """Return who plays, in words."""
+    if cast.expert is not None:
         return EXPERT
-    check_policy(policy)
-    return getattr(policy, "__qualname__", type(policy).__qualname__)
+    return getattr(cast.policy, "__qualname__", type(cast.policy).__qualname__)
 
 
 def _spread(by_seed: Mapping[int, float]) -> tuple[float, float, float]:

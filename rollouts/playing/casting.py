@@ -6,14 +6,16 @@ from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import Any
 
+from experts import find_expert
 from experts.registry import Expert
 from robots import TaskError
 from rollouts.playing.plan_conversion import Planner
 from rollouts.playing.randomness import random_states, seed_all
 from rollouts.playing.together import Player, is_batched
 from rollouts.sources.actors import is_person
+from rollouts.sources.policies import EXPERT, check_policy, find_policy
 from tasks import MultiRobotTask
-from tasks.episode import follow
+from tasks.episode import Policy, follow
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,22 @@ class Cast:
     def members(self) -> tuple[Any, ...]:
         """All of them."""
         return self.policy, self.expert, self.takeover, self.corrector
+
+
+def cast_of(policy: Policy | str, task: type[MultiRobotTask]) -> tuple[Cast, str | None]:
+    """Return who plays, and by which name ``module:name`` that was imported, if it was.
+
+    Args:
+        policy: A policy, the name of one, or the word ``"expert"``.
+        task: What is played.
+
+    Raises:
+        TaskError: If that is nobody, or the task has no expert.
+    """
+    name = policy if isinstance(policy, str) else None
+    if name == EXPERT:
+        return Cast(expert=find_expert(task.task_id)), None
+    return Cast(check_policy(policy if name is None else find_policy(name))), name
 
 
 class Casting:

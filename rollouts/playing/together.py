@@ -98,7 +98,7 @@ class Player:
         """Return what happened.
 
         Args:
-            states: Those of its environment, each entry (T + 1, k), or with more rows after these.
+            states: Those of its environment, each entry (T + 1, k).
             drawn: What was varied in its world.
 
         Raises:
@@ -106,15 +106,11 @@ class Player:
         """
         if not self.steps:
             raise TaskError(self.reason or "an episode needs at least one action")
-        moments = len(self.steps) + 1
         corrections = [s.correction for s in self.steps if s.correction is not None]
         return PlayedEpisode(
             seed=self.seed,
             actions=np.stack([step.action for step in self.steps]),
-            states={
-                kind: {name: rows[:moments] for name, rows in entries.items()}
-                for kind, entries in states.items()
-            },
+            states=states,
             rewards=np.array([step.reward for step in self.steps], np.float32),
             success=np.array([step.success for step in self.steps]),
             terminated=np.array([step.terminated for step in self.steps]),
@@ -144,11 +140,12 @@ def play_together(env: MultiRobotTask, players: Sequence[Player]) -> None:
         pass
 
 
-def record_together(env: MultiRobotTask, players: Sequence[Player]) -> list[PlayedEpisode]:
-    """Play an episode for each player, as `steps_together` does, and keep what happens.
+def states_together(env: MultiRobotTask, players: Sequence[Player]) -> list[States]:
+    """Play an episode for each player, as `steps_together` does, and return the states of each.
 
-    Raises:
-        TaskError: Also if a player takes no step.
+    Returns:
+        State dicts of `MultiRobotTask.get_state_dict`, each entry (T + 1, k) for T steps of its
+        player.
     """
     happening = steps_together(env, players)
     next(happening)
@@ -158,15 +155,22 @@ def record_together(env: MultiRobotTask, players: Sequence[Player]) -> list[Play
         env.write_tape(tape)
     states = tape.read()
     return [
-        player.episode(
-            {
-                kind: {name: rows[:, i] for name, rows in entries.items()}
-                for kind, entries in states.items()
-            },
-            env.drawn(i),
-        )
+        {
+            kind: {name: rows[: len(player.steps) + 1, i] for name, rows in entries.items()}
+            for kind, entries in states.items()
+        }
         for i, player in enumerate(players)
     ]
+
+
+def record_together(env: MultiRobotTask, players: Sequence[Player]) -> list[PlayedEpisode]:
+    """Play an episode for each player, as `steps_together` does, and keep what happens.
+
+    Raises:
+        TaskError: Also if a player takes no step.
+    """
+    states = states_together(env, players)
+    return [player.episode(states[i], env.drawn(i)) for i, player in enumerate(players)]
 
 
 def steps_together(env: MultiRobotTask, players: Sequence[Player]) -> Generator[None]:

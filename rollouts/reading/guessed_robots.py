@@ -33,7 +33,7 @@ def describe_guessed(layout: Layout) -> dict[str, dict[str, str]]:
         place: {
             "urdf": str(path),
             "sha256": _checksum(path),
-            "descriptor": _digest(placement.robot),
+            "descriptor": descriptor_digest(placement.robot),
         }
         for place, placement in layout.items()
         if (path := _own_file(placement.robot)) is not None
@@ -68,7 +68,7 @@ def guess_again(place: str, recorded: Mapping[str, str], name: str) -> RobotDesc
             f"the robot of {place!r} was guessed from {path}, which has changed since; {helps}"
         )
     robot = RobotDescriptor.from_urdf(path, name, quiet=True)
-    if _digest(robot) != recorded["descriptor"]:
+    if descriptor_digest(robot) != recorded["descriptor"]:
         raise TrajectoryError(
             f"the robot of {place!r} is not what is guessed from {path} now, with this version of"
             f" the library and these packages, or fields of it were given; {helps}"
@@ -91,7 +91,8 @@ def _checksum(path: Path) -> str:
     return hashlib.sha256(read_regular(path, MAX_URDF_BYTES)).hexdigest()
 
 
-def _digest(robot: RobotDescriptor) -> str:
+def descriptor_digest(robot: RobotDescriptor) -> str:
+    """Return a SHA-256, in hex, over all fields of a descriptor but where its files are."""
     values = {f.name: getattr(robot, f.name) for f in fields(robot) if f.name != "urdf"}
     values["keyframes"] = dict(robot.keyframes)
     return hashlib.sha256(repr(values).encode()).hexdigest()

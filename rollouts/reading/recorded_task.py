@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from layouts import Layout, Placement
+from layouts import Layout
 from layouts.placement import RobotLike
-from robots import LayoutError, RobotLayoutsError, RobotRegistry, UnknownNameError
-from rollouts.reading.guessed_robots import guess_again
+from robots import RobotLayoutsError, UnknownNameError
+from rollouts.reading.recorded_layout import layout_again, same_places
 from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
 from tasks import MultiRobotTask, get_task_class, make
 from tasks.language.needs import ACT, HOLD
 from tasks.native.format import mode_by_arm
 from tasks.varying.randomization import Randomization
-
-MOST_ROBOTS = 64  # each takes memory, whoever wrote the file
 
 
 def task_class(file: TrajectoryFile, task_id: str | None = None) -> type[MultiRobotTask]:
@@ -107,41 +105,8 @@ def _recorded(
     file: TrajectoryFile, cls: type[MultiRobotTask], robots: Mapping[str, RobotLike]
 ) -> dict[str, Any]:
     """Return the layout of a recording as arguments of `tasks.make`, none if it is the task's."""
-    described, guessed = file.layout or {}, file.guessed or {}
-    if len(described) > MOST_ROBOTS:
-        raise TrajectoryError(
-            f"{file.path} has a layout of {len(described)} robots; {MOST_ROBOTS} are the most that"
-            " are built for a recording"
-        )
-    placements: dict[str, Placement] = {}
-    for place, about in described.items():
-        try:
-            if place in robots:
-                robot: RobotLike = robots[place]
-            elif place in guessed:
-                robot = guess_again(place, guessed[place], about["robot"])
-            elif place in cls.layout and cls.layout[place].robot.name == about["robot"]:
-                robot = cls.layout[place].robot
-            else:
-                robot = RobotRegistry.load(about["robot"])
-            placements[place] = Placement(
-                robot,  # pyright: ignore[reportArgumentType]
-                tuple(about["position"]),  # pyright: ignore[reportArgumentType]
-                tuple(about["quaternion"]),  # pyright: ignore[reportArgumentType]
-                about["keyframe"],
-                about["qpos_noise"],
-            )
-        except TrajectoryError:
-            raise
-        except RobotLayoutsError as error:
-            raise TrajectoryError(
-                f"{file.path} has a robot at {place!r} that cannot be had here: {error}"
-            ) from error
-    try:
-        layout = Layout(placements)
-    except LayoutError as error:
-        raise TrajectoryError(f"{file.path} has no layout that can be used: {error}") from error
-    if _same(layout, cls.layout):
+    layout = layout_again(file.layout or {}, file.guessed or {}, cls.layout, robots, file.path)
+    if same_places(layout, cls.layout):
         return {"robots": None}
     extra = cls.robot_counts is None and set(layout.places) - set(cls.layout.places)
     bystanders = (HOLD if _holds(file, layout) else ACT) if extra else None
@@ -156,16 +121,3 @@ def _holds(file: TrajectoryFile, layout: Layout) -> bool:
         last - first < acting[place].stop - acting[place].start
         for place, (first, last) in recorded.items()
     )
-
-
-def _same(first: Layout, second: Layout) -> bool:
-    """Return whether two layouts put the same robots at the same places of the world."""
-    return [_outline(*item) for item in first.items()] == [
-        _outline(*item) for item in second.items()
-    ]
-
-
-def _outline(place: str, placement: Placement) -> tuple[Any, ...]:
-    pose = placement.base_pose
-    start = placement.start_keyframe, placement.qpos_noise
-    return place, placement.robot, pose.position, pose.quaternion, *start

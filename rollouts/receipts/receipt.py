@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from base64 import b64decode
 from binascii import Error as NotBase64
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from hashlib import sha256
@@ -15,6 +16,7 @@ from typing import Any
 from robots import RobotLayoutsError, UnreadableFileError
 from robots.common.files import read_json
 from robots.common.writing import write_whole
+from rollouts.playing.state_trace import BYTES
 from rollouts.reading.json_fields import (
     FLAG,
     NAME,
@@ -32,7 +34,6 @@ from rollouts.reading.summary import MAX_SEED, MAX_STEPS
 
 FORMAT = "robot-layouts receipt 1"
 MAX_BYTES = 2**27  # of a file; 100,000 episodes of 200 steps take a half
-BYTES = 2  # of a trace, for each moment
 
 _HEX = frozenset("0123456789abcdef")
 
@@ -125,10 +126,14 @@ class Receipt:
 
     Attributes:
         task: ``id``, ``class`` (``module:Class``) and ``sha256`` of the module's source.
+            See `rollouts.receipts.sources.describe_task`.
         policy: ``kind`` (``expert`` or ``policy``), ``name`` (``module:name``), ``sha256`` of its
-            module's source, and of a policy that declares files, those of ``files`` by name.
-        making: What the task was made with: ``layout`` and more; see `rollouts.receipts.making`.
-        environment: ``versions`` and ``processor`` of where it was played.
+            module's source, and more; see `rollouts.receipts.sources.describe_policy`.
+        making: What the task was made with: its ``layout`` with the checksums of robot files, and
+            more; see `rollouts.receipts.making.describe_making`.
+        environment: ``versions`` and ``processor`` of where it was played; see
+            `rollouts.playing.environment`. ``others``, if workers differed; ``guessed``, where the
+            files of robots were that no registry knows.
         episodes: One for each seed, in the order in which these were given.
         claimed: The hash that a file says it has; empty if it comes from no file.
     """
@@ -149,12 +154,11 @@ class Receipt:
         for kind, name in ((TASK, "task"), (POLICY, "policy"), (MAKING, "making")):
             _expect(kind, getattr(self, name), name)
         _expect(ENVIRONMENT, self.environment, "environment")
-        seeds = [episode.seed for episode in self.episodes]
+        seeds = Counter(episode.seed for episode in self.episodes)
         if not seeds:
             raise ReceiptError("a receipt has one episode or more; this has none")
-        if len(set(seeds)) < len(seeds):
-            twice = next(seed for seed in seeds if seeds.count(seed) > 1)
-            raise ReceiptError(f"a receipt has each seed once; this has seed {twice} twice")
+        if twice := [seed for seed, count in seeds.items() if count > 1]:
+            raise ReceiptError(f"a receipt has each seed once; this has seed {twice[0]} twice")
 
     @property
     def hash(self) -> str:
@@ -194,8 +198,8 @@ class Receipt:
             found = read_json(path, MAX_BYTES)
             RECEIPT.expect(found, "")
             episodes = tuple(_episode(about) for about in found["episodes"])
-            parts = (found[name] for name in ("task", "policy", "making", "environment"))
-            return cls(*parts, episodes, found["hash"])
+            parts = {name: found[name] for name in ("task", "policy", "making", "environment")}
+            return cls(**parts, episodes=episodes, claimed=found["hash"])
         except UnreadableFileError as error:
             raise ReceiptError(str(error)) from error
         except (FieldError, ReceiptError) as error:

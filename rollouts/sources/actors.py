@@ -72,7 +72,7 @@ def is_person(policy: Any) -> bool:
 
 def name_of(policy: Any) -> str:
     """Return ``module:function`` of a function, ``module:Class`` of other things."""
-    defined = _definition(policy)
+    defined = definition(policy)
     return f"{defined.__module__}:{defined.__qualname__}"
 
 
@@ -100,8 +100,8 @@ def _listing(acted: Sequence[dict[str, Any]]) -> str:
     return ", ".join(dict.fromkeys(actor["name"] for actor in acted))
 
 
-def _definition(policy: Any) -> Any:
-    """Return the function or class that stands in a source file."""
+def definition(policy: Any) -> Any:
+    """Return the function or the class of a policy that stands in a source file."""
     while isinstance(policy, partial):
         policy = policy.func
     return policy if hasattr(policy, "__qualname__") else type(policy)
@@ -111,7 +111,7 @@ def _checksum(policy: Any) -> str | None:
     file = getattr(policy, "file", None)
     if file is None:
         try:
-            file = inspect.getsourcefile(_definition(policy))
+            file = inspect.getsourcefile(definition(policy))
         except TypeError:  # a notebook's class, or a built-in one
             file = None
         if file is None or not Path(file).is_file():

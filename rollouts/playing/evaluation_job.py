@@ -1,0 +1,123 @@
+"""Plays the episodes of an evaluation in workers, and keeps how they went."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from typing import Any, NoReturn
+
+import torch
+
+from rollouts.playing.casting import Cast, Casting
+from rollouts.playing.environment import environment
+from rollouts.playing.executor import Event, Executor, modules_of, play_all
+from rollouts.playing.state_trace import StateTrace, trace_of
+from rollouts.playing.together import one_by_one, play_together, states_together
+from tasks import MultiRobotTask, Scenario
+from tasks.episode import Score
+
+
+@dataclass(frozen=True)
+class TracedScore(Score):
+    """How an episode went, with a digest of its states.
+
+    Attributes:
+        trace: The digest.
+        environment: On what it was played; see `rollouts.playing.environment`.
+    """
+
+    trace: StateTrace = field(kw_only=True)
+    environment: Mapping[str, Any] = field(kw_only=True, compare=False)
+
+
+@dataclass(frozen=True)
+class EvaluationJob:
+    """Everything but the seed that decides an episode; can be pickled.
+
+    Attributes:
+        task: Class of the task.
+        scenario: How to make it.
+        cast: Who plays.
+        together: Seeds that are played at once, by the first of them.
+        traced: Whether each score is to be a `TracedScore`.
+    """
+
+    task: type[MultiRobotTask]
+    scenario: Scenario
+    cast: Cast
+    together: Mapping[int, tuple[int, ...]] = field(default_factory=dict[int, tuple[int, ...]])
+    traced: bool = False
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """What other machines may need to play it."""
+        return modules_of(self.task, *self.cast.members)
+
+    def __call__(self) -> Callable[[int], dict[int, Score]]:
+        """Make the task in a worker, and return what plays the episodes of a seed and others."""
+        torch.set_num_threads(1)  # as many everywhere, so that sums are the same
+        return _Play(self)
+
+
+class _Play:
+    """Plays episodes in the worlds of one task, which are built anew for each."""
+
+    def __init__(self, job: EvaluationJob) -> None:
+        self._together, self._env, self._traced = job.together, job.task(job.scenario), job.traced
+        self._casting = Casting(job.cast, self._env)
+
+    def __call__(self, seed: int) -> dict[int, Score]:
+        """Play the episodes of a seed and of those that are played together with it."""
+        players = [self._casting(seed) for seed in self._together[seed]]
+        with torch.no_grad():
+            if not self._traced:
+                play_together(self._env, players)
+                return {player.seed: player.score for player in players}
+            played = states_together(self._env, players)
+        return {
+            player.seed: TracedScore(
+                **vars(player.score), trace=trace_of(states), environment=environment()
+            )
+            for player, states in zip(players, played, strict=True)
+        }
+
+    def close(self) -> None:
+        """Let the worlds go."""
+        self._env.close()
+        self._casting.close()
+
+
+def scores_of(
+    executor: Executor, job: EvaluationJob, on_event: Callable[[Event], None]
+) -> dict[int, Score]:
+    """Play all episodes of a job, and return how each went, by seed.
+
+    Args:
+        executor: Who plays.
+        job: What is played.
+        on_event: Called with each event of the executor, one for each episode.
+
+    Raises:
+        WorkerError: If an episode cannot be played.
+    """
+    scores: dict[int, Score] = {}
+    with closing(play_all(executor, job, list(job.together))) as events:
+        for event in events:
+            for single in one_by_one(event):
+                on_event(single)
+                if single.seed is not None and isinstance(single.result, Score):
+                    scores[single.seed] = single.result
+            if event.error is not None:
+                seeds = [event.seed] if event.seed is None else job.together[event.seed]
+                _raise(event.error, seeds)
+    return scores
+
+
+def _raise(error: Exception, seeds: Sequence[int | None]) -> NoReturn:
+    """Raise an error that says at which seeds it happened."""
+    which = (
+        f"seed {seeds[0]}" if len(seeds) == 1 else f"one of the seeds {', '.join(map(str, seeds))}"
+    )
+    error.args = (f"{which}: {error}", *error.args[1:])
+    raise error

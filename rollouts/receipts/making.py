@@ -1,0 +1,158 @@
+"""What a task was made with, as plain data, and the arguments to make it so again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+from layouts import Layout
+from layouts.placement import RobotLike
+from robots import RobotLayoutsError
+from robots.control_modes import plain_mode
+from robots.fingerprint import asset_checksums
+from rollouts.reading.guessed_robots import GUESSED, descriptor_digest
+from rollouts.reading.json_fields import (
+    NAME,
+    NUMBER,
+    OBJECT,
+    FieldError,
+    by_name,
+    either,
+    fields,
+    items,
+    maybe,
+    whole,
+)
+from rollouts.reading.provenance import LAYOUT, describe_layout
+from rollouts.reading.recorded_layout import layout_again, same_places
+from rollouts.receipts.receipt import ReceiptError
+from simulation import Camera, PhysicsSettings
+from simulation.physics import Friction
+from tasks import MultiRobotTask, Scenario
+from tasks.varying.randomization import Randomization
+
+_MOST = 10**6
+
+_MAKING = fields(
+    {
+        "layout": LAYOUT,
+        "obs_mode": NAME,
+        "reward_mode": NAME,
+        "control_mode": maybe(either(NAME, by_name(NAME))),
+        "control_frequency": NUMBER,
+        "max_episode_steps": whole(1, 2**31 - 1),
+        "physics": maybe(OBJECT),
+        "randomization": maybe(OBJECT),
+        "cameras": items(OBJECT),
+        "camera_size": maybe(items(whole(1, _MOST), 2)),
+        "bystanders": maybe(NAME),
+        "simulator": NAME,
+    },
+    {"num_envs": whole(1, _MOST)},
+)
+
+_AS_THEY_ARE = (
+    "obs_mode",
+    "reward_mode",
+    "control_mode",
+    "control_frequency",
+    "max_episode_steps",
+    "bystanders",
+    "simulator",
+)  # arguments of the same name
+
+
+def describe_making(
+    cls: type[MultiRobotTask], scenario: Scenario, num_envs: int | None = None
+) -> dict[str, Any]:
+    """Return what a task is made with.
+
+    Of each robot in ``layout`` it is what `describe_layout` says, and its ``control_mode`` there,
+    a SHA-256 of its ``descriptor`` and of each of its ``files`` that physics reads.
+
+    Args:
+        cls: Class of the task.
+        scenario: What it is made with.
+        num_envs: How many environments play at once, where that makes a difference.
+
+    Raises:
+        AssetError: If robot files cannot be found.
+    """
+    mode, varied = scenario.control_mode, scenario.randomization
+    described = {
+        "layout": _describe_places(scenario.layout),
+        "obs_mode": scenario.obs_mode,
+        "reward_mode": scenario.reward_mode or cls.reward_modes[0],
+        "control_mode": None if mode is None else plain_mode(mode),
+        "control_frequency": scenario.control_frequency,
+        "max_episode_steps": scenario.max_episode_steps or cls.max_episode_steps,
+        "physics": None if scenario.physics is None else asdict(scenario.physics),
+        "randomization": varied.to_json() if varied else None,
+        "cameras": [asdict(camera) for camera in scenario.cameras],
+        "camera_size": scenario.camera_size,
+        "bystanders": scenario.bystanders,
+        "simulator": scenario.simulator,
+        **({} if num_envs is None else {"num_envs": num_envs}),
+    }
+    return json.loads(json.dumps(described))
+
+
+def _describe_places(layout: Layout) -> dict[str, Any]:
+    return {
+        place: {
+            **{name: value for name, value in about.items() if name != "assets"},
+            "control_mode": layout[place].control_mode,
+            "descriptor": descriptor_digest(layout[place].robot),
+            "files": asset_checksums(layout[place].robot.urdf),
+        }
+        for place, about in describe_layout(layout).items()
+    }
+
+
+def make_again(
+    making: Mapping[str, Any],
+    guessed: Mapping[str, Any],
+    cls: type[MultiRobotTask],
+    robots: Mapping[str, RobotLike],
+) -> dict[str, Any]:
+    """Return the arguments of `tasks.registry.make_scenario` for what a receipt says.
+
+    Args:
+        making: What `describe_making` returned.
+        guessed: What `rollouts.reading.guessed_robots.describe_guessed` returned then.
+        cls: Class of the task.
+        robots: Which robots to take, by place, where that does not say it.
+
+    Raises:
+        ReceiptError: If it makes no sense here, or a robot cannot be had.
+    """
+    try:
+        _MAKING.expect(dict(making), "making")
+        GUESSED.expect(dict(guessed), "guessed")
+        layout = layout_again(making["layout"], guessed, cls.layout, robots, "the receipt")
+        physics, varied = making["physics"], making["randomization"]
+        size = making["camera_size"]
+        chosen = {name: making[name] for name in _AS_THEY_ARE}
+        return {
+            **chosen,
+            "layout": cls.layout if _same(layout, cls.layout) else layout,
+            "physics": None if physics is None else _physics(physics),
+            "randomization": None if varied is None else Randomization.from_json(varied),
+            "cameras": [Camera(**camera) for camera in making["cameras"]],
+            "camera_size": None if size is None else tuple(size),
+            "check_layout": False,  # it was played like that
+        }
+    except (FieldError, RobotLayoutsError, TypeError) as error:
+        raise ReceiptError(f"the receipt's task cannot be made here: {error}") from error
+
+
+def _same(first: Layout, second: Layout) -> bool:
+    """Return whether a layout is another one, but for frames that things hang on."""
+    modes = ([placement.control_mode for placement in each.values()] for each in (first, second))
+    return same_places(first, second) and next(modes) == next(modes)
+
+
+def _physics(described: Mapping[str, Any]) -> PhysicsSettings:
+    return PhysicsSettings(**{**described, "friction": Friction(**described["friction"])})
