@@ -152,7 +152,9 @@ def _verify(options: argparse.Namespace) -> int:
     for name, verification in found.items():
         print(printable(f"{name}: {verification}"))
     equal = sum(verification.equal for verification in found.values())
-    print(f"{equal} of {len(found)} receipts verified; {len(run.missing)} cases were not played")
+    missing = len(run.missing)
+    words = f"{missing} case{' was' if missing == 1 else 's were'} not played"
+    print(f"{equal} of {len(found)} receipts verified; {words}")
     return 0 if equal == len(found) and found else 1
 
 
