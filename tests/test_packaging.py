@@ -60,7 +60,8 @@ class TestWheel:
             f"parity/report/templates/report.{suffix}" for suffix in ("html.jinja", "css", "js")
         }
         sheets = {f"robots/common/{name}.css" for name in ("palette", "page")}
-        assert names | sheets <= {*wheel.namelist()}
+        suites = {f"rollouts/suite/{name}" for name in ("suite.css", "standard.yaml")}
+        assert names | sheets | suites <= {*wheel.namelist()}
 
     def test_carries_the_asset_manifest_unchanged(self, wheel):
         manifest = (ROOT / "assets_cache" / "manifest.json").read_bytes()

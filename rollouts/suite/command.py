@@ -171,7 +171,7 @@ def _policies(words: list[str] | None) -> dict[str, str] | None:
         return None
     found: dict[str, str] = {}
     for word in words:
-        task, equals, policy = word.rpartition("=")
+        task, _, policy = word.rpartition("=")
         if (task or OTHERS) in found:
             raise TaskError(f"the policy of {task or OTHERS} is given twice")
         found[task or OTHERS] = policy

@@ -9,9 +9,9 @@ from pathlib import Path
 from robots import TaskError
 from robots.common.writing import writing_errors
 from rollouts.receipts.receipt import Receipt, ReceiptError
+from rollouts.suite.belonging import expect_of_case
 from rollouts.suite.files import load_suite, save_suite
 from rollouts.suite.suite import Case, Suite
-from tasks import get_task_class
 
 SUITE, RECEIPTS = "suite.yaml", "receipts"
 
@@ -78,8 +78,11 @@ def read_run(folder: Path) -> SuiteRun:
             " makes one"
         )
     suite = load_suite(folder / SUITE)
-    paths = {case: receipt_path(folder, case) for case in suite.cases}
-    found = {case.name: _receipt(path, case) for case, path in paths.items() if path.exists()}
+    found = {
+        case.name: _receipt(path, case)
+        for case in suite.cases
+        if (path := receipt_path(folder, case)).exists()
+    }
     return SuiteRun(folder, suite, found)
 
 
@@ -99,9 +102,5 @@ def expect_untouched(run: SuiteRun) -> SuiteRun:
 
 def _receipt(path: Path, case: Case) -> Receipt:
     receipt = Receipt.read(path)
-    task_id = get_task_class(case.task).task_id
-    if receipt.task["id"] != task_id:
-        raise ReceiptError(f"{path} is of {receipt.task['id']}, not of {task_id}")
-    if {episode.seed for episode in receipt.episodes} != {*case.seeds}:
-        raise ReceiptError(f"{path} has other seeds than the case {case.name} of its suite")
+    expect_of_case(receipt, case, path)
     return receipt

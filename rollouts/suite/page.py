@@ -135,4 +135,6 @@ def _markdown(shown: Table, text: int) -> Iterator[str]:
 
 
 def _row(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"
+    """Return a row, in which no cell can be markup."""
+    plain = (escape(cell, quote=False).replace("|", "\\|").replace("\n", " ") for cell in cells)
+    return f"| {' | '.join(plain)} |"

@@ -16,7 +16,7 @@ from rollouts.receipts.sources import describe_expert, describe_policy
 from rollouts.sources.policies import EXPERT
 from rollouts.suite.folder import SuiteRun, begin_run, read_run, receipt_path
 from rollouts.suite.policies import Player, chosen_cases, chosen_policies
-from rollouts.suite.suite import Case, Suite
+from rollouts.suite.suite import Case, Suite, naming
 from tasks.episode import Policy
 
 
@@ -79,15 +79,16 @@ def _play(
     executor: Executor,
     on_event: Callable[[Case, Event | None], None],
 ) -> None:
-    evaluate(
-        player.name or player.policy,
-        case.task,
-        case.seeds,
-        executor=executor,
-        receipt=path,
-        on_event=lambda event: on_event(case, event),
-        **case.making,
-    )
+    with naming(case):
+        evaluate(
+            player.name or player.policy,
+            case.task,
+            case.seeds,
+            executor=executor,
+            receipt=path,
+            on_event=lambda event: on_event(case, event),
+            **case.making,
+        )
 
 
 def _expect_same(receipt: Receipt, player: Player, path: Path) -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 from layouts import Layout
-from robots import TaskError
+from robots import RobotLayoutsError, TaskError
 from robots.common.bounds import shown
 from rollouts.suite.seeds import read_seeds, write_seeds
 from tasks.registry import full_name, get_task_class, make_scenario
@@ -138,6 +139,16 @@ class Suite:
         """Show a line for each case."""
         head = f"{self.name} {self.id}: {self.episodes:,} episodes, {len(self.cases)} cases"
         return "\n".join([head, *(f"  {_line(case)}" for case in self.cases)])
+
+
+@contextmanager
+def naming(case: Case) -> Generator[None]:
+    """Let every error of this library say in which case it happened."""
+    try:
+        yield
+    except RobotLayoutsError as error:
+        error.args = (f"{case.name}: {error}", *error.args[1:])
+        raise
 
 
 def checked_name(what: str, name: Any) -> str:

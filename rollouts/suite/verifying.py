@@ -11,7 +11,7 @@ from rollouts.receipts.verification import Verification, verify
 from rollouts.suite.files import OTHERS
 from rollouts.suite.folder import SuiteRun, read_run
 from rollouts.suite.policies import named_policies
-from rollouts.suite.suite import Case
+from rollouts.suite.suite import Case, naming
 from tasks import get_task_class
 from tasks.episode import Policy
 
@@ -49,11 +49,12 @@ def verify_run(
     for case in run.suite.cases:
         if case.name in run.receipts:
             player = given.get(get_task_class(case.task).task_id, given.get(OTHERS))
-            found[case.name] = verify(
-                run.receipts[case.name],
-                executor,
-                lambda event, case=case: on_event(case, event),
-                policy=None if player is None else player.name or player.policy,
-                task=case.task,
-            )
+            with naming(case):
+                found[case.name] = verify(
+                    run.receipts[case.name],
+                    executor,
+                    lambda event, case=case: on_event(case, event),
+                    policy=None if player is None else player.name or player.policy,
+                    task=case.task,
+                )
     return found

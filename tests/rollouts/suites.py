@@ -7,9 +7,12 @@ from collections.abc import Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
 
+from rollouts.receipts.making import describe_making
 from rollouts.receipts.receipt import EpisodeReceipt, Receipt
 from rollouts.suite.folder import SuiteRun, begin_run, read_run, receipt_path
-from rollouts.suite.suite import Suite
+from rollouts.suite.suite import Case, Suite
+from tasks import get_task_class
+from tasks.registry import make_scenario
 
 
 def written(folder: Path, text: str) -> Path:
@@ -19,12 +22,13 @@ def written(folder: Path, text: str) -> Path:
     return path
 
 
-def receipt(task: str, successes: Mapping[int, bool], name: str = "lab:POLICY") -> Receipt:
+def receipt(case: Case, successes: Mapping[int, bool]) -> Receipt:
     """Return a receipt of episodes, each of as many steps as its seed and one."""
+    cls = get_task_class(case.task)
     return Receipt(
-        {"id": task, "class": "lab:Task", "sha256": None},
-        {"kind": "policy", "name": name, "sha256": "ab" * 32},
-        {"layout": {}},
+        {"id": cls.task_id, "class": "lab:Task", "sha256": None},
+        {"kind": "policy", "name": "lab:POLICY", "sha256": "ab" * 32},
+        describe_making(cls, make_scenario(cls, **case.making)),
         {"versions": {"python": "3.11.0", "sapien": "3.0.3"}, "processor": {"name": "A & B"}},
         tuple(_episode(seed, success) for seed, success in successes.items()),
     )
@@ -36,7 +40,7 @@ def made_run(folder: Path, suite: Suite, solved: Mapping[str, Sequence[int]]) ->
     for case in suite.cases:
         if case.name in solved:
             successes = {seed: seed in solved[case.name] for seed in case.seeds}
-            receipt(case.task, successes).write(receipt_path(folder, case))
+            receipt(case, successes).write(receipt_path(folder, case))
     return read_run(folder)
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from layouts import single
 from robots import TaskError
 from rollouts.__main__ import main
 from rollouts.receipts.receipt import Receipt, ReceiptError
@@ -13,6 +14,7 @@ from rollouts.suite.page import read_runs, render_markdown, render_page
 from rollouts.suite.results import compare, overall
 from rollouts.suite.suite import Case, Suite
 from rollouts.suite.tables import ALL, comparisons, failures, lengths, successes
+from tasks import Randomization
 from tests.rollouts.suites import made_run, receipt
 
 SUITE = Suite(
@@ -24,6 +26,12 @@ SUITE = Suite(
     ),
 )
 EVERY = range(20)
+OTHERWISE = {
+    "layout": {"layout": single({"arm": "panda_wristcam"})},
+    "control_mode": {"control_mode": "pd_joint_pos"},
+    "obs_mode": {"obs_mode": "state_dict"},
+    "randomization": {"randomization": Randomization(mass={"cube": 2.0})},
+}
 
 
 @pytest.fixture
@@ -58,8 +66,8 @@ def test_runs_are_compared_seed_by_seed(folders):
 
 
 def test_pairs_are_of_equal_seeds():
-    one = receipt("PickCube-v1", {0: True, 1: True, 5: False})
-    other = receipt("PickCube-v1", {5: True, 1: False, 0: True})
+    one = receipt(SUITE.cases[0], {0: True, 1: True, 5: False})
+    other = receipt(SUITE.cases[0], {5: True, 1: False, 0: True})
     case, all_cases = compare([(one, other)])
     assert (case.gained, case.lost, case.episodes) == (1, 1, 3)
     assert all_cases == case
@@ -67,7 +75,9 @@ def test_pairs_are_of_equal_seeds():
 
 
 def test_all_cases_together():
-    found = overall([receipt("a", {0: True, 1: False}), receipt("b", {7: True})])
+    found = overall(
+        [receipt(SUITE.cases[0], {0: True, 1: False}), receipt(SUITE.cases[1], {7: True})]
+    )
     assert found is not None
     assert (found.successes, found.episodes, found.lengths) == (2, 3, (1, 8))
     assert (found.length, found.total) == (2, (1 + 2 + 8) / 6)
@@ -100,6 +110,7 @@ def test_the_page(folders, tmp_path, capsys):
     assert not re.search(r"url\(|@import", text)
     markdown = page.with_suffix(".md").read_text()
     assert f"SHA-256: `{SUITE.hash}`" in markdown
+    assert "it was &lt;dropped&gt;" in markdown
     assert "| Push | 100.0 (83.9 to 100.0) | 40.0 (21.9 to 61.3) | 20 |" in markdown
     rows = [line for line in markdown.splitlines() if line.startswith("| Push ")]
     assert len(rows) == 4  # successes, comparison, lengths, receipts
@@ -136,9 +147,13 @@ def test_receipts_that_are_not_what_they_should_be(folders):
     replace(good, episodes=good.episodes[1:]).write(path)
     with pytest.raises(ReceiptError, match="has other seeds than the case PickCube-v1"):
         read_runs(folders)
-    receipt("PushT-v1", dict.fromkeys(range(4), True)).write(path)
+    receipt(SUITE.cases[2], dict.fromkeys(range(4), True)).write(path)
     with pytest.raises(ReceiptError, match="is of PushT-v1, not of PickCube-v1"):
         read_runs(folders)
+    for otherwise, what in OTHERWISE.items():
+        receipt(replace(SUITE.cases[0], **what), dict.fromkeys(range(4), True)).write(path)
+        with pytest.raises(ReceiptError, match=f"as the case PickCube-v1 .* are {otherwise}$"):
+            read_runs(folders)
     path.write_text("{}")
     with pytest.raises(ReceiptError, match="PickCube-v1.json is no receipt"):
         read_runs(folders)
