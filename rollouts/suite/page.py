@@ -63,7 +63,7 @@ def _parts(runs: Sequence[SuiteRun]) -> Iterator[tuple[str, str, Table, int]]:
     if (failed := tables.failures(runs)).rows:
         yield "Failures", "", failed, 5
     yield "Who played", "", tables.players(runs), 6
-    words = "How the SHA-256 of each receipt begins; `robot-layouts suite verify` plays them again."
+    words = "How the SHA-256 of each receipt begins; robot-layouts suite verify plays them again."
     yield "Receipts", words, tables.receipts(runs), 1 + len(runs)
 
 

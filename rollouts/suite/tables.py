@@ -15,7 +15,7 @@ from rollouts.suite.statistics import Interval
 from rollouts.suite.suite import SHORT
 
 ALL = "all"  # the row of all cases together
-NOT_PLAYED = "–"
+NONE = "–"
 LETTERS = "ABCDEFGH"  # of runs that stand side by side
 
 INTERVALS = (
@@ -27,7 +27,8 @@ PAIRED = (
     "Both played the same seeds, so they are compared seed by seed: McNemar's exact test asks how"
     " probable so uneven a split of the seeds that only one of them solved would be if both were"
     " equally good (p; by Holm's procedure for all cases, so that many cases raise no false alarm),"
-    " and the 95 % interval of the difference is Bonett and Price's for paired rates."
+    " and the 95 % interval of the difference is Bonett and Price's for paired rates, an"
+    " approximation if seeds are few."
 )
 
 _SHOWN, _REASONS = 10, 3  # seeds and reasons that a row names
@@ -140,12 +141,12 @@ def _column(runs: Sequence[SuiteRun], number: int, what: str) -> str:
 
 def _episodes(results: Sequence[Result | None]) -> str:
     counts = {f"{result.episodes:,}" for result in results if result is not None}
-    return " / ".join(sorted(counts)) or NOT_PLAYED
+    return " / ".join(sorted(counts)) or NONE
 
 
 def _rate(result: Result | None) -> str:
     if result is None:
-        return NOT_PLAYED
+        return NONE
     return f"{percent(result.rate)} ({_interval(result.interval)})"
 
 
@@ -156,7 +157,7 @@ def _interval(interval: Interval, sign: str = "") -> str:
 
 def _length(result: Result | None) -> tuple[str, str, str]:
     if result is None:
-        return NOT_PLAYED, NOT_PLAYED, NOT_PLAYED
+        return NONE, NONE, NONE
     least, most = result.lengths
     return f"{result.length:g}", f"{least} to {most}", f"{result.total:.2f}"
 
@@ -176,18 +177,18 @@ def _failed(receipt: Receipt) -> tuple[str, str, str]:
     failed = [episode for episode in receipt.episodes if not episode.success]
     seeds = ", ".join(str(episode.seed) for episode in failed[:_SHOWN])
     more = ", …" if len(failed) > _SHOWN else ""
-    reasons = Counter(episode.reason or "not known" for episode in failed).most_common(_REASONS)
-    words = "; ".join(f"{count} × {reason}" for reason, count in reasons)
-    return f"{len(failed):,}", f"{seeds}{more}", words
+    reasons = Counter(episode.reason for episode in failed if episode.reason)
+    words = "; ".join(f"{count} × {reason}" for reason, count in reasons.most_common(_REASONS))
+    return f"{len(failed):,}", f"{seeds}{more}", words or NONE
 
 
 def _players(run: SuiteRun) -> Sequence[tuple[str, str, str, str]]:
     """Return each policy, the cases that it played, its source, and what it was played on."""
     cases: dict[tuple[str, str, str], list[str]] = {}
     for name, receipt in run.receipts.items():
-        policy, digest = receipt.policy, receipt.policy.get("sha256") or NOT_PLAYED
+        policy, digest = receipt.policy, receipt.policy.get("sha256") or NONE
         own = policy["name"] if policy["kind"] != EXPERT else EXPERT
-        digest = NOT_PLAYED if own == EXPERT else digest[:SHORT]
+        digest = NONE if own == EXPERT else digest[:SHORT]
         cases.setdefault((own, digest, _played_on(receipt)), []).append(name)
     return [
         (policy, plural(len(names), "case"), digest, machine)
@@ -203,7 +204,7 @@ def _played_on(receipt: Receipt) -> str:
 
 
 def _short_hash(receipt: Receipt | None) -> str:
-    return NOT_PLAYED if receipt is None else receipt.hash[:16]
+    return NONE if receipt is None else receipt.hash[:16]
 
 
 def summary(run: SuiteRun) -> Iterator[str]:
@@ -215,6 +216,6 @@ def summary(run: SuiteRun) -> Iterator[str]:
     for name, rate, episodes in table.rows:
         yield (
             f"  {name:<{width}}  {rate} % of {episodes}"
-            if rate != NOT_PLAYED
+            if rate != NONE
             else (f"  {name:<{width}}  not played")
         )
