@@ -15,6 +15,7 @@ COMMANDS = {
     "record": "rollouts.recording.record_command",
     "teleop": "rollouts.teleop.command",
     "evaluate": "rollouts.evaluate_command",
+    "verify": "rollouts.receipts.verify_command",
     "suite": "rollouts.suite.command",
     "convert": "rollouts.recording.convert_command",
     "replay": "rollouts.playing.replay_command",

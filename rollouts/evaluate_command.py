@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rollouts.playing import command_options as workers
 from rollouts.playing.command_options import INTERRUPTED, one_or_more, stop_signals, zero_or_more
-from rollouts.sources.policies import find_policy
 from tasks.cell_options import add_cell_options, chosen_cell
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--episodes", type=one_or_more, default=100, metavar="N", help="how many (%(default)s)")
     workers.add_arguments(parser)
     add("--seed", type=zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
+    add("--receipt", type=Path, metavar="JSON", help="write a receipt, which `verify` plays again")
     workers.add_control_mode(parser)
     add_cell_options(parser)
 
@@ -53,10 +54,11 @@ def run(options: argparse.Namespace) -> int:
     try:
         with stop_signals(), line:
             found = evaluate(
-                find_policy(options.policy),
+                options.policy,
                 options.task,
                 range(options.seed, options.seed + options.episodes),
                 executor=executor,
+                receipt=options.receipt,
                 on_event=_Status(line).show,
                 control_mode=options.control_mode,
                 **chosen_cell(options),
@@ -65,6 +67,8 @@ def run(options: argparse.Namespace) -> int:
         print("stopped", file=sys.stderr)
         return INTERRUPTED
     print(found)
+    if found.receipt is not None:
+        print(f"{options.receipt}: receipt {found.receipt.hash}")
     return 0
 
 

@@ -77,7 +77,7 @@ def episode_differences(recorded: Receipt, here: Receipt) -> Iterator[Difference
     for before in recorded.episodes:
         now = played[before.seed]
         if before != now:
-            yield Difference(before.seed, _first_step(before, now), before, now)
+            yield Difference(before.seed, first_step(before, now), before, now)
 
 
 def changes(recorded: Receipt, here: Receipt) -> Iterator[Change]:
@@ -92,7 +92,7 @@ def changes(recorded: Receipt, here: Receipt) -> Iterator[Change]:
                 yield Change(*what, before.get(path), now.get(path))
 
 
-def _first_step(before: EpisodeReceipt, now: EpisodeReceipt) -> int | None:
+def first_step(before: EpisodeReceipt, now: EpisodeReceipt) -> int | None:
     """Return the first moment that differs; the last one if the short digests do not tell."""
     if before.states == now.states:
         return None

@@ -144,7 +144,7 @@ def make_again(
             "camera_size": None if size is None else tuple(size),
             "check_layout": False,  # it was played like that
         }
-    except (FieldError, RobotLayoutsError, TypeError) as error:
+    except (FieldError, RobotLayoutsError, TypeError, KeyError) as error:
         raise ReceiptError(f"the receipt's task cannot be made here: {error}") from error
 
 
@@ -155,4 +155,5 @@ def _same(first: Layout, second: Layout) -> bool:
 
 
 def _physics(described: Mapping[str, Any]) -> PhysicsSettings:
-    return PhysicsSettings(**{**described, "friction": Friction(**described["friction"])})
+    settings: dict[str, Any] = {**described, "friction": Friction(**described["friction"])}
+    return PhysicsSettings(**settings)

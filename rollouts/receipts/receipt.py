@@ -43,7 +43,9 @@ def _is_digest(value: Any) -> bool:
 
 
 DIGEST = Kind("a SHA-256: 64 of the digits 0-9 and a-f", _is_digest)
-TASK = fields({"id": NAME, "class": NAME, "sha256": maybe(DIGEST)})
+# A module before a task's id would be imported.
+ID = Kind("a task's id, without a module", lambda value: NAME.fits(value) and ":" not in value)
+TASK = fields({"id": ID, "class": NAME, "sha256": maybe(DIGEST)})
 POLICY = fields({"kind": NAME, "name": NAME, "sha256": maybe(DIGEST)}, {"files": OBJECT})
 MAKING = fields({"layout": OBJECT})
 ENVIRONMENT = fields({"versions": OBJECT, "processor": OBJECT})

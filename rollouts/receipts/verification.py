@@ -22,7 +22,7 @@ from rollouts.receipts.receipt import Receipt, ReceiptError
 from rollouts.receipts.sources import EXPERT, is_the_same_code
 from tasks import MultiRobotTask, get_task_class
 from tasks.episode import Policy
-from tasks.registry import make_scenario
+from tasks.registry import TASKS, make_scenario
 
 _SHOWN = 10  # episodes that a text names
 
@@ -130,14 +130,12 @@ def _task(receipt: Receipt, name: str | None) -> type[MultiRobotTask]:
         if cls.task_id != recorded:
             raise ReceiptError(f"the receipt is of {recorded}, not of {cls.task_id}")
         return cls
+    if recorded not in TASKS and not is_the_same_code(module, receipt.task["sha256"]):
+        raise ReceiptError(_unlike("task", recorded, module) + f"--task {module}:{recorded}")
     try:
-        return get_task_class(recorded)
+        return get_task_class(recorded if recorded in TASKS else f"{module}:{recorded}")
     except UnknownNameError as error:
-        if is_the_same_code(module, receipt.task["sha256"]):
-            return get_task_class(f"{module}:{recorded}")
-        raise ReceiptError(
-            _unlike("task", recorded, module) + f"--task {module}:{recorded}"
-        ) from error
+        raise ReceiptError(f"the receipt's task cannot be made here: {error}") from error
 
 
 def _cast(
