@@ -87,7 +87,8 @@ def run(options: argparse.Namespace) -> int:
         with stop_signals():
             return options.suite_command(options)
     except KeyboardInterrupt:
-        print("stopped; the same command goes on from there", file=sys.stderr)
+        goes_on = "; the same command goes on from there" if options.suite_command is _run else ""
+        print(f"stopped{goes_on}", file=sys.stderr)
         return INTERRUPTED
 
 

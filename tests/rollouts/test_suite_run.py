@@ -164,6 +164,15 @@ def test_all_is_played_again(played):
     assert {*seen} == {"First", "Later"}
 
 
+def test_a_policy_that_is_named_plays_again(played, tmp_path):
+    assert verify_run(played, {"push_t": STILL}, workers=0)["Later"].equal
+    found = verify_run(played, LEANS, workers=0)
+    assert [one.equal for one in found.values()] == [False, False]
+    run_suite(SUITE, tmp_path, Leans(), only=["Later"], workers=0)
+    with pytest.raises(ReceiptError, match="^Later: the receipt's policy, .*cannot be imported"):
+        verify_run(tmp_path, workers=0)
+
+
 def test_a_state_that_differs_is_named(played, tmp_path, capsys):
     run = read_run(played)
     begin_run(tmp_path, SUITE)
