@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from rollouts.progress import LiveLine
     from rollouts.suite.suite import Case
 
+_FOLDER = "the folder of a run"
+
 DESCRIPTION = "play a suite of tasks × seeds × layouts with receipts, report it, verify it"
 RUN_EPILOG = (
     "The same command goes on where it was stopped: what has a receipt is not played again. Exit"
@@ -30,41 +32,37 @@ VERIFY_EPILOG = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    suite = "a suite's file (.yaml), or a suite of this library: standard"
-    folder = "the folder of a run"
+    for name, (about, epilog, add_own, run_own) in _COMMANDS.items():
+        own = commands.add_parser(name, help=about, description=about, epilog=epilog)
+        add_own(own)
+        own.set_defaults(suite_command=run_own)
 
-    about = "print what a suite plays, and its hash"
-    show = commands.add_parser("show", help=about, description=about)
-    show.add_argument("suite", metavar="SUITE", help=suite)
-    show.set_defaults(suite_command=_show)
 
-    about = "play a suite in worker processes; a receipt for each case"
-    play = commands.add_parser("run", help=about, description=about, epilog=RUN_EPILOG)
-    play.add_argument("suite", metavar="SUITE", help=suite)
-    play.add_argument("--out", type=Path, required=True, metavar="DIR", help=folder)
-    _add_policy(play, "as the suite says, else the experts")
-    play.add_argument(
-        "--only", nargs="+", default=(), metavar="CASE", help="play these cases alone"
-    )
-    workers.add_arguments(play)
-    play.set_defaults(suite_command=_run)
+def _add_show(parser: argparse.ArgumentParser) -> None:
+    about = "a suite's file (.yaml), or a suite of this library: standard"
+    parser.add_argument("suite", metavar="SUITE", help=about)
 
-    about = "write what runs of one suite amount to: an HTML page, and Markdown beside it"
-    report = commands.add_parser("report", help=about, description=about)
-    report.add_argument(
-        "folders", nargs="+", type=Path, metavar="DIR", help=f"{folder}; several are compared"
-    )
-    report.add_argument(
-        "--out", type=Path, metavar="PAGE", help="the HTML file (report.html in the first folder)"
-    )
-    report.set_defaults(suite_command=_report)
 
-    about = "play every episode of a run again, and compare every state"
-    verify = commands.add_parser("verify", help=about, description=about, epilog=VERIFY_EPILOG)
-    verify.add_argument("folder", type=Path, metavar="DIR", help=folder)
-    _add_policy(verify, "as the receipts say, if that can be imported as it was")
-    workers.add_arguments(verify)
-    verify.set_defaults(suite_command=_verify)
+def _add_run(parser: argparse.ArgumentParser) -> None:
+    _add_show(parser)
+    add = parser.add_argument
+    add("--out", type=Path, required=True, metavar="DIR", help=_FOLDER)
+    _add_policy(parser, "as the suite says, else the experts")
+    add("--only", nargs="+", default=(), metavar="CASE", help="play these cases or tasks alone")
+    workers.add_arguments(parser)
+
+
+def _add_report(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("folders", nargs="+", type=Path, metavar="DIR", help=f"{_FOLDER}; several are compared")
+    page = "the HTML file (report.html in the first folder)"
+    add("--out", type=Path, metavar="PAGE", help=page)
+
+
+def _add_verify(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("folder", type=Path, metavar="DIR", help=_FOLDER)
+    _add_policy(parser, "as the receipts say, if that can be imported as it was")
+    workers.add_arguments(parser)
 
 
 def _add_policy(parser: argparse.ArgumentParser, default: str) -> None:
@@ -177,6 +175,29 @@ def _policies(words: list[str] | None) -> dict[str, str] | None:
             raise TaskError(f"the policy of {task or OTHERS} is given twice")
         found[task or OTHERS] = policy
     return found
+
+
+_COMMANDS = {
+    "show": ("print what a suite plays, and its hash", None, _add_show, _show),
+    "run": (
+        "play a suite in worker processes; a receipt for each case",
+        RUN_EPILOG,
+        _add_run,
+        _run,
+    ),
+    "report": (
+        "write what runs of one suite amount to: an HTML page, and Markdown beside it",
+        None,
+        _add_report,
+        _report,
+    ),
+    "verify": (
+        "play every episode of a run again, and compare every state",
+        VERIFY_EPILOG,
+        _add_verify,
+        _verify,
+    ),
+}
 
 
 class _Status:

@@ -169,7 +169,7 @@ def test_a_policy_that_is_named_plays_again(played, tmp_path):
     found = verify_run(played, LEANS, workers=0)
     assert [one.equal for one in found.values()] == [False, False]
     run_suite(SUITE, tmp_path, Leans(), only=["Later"], workers=0)
-    with pytest.raises(ReceiptError, match="^Later: the receipt's policy, .*cannot be imported"):
+    with pytest.raises(ReceiptError, match="^Later: the receipt's policy .*cannot be imported"):
         verify_run(tmp_path, workers=0)
 
 
