@@ -6,9 +6,7 @@ import json
 import platform
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +14,7 @@ from robots import RecordingError, UnreadableFileError
 from robots.common.files import read_json
 from robots.common.writing import write_whole
 from rollouts.dataset.comparison import Replay
+from rollouts.playing.environment import versions as installed
 from rollouts.reading.json_fields import FLAG, NAME, OBJECT, FieldError, Kind, fields, items, whole
 from rollouts.reading.manifest import MOST_EPISODES, spans_of
 from rollouts.reading.summary import MAX_JSON, MAX_SEED
@@ -157,11 +156,8 @@ class Certificate:
 
 def versions() -> dict[str, str]:
     """Return the versions that bits depend on, and the kind of machine."""
-    found = {"python": platform.python_version(), "machine": platform.machine()}
-    for package in PACKAGES:
-        with suppress(PackageNotFoundError):
-            found[package] = version(package)
-    return found
+    machine = {"python": platform.python_version(), "machine": platform.machine()}
+    return {**machine, **installed(PACKAGES)}
 
 
 def sentences(certificate: Certificate) -> Sequence[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -34,6 +35,17 @@ PACKAGES = (
 )
 SOURCE = "robot-layouts source"  # a SHA-256: a checkout changes more often than its version
 
+# What libraries go by when they choose, among versions of a function, that for the processor.
+_VARIABLES = (
+    "ATEN_CPU_CAPABILITY",
+    "GLIBC_TUNABLES",
+    "MKL_CBWR",
+    "NPY_DISABLE_CPU_FEATURES",
+    "ONEDNN_MAX_CPU_ISA",
+    "OPENBLAS_CORETYPE",
+)
+_PORTABLE = "ROBOT_LAYOUTS_PORTABLE"  # set, and not to 0, in processes that compute portably
+
 _ROOT = Path(__file__).parents[2]
 _PLAYING = (*PLAYING[:-1], "rollouts/playing")  # the rest of rollouts only writes things down
 
@@ -43,13 +55,16 @@ def environment() -> dict[str, Any]:
     """Return versions and processor, as plain data; other processes may have others.
 
     ``versions`` has those of Python, of the C library and of packages, and a SHA-256 of our own
-    source; ``processor`` its name and what torch and NumPy use of it.
+    source; ``processor`` its name, what torch and NumPy use of it, whether the process is to
+    compute the same on every one (``portable``), and the variables that choose what is used.
     """
     return {
         "versions": {
             "python": platform.python_version(),
             "libc": " ".join(platform.libc_ver()),
             **versions(PACKAGES),
+            "numpy": np.__version__,  # what is loaded, which need not be what is installed
+            "torch": torch.__version__,
             SOURCE: _source(),
         },
         "processor": {
@@ -57,6 +72,8 @@ def environment() -> dict[str, Any]:
             "name": _processor(),
             "torch": torch.backends.cpu.get_cpu_capability(),
             "numpy": " ".join(_numpy_features()),
+            "portable": _is_portable(),
+            "variables": " ".join(f"{n}={os.environ[n]}" for n in _VARIABLES if n in os.environ),
         },
     }
 
@@ -68,6 +85,10 @@ def versions(packages: Iterable[str]) -> dict[str, str]:
         with suppress(PackageNotFoundError):
             found[package] = version(package)
     return found
+
+
+def _is_portable() -> bool:
+    return os.environ.get(_PORTABLE, "0") != "0"
 
 
 def _source() -> str:

@@ -74,6 +74,7 @@ def verify(
     executor: Executor | None = None,
     on_event: Callable[[Event], None] = lambda event: None,
     *,
+    workers: int | None = None,
     policy: Policy | str | None = None,
     task: str | None = None,
     robots: Mapping[str, RobotLike] | None = None,
@@ -86,8 +87,10 @@ def verify(
 
     Args:
         receipt: A receipt, or its file.
-        executor: Who plays; by default one process for each core that this one may use.
+        executor: Who plays; None: as many processes as ``workers`` says.
         on_event: Called with each event of the executor, to show progress.
+        workers: How many processes play; None: one for each core that this process may use; 0:
+            none, but this one.
         policy: The policy, where the receipt cannot name it: as `rollouts.evaluate` takes it.
         task: The task, ``module:Id``, if it is in a module that no package lists.
         robots: Which robots these were, by place, where the receipt cannot say it.
@@ -97,7 +100,7 @@ def verify(
     Raises:
         ReceiptError: If it cannot be read or is none; its task or policy cannot be had here, or
             would have to be named.
-        TaskError: If a policy is given that is none.
+        TaskError: If a policy is given that is none, or both ``workers`` and an executor.
         AssetError: If robot files cannot be found.
         WorkerError: If the policy raised something, or workers die of it again and again.
     """
@@ -116,7 +119,7 @@ def verify(
         raise ReceiptError(f"the receipt's task cannot be made here: {error}") from error
     job = EvaluationJob(cls, scenario, cast, grouped(seeds, at_once), traced=True)
     described = describe_job(job, name)
-    scores = scores_of(choose_executor(None, executor), job, on_event)
+    scores = scores_of(choose_executor(workers, executor), job, on_event)
     return Verification(
         recorded, receipt_of(described, job, {seed: scores[seed] for seed in seeds})
     )

@@ -21,6 +21,7 @@ from rollouts.playing.executor import WorkerError, WorkersDied
 from rollouts.playing.ray_cluster import gather_code
 from rollouts.playing.ray_executor import RayExecutor
 from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.receipts import verify
 from rollouts.recording.record import FILE, record
 from tests.rollouts.clusters import Nodes, running_cluster
 from tests.rollouts.plays import (
@@ -176,6 +177,15 @@ def test_a_recording_on_a_cluster_is_stopped_and_goes_on(nodes, tmp_path):
 def test_a_policy_does_as_well_there_as_here(nodes):
     there = evaluate(Wanders(), TASK, range(6), executor=RayExecutor(nodes.address))
     assert there.scores == evaluate(Wanders(), TASK, range(6), executor=Here()).scores
+
+
+@pytest.mark.long
+def test_a_receipt_says_there_what_it_says_here(nodes, tmp_path):
+    there, here = tmp_path / "there.json", tmp_path / "here.json"
+    evaluate(Wanders(), TASK, range(3), executor=RayExecutor(nodes.address), receipt=there)
+    evaluate(Wanders(), TASK, range(3), workers=0, receipt=here)
+    assert there.read_bytes() == here.read_bytes()
+    assert verify(here, RayExecutor(nodes.address), policy=Wanders()).equal
 
 
 @pytest.mark.long

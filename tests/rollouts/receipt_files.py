@@ -1,0 +1,28 @@
+"""Receipts to verify, and to change by hand."""
+
+import json
+from pathlib import Path
+
+from rollouts import evaluate
+from rollouts.receipts import Verification, verify
+from tests.rollouts.policies import LEANS, TASK
+
+
+def written(
+    tmp_path, name="receipt.json", policy=LEANS, seeds=range(3), task=TASK, **details
+) -> Path:
+    details = {"workers": 0, "max_episode_steps": 10, **details}
+    evaluate(policy, task, seeds, receipt=tmp_path / name, **details)
+    return tmp_path / name
+
+
+def again(receipt, **details) -> Verification:
+    return verify(receipt, workers=0, **details)
+
+
+def edit(path: Path, change) -> Path:
+    """Change a receipt by hand."""
+    about = json.loads(path.read_text())
+    change(about)
+    path.write_text(json.dumps(about))
+    return path
