@@ -16,6 +16,7 @@ COMMANDS = {
     "teleop": "rollouts.teleop.command",
     "evaluate": "rollouts.evaluate_command",
     "verify": "rollouts.receipts.verify_command",
+    "suite": "rollouts.suite.command",
     "convert": "rollouts.recording.convert_command",
     "replay": "rollouts.playing.replay_command",
     "certify": "rollouts.dataset.certify_command",

@@ -59,8 +59,9 @@ class TestWheel:
         names = {
             f"parity/report/templates/report.{suffix}" for suffix in ("html.jinja", "css", "js")
         }
-        sheets = {"robots/common/palette.css", "rollouts/dataset/page.css"}
-        assert names | sheets <= {*wheel.namelist()}
+        sheets = {f"robots/common/{name}.css" for name in ("palette", "page")}
+        suites = {f"rollouts/suite/{name}" for name in ("suite.css", "standard.yaml")}
+        assert names | sheets | suites <= {*wheel.namelist()}
 
     def test_carries_the_asset_manifest_unchanged(self, wheel):
         manifest = (ROOT / "assets_cache" / "manifest.json").read_bytes()

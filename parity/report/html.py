@@ -31,7 +31,7 @@ def render(context: Mapping[str, Any], fitted: Mapping[str, Embedded]) -> str:
         name: (folder / f"report.{suffix}").read_text(encoding="utf-8")
         for name, suffix in (("page", "html.jinja"), ("script", "js"))
     }
-    style = read_style("parity.report", "templates/report.css")
+    style = read_style(("parity.report", "templates/report.css"))
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )

@@ -45,6 +45,7 @@ COMMANDS: Mapping[str, Command] = {
         certify="play every episode of a recording again, and certify that it is the same",
         evaluate="let a policy or an expert play, and tell how well it does",
         verify="play what a receipt is of again, and compare every bit",
+        suite="play tasks × seeds × layouts of one file with receipts; report and verify that",
         convert="record a recording again in another control mode",
         report="write one page on a data set: counts, lengths, sources, what was varied, clips",
         export="write a recording as a dataset for LeRobot or robomimic",

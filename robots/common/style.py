@@ -6,16 +6,17 @@ import base64
 import hashlib
 from importlib.resources import files
 
+COMMON = "robots.common"
 
-def read_style(package: str, name: str) -> str:
-    """Return a style sheet of a package, after the colours that all pages share.
+
+def read_style(*sheets: tuple[str, str]) -> str:
+    """Return style sheets, one after the other, after the colours that all pages share.
 
     Args:
-        package: The package that holds the file, such as ``rollouts.dataset``.
-        name: The file.
+        sheets: Of each the package that holds the file, such as ``robots.common``, and its name.
     """
-    sheets = (files("robots.common") / "palette.css", files(package) / name)
-    return "".join(sheet.read_text(encoding="utf-8") for sheet in sheets)
+    places = [files(package) / name for package, name in ((COMMON, "palette.css"), *sheets)]
+    return "".join(place.read_text(encoding="utf-8") for place in places)
 
 
 def source_hash(text: str) -> str:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from typing import Any
 
 import numpy as np
 
-from robots.common.style import read_style, source_hash
+from robots.common.pages import Tile, document, heading, plural, section, table
 from rollouts.dataset.certificate import Certificate
 from rollouts.dataset.charts import histogram
 from rollouts.dataset.clearance import Clearances
@@ -45,70 +45,46 @@ class Report:
 
 def render(report: Report) -> str:
     """Return the page."""
-    style = read_style("rollouts.dataset", "page.css")
-    policy = f"default-src 'none'; media-src data:; img-src data:; style-src {source_hash(style)}"
-    sections = "".join(
-        (
-            _lengths(report.contents),
-            _sources(report.contents),
-            _varied(report.contents),
-            _clearances(report),
-            _certificate(report.certificate),
-            _clips(report.clips),
-            _layout(report.layout),
-            _files(report),
-            _remarks(report.remarks),
-        )
+    sections = (
+        _lengths(report.contents),
+        _sources(report.contents),
+        _varied(report.contents),
+        _clearances(report),
+        _certificate(report.certificate),
+        _clips(report.clips),
+        _layout(report.layout),
+        _files(report),
+        _remarks(report.remarks),
     )
-    return (
-        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
-        f'<title>{escape(report.title)}</title>\n<link rel="icon" href="data:,">\n'
-        f"<style>{style}</style>\n</head>\n<body>\n{_header(report)}<main>\n{sections}</main>\n"
-        "</body>\n</html>\n"
-    )
+    return document(report.title, _header(report), sections)
 
 
 def _header(report: Report) -> str:
     contents, c = report.contents, report.certificate
     count, solved = len(contents.steps), int(contents.success.sum())
     tiles = [
-        ("episodes", f"{count:,}", f"{int(contents.steps.sum()):,} steps", ""),
-        (
-            "success",
-            f"{solved / count:.1%}" if count else "–",
-            f"{count - solved:,} without",
-            "",
-        ),
-        ("on disk", f"{contents.megabytes:,.1f} MB", _plural(len(contents.files), "file"), ""),
+        Tile("episodes", f"{count:,}", f"{int(contents.steps.sum()):,} steps"),
+        Tile("success", f"{solved / count:.1%}" if count else "–", f"{count - solved:,} without"),
+        Tile("on disk", f"{contents.megabytes:,.1f} MB", plural(len(contents.files), "file")),
     ]
     if c is None:
-        tiles.append(("certified", "–", "nobody has replayed it", ""))
+        tiles.append(Tile("certified", "–", "nobody has replayed it"))
     else:
         kind = "good" if c.holds else "bad"
-        tiles.append(("equal to the last bit", f"{c.equal:,} of {c.episodes:,}", "replayed", kind))
+        equal = f"{c.equal:,} of {c.episodes:,}"
+        tiles.append(Tile("equal to the last bit", equal, "replayed", kind))
         touched = f"{c.contact_episodes:,}"
         note = "in every step of physics"
         kind = "bad" if c.contact_episodes else "good"
-        tiles.append(("episodes in which arms touch", touched, note, kind))
+        tiles.append(Tile("episodes in which arms touch", touched, note, kind))
     if report.clearances is not None:
         least = float(report.clearances.least.min())
-        note = f"in a sample of {_plural(len(report.clearances.places), 'episode')}"
-        tiles.append(("least clearance", f"{least * 1e3:.1f} mm".replace("-", "−"), note, ""))
-    shown = "".join(
-        f'<div class="tile"><dt>{escape(label)}</dt><dd class="value {kind}">{escape(value)}</dd>'
-        f'<dd class="note">{escape(note)}</dd></div>'
-        for label, value, note, kind in tiles
-    )
+        note = f"in a sample of {plural(len(report.clearances.places), 'episode')}"
+        tiles.append(Tile("least clearance", f"{least * 1e3:.1f} mm".replace("-", "−"), note))
     mode = contents.control_mode
     words = mode if isinstance(mode, str) else ", ".join(f"{a} {m}" for a, m in mode.items())
-    return (
-        '<header><p class="kicker">robot-layouts, a data set</p>'
-        f"<h1>{escape(report.title)}</h1>"
-        f'<p class="note">{escape(contents.task_id)}, {escape(words)}</p>'
-        f'<dl class="tiles">{shown}</dl></header>\n'
-    )
+    note = f"{contents.task_id}, {words}"
+    return heading("robot-layouts, a data set", report.title, note, tiles)
 
 
 def _lengths(contents: Contents) -> str:
@@ -119,7 +95,7 @@ def _lengths(contents: Contents) -> str:
     words = f"Median {middle:.0f} steps; 5 % have at most {low:.0f}, 5 % at least {high:.0f}."
     if not contents.success.all():
         words += " Episodes without success are red."
-    return _section("Lengths", f"<p>{words}</p><figure>{chart}</figure>")
+    return section("Lengths", f"<p>{words}</p><figure>{chart}</figure>")
 
 
 def _sources(contents: Contents) -> str:
@@ -132,7 +108,7 @@ def _sources(contents: Contents) -> str:
         )
         for name, facts in sorted(contents.sources.items(), key=lambda item: -item[1].episodes)
     ]
-    return _section("Who acted", _table(("source", "episodes", "success", "steps, mean"), rows))
+    return section("Who acted", table(("source", "episodes", "success", "steps, mean"), rows))
 
 
 def _varied(contents: Contents) -> str:
@@ -142,7 +118,7 @@ def _varied(contents: Contents) -> str:
     left_out = len(figures) - _CHARTS
     more = f"<p>{left_out} more are left out.</p>" if left_out > 0 else ""
     words = "What was drawn for each episode; with its seed it comes back."
-    return _section(
+    return section(
         "What was varied",
         f'<p>{words}</p><div class="grid">{"".join(figures[:_CHARTS])}</div>{more}',
     )
@@ -164,10 +140,10 @@ def _clearances(report: Report) -> str:
     chart = histogram(found.least * 1e3, failed, "least clearance, mm", lambda v: f"{v:.0f} mm")
     words = (
         "The least distance of links of different robots at any control step, in each of"
-        f" {_plural(len(found.places), 'episode')}, evenly chosen; it is negative where the convex"
+        f" {plural(len(found.places), 'episode')}, evenly chosen; it is negative where the convex"
         " hulls of their shapes overlap, as those of hands can in clones of ManiSkill's tasks."
     )
-    return _section("Clearance between robots", f"<p>{words}</p><figure>{chart}</figure>")
+    return section("Clearance between robots", f"<p>{words}</p><figure>{chart}</figure>")
 
 
 def _certificate(certificate: Certificate | None) -> str:
@@ -175,7 +151,7 @@ def _certificate(certificate: Certificate | None) -> str:
         words = (
             "There is no certificate of these files; <code>robot-layouts certify</code> makes one."
         )
-        return _section("Certificate", f"<p>{words}</p>")
+        return section("Certificate", f"<p>{words}</p>")
     c = certificate
     versions = ", ".join(f"{name} {version}" for name, version in c.versions.items())
     rows = [
@@ -191,7 +167,7 @@ def _certificate(certificate: Certificate | None) -> str:
         rows.append(("differs", f"seed {entry['seed']}, step {entry['step']}, {entry['array']}"))
     for entry in c.not_played[:10]:
         rows.append(("not played", f"seed {entry['seed']}: {entry['reason']}"))
-    return _section("Certificate", _table(("", ""), rows, text=2))
+    return section("Certificate", table(("", ""), rows, text=2))
 
 
 def _clips(clips: Sequence[Clip]) -> str:
@@ -204,7 +180,7 @@ def _clips(clips: Sequence[Clip]) -> str:
         f"</video><figcaption>{escape(_caption(clip))}</figcaption></figure>"
         for clip in clips
     )
-    return _section("Clips", f'<div class="grid">{shown}</div>')
+    return section("Clips", f'<div class="grid">{shown}</div>')
 
 
 def _caption(clip: Clip) -> str:
@@ -218,7 +194,7 @@ def _layout(layout: Mapping[str, tuple[str, Sequence[float]]]) -> str:
         (place, robot, *(f"{value:.3f}" for value in position))
         for place, (robot, position) in layout.items()
     ]
-    return _section("Layout", _table(("place", "robot", "x (m)", "y (m)", "z (m)"), rows, text=2))
+    return section("Layout", table(("place", "robot", "x (m)", "y (m)", "z (m)"), rows, text=2))
 
 
 def _files(report: Report) -> str:
@@ -236,34 +212,9 @@ def _files(report: Report) -> str:
         for file in report.contents.files
     ]
     names = ("file", "seeds", "episodes", "MB", "SHA-256 begins")
-    return _section("Files", _table(names, rows))
+    return section("Files", table(names, rows))
 
 
 def _remarks(remarks: Sequence[str]) -> str:
     lines = "".join(f"<p>{escape(remark)}</p>" for remark in remarks)
-    return _section("Left out", lines) if lines else ""
-
-
-def _section(title: str, content: str) -> str:
-    return f"<section><h2>{escape(title)}</h2>{content}</section>\n"
-
-
-def _table(names: Sequence[str], rows: Iterable[Sequence[str]], *, text: int = 1) -> str:
-    """Return a table; the first columns hold text, the others numbers."""
-
-    def cell(tag: str, place: int, words: str) -> str:
-        kind = ' class="number"' if place >= text else ""
-        return f"<{tag}{kind}>{escape(words)}</{tag}>"
-
-    head = "".join(cell("th", i, name) for i, name in enumerate(names)) if any(names) else ""
-    body = "".join(
-        f"<tr>{''.join(cell('td', i, words) for i, words in enumerate(row))}</tr>" for row in rows
-    )
-    return (
-        f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
-        "</div>"
-    )
-
-
-def _plural(count: int, word: str) -> str:
-    return f"{count:,} {word}" + ("" if count == 1 else "s")
+    return section("Left out", lines) if lines else ""

@@ -1,4 +1,4 @@
-"""Randomizations as files: YAML or json, read as plain data; nothing in a file is executed."""
+"""Declarations as files: YAML or json, read as plain data; nothing in a file is executed."""
 
 from __future__ import annotations
 
@@ -24,8 +24,12 @@ class _Loader(yaml.SafeLoader):
     yaml_implicit_resolvers: dict[str, Any] = {}
 
 
-def read_data(path: str | PathLike[str]) -> Any:
+def read_data(path: str | PathLike[str], what: str = "randomization") -> Any:
     """Return what a file holds: mappings, lists, numbers and texts. Json is YAML, too.
+
+    Args:
+        path: The file.
+        what: What it declares, for errors.
 
     Raises:
         TaskError: If it cannot be read or is no YAML; names the file, and the line if it can.
@@ -35,7 +39,7 @@ def read_data(path: str | PathLike[str]) -> Any:
         _check(text, path)
         node = yaml.compose(text, _Loader)
     except UnreadableFileError as error:
-        raise TaskError(f"cannot read the randomization {str(path)!r}: {error.strerror}") from error
+        raise TaskError(f"cannot read the {what} {str(path)!r}: {error.strerror}") from error
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = "" if mark is None else f", line {mark.line + 1}"

@@ -1,0 +1,1 @@
+"""Suites: tasks × seeds × layouts in one file that names itself by hash, played with receipts."""

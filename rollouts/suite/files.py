@@ -1,0 +1,148 @@
+"""Suites as YAML files: read with all that they include, and written so that they need no other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from robots import RobotLayoutsError, TaskError, UnknownNameError
+from robots.common.bounds import shown
+from robots.common.writing import write_whole
+from rollouts.suite.included import OWN, read_layout, read_randomization, written_layout
+from rollouts.suite.suite import Case, Suite, checked_name
+from tasks import get_task_class
+from tasks.varying.files import read_data
+
+SHIPPED = {"standard": Path(__file__).with_name("standard.yaml")}
+"""Suites that come with the library, by name."""
+
+SHARED = ("seeds", "control_mode", "obs_mode", "randomization")  # for all tasks, or for one
+OTHERS = "others"  # in a mapping of policies: every task that is not named
+TOP = ("name", *SHARED, "policies", "tasks")
+ENTRY = ("task", "name", *SHARED, "layout", "layouts")
+
+
+def load_suite(path: str | PathLike[str]) -> Suite:
+    """Return a suite.
+
+    Args:
+        path: A YAML file, or the name of a suite that comes with the library: ``"standard"``.
+
+    Raises:
+        UnknownNameError: If it is neither.
+        TaskError: If the file cannot be read or describes no suite; the message names it.
+    """
+    file = SHIPPED.get(str(path), Path(path))
+    if file.suffix.lower() not in (".yaml", ".yml"):
+        raise UnknownNameError("suite", str(path), SHIPPED, "Or give a file ending in .yaml.")
+    data = read_data(file, "suite")
+    try:
+        return _suite(data, file.parent)
+    except RobotLayoutsError as error:
+        raise TaskError(f"{file}: {error}") from error
+
+
+def save_suite(suite: Suite, path: str | PathLike[str]) -> None:
+    """Write a suite with all that it includes to one YAML file, whole or not at all.
+
+    `load_suite` returns one of the same hash.
+
+    Raises:
+        UnwritableFileError: If it cannot be written (also an ``OSError``).
+    """
+    data: dict[str, Any] = {"name": suite.name}
+    if suite.policies:
+        data["policies"] = dict(suite.policies)
+    data["tasks"] = [_entry(case) for case in suite.cases]
+    text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, allow_unicode=True)
+    write_whole(path, f"# suite {suite.id}\n{text}")
+
+
+def _suite(data: Any, folder: Path) -> Suite:
+    top = _mapping(data, "a suite", TOP)
+    name = checked_name("a suite", top.get("name"))
+    entries = top.get("tasks")
+    if not isinstance(entries, list) or not entries:
+        raise TaskError(f"the suite {name} is empty; it needs 'tasks', a list of one or more")
+    shared = {key: top[key] for key in SHARED if key in top}
+    cases = [
+        case
+        for number, entry in enumerate(entries, 1)
+        for case in _cases(entry, shared, folder, number)
+    ]
+    return Suite(name, tuple(cases), _policies(top.get("policies", {})))
+
+
+def _policies(given: Any) -> dict[str, str]:
+    """Return who plays, as written; tasks are looked up when it is played."""
+    found = _mapping(given, "policies")
+    for task, policy in found.items():
+        if not isinstance(policy, str):
+            raise TaskError(f"the policy of {task} is {shown(policy)}; it must be MODULE:NAME")
+        if task != OTHERS:
+            get_task_class(task)
+    return dict(found)
+
+
+def _cases(entry: Any, shared: Mapping[str, Any], folder: Path, number: int) -> Sequence[Case]:
+    """Return the cases of an entry: one for each of its layouts."""
+    try:
+        own = {"task": entry} if isinstance(entry, str) else _mapping(entry, "an entry", ENTRY)
+        about = {**shared, **own}
+        for key in ("task", "seeds"):
+            if key not in about:
+                raise TaskError(f"{key!r} is missing; it needs a task, and seeds unless all share")
+        name = str(about.get("name") or get_task_class(str(about["task"])).task_id)
+        return [_case(about, *place, folder) for place in _places(about, name)]
+    except RobotLayoutsError as error:
+        raise TaskError(f"task {number}{_named(entry)}: {error}") from error
+
+
+def _places(about: Mapping[str, Any], name: str) -> list[tuple[str, Any]]:
+    """Return the name and the layout of each case of an entry."""
+    if "layouts" not in about:
+        return [(name, about.get("layout", OWN))]
+    if "layout" in about:
+        raise TaskError("it has 'layout' and 'layouts'; the latter holds several, by name")
+    several = _mapping(about["layouts"], "layouts")
+    if not several:
+        raise TaskError(f"layouts is empty; leave it out for the task's {OWN}")
+    return [(name if key == OWN else f"{name}.{key}", value) for key, value in several.items()]
+
+
+def _case(about: Mapping[str, Any], name: str, layout: Any, folder: Path) -> Case:
+    return Case(
+        about["task"],
+        about["seeds"],
+        name,
+        read_layout(layout, folder),
+        about.get("control_mode"),
+        about.get("obs_mode", "state"),
+        read_randomization(about.get("randomization"), folder),
+    )
+
+
+def _entry(case: Case) -> dict[str, Any]:
+    """Return a case as an entry that includes everything."""
+    about = {key: value for key, value in case.to_json().items() if value is not None}
+    if case.layout is not None:
+        about["layout"] = written_layout(case.layout)
+    return about
+
+
+def _mapping(value: Any, what: str, keys: Sequence[str] | None = None) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise TaskError(f"{what} is {shown(value)}; it takes a mapping (key: value)")
+    for key in value:
+        if keys is not None and key not in keys:
+            raise UnknownNameError(f"key of {what}", key, keys)
+    return value
+
+
+def _named(entry: Any) -> str:
+    name = entry.get("task") if isinstance(entry, Mapping) else entry
+    return f" ({name})" if isinstance(name, str) else ""

@@ -1,0 +1,106 @@
+"""The folder of a suite's run: the suite with all that it includes, and a receipt for each case."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from robots import TaskError
+from robots.common.writing import writing_errors
+from rollouts.receipts.receipt import Receipt, ReceiptError
+from rollouts.suite.belonging import expect_of_case
+from rollouts.suite.files import load_suite, save_suite
+from rollouts.suite.suite import Case, Suite
+
+SUITE, RECEIPTS = "suite.yaml", "receipts"
+
+
+@dataclass(frozen=True)
+class SuiteRun:
+    """What has been played of a suite.
+
+    Attributes:
+        folder: Where it is kept.
+        suite: The suite.
+        receipts: By the names of the cases that were played, in the suite's order.
+    """
+
+    folder: Path
+    suite: Suite
+    receipts: Mapping[str, Receipt]
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Names of the cases that have not been played."""
+        return tuple(case.name for case in self.suite.cases if case.name not in self.receipts)
+
+
+def receipt_path(folder: Path, case: Case) -> Path:
+    """Return where the receipt of a case is, once it was played."""
+    return folder / RECEIPTS / f"{case.name}.json"
+
+
+def begin_run(folder: Path, suite: Suite) -> SuiteRun:
+    """Return the run of a suite in a folder, which is begun if need be.
+
+    Raises:
+        TaskError: If the folder holds the run of another suite, or something else.
+        ReceiptError: If a receipt in it is damaged, or of something else.
+        UnwritableFileError: If it cannot be written.
+    """
+    if (folder / SUITE).exists():
+        run = expect_untouched(read_run(folder))
+        if run.suite.hash != suite.hash:
+            raise TaskError(
+                f"{folder} holds a run of the suite {run.suite.name} {run.suite.id}; this is"
+                f" {suite.name} {suite.id}, which needs a folder of its own"
+            )
+        return run
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise TaskError(f"{folder} holds something else; the run of a suite needs its own folder")
+    with writing_errors(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    save_suite(suite, folder / SUITE)
+    return SuiteRun(folder, suite, {})
+
+
+def read_run(folder: Path) -> SuiteRun:
+    """Return the run in a folder.
+
+    Raises:
+        TaskError: If there is none.
+        ReceiptError: If a receipt in it is damaged, or of something else.
+    """
+    if not (folder / SUITE).is_file():
+        raise TaskError(
+            f"{folder} holds no run of a suite; `robot-layouts suite run SUITE --out {folder}`"
+            " makes one"
+        )
+    suite = load_suite(folder / SUITE)
+    found = {
+        case.name: _receipt(path, case)
+        for case in suite.cases
+        if (path := receipt_path(folder, case)).exists()
+    }
+    return SuiteRun(folder, suite, found)
+
+
+def expect_untouched(run: SuiteRun) -> SuiteRun:
+    """Return a run of which every receipt is as it was written.
+
+    Raises:
+        ReceiptError: If one is not.
+    """
+    for case in run.suite.cases:
+        receipt = run.receipts.get(case.name)
+        if receipt is not None and not receipt.untouched:
+            path = receipt_path(run.folder, case)
+            raise ReceiptError(f"{path} was changed after it was written: its hash is another")
+    return run
+
+
+def _receipt(path: Path, case: Case) -> Receipt:
+    receipt = Receipt.read(path)
+    expect_of_case(receipt, case, path)
+    return receipt

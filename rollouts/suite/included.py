@@ -1,0 +1,110 @@
+"""What a suite's file may include: layouts and randomizations, as files or written out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from inspect import signature
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from layouts import Layout
+from layouts.presets import PRESETS
+from robots import LayoutError, TaskError, UnknownNameError
+from robots.common.bounds import shown
+from tasks.varying.randomization import Randomization
+
+OWN = "own"  # the task's own layout
+
+_HOW = f"{OWN!r}, a file, a preset ({{preset: ring, robots: …}}), or frames and robots"
+_LINE = re.compile(r"^line \d+: ")  # of a text that nobody has seen
+
+
+def read_layout(value: Any, folder: Path) -> Layout | None:
+    """Return the layout that a value describes; None for the task's own.
+
+    Args:
+        value: ``"own"``, a file, a preset's name with its arguments, or a layout written out.
+        folder: What a file's name is relative to.
+
+    Raises:
+        LayoutError: If it describes none.
+        UnknownNameError: If a name in it is unknown.
+    """
+    if value == OWN:
+        return None
+    if isinstance(value, str):
+        return Layout.load(folder / value)
+    if isinstance(value, Mapping) and "preset" in value:
+        return _preset(value)
+    if isinstance(value, Mapping) and "robots" in value:
+        return _written_out(value)
+    raise LayoutError(f"a layout is {shown(value)}; it takes {_HOW}")
+
+
+def written_layout(layout: Layout) -> dict[str, Any]:
+    """Return a layout written out, as `read_layout` reads it.
+
+    Raises:
+        LayoutError: If a robot is not registered, or not as it is here.
+    """
+    data = yaml.load(layout.to_yaml(), _Loader)
+    del data["version"]
+    return data
+
+
+def read_randomization(value: Any, folder: Path) -> Randomization | None:
+    """Return what varies: a file's, or what a mapping describes; None if it is None.
+
+    Raises:
+        TaskError: If it makes no sense.
+        UnknownNameError: If there is no such axis.
+    """
+    if value is None:
+        return None
+    if isinstance(value, str):
+        return Randomization.load(folder / value)
+    if not isinstance(value, Mapping):
+        raise TaskError(f"randomization is {shown(value)}; it takes a file, or axes by name")
+    return Randomization.from_json(value)
+
+
+class _Loader(yaml.SafeLoader):
+    """Reads the numbers of `Layout.to_yaml`, and all else as texts."""
+
+    yaml_implicit_resolvers = {
+        first: [(tag, pattern) for tag, pattern in resolvers if tag.endswith(":float")]
+        for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    }
+
+
+def _written_out(value: Mapping[str, Any]) -> Layout:
+    text = yaml.safe_dump({**value, "version": 1}, sort_keys=False)
+    try:
+        return Layout.from_yaml(text)
+    except LayoutError as error:
+        raise LayoutError(_LINE.sub("", str(error))) from error
+
+
+def _preset(value: Mapping[str, Any]) -> Layout:
+    options = {key: _whole(given) for key, given in value.items() if key not in ("preset",)}
+    place = PRESETS[str(value["preset"])]
+    takes = signature(place).parameters
+    for name in options:
+        if name not in takes:
+            raise UnknownNameError(f"argument of {value['preset']}", name, takes)
+    lacking = [name for name, one in takes.items() if one.default is one.empty]
+    for name in lacking:
+        if name not in options:
+            raise LayoutError(f"{value['preset']} needs {name!r}")
+    layout = place(**options)
+    if not isinstance(layout, Layout):
+        raise LayoutError(f"the preset {value['preset']} returned {shown(layout)}, no Layout")
+    return layout
+
+
+def _whole(value: Any) -> Any:
+    """Return a whole number as one; a file's numbers are all read as floats."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value

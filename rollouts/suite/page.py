@@ -1,0 +1,140 @@
+"""The report of a suite's runs: one HTML page that needs nothing else, and the same as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from html import escape
+from pathlib import Path
+
+from robots import TaskError
+from robots.common.pages import Markup, Tile, document, heading, plural, section, table
+from rollouts.suite import tables
+from rollouts.suite.folder import SuiteRun, expect_untouched, read_run
+from rollouts.suite.results import Result
+from rollouts.suite.tables import ALL, INTERVALS, LETTERS, PAIRED, Table
+
+STYLE = ("rollouts.suite", "suite.css")
+
+_WIDTH, _ROW = 160, 12  # of a chart of intervals
+
+
+def read_runs(folders: Sequence[Path]) -> list[SuiteRun]:
+    """Return runs of one suite, to be shown side by side.
+
+    Raises:
+        TaskError: If they are of several suites, too many, or nothing was played.
+        ReceiptError: If a receipt is damaged, or was changed.
+    """
+    if not 1 <= len(folders) <= len(LETTERS):
+        raise TaskError(f"{len(folders)} runs were given; a report shows 1 to {len(LETTERS)}")
+    runs = [expect_untouched(read_run(folder)) for folder in folders]
+    for run in runs:
+        if run.suite.hash != runs[0].suite.hash:
+            names = " and ".join(f"{r.folder}: {r.suite.name} {r.suite.id}" for r in (runs[0], run))
+            raise TaskError(f"runs of one suite can be compared; these are of two ({names})")
+        if not run.receipts:
+            raise TaskError(f"nothing has been played in {run.folder}; there is nothing to report")
+    return runs
+
+
+def render_page(runs: Sequence[SuiteRun]) -> str:
+    """Return the report as HTML; see `read_runs`."""
+    suite = runs[0].suite
+    sections = [section(title, content) for title, content in _sections(runs)]
+    return document(f"{suite.name} {suite.id}", _head(runs), sections, STYLE)
+
+
+def render_markdown(runs: Sequence[SuiteRun]) -> str:
+    """Return the report's tables as Markdown; see `read_runs`."""
+    suite = runs[0].suite
+    lines = [f"# {suite.name} {suite.id}", "", f"{_about(runs)} SHA-256: `{suite.hash}`.", ""]
+    for title, words, shown, text in _parts(runs):
+        lines += [f"## {title}", "", *([words, ""] if words else []), *_markdown(shown, text), ""]
+    return "\n".join(lines)
+
+
+def _parts(runs: Sequence[SuiteRun]) -> Iterator[tuple[str, str, Table, int]]:
+    """Yield of each part its title, its words, a table, and how many columns of it are text."""
+    yield "Success", INTERVALS, tables.successes(runs), 1
+    for title, found in tables.comparisons(runs):
+        yield title, PAIRED, found, 1
+    words = "Steps are the median of all episodes and the range; the return is the mean."
+    yield "Lengths and returns", words, tables.lengths(runs), 1
+    if (failed := tables.failures(runs)).rows:
+        yield "Failures", "", failed, 5
+    yield "Who played", "", tables.players(runs), 6
+    words = "How the SHA-256 of each receipt begins; robot-layouts suite verify plays them again."
+    yield "Receipts", words, tables.receipts(runs), 1 + len(runs)
+
+
+def _sections(runs: Sequence[SuiteRun]) -> Iterator[tuple[str, str]]:
+    results = tables.results_of(runs)
+    for title, words, shown, text in _parts(runs):
+        names, rows = shown.names, shown.rows
+        if title == "Success":
+            names = (*names[:-1], "0 to 100 %", names[-1])
+            rows = [(*row[:-1], _chart(results[row[0]]), row[-1]) for row in rows]
+        prose = f"<p>{escape(words)}</p>" if words else ""
+        yield title, prose + table(names, rows, text=text)
+
+
+def _head(runs: Sequence[SuiteRun]) -> str:
+    suite, total = runs[0].suite, tables.results_of(runs)[ALL]
+    tiles = [
+        Tile("episodes", f"{suite.episodes:,}", f"{plural(len(suite.cases), 'case')}"),
+        *(_tile(number, *of) for number, of in enumerate(zip(runs, total, strict=True))),
+    ]
+    return heading("robot-layouts, a suite", f"{suite.name} {suite.id}", _about(runs), tiles)
+
+
+def _tile(number: int, run: SuiteRun, result: Result | None) -> Tile:
+    assert result is not None  # `read_runs` has seen to that
+    note = f"{result.successes:,} of {result.episodes:,}"
+    if run.missing:
+        note += f"; {plural(len(run.missing), 'case')} not played"
+    label = f"{LETTERS[number]}: success of {run.folder.resolve().name}"
+    return Tile(label, f"{tables.percent(result.rate)} %", note)
+
+
+def _about(runs: Sequence[SuiteRun]) -> str:
+    suite = runs[0].suite
+    count = f"{plural(len(suite.cases), 'case')}, {suite.episodes:,} episodes"
+    return f"A suite of {count}, in {plural(len(runs), 'run')}."
+
+
+def _chart(results: Sequence[Result | None]) -> Markup:
+    """Return an interval for each run, drawn from 0 to 100 %."""
+    height = _ROW * len(results)
+    drawn = "".join(
+        _whisker(result, place, LETTERS[place])
+        for place, result in enumerate(results)
+        if result is not None
+    )
+    return Markup(
+        f'<svg class="intervals" viewBox="-4 0 {_WIDTH + 8} {height}" style="height:{height}px"'
+        f' role="img" aria-label="success with intervals">{drawn}</svg>'
+    )
+
+
+def _whisker(result: Result, place: int, letter: str) -> str:
+    y = _ROW * (place + 0.5)
+    low, high = (_WIDTH * end for end in result.interval)
+    words = f"{letter}: {result.successes:,} of {result.episodes:,}"
+    return (
+        f'<g class="run-{place % 4}"><title>{escape(words)}</title>'
+        f'<line class="axis" x1="0" x2="{_WIDTH}" y1="{y}" y2="{y}"/>'
+        f'<line class="interval" x1="{low:.1f}" x2="{high:.1f}" y1="{y}" y2="{y}"/>'
+        f'<circle cx="{_WIDTH * result.rate:.1f}" cy="{y}" r="3.5"/></g>'
+    )
+
+
+def _markdown(shown: Table, text: int) -> Iterator[str]:
+    yield _row(shown.names)
+    yield _row([("---" if place < text else "--:") for place in range(len(shown.names))])
+    yield from map(_row, shown.rows)
+
+
+def _row(cells: Sequence[str]) -> str:
+    """Return a row, in which no cell can be markup."""
+    plain = (escape(cell, quote=False).replace("|", "\\|").replace("\n", " ") for cell in cells)
+    return f"| {' | '.join(plain)} |"

@@ -1,0 +1,175 @@
+"""A suite: which episodes are played of which tasks, in which layouts; it names itself by hash."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from hashlib import sha256
+from typing import TYPE_CHECKING, Any
+
+from layouts import Layout
+from robots import RobotLayoutsError, TaskError
+from robots.common.bounds import shown
+from rollouts.suite.seeds import read_seeds, write_seeds
+from tasks.registry import full_name, get_task_class, make_scenario
+from tasks.varying.randomization import Randomization
+
+if TYPE_CHECKING:
+    from tasks.engine.making import MakingFields
+
+FORMAT = 1
+SHORT = 12  # digits of a hash that tell suites apart
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,99}")
+
+
+@dataclass(frozen=True)
+class Case:
+    """Episodes of one task, all in one layout.
+
+    Attributes:
+        task: Id of the task, ``module:Id`` of one of your own.
+        seeds: Which episodes: a number, ``"0-99"``, or a sequence; kept as whole numbers, sorted.
+        name: What it is called in tables, and its receipt on the disk; the task's id if left out.
+        layout: Other places for the robots; None for the task's own.
+        control_mode: As `tasks.make` takes it.
+        obs_mode: As `tasks.make` takes it.
+        randomization: What varies from episode to episode, or None.
+    """
+
+    task: str
+    seeds: tuple[int, ...]
+    name: str = ""
+    layout: Layout | None = None
+    control_mode: str | Mapping[str, str] | None = None
+    obs_mode: str = "state"
+    randomization: Randomization | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be made.
+
+        Raises:
+            UnknownNameError: If there is no such task.
+            TaskError: If seeds, name or modes make no sense, or the task cannot be played in the
+                layout.
+        """
+        cls = get_task_class(self.task)
+        object.__setattr__(self, "task", full_name(cls))
+        object.__setattr__(self, "seeds", read_seeds(self.seeds))
+        object.__setattr__(self, "name", checked_name("a case", self.name or cls.task_id))
+        scenario = make_scenario(cls, **self.making)
+        scenario.check(cls.reward_modes)
+        cls.built_layout(scenario)  # refuses a layout that lacks the task's places
+
+    @property
+    def making(self) -> MakingFields:
+        """What `tasks.make` takes besides the task."""
+        return {
+            "layout": self.layout,
+            "control_mode": self.control_mode,
+            "obs_mode": self.obs_mode,
+            "randomization": self.randomization,
+        }
+
+    def to_json(self) -> dict[str, Any]:
+        """Return all that decides its episodes as plain data; layouts with their content."""
+        varied, modes = self.randomization, self.control_mode
+        return {
+            "name": self.name,
+            "task": self.task,
+            "seeds": write_seeds(self.seeds),
+            "layout": None if self.layout is None else self.layout.to_yaml(),
+            "control_mode": dict(modes) if isinstance(modes, Mapping) else modes,
+            "obs_mode": self.obs_mode,
+            "randomization": None if varied is None else varied.to_json(),
+        }
+
+
+@dataclass(frozen=True)
+class Suite:
+    """Cases that are played and judged together.
+
+    Attributes:
+        name: What it is called.
+        cases: One or more, each with a name of its own.
+        policies: Who plays, by task, where the one who runs it does not say: ``module:name`` or
+            ``"expert"``. It is no part of the hash.
+    """
+
+    name: str
+    cases: tuple[Case, ...]
+    policies: Mapping[str, str] = field(default_factory=dict[str, str])
+
+    def __post_init__(self) -> None:
+        """Refuse a suite that has no cases, or two of one name.
+
+        Raises:
+            TaskError: If so.
+        """
+        checked_name("a suite", self.name)
+        if not self.cases:
+            raise TaskError(f"the suite {self.name} is empty; it needs one task or more")
+        # On some disks names that differ in capitals alone are the same file.
+        counts = Counter(case.name.lower() for case in self.cases)
+        twice = next((case.name for case in self.cases if counts[case.name.lower()] > 1), None)
+        if twice is not None:
+            raise TaskError(f"two cases are called {twice}; give one of them another 'name'")
+
+    @property
+    def hash(self) -> str:
+        """SHA-256, in hex, over what is played: the cases in any order, with their layouts."""
+        cases = sorted((case.to_json() for case in self.cases), key=lambda case: case["name"])
+        return sha256(json.dumps([FORMAT, cases], sort_keys=True).encode()).hexdigest()
+
+    @property
+    def id(self) -> str:
+        """The beginning of the hash, which papers can name."""
+        return self.hash[:SHORT]
+
+    @property
+    def episodes(self) -> int:
+        """How many episodes it has."""
+        return sum(len(case.seeds) for case in self.cases)
+
+    def __str__(self) -> str:
+        """Show a line for each case."""
+        head = f"{self.name} {self.id}: {self.episodes:,} episodes, {len(self.cases)} cases"
+        return "\n".join([head, *(f"  {_line(case)}" for case in self.cases)])
+
+
+@contextmanager
+def naming(case: Case) -> Generator[None]:
+    """Let every error of this library say in which case it happened."""
+    try:
+        yield
+    except RobotLayoutsError as error:
+        error.args = (f"{case.name}: {error}", *error.args[1:])
+        raise
+
+
+def checked_name(what: str, name: Any) -> str:
+    """Return a name that can be that of a file.
+
+    Raises:
+        TaskError: If it cannot.
+    """
+    if not (isinstance(name, str) and _NAME.fullmatch(name)):
+        raise TaskError(
+            f"the name of {what} is {shown(name)}; it takes up to 100 letters, digits and _.+-,"
+            " a letter or digit first"
+        )
+    return name
+
+
+def _line(case: Case) -> str:
+    about = [f"seeds {write_seeds(case.seeds)}"]
+    about += [] if case.name == case.task else [case.task]
+    about += [] if case.layout is None else [f"layout of {', '.join(case.layout)}"]
+    about += [] if case.control_mode is None else [str(case.control_mode)]
+    about += [] if case.obs_mode == "state" else [f"observes {case.obs_mode}"]
+    about += [] if case.randomization is None else ["randomized"]
+    return f"{case.name}: {'; '.join(about)}"
