@@ -21,6 +21,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from robots.common.portable import is_portable
+
 Floats = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 Array = NDArray[Any]
@@ -124,7 +126,13 @@ def tanh(x: Array) -> Any:
 
 
 def sqrt(x: Array) -> Any:
-    """Return torch's square roots."""
+    """Return torch's square roots; in a portable process, those rounded as IEEE 754 says.
+
+    Torch's differ from processor to processor, also where everything else of it does not: they
+    begin with the processor's own estimate of 1 / √x.
+    """
+    if is_portable():
+        return x.double().sqrt().to(x.dtype) if isinstance(x, Tensor) else np.sqrt(x)
     return x.sqrt() if isinstance(x, Tensor) else torch.from_numpy(x).sqrt().numpy()
 
 
