@@ -58,10 +58,10 @@ def _become(words: Sequence[str]) -> NoReturn:
 
 
 def _variables() -> dict[str, str]:
-    return portable_variables(os.environ, _numpy_versions())
+    return portable_variables(os.environ, numpy_versions())
 
 
-def _numpy_versions() -> tuple[str, ...]:
+def numpy_versions() -> tuple[str, ...]:
     """Return the names of what NumPy's functions have versions for.
 
     Raises:

@@ -69,12 +69,23 @@ def is_portable() -> bool:
     return True
 
 
+def inherited_variables() -> dict[str, str]:
+    """Return the variables that a process elsewhere needs to be as portable as this one.
+
+    Raises:
+        SimulationError: See `is_portable`.
+    """
+    if not is_portable():
+        return {}
+    return {name: os.environ[name] for name in (*FIXED, NUMPY, GLIBC, PORTABLE)}
+
+
 def missing_variables(environment: Mapping[str, str]) -> list[str]:
     """Return the names of variables that a portable process begins with, and this one lacks."""
     missing = [name for name, value in FIXED.items() if environment.get(name) != value]
     if not environment.get(NUMPY):
         missing.append(NUMPY)
-    tunables = dict(t.partition("=")[::2] for t in environment.get(GLIBC, "").split(":"))
+    tunables = dict(_pair(t) for t in environment.get(GLIBC, "").split(":"))
     if not {*_WITHOUT} <= {*tunables.get(_TUNABLE, "").split(",")}:
         missing.append(GLIBC)
     return missing
@@ -82,5 +93,10 @@ def missing_variables(environment: Mapping[str, str]) -> list[str]:
 
 def _at_the_beginning() -> dict[str, str]:
     """Return the environment that this process began with; what is set later has no effect."""
-    rows = Path("/proc/self/environ").read_bytes().split(b"\0")
-    return dict(os.fsdecode(row).partition("=")[::2] for row in rows if row)
+    rows = os.fsdecode(Path("/proc/self/environ").read_bytes()).split("\0")
+    return dict(_pair(row) for row in rows)
+
+
+def _pair(text: str) -> tuple[str, str]:
+    name, _, value = text.partition("=")
+    return name, value
