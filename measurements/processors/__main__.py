@@ -9,17 +9,19 @@ from __future__ import annotations
 
 import argparse
 import json
+import platform
 from pathlib import Path
 
 from measurements.processors.measure import (
     EMULATOR,
     Record,
     differences,
+    physics,
     play_under,
     processor,
 )
 from measurements.processors.play import EXPERT, Digests, Played
-from measurements.processors.settings import Setting, settings
+from measurements.processors.settings import PORTABLE, Setting, settings
 from measurements.processors.table import markdown
 from measurements.robots.record import versions_of
 from robots import RecordingError
@@ -28,8 +30,16 @@ from robots.common.writing import write_whole
 from rollouts.progress import LiveLine
 from tasks import list_tasks
 
+PACKAGES = ("numpy", "torch", "sapien")
 RECORD = Path("docs/processors.json")
-MODES = ("pd_joint_delta_pos", "pd_ee_delta_pose", "pd_ee_pose")
+
+# The first seed of each, and the number of steps where actions are random.
+CONTROLS = {
+    EXPERT: (0, 0),
+    "pd_joint_delta_pos": (3, 12),
+    "pd_ee_delta_pose": (4, 12),
+    "pd_ee_pose": (5, 8),
+}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -41,8 +51,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog=program("measurements.processors"), description=__doc__)
     add = parser.add_argument
     add("--tasks", nargs="+", default=list_tasks(), metavar="TASK", help="(all)")
-    add("--seeds", type=int, default=2, metavar="N", help="of each expert and mode (%(default)s)")
-    add("--steps", type=int, default=12, metavar="N", help="of random actions (%(default)s)")
+    add("--seeds", type=int, default=1, metavar="N", help="of each expert and mode (%(default)s)")
     add("--settings", nargs="+", choices=settings(), metavar="NAME", help="(all that need no QEMU)")
     add("--emulator", default=EMULATOR, metavar="PROGRAM", help="QEMU's (%(default)s)")
     add("--out", type=Path, default=RECORD, metavar="FILE", help="the record (%(default)s)")
@@ -54,7 +63,7 @@ def _run(options: argparse.Namespace) -> int:
     record = _read(options.out) if options.out.exists() else _empty()
     if not options.table:
         record["processor"] = processor()
-        record["versions"] |= versions_of("numpy", "torch", "sapien")
+        record["versions"] |= {**versions_of(*PACKAGES), "glibc": platform.libc_ver()[1]}
         _measure(record, options)
     table = options.out.with_suffix(".md")
     write_whole(table, "\n".join(markdown(record)) + "\n")
@@ -63,7 +72,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _empty() -> Record:
-    return {"processor": "", "versions": {}, "settings": {}}
+    return {"processor": "", "versions": {}, "settings": {}, "portable": {}}
 
 
 def _read(path: Path) -> Record:
@@ -76,10 +85,10 @@ def _read(path: Path) -> Record:
 
 def _episodes(options: argparse.Namespace) -> list[Played]:
     return [
-        Played(task, seed, control, options.steps)
+        Played(task, first + i, control, steps)
         for task in options.tasks
-        for control in (EXPERT, *MODES)
-        for seed in range(options.seeds)
+        for control, (first, steps) in CONTROLS.items()
+        for i in range(options.seeds)
     ]
 
 
@@ -100,7 +109,9 @@ def _measure(record: Record, options: argparse.Namespace) -> None:
             )
             if name != one.against:
                 record["settings"][name] = _compared(one, episodes, played, name)
-                write_whole(options.out, json.dumps(record, indent=1) + "\n")
+            if name == PORTABLE:
+                record["portable"] |= physics(episodes, played[name])
+            write_whole(options.out, json.dumps(record, indent=1) + "\n")
 
 
 def _compared(

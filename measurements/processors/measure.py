@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from hashlib import sha256
 from typing import Any
 
 from measurements.processors.play import KINDS, Digests, Played
@@ -82,6 +83,15 @@ def differences(
         if first is not None and second is not None and first != second:
             found[str(played)] = dict(_first(first, second))
     return found
+
+
+def physics(episodes: Sequence[Played], found: Sequence[Digests | None]) -> dict[str, str]:
+    """Return one digest of all actions and states of each episode."""
+    return {
+        str(played): sha256(" ".join(one["actions"] + one["states"]).encode()).hexdigest()[:16]
+        for played, one in zip(episodes, found, strict=True)
+        if one is not None
+    }
 
 
 def _first(one: Digests, other: Digests) -> Iterator[tuple[str, int]]:

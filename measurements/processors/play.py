@@ -26,7 +26,7 @@ from tasks.varying.streams import Stream
 
 EXPERT = "expert"
 KINDS = ("actions", "states", "observations", "rewards")
-_REACH = 0.6  # m, rad; where an action number has no bound
+REACH = 0.6  # m, rad; where an action number has no bound
 
 Digests = dict[str, list[str]]
 
@@ -86,12 +86,12 @@ def _actions(task: MultiRobotTask, played: Played) -> Iterable[NDArray[np.float3
     if played.control == EXPERT:
         return np.asarray(find_expert(played.task)(task, played.seed), np.float32)
     low, high = (
-        np.where(np.isfinite(bound), bound, sign * _REACH).astype(float)
+        np.where(np.isfinite(bound), bound, sign * REACH).astype(float)
         for bound, sign in zip(
             (task.single_action_space.low, task.single_action_space.high), (-1, 1), strict=True
         )
     )
-    shares = (Stream(played.seed).numbers(len(low), step) for step in range(played.steps))
+    shares = (Stream(played.seed).numbers(len(low), "probe", step) for step in range(played.steps))
     return [(low + np.array(row) * (high - low)).astype(np.float32) for row in shares]
 
 

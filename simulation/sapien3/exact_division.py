@@ -10,10 +10,11 @@ from __future__ import annotations
 import ctypes
 import mmap
 import os
+import re
 import struct
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
 
 from robots import SimulationError
 
@@ -40,42 +41,47 @@ def divide_exactly() -> None:
     Raises:
         SimulationError: If the library is not the one known, or the system forbids it.
     """
-    code = _loaded_code()
-    held = ctypes.string_at(code.start, code.size)
-    sought = _BEFORE + _ESTIMATE + _BEHIND + _AFTER
-    if held.count(sought) != 1:
-        raise SimulationError(
-            f"{code.path} is not that of sapien 3.0.3: its estimate of 1 / x is not where it was,"
-            " so physics would differ from processor to processor; install sapien 3.0.3, or begin"
-            " without `robot-layouts portable`"
-        )
-    place = code.start + held.index(sought) + len(_BEFORE)
+    place = _place() + len(_BEFORE)
     beyond = place + len(_ESTIMATE + _BEHIND)
-    detour = _new_page(code)
+    detour = _new_page(place)
     _write(detour, _ONES + _detour(detour + len(_ONES), beyond))
     _write(place, _jump(place, detour + len(_ONES)) + _NOTHING)
 
 
-class _Code(NamedTuple):
-    """Where a library's instructions are in memory."""
-
-    path: Path
-    start: int
-    size: int
-
-
-def _loaded_code() -> _Code:
-    """Return where SAPIEN's instructions are.
+def _place() -> int:
+    """Return the address of the instructions that are known.
 
     Raises:
-        SimulationError: If it is not loaded.
+        SimulationError: If there are none, or several times.
     """
-    for line in Path("/proc/self/maps").read_text(encoding="utf-8").splitlines():
-        addresses, rights, *_, path = line.split(maxsplit=5)
-        if path.endswith(LIBRARY) and "x" in rights:
+    sought = _BEFORE + _ESTIMATE + _BEHIND + _AFTER
+    places: list[int] = []
+    for start, end in _loaded():
+        held = ctypes.string_at(start, end - start)
+        places += [start + found.start() for found in re.finditer(re.escape(sought), held)]
+    if len(places) != 1:
+        raise SimulationError(
+            f"{LIBRARY} is not that of sapien 3.0.3: its estimate of 1 / x is not where it was,"
+            " so physics would differ from processor to processor; install sapien 3.0.3, or begin"
+            " without `robot-layouts portable`"
+        )
+    return places[0]
+
+
+def _loaded() -> Iterator[tuple[int, int]]:
+    """Yield from where to where SAPIEN's library is in memory.
+
+    Raises:
+        SimulationError: If it is not.
+    """
+    lines = Path("/proc/self/maps").read_text(encoding="utf-8").splitlines()
+    parts = [line.split(maxsplit=2) for line in lines if line.endswith(LIBRARY)]
+    if not parts:
+        raise SimulationError(f"{LIBRARY} is not loaded; `import sapien` loads it")
+    for addresses, rights, _ in parts:
+        if rights.startswith("r"):
             start, end = (int(address, 16) for address in addresses.split("-"))
-            return _Code(Path(path), start, end - start)
-    raise SimulationError(f"{LIBRARY} is not loaded; `import sapien` loads it")
+            yield start, end
 
 
 def _detour(at: int, beyond: int) -> bytes:
@@ -89,8 +95,8 @@ def _jump(at: int, to: int) -> bytes:
     return _JUMP + struct.pack("<i", to - at - 5)
 
 
-def _new_page(code: _Code) -> int:
-    """Return the address of a page of memory so near to some code that a jump gets there.
+def _new_page(place: int) -> int:
+    """Return the address of a page of memory so near to an instruction that a jump gets there.
 
     Raises:
         SimulationError: If there is none.
@@ -100,12 +106,12 @@ def _new_page(code: _Code) -> int:
     c.mmap.argtypes = [ctypes.c_void_p, ctypes.c_size_t, *[ctypes.c_int] * 3, ctypes.c_long]
     private = mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS
     for away in range(2**24, _REACH, 2**24):
-        wish = code.start - away
+        wish = (place - away) // mmap.PAGESIZE * mmap.PAGESIZE
         page = c.mmap(wish, mmap.PAGESIZE, _READ, private, -1, 0)
-        if page is not None and abs(page - code.start) < _REACH:
+        if page is not None and abs(page - place) < _REACH:
             return page
         c.munmap(ctypes.c_void_p(page), ctypes.c_size_t(mmap.PAGESIZE))
-    raise SimulationError(f"there is no memory free within {_REACH} bytes of {code.path}")
+    raise SimulationError(f"there is no memory free within {_REACH} bytes of {LIBRARY}")
 
 
 def _write(address: int, data: bytes) -> None:
