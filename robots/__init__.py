@@ -19,6 +19,7 @@ from robots.common.errors import (
     closest_match,
     unknown_name_message,
 )
+from robots.common.portable import is_portable
 from robots.descriptor import (
     CONTROL_MODES,
     ActionNumber,
@@ -61,5 +62,6 @@ __all__ = [
     "UnreadableFileError",
     "UrdfLocator",
     "closest_match",
+    "is_portable",
     "unknown_name_message",
 ]

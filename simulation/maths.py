@@ -21,6 +21,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from robots.common.portable import is_portable
+
 Floats = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 Array = NDArray[Any]
@@ -123,8 +125,14 @@ def tanh(x: Array) -> Any:
     return x.tanh() if isinstance(x, Tensor) else torch.from_numpy(x).tanh().numpy()
 
 
-def sqrt(x: Array) -> Any:
-    """Return torch's square roots."""
+def sqrt(x: Array | Tensor) -> Any:
+    """Return torch's square roots; in a portable process, those rounded as IEEE 754 says.
+
+    Torch's differ from processor to processor, also where everything else of it does not: they
+    begin with the processor's own estimate of 1 / √x.
+    """
+    if is_portable():
+        return x.double().sqrt().type(x.dtype) if isinstance(x, Tensor) else np.sqrt(x)
     return x.sqrt() if isinstance(x, Tensor) else torch.from_numpy(x).sqrt().numpy()
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from simulation.maths import Floats, arctan2
+from simulation.maths import Floats, arctan2, sqrt
 
 # Products of quaternion entries (w = 0, x = 1, y = 2, z = 3) that each of the nine matrix entries,
 # row by row, is the sum or difference of.
@@ -72,7 +72,7 @@ def quaternion(matrix: torch.Tensor) -> torch.Tensor:
             1.0 - xx - yy + zz,
         ]
     )
-    root = doubled.clamp(min=0.0).sqrt()
+    root = sqrt(doubled.clamp(min=0.0))
     squared = root**2
     rows = (
         (squared[0], zy - yz, xz - zx, yx - xy),

@@ -65,6 +65,7 @@ COMMANDS: Mapping[str, Command] = {
     "new robot": Command(
         "robots.new_robot", "write the file of a robot from its URDF, and its test"
     ),
+    "portable": Command("robots.portable", "begin a program, with the same bits on any processor"),
     "parity": Command("parity.__main__", "comparisons with native ManiSkill"),
 }
 

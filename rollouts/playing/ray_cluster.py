@@ -22,6 +22,7 @@ from typing import Any, TypeVar
 
 from robots import MissingPackageError, TaskError, UnknownNameError
 from robots.assets.manifest import load_manifest
+from robots.common.portable import inherited_variables
 from robots.common.rooms import PLAYING
 from rollouts.playing.events import WorkerError
 from rollouts.playing.transport import is_installed
@@ -179,7 +180,7 @@ def joined(ray: Any, address: str, modules: Sequence[str]) -> Generator[None]:
             try:
                 ray.init(
                     address=address,
-                    runtime_env={"working_dir": folder},
+                    runtime_env={"working_dir": folder, "env_vars": inherited_variables()},
                     log_to_driver=False,
                     logging_level="ERROR",
                 )

@@ -10,12 +10,14 @@ import sapien.physx as physx
 
 from layouts import Layout
 from robots import SimulationError
+from robots.common.portable import is_portable
 from simulation.looks import AS_DECLARED
 from simulation.parts import Part
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
 from simulation.sapien3.blueprint import Blueprint, read_blueprint
 from simulation.sapien3.collision import add_collision
 from simulation.sapien3.device import expect_render_device, outlive_forks
+from simulation.sapien3.exact_division import divide_exactly
 from simulation.sapien3.robot import SimulatedRobot
 from simulation.sapien3.settings import apply
 from simulation.shapes import Shape
@@ -76,11 +78,14 @@ class BuiltWorld:
 
         Raises:
             AssetError: If a robot's files cannot be found.
-            SimulationError: If pictures are wanted and there is no Vulkan driver.
+            SimulationError: If pictures are wanted and there is no Vulkan driver, or this process
+                was begun to be portable and cannot be.
         """
         self.layout = layout
         self.physics = SAPIEN_DEFAULTS if physics is None else physics
         self.visuals = visuals
+        if is_portable():
+            divide_exactly()
         apply(self.physics)
         self.system = physx.PhysxCpuSystem()
         systems: list[Any] = [self.system]

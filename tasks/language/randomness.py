@@ -12,6 +12,7 @@ from torch import Tensor
 
 from layouts import Layout
 from robots import TaskError
+from simulation.maths import sqrt
 from tasks.varying.streams import Stream
 
 
@@ -166,7 +167,7 @@ class EpisodeRandom:
         angle = self.uniform(1, 3)[0, 2] * (high - low) + low
         cos, sin = torch.cos(angle), torch.sin(angle)
         w_squared, z_squared = 1.0 + cos + cos + 1.0, 1.0 - cos - cos + 1.0
-        w, z = torch.sqrt(w_squared), torch.sqrt(z_squared)
+        w, z = sqrt(w_squared), sqrt(z_squared)
         zero = torch.zeros(())
         if w >= z:
             quaternion = torch.stack((w**2, zero, zero, sin + sin)) / (2.0 * w)

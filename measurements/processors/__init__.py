@@ -1,0 +1,1 @@
+"""What results depend on the processor, by playing the same episodes as on others."""

@@ -1,0 +1,81 @@
+"""``robot-layouts portable PROGRAM …``: begins a program whose physics is the same everywhere.
+
+NumPy, torch and the C library choose functions by the processor as they are loaded, so this has to
+be settled before. Processes that the program begins inherit it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+from collections.abc import Sequence
+from typing import NoReturn
+
+from robots.common.commands import exit_code, program, start
+from robots.common.errors import RobotLayoutsError, SimulationError
+from robots.common.portable import portable_variables
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command: become the program, or print the variables.
+
+    Returns:
+        1 if there is no such program; it does not return if there is.
+    """
+    parser = argparse.ArgumentParser(
+        prog=program("robots.portable"),
+        description="Begin a program with the variables of the environment with which physics is"
+        " the same to the last bit on every x86-64 processor.",
+        epilog="robot-layouts portable python train.py",
+    )
+    parser.add_argument(
+        "program",
+        nargs=argparse.REMAINDER,
+        metavar="PROGRAM",
+        help="the program and its arguments; none: print the variables instead",
+    )
+    words: list[str] = parser.parse_args(arguments).program
+    return exit_code(lambda: _become(words) if words else _print())
+
+
+def _print() -> None:
+    for name, value in _variables().items():
+        print(f"{name}={value}")
+
+
+def _become(words: Sequence[str]) -> NoReturn:
+    path = shutil.which(words[0])
+    if path is None:
+        raise SimulationError(
+            f"there is no program {words[0]!r}; write it as in a terminal, such as"
+            " `robot-layouts portable python train.py`"
+        )
+    try:
+        os.execve(path, list(words), {**os.environ, **_variables()})
+    except OSError as error:
+        raise SimulationError(f"{path} cannot be begun: {error}") from error
+
+
+def _variables() -> dict[str, str]:
+    return portable_variables(os.environ, numpy_versions())
+
+
+def numpy_versions() -> tuple[str, ...]:
+    """Return the names of what NumPy's functions have versions for.
+
+    Raises:
+        RobotLayoutsError: If this NumPy does not tell.
+    """
+    try:
+        from numpy._core._multiarray_umath import __cpu_dispatch__
+    except ImportError:
+        try:
+            from numpy.core._multiarray_umath import __cpu_dispatch__
+        except ImportError:
+            raise RobotLayoutsError("this NumPy does not tell what processors it knows") from None
+    return tuple(__cpu_dispatch__)
+
+
+if __name__ == "__main__":
+    start(main)
