@@ -6,10 +6,13 @@ somebody has options of their own: ``lerobot-eval --env.type=robot_layouts
 --env.hub_path=USER/REPOSITORY --trust_remote_code=true --env.task=…``.
 """
 
+from gymnasium.vector import VectorEnv
 from lerobot_env_robot_layouts import RobotLayoutsEnv
 
 
-def make_env(n_envs: int = 1, use_async_envs: bool = False, cfg: RobotLayoutsEnv | None = None):
+def make_env(
+    n_envs: int = 1, use_async_envs: bool = False, cfg: RobotLayoutsEnv | None = None
+) -> dict[str, dict[int, VectorEnv]]:
     """Return the vectors by task; each observes pixels and states, and has an instruction."""
     wanted = cfg or RobotLayoutsEnv(task="TwoRobotPickCube-v1", cameras=True)
     return wanted.create_envs(n_envs, use_async_envs)

@@ -56,7 +56,9 @@ def working(name):
 
 
 def runs(python):
-    done = subprocess.run([python, "-c", "import venv, ensurepip"], capture_output=True, check=False)
+    done = subprocess.run(
+        [python, "-c", "import venv, ensurepip"], capture_output=True, check=False
+    )
     return done.returncode == 0
 
 

@@ -27,11 +27,15 @@ def env():
         yield vector
 
 
+def plan_of(seed):
+    with closing(tasks.make(TASK)) as task:
+        return find_expert(TASK)(task, seed)
+
+
 @pytest.fixture(scope="module")
 def plan():
     """What solves the episode of one seed."""
-    with closing(tasks.make(TASK)) as task:
-        return find_expert(TASK)(task, SEEDS[SOLVED])
+    return plan_of(SEEDS[SOLVED])
 
 
 @pytest.fixture(scope="module")
@@ -49,12 +53,9 @@ def steps(env, plan):
         yield env.step(actions)
 
 
-def carry_out(plan):
-    """Return a policy that gives a plan's actions, and its last one from then on."""
-    return _CarryOut(plan)
+class CarryOut:
+    """A policy that gives a plan's actions, and its last one from then on."""
 
-
-class _CarryOut:
     def __init__(self, plan):
         self.plan, self.step = plan, -1
 
@@ -139,11 +140,10 @@ def test_only_what_is_reset_begins_anew(env, plan):
 
 
 def test_episodes_are_those_of_an_evaluation(env, played, plan):
-    """Also after other episodes, whose worlds were rebuilt."""
     still = np.zeros((1, 16), np.float32)
     expected = {
         seed: evaluate(
-            carry_out(plan if i == SOLVED else still), TASK, [seed], workers=0, obs_mode="none"
+            CarryOut(plan if i == SOLVED else still), TASK, [seed], workers=0, obs_mode="none"
         ).scores[seed]
         for i, seed in enumerate(SEEDS)
     }
@@ -155,6 +155,19 @@ def test_episodes_are_those_of_an_evaluation(env, played, plan):
         assert expected[seed].success == again[-1][4]["is_success"][i]
         total = sum(float(step[1][i]) for step in again)
         assert expected[seed].total == pytest.approx(total, rel=1e-12)
+
+
+def test_nothing_stays_of_what_was_played_before(plan):
+    """Contacts that PhysX remembers would show in the last bits: worlds are rebuilt."""
+    with closing(make(num_envs=1)) as used, closing(make(num_envs=1)) as fresh:
+        used.reset(seed=[SEEDS[0]], options=THEIRS)
+        for action in plan_of(SEEDS[0]):
+            used.step(action[None])
+        for vector in (used, fresh):
+            vector.reset(seed=[SEEDS[SOLVED]], options=THEIRS)
+        for action in plan:
+            one, other = (vector.step(action[None])[0] for vector in (used, fresh))
+            assert all(np.array_equal(one[name], other[name]) for name in one)
 
 
 def test_processes_change_nothing(env, plan):

@@ -37,12 +37,8 @@ def trained_policies_play(folder: Path, recording: Path) -> None:
     export(Export(recording, "lerobot", folder / "dataset"))
     policy = train(folder / "dataset", folder / "act", "--steps=10", "--batch_size=8")
     words = f"--policy.path={policy}", "--policy.device=cpu", *EVAL
-    reported = evaluated(
-        folder / "trained", *words, "--eval.n_episodes=3", "--eval.batch_size=3"
-    )
-    ours = evaluate(
-        LeRobotPolicy.load(policy, TASK), TASK, range(3), workers=0, obs_mode="lerobot"
-    )
+    reported = evaluated(folder / "trained", *words, "--eval.n_episodes=3", "--eval.batch_size=3")
+    ours = evaluate(LeRobotPolicy.load(policy, TASK), TASK, range(3), workers=0, obs_mode="lerobot")
     assert successes(reported, TASK) == [*ours.successes.values()]
     returns = reported["per_task"][0]["metrics"]["sum_rewards"]
     assert np.allclose(returns, [*ours.returns.values()], rtol=1e-3), (returns, ours.returns)
@@ -87,7 +83,9 @@ def replayed(remembered: Path) -> LeRobotPolicy:
     config = ReplayConfig(
         device="cpu", plans=str(remembered), input_features=features, output_features=action
     )
-    return LeRobotPolicy(get_policy_class("replay")(config), *make_pre_post_processors(config), TASK)
+    return LeRobotPolicy(
+        get_policy_class("replay")(config), *make_pre_post_processors(config), TASK
+    )
 
 
 def several_tasks_are_evaluated_one_by_one(folder: Path) -> None:
