@@ -75,6 +75,8 @@ class RobotLayoutsEnv(HubEnvConfig):
             None, and the films are black.
         num_workers: How many processes step the environments; None: one per core if LeRobot asks
             for processes, else none but this one.
+        timeout: Seconds that these may take for a step or a reset, which is long where a processor
+            draws pictures; None: for ever.
         hub_path: A repository of LeRobot's hub whose ``env.py`` makes the environments instead.
     """
 
@@ -91,6 +93,7 @@ class RobotLayoutsEnv(HubEnvConfig):
     max_episode_steps: int | None = None
     render_mode: str | None = "rgb_array"
     num_workers: int | None = None
+    timeout: float | None = 600.0
 
     def __post_init__(self) -> None:
         """Read off the tasks what policies are given and give.
@@ -130,6 +133,7 @@ class RobotLayoutsEnv(HubEnvConfig):
             "max_episode_steps": self.max_episode_steps,
             "instruction": self.instruction,
             "render_mode": self.render_mode,
+            "timeout": self.timeout,
         }
 
     def create_envs(

@@ -34,14 +34,16 @@ def plans(recording: Path, path: Path) -> Path:
 
 
 def trained_policies_play(folder: Path, recording: Path) -> None:
+    """What a network computes for one environment at a time is the same to the last bit."""
     export(Export(recording, "lerobot", folder / "dataset"))
     policy = train(folder / "dataset", folder / "act", "--steps=10", "--batch_size=8")
     words = f"--policy.path={policy}", "--policy.device=cpu", *EVAL
-    reported = evaluated(folder / "trained", *words, "--eval.n_episodes=3", "--eval.batch_size=3")
-    ours = evaluate(LeRobotPolicy.load(policy, TASK), TASK, range(3), workers=0, obs_mode="lerobot")
+    reported = evaluated(folder / "trained", *words, "--eval.n_episodes=2", "--eval.batch_size=1")
+    ours = evaluate(LeRobotPolicy.load(policy, TASK), TASK, range(2), workers=0, obs_mode="lerobot")
     assert successes(reported, TASK) == [*ours.successes.values()]
     returns = reported["per_task"][0]["metrics"]["sum_rewards"]
-    assert np.allclose(returns, [*ours.returns.values()], rtol=1e-3), (returns, ours.returns)
+    sums = np.float32([*ours.returns.values()])  # LeRobot adds in another order
+    assert np.allclose(returns, sums, rtol=1e-6, atol=0), (returns, sums)
 
 
 def successes_are_those_of_our_evaluation(folder: Path, recording: Path) -> None:
