@@ -14,7 +14,7 @@ from tests.clients.environments import ROOT, installed, play
 HERE = Path(__file__).parent
 REQUIREMENTS = HERE / "requirements" / "lerobot.txt"
 CONSTRAINTS = ROOT / "constraints" / "lerobot.txt"
-OURS = (f"{ROOT}[export]", str(ROOT / "integrations" / "lerobot_env_robot_layouts"))
+OURS = (f"{ROOT}[export,video]", str(ROOT / "integrations" / "lerobot_env_robot_layouts"))
 PROGRAMS = ("", "_cameras", "_eval", "_eval_cameras", "_hub")
 VERSIONS = ("python3.12", "python3.13")  # LeRobot needs 3.12; torch of constraints ends at 3.14
 BYTES = 12e9  # the environment takes 6 GB, and pip as much for what it unpacks
