@@ -154,12 +154,14 @@ class RobotLayoutsEnv(HubEnvConfig):
         """Return the action, states and pictures of a task."""
         vector = self._make(task, 1, 0)
         vector.close()
-        spaces = dict(vector.single_observation_space.spaces)
+        observed, actions = vector.single_observation_space, vector.single_action_space
+        assert isinstance(observed, gym.spaces.Dict)
+        spaces = dict(observed.spaces)
         pictures = spaces.pop(PIXELS, gym.spaces.Dict())
         assert isinstance(pictures, gym.spaces.Dict)
-        features = {ACTION: PolicyFeature(FeatureType.ACTION, vector.single_action_space.shape)}
+        features = {ACTION: PolicyFeature(FeatureType.ACTION, actions.shape or ())}
         for name, space in spaces.items():
-            features[name] = PolicyFeature(KINDS.get(name, FeatureType.STATE), space.shape)
+            features[name] = PolicyFeature(KINDS.get(name, FeatureType.STATE), space.shape or ())
         for camera, space in pictures.spaces.items():
-            features[f"{PICTURES}{camera}"] = PolicyFeature(FeatureType.VISUAL, space.shape)
+            features[f"{PICTURES}{camera}"] = PolicyFeature(FeatureType.VISUAL, space.shape or ())
         return features
