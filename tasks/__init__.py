@@ -10,6 +10,7 @@ Making an environment of it for other programs (each loads its package when it i
     gymnasium.make, gymnasium.make_vec: ``"RobotLayouts/PickCube-v1"``, once this is imported.
     parallel_env: PettingZoo, one agent per robot.
     sb3_vec_env: Stable-Baselines3.
+    lerobot_vec_env: LeRobot's evaluation.
 
 Writing a task (`tasks.vocabulary` lists every name; functions of arrays are in `tasks.maths`):
     MultiRobotTask: What a task's class subclasses.
@@ -29,7 +30,7 @@ expect_own("robots", "layouts", "simulation")
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from tasks.fronts import parallel_env, register, sb3_vec_env
+from tasks.fronts import lerobot_vec_env, parallel_env, register, sb3_vec_env
 from tasks.registry import on_registration
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ __all__ = [  # what only tasks' files need is in `tasks.vocabulary`
     "MultiRobotTask",
     "Scenario",
     "get_task_class",
+    "lerobot_vec_env",
     "list_clones",
     "list_tasks",
     "make",

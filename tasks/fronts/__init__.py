@@ -1,4 +1,4 @@
-"""Tasks behind the interfaces of Gymnasium, its vectors, PettingZoo and Stable-Baselines3.
+"""Tasks behind the interfaces of Gymnasium, PettingZoo, Stable-Baselines3 and LeRobot.
 
 Importing this loads neither torch nor sapien; each front is loaded when one is made.
 """
@@ -14,12 +14,13 @@ from tasks.fronts.names import NAMESPACE
 from tasks.registry import list_own, list_tasks
 
 if TYPE_CHECKING:
+    from tasks.fronts.lerobot import LeRobotTask
     from tasks.fronts.parallel import ParallelTask
     from tasks.fronts.sb3 import SB3Task
 
 _GYMNASIUM_NAME = re.compile(r"[\w.-]+-v\d+")
 
-__all__ = ["NAMESPACE", "parallel_env", "register", "sb3_vec_env"]
+__all__ = ["NAMESPACE", "lerobot_vec_env", "parallel_env", "register", "sb3_vec_env"]
 
 
 def register() -> None:
@@ -105,3 +106,31 @@ def sb3_vec_env(
             "sb3_vec_env needs stable-baselines3; pip install 'robot-layouts[sb3]'"
         ) from error
     return SB3Task(task_id, num_envs, num_workers=num_workers, **fields)
+
+
+def lerobot_vec_env(
+    task_id: str, num_envs: int = 1, num_workers: int | None = None, **fields: Any
+) -> LeRobotTask:
+    """Make a vector of a task as ``lerobot-eval`` and LeRobot's EnvHub use them.
+
+    What is observed are the columns of exported LeRobot datasets, so that a policy that was trained
+    on one plays as it is; LeRobot itself is not needed here.
+
+    Args:
+        task_id: The task's id or another of its names.
+        num_envs: Number of environments.
+        num_workers: Number of processes; None takes one per core, 0 this process.
+        fields: ``obs_mode``, one of ``"lerobot"``, ``"lerobot+video"`` and ``"lerobot+cameras"``;
+            ``instruction``, what policies are told to do if it is not the task's own sentence;
+            ``timeout`` and ``render_mode``, as ``gymnasium.make_vec`` takes them; and other
+            arguments of `tasks.make`.
+
+    Raises:
+        UnknownNameError: If the task, a place, a robot or a field is unknown.
+        TaskError: If the task cannot be made like that.
+        AssetError: If robot files cannot be found.
+        WorkerError: If a worker ends before it is ready.
+    """
+    from tasks.fronts.lerobot import LeRobotTask
+
+    return LeRobotTask(task_id, num_envs, num_workers=num_workers, **fields)

@@ -16,9 +16,10 @@ from stable_baselines3.common.vec_env.base_vec_env import (
     VecEnvObs,
 )
 
-from robots import TaskError, UnknownNameError
+from robots import TaskError
 from tasks.engine.arguments import RECONFIGURE, own_options
 from tasks.engine.remade import Remade
+from tasks.fronts.attributes import UnknownAttributeError
 from tasks.fronts.names import NAMESPACE
 from tasks.fronts.vector import VectorTask
 from tasks.registry import get_task_class
@@ -177,10 +178,6 @@ class SB3Task(Remade, VecEnv):
     ) -> list[bool]:
         """Return whether environments are in a Gymnasium wrapper: none is."""
         return [False for _ in self._get_indices(indices)]
-
-
-class UnknownAttributeError(UnknownNameError, AttributeError):
-    """An attribute that environments do not have (also an ``AttributeError``)."""
 
 
 def _rows(info: Mapping[str, Any], num_envs: int) -> list[dict[str, Any]]:

@@ -24,14 +24,17 @@ def new_environment(folder: Path, requirements: Path) -> Path:
     lines = [f"import site; site.addsitedir({path!r})\n" for path in theirs]
     (own / "tests.pth").write_text("".join(lines))
     python = folder / "bin" / "python"
-    install = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    done = subprocess.run(
-        [*install, "-r", requirements], capture_output=True, text=True, check=False
-    )
-    if done.returncode and any(text in done.stderr for text in UNREACHABLE):
-        pytest.skip(f"the package index cannot be reached for {requirements.name}")
-    assert done.returncode == 0, done.stderr
+    installed(python, ["-r", str(requirements)], requirements.name)
     return python
+
+
+def installed(python: Path, words: list[str], what: str) -> None:
+    """Let pip install something; skip where the package index cannot be reached."""
+    install = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    done = subprocess.run([*install, *words], capture_output=True, text=True, check=False)
+    if done.returncode and any(text in done.stderr for text in UNREACHABLE):
+        pytest.skip(f"the package index cannot be reached for {what}")
+    assert done.returncode == 0, done.stderr
 
 
 def play(python: Path, program: Path, folder: Path) -> None:

@@ -80,8 +80,9 @@ def main(folder: Path) -> None:
 
     register_third_party_plugins()
     wanted = EnvConfig.get_choice_class("robot_layouts")(
-        task=TASK, robots=ROBOTS, render_mode=None, cameras=True, camera_size=list(SIZE)
-    )
+        task=TASK, robots=ROBOTS, render_mode=None, cameras=True, camera_size=list(SIZE),
+        max_episode_steps=10,
+    )  # fmt: skip
     (suite,) = make_env(wanted, n_envs=1).values()
     before, after = make_env_pre_post_processors(wanted, config)
     played = rollout(suite[0], policy, before, after, prepare, finish, seeds=[5])
