@@ -100,7 +100,7 @@ def running_browser(*flags: str) -> Generator[Any]:
         from playwright.sync_api import sync_playwright
     except ImportError as error:
         raise MissingPackageError(
-            "a browser is driven by playwright: pip install playwright"
+            "driving a browser needs playwright: pip install 'robot-layouts[browser]'"
         ) from error
     path = shutil.which("chromium")
     if path is None:

@@ -112,6 +112,7 @@ class TestDependencies:
             "checks",
             "preview",
             "view",
+            "browser",
             "video",
             "export",
             "mjcf",

@@ -2,6 +2,7 @@
 
 import json
 import re
+import sys
 
 import numpy as np
 import pytest
@@ -48,6 +49,15 @@ def test_a_command_without_a_page_says_why():
     with (
         pytest.raises(ViewerError, match=r"teleop NoTask-v1` serves no page: .*NoTask-v1"),
         browser.served("rollouts", "teleop", "NoTask-v1"),
+    ):
+        pass
+
+
+def test_an_installation_without_playwright_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "playwright.sync_api", None)
+    with (
+        pytest.raises(MissingPackageError, match=r"pip install 'robot-layouts\[browser\]'"),
+        browser.running_browser(),
     ):
         pass
 
