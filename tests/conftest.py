@@ -51,7 +51,7 @@ def native_problem() -> str | None:
 def browser_problem() -> str | None:
     """Say why no browser can be driven here, or None if one can."""
     if importlib.util.find_spec("playwright") is None:
-        return "playwright is not installed; pip install playwright"
+        return "playwright is not installed; pip install 'robot-layouts[browser]'"
     if shutil.which("chromium") is None:
         return "there is no chromium; apt-get install chromium"
     return None

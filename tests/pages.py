@@ -1,11 +1,6 @@
-"""Pages of ``view`` commands: served by a process of its own, and looked at in a browser."""
+"""Pages that commands serve, looked at in a browser."""
 
 import io
-import re
-import shutil
-import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,78 +9,10 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-# No traffic of the browser's own.
-QUIET = (
-    "--no-sandbox --disable-quic --no-first-run --disable-background-networking"
-    " --disable-component-update --disable-sync"
-).split()
-SOFTWARE_WEBGL = (
-    "--use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --ignore-gpu-blocklist"
-).split()
-PATIENCE = 120.0  # s; browsers without a graphics card are slow
+from measurements.browser import PATIENCE, SOFTWARE_WEBGL, running_browser
+
 SIZE = {"width": 900, "height": 560}
 PLAN = 580  # pixels from the left that no panel covers
-
-
-def _heed_ctrl_c() -> None:
-    """Undo what a shell does to processes in the background: they would never see Ctrl-C."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-
-class Served:
-    """A ``view`` command that runs.
-
-    Attributes:
-        process: The process.
-        url: Where its page is.
-        lines: What it has printed.
-    """
-
-    def __init__(self, *words: str) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", *words],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            preexec_fn=_heed_ctrl_c,
-        )
-        assert self.process.stdout is not None
-        self.lines: list[str] = []
-        self.url = ""
-        for line in self.process.stdout:
-            self.lines.append(line.rstrip())
-            if found := re.search(r"http://\S+", line):
-                self.url = found[0]
-                return
-        raise AssertionError(f"no page, but: {self.lines}")
-
-    def interrupt(self) -> tuple[int, str]:
-        """Press Ctrl-C; return the exit status and all that was printed since."""
-        self.process.send_signal(signal.SIGINT)
-        rest, _ = self.process.communicate(timeout=PATIENCE)
-        return self.process.returncode, rest
-
-
-@contextmanager
-def served(*words: str) -> Iterator[Served]:
-    page = Served(*words)
-    try:
-        yield page
-    finally:
-        page.process.kill()
-        page.process.communicate()
-
-
-@contextmanager
-def running_browser(*flags: str) -> Iterator[Any]:
-    """Run Debian's chromium, with some flags more."""
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        path = shutil.which("chromium")
-        browser = playwright.chromium.launch(executable_path=path, args=[*QUIET, *flags])
-        yield browser
-        browser.close()
 
 
 @contextmanager

@@ -113,6 +113,7 @@ class TestDependencies:
             "checks",
             "preview",
             "view",
+            "browser",
             "video",
             "export",
             "mjcf",

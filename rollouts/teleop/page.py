@@ -34,6 +34,9 @@ class TeleopPage:
     """A session on a viser server.
 
     Everything happens in the thread that calls `run` or `tick`; what browsers send waits for it.
+
+    Attributes:
+        pace: Says when steps are due, and whether time goes slower.
     """
 
     def __init__(self, server: Any, session: Session) -> None:
@@ -46,7 +49,7 @@ class TeleopPage:
         self._server, self._session = server, session
         self._waiting: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._said = self._drawn = 0.0  # when
-        self._pace, self._seats = Pace(session.seconds), Seats(session.arms)
+        self.pace, self._seats = Pace(session.seconds), Seats(session.arms)
         self._picture = Picture(server, session)
         self._gizmos = {arm: self._add_gizmo(arm) for arm in session.arms}
         self._build()
@@ -63,8 +66,8 @@ class TeleopPage:
     def tick(self) -> None:
         """Do what browsers ask for, and take a step once it is due; wait for either till then."""
         running = self._session.phase is Phase.RUNNING
-        asked = self._handle_waiting(max(self._pace.left(), 0.0) if running else IDLE)
-        if self._session.phase is Phase.RUNNING and self._pace.left() <= 0:
+        asked = self._handle_waiting(max(self.pace.left(), 0.0) if running else IDLE)
+        if self._session.phase is Phase.RUNNING and self.pace.left() <= 0:
             self._step()
         if asked or monotonic() - self._said > IDLE:
             self._say()
@@ -79,8 +82,8 @@ class TeleopPage:
             self._session.stop()
             self._note.text = f"Stopped: {error}"
             return
-        self._pace.stepped()
-        if self._pace.behind and monotonic() - self._drawn < LONGEST_UNSEEN:
+        self.pace.stepped()
+        if self.pace.behind and monotonic() - self._drawn < LONGEST_UNSEEN:
             return  # it catches up first
         self._drawn = monotonic()
         with self._server.atomic():
@@ -190,7 +193,7 @@ class TeleopPage:
             self._session.stop()
         else:
             self._session.start()
-            self._pace.restart()
+            self.pace.restart()
 
     def _back(self, _: int) -> None:
         steps = len(self._session.actions)
@@ -242,9 +245,9 @@ class TeleopPage:
             f" ({steps * session.seconds:.1f} s), {solved}"
             + ("" if session.by_hand else "\nThe policy acts; take an arm to steer."),
         )
-        speed = f"Time runs at {self._pace.speed:.0%} of real time"
-        lost = f"; it stood still for {self._pace.lost:.1f} s" if self._pace.lost else ""
-        slow = self._pace.speed < SLOW or self._pace.lost
+        speed = f"Time runs at {self.pace.speed:.0%} of real time"
+        lost = f"; it stood still for {self.pace.lost:.1f} s" if self.pace.lost else ""
+        slow = self.pace.speed < SLOW or self.pace.lost
         _write(self._clock, f"{speed}{lost}; no step is left out." if slow else "Real time.")
         solved_episodes = sum(session.kept.values())
         _write(self._count, f"{len(session.kept)} episodes kept, {solved_episodes} of them solved")

@@ -17,9 +17,9 @@ from layouts.viewer.page import Page, contacts_text
 from layouts.viewer.saved import NO_SLIDERS, save_html
 from layouts.viewer.server import serving
 from layouts.visuals import coloured, read_visuals
+from measurements.browser import served
 from robots import LayoutError, MissingPackageError, RobotRegistry
 from tests.layouts.cells import link_poses, mixed_cell, random_positions
-from tests.pages import served
 
 ARM = ("single", "arm=so100")
 

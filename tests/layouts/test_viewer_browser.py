@@ -8,19 +8,11 @@ import viser
 from layouts.__main__ import main
 from layouts.viewer.saved import save_html
 from layouts.viewer.text import printable
+from measurements.browser import PATIENCE, SOFTWARE_WEBGL, running_browser, served
 from tests.layouts.guests import site, small_cell
 from tests.layouts.hostile_names import HOSTILE_NAMES
 from tests.layouts.hostile_site import ATTACK, NOTHING, hostile_site
-from tests.pages import (
-    PATIENCE,
-    SOFTWARE_WEBGL,
-    browser_page,
-    changed,
-    coloured,
-    running_browser,
-    served,
-    settled,
-)
+from tests.pages import browser_page, changed, coloured, settled
 
 pytestmark = pytest.mark.browser
 

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from layouts import face_to_face
+from measurements.browser import served
 from motion.page import motion_cell
 from tests.experts.free_motions import swing
 from tests.motion.motions import LAYOUT, busy_motion
-from tests.pages import browser_page, changed, coloured, served, settled
+from tests.pages import browser_page, changed, coloured, settled
 
 BLUE, ORANGE = (0, 114, 178), (213, 94, 0)  # of left and right
 SMALL = face_to_face({"left": "so100", "right": "so100"}, spacing=0.5)  # quickly drawn

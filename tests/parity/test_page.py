@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 import tasks
+from measurements.browser import PATIENCE, running_browser
 from parity.__main__ import COMMANDS, main
 from parity.compare.results import RESULTS, read
 from parity.report.figures import COLUMNS, RECORDED_COLUMNS, UNKNOWN, cells, is_verified, tiles
 from parity.report.gaps import grouped
 from parity.show.embedding import ClipError, fit, poster, share, size
 from parity.sweep.entries import SUMMARY, blank, write_summary
-from tests.pages import PATIENCE, running_browser
 
 DESKTOP, PHONE = (1280, 900), (390, 844)
 INJECTION = '</p><script>document.title = "taken over"</script><img src=x onerror=alert(1)>'

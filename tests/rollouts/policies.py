@@ -37,9 +37,11 @@ class Leans:
     """Depends on nothing but each observation, for one or for many at once."""
 
     batched: bool = False
+    actions: int = ACTIONS
+    strength: float = 3
 
     def __call__(self, obs):
-        return torch.tanh(obs[:, :ACTIONS] * 3)
+        return torch.tanh(obs[:, : self.actions] * self.strength)
 
 
 LEANS = Leans()

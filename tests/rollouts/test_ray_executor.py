@@ -35,7 +35,7 @@ from tests.rollouts.plays import (
 )
 from tests.rollouts.policies import LEANS, Wanders, meddles
 from tests.rollouts.test_executor import squares
-from tests.rollouts.test_record import arguments, recorded_directly, start, wait_for_parts
+from tests.rollouts.test_record import PATIENCE, arguments, recorded_directly, start, wait_for_parts
 from tests.rollouts.test_recorder import same_files
 
 ROOT = Path(__file__).parents[2]
@@ -139,7 +139,7 @@ def test_a_recording_on_a_cluster_is_stopped_and_goes_on(nodes, tmp_path):
     stopped = start(*arguments(out, 10**6), *words)
     wait_for_parts(out, 3)
     stopped.send_signal(signal.SIGTERM)
-    printed, said = stopped.communicate(timeout=180)
+    printed, said = stopped.communicate(timeout=PATIENCE)
     assert (stopped.returncode, "Traceback" in said) == (130, False)
     assert "recorded" not in printed  # Ray itself may tell there of nodes that are gone
     nodes.wait_for_no_player()
@@ -152,7 +152,7 @@ def test_a_recording_on_a_cluster_is_stopped_and_goes_on(nodes, tmp_path):
     interrupted = start(*arguments(out, 10**6), *words)
     wait_for_parts(out, 3)
     os.killpg(interrupted.pid, signal.SIGINT)
-    printed, said = interrupted.communicate(timeout=180)
+    printed, said = interrupted.communicate(timeout=PATIENCE)
     assert (interrupted.returncode, "Traceback" in said) == (130, False)
     nodes.wait_for_no_player()
     with TrajectoryFile(out / FILE) as file:
@@ -166,7 +166,7 @@ def test_a_recording_on_a_cluster_is_stopped_and_goes_on(nodes, tmp_path):
     count += len(list(out.glob("trajectory.parts/*.part")))
     whole = count + 20
     last = start(*arguments(out, whole, workers=2), *words)
-    printed, said = last.communicate(timeout=180)
+    printed, said = last.communicate(timeout=PATIENCE)
     assert last.returncode == 0, said
     assert f"{count} of {whole} episodes were recorded before" in said
     assert "recorded now 20, 0 with success" in printed

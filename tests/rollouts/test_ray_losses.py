@@ -24,7 +24,7 @@ from tests.rollouts.clusters import running_cluster
 from tests.rollouts.plays import Play
 from tests.rollouts.test_executor import squares
 from tests.rollouts.test_ray_executor import MODULES
-from tests.rollouts.test_record import arguments, recorded_directly, start, wait_for_parts
+from tests.rollouts.test_record import PATIENCE, arguments, recorded_directly, start, wait_for_parts
 from tests.rollouts.test_recorder import same_files
 
 ray = pytest.importorskip("ray")
@@ -131,14 +131,14 @@ def test_the_node_of_this_machine_is_lost(nodes, tmp_path, how):
     recording = record_with(nodes, tmp_path, 10**5)
     wait_for_parts(tmp_path, 5)
     nodes.signal_head("raylet", how)
-    printed, said = recording.communicate(timeout=180)
+    printed, said = recording.communicate(timeout=PATIENCE)
     assert recording.returncode == 1, said
     assert "Traceback" not in said
     assert "error: the Ray node of this machine has died" in said
     if how is signal.SIGKILL:
         (kept,) = map(int, re.findall(r"stopped; (\d+) episodes are recorded", said))
         again = start(*arguments(tmp_path, kept + 5, seed=FIRST))
-        _, said = again.communicate(timeout=180)
+        _, said = again.communicate(timeout=PATIENCE)
         assert again.returncode == 0, said
         assert f"{kept} of {kept + 5} episodes were recorded before" in said
         whole = recorded_directly(tmp_path / "direct" / FILE, range(FIRST, FIRST + kept + 5))
@@ -155,7 +155,7 @@ def test_the_head_is_lost(nodes, tmp_path, how):
         time.sleep(5)
         for worker in nodes.players():
             os.kill(worker, signal.SIGKILL)
-    printed, said = recording.communicate(timeout=180)
+    printed, said = recording.communicate(timeout=PATIENCE)
     if how is signal.SIGSTOP:
         os.kill(pid, signal.SIGCONT)
     assert recording.returncode == 1, said
@@ -170,7 +170,7 @@ def test_a_short_recording_may_go_on_without_the_head(nodes, tmp_path):
     recording = record_with(nodes, tmp_path, 150)
     wait_for_parts(tmp_path, 5)
     nodes.signal_head("gcs_server", signal.SIGKILL)
-    printed, said = recording.communicate(timeout=180)
+    printed, said = recording.communicate(timeout=PATIENCE)
     assert "Traceback" not in said
     if recording.returncode == 0:
         assert f"{FILE}: 150 episodes" in printed
@@ -216,7 +216,7 @@ def test_a_cluster_that_asks_for_a_token(monkeypatch, tmp_path):
     with guarded_head(monkeypatch, tmp_path) as address:
         words = [*arguments(tmp_path / "out", 3), f"--ray={address}"]
         recording = start(*words)
-        printed, said = recording.communicate(timeout=180)
+        printed, said = recording.communicate(timeout=PATIENCE)
         assert recording.returncode == 0, said
         assert "recorded now 3" in printed
         monkeypatch.setenv("RAY_AUTH_TOKEN", "another token")
@@ -231,7 +231,7 @@ def test_a_cluster_that_asks_for_a_token(monkeypatch, tmp_path):
 
 def expect_refusal(words):
     recording = start(*words, "--seed=3")
-    _, said = recording.communicate(timeout=180)
+    _, said = recording.communicate(timeout=PATIENCE)
     assert recording.returncode == 1
     assert said.splitlines()[-1].endswith(
         "the cluster asks for a token: on its head, `ray get-auth-token` prints it; here, put it"

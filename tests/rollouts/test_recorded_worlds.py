@@ -14,15 +14,18 @@ from rollouts.playing.ray_executor import RayExecutor
 from rollouts.playing.replay import replay, task_for
 from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
 from rollouts.recording.record import FILE
+from tasks.varying.axes import AXES
 from tests.rollouts.clusters import running_cluster
+from tests.rollouts.policies import Leans
 from tests.rollouts.test_recorder import same_files
-from tests.tasks.varying.declarations import TASK, VARIED
+from tests.tasks.varying.declarations import EVERY_AXIS, TASK, VARIED
 
 SOLVED = 0, 3  # seeds of worlds that vary in which the expert finds a way
 
 
 def recorded(folder: Path, seeds: Sequence[int], **arguments: object) -> Path:
-    summary = record(TASK, seeds, folder, randomization=VARIED, **arguments)  # type: ignore[arg-type]
+    arguments = {"randomization": VARIED, **arguments}
+    summary = record(TASK, seeds, folder, **arguments)  # type: ignore[arg-type]
     assert not summary.failed
     return folder / FILE
 
@@ -91,14 +94,28 @@ def test_policies_are_judged_in_worlds_that_vary() -> None:
     assert alone.scores != plain.scores
 
 
+def test_experts_do_the_same_in_workers(tmp_path: Path) -> None:
+    here, there = (recorded(tmp_path / str(w), SOLVED, workers=w) for w in (0, 2))
+    assert same_files(here, there)
+
+
 @pytest.mark.long
 def test_worlds_are_the_same_whoever_plays(tmp_path: Path) -> None:
-    """In this process, in 1, 2 and 8 workers, and on a Ray cluster."""
-    seeds = range(8)
-    expected = recorded(tmp_path / "here", seeds, workers=0)
+    """Every axis, in this process, in 1, 2 and 8 workers, and on a Ray cluster.
+
+    A policy acts by what it observes, noise and delays included.
+    """
+    assert {*EVERY_AXIS.declared} == {*AXES}
+    seeds, policy = range(8), Leans(actions=16, strength=0.1)
+    worlds = {"randomization": EVERY_AXIS, "policy": policy}
+    expected = recorded(tmp_path / "here", seeds, workers=0, **worlds)
     for workers in (1, 2, 8):
-        assert same_files(recorded(tmp_path / str(workers), seeds, workers=workers), expected)
+        path = recorded(tmp_path / str(workers), seeds, workers=workers, **worlds)
+        assert same_files(path, expected)
     with running_cluster() as nodes:
         nodes.grow(2)
         executor = RayExecutor(str(nodes.address))
-        assert same_files(recorded(tmp_path / "ray", seeds, executor=executor), expected)
+        assert same_files(recorded(tmp_path / "ray", seeds, executor=executor, **worlds), expected)
+    with TrajectoryFile(expected) as file, closing(task_for(file)) as env:
+        replays = [replay(env, episode) for episode in file]
+    assert all(played.agrees and played.difference is None for played in replays)

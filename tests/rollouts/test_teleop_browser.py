@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 import tasks
+from measurements.browser import served
 from rollouts.playing.replay import replay
 from rollouts.reading.recorded_task import task_for
 from rollouts.reading.trajectory import TrajectoryFile
 from rollouts.recording.record import FILE
 from rollouts.teleop.session import Session
-from tests.pages import browser_page, served
+from tests.pages import browser_page
 from tests.rollouts.steering_hands import Hands, yaw_between
 
 pytestmark = [pytest.mark.browser, pytest.mark.long]

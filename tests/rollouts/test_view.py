@@ -6,10 +6,11 @@ import sys
 import numpy as np
 import pytest
 
+from measurements.browser import served
 from rollouts.__main__ import main
 from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
 from rollouts.view_command import episode_cell
-from tests.pages import browser_page, changed, served, settled
+from tests.pages import browser_page, changed, settled
 from tests.rollouts.recordings import LEFT_KEY, TWO_ROBOTS, edited, read, record
 
 STEPS = 6

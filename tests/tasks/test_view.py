@@ -7,12 +7,12 @@ import tasks
 from kinematics.rotations import pose_matrix
 from layouts import single
 from layouts.viewer.saved import NO_SLIDERS, save_html
+from measurements.browser import served
 from simulation import Box, Capsule, Cylinder, Sphere
 from simulation.sapien3.world import BuiltWorld
 from simulation.world import Body
 from tasks.__main__ import main
 from tasks.view import body_parts, task_cell
-from tests.pages import served
 
 TURNED = (0.5, 0.5, -0.5, 0.5)
 

@@ -1,8 +1,20 @@
-"""A task, and what may vary in it: all that is physical, with the expert still able to solve it."""
+"""A task, and what may vary in it."""
 
 from dataclasses import replace
 
-from tasks import LogUniform, Normal, Randomization, Shift, Uniform, Whole
+from tasks import (
+    CameraShift,
+    Distractors,
+    Light,
+    LogUniform,
+    Normal,
+    Randomization,
+    Shift,
+    Surface,
+    Texture,
+    Uniform,
+    Whole,
+)
 
 TASK = "TwoRobotPickCube-v1"
 IN_PLACE = Randomization(
@@ -18,3 +30,13 @@ IN_PLACE = Randomization(
     observation_delay=Whole(0, 2),
 )
 VARIED = replace(IN_PLACE, size={"cube": Uniform(0.8, 1.2)}, gravity=Uniform(9.0, 10.5))
+"""All that is physical; the expert solves some of these worlds."""
+
+EVERY_AXIS = replace(
+    VARIED,
+    cameras={"*": CameraShift(x=Uniform(-0.05, 0.05), fov=Uniform(0.8, 1.2))},
+    lights={"*": Light(turn=Uniform(-1, 1), strength=Uniform(0.5, 1.5))},
+    colors={"left": Surface(green=Uniform(0, 1), share=0.5)},
+    textures={"table-workspace": Texture()},
+    distractors=Distractors(count=Whole(0, 4)),
+)

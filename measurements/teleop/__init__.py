@@ -1,0 +1,1 @@
+"""How quick the page of ``teleop`` is, measured in a real browser."""

@@ -1,0 +1,72 @@
+"""``python -m measurements.teleop``: the time from drag to picture, measured by the page itself."""
+
+import json
+import re
+import sys
+
+import numpy as np
+import pytest
+
+from layouts.viewer.server import ViewerError
+from measurements import browser
+from measurements.teleop.__main__ import main
+from measurements.teleop.latency import Latency
+from robots import MissingPackageError
+
+
+@pytest.mark.long
+@pytest.mark.browser
+def test_what_the_page_measures_is_what_is_said(tmp_path, capsys):
+    out, picture = tmp_path / "latency.json", tmp_path / "page.png"
+    code = main(["--drags", "14", "--out", str(out), "--picture", str(picture)])
+    seen = json.loads(out.read_text())
+    assert len(seen["times"]) >= 14
+    assert all(0 < time < 60_000 for time in seen["times"])
+    said = re.match(r"From .*: (\d+) ms \(median\), (\d+) ms \(95 %\), of (\d+)", seen["page"])
+    assert said
+    median, most, count = map(int, said.groups())
+    assert count == len(seen["times"])
+    assert abs(seen["median"] - median) < 1
+    printed = capsys.readouterr().out
+    latency = re.search(r"(\d+) ms from drag to picture \(median\), (\d+) ms", printed)
+    assert latency
+    assert abs(np.subtract([median, most], [*map(int, latency.groups())])).max() <= 1
+    assert code == int(seen["median"] > 150)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_shares_of_drags_are_those_of_the_page():
+    seen = Latency(tuple(float(n) for n in range(1, 24)), "", "", 0.0, 2)
+    assert (seen.median, seen.most) == (12.0, 21.0)
+
+
+def test_more_drags_than_the_page_remembers_are_refused(capsys):
+    assert main(["--drags", "201"]) == 1
+    assert "the page remembers 200 drags; 201 are too many" in capsys.readouterr().err
+
+
+def test_a_command_without_a_page_says_why():
+    with (
+        pytest.raises(ViewerError, match=r"teleop NoTask-v1` serves no page: .*NoTask-v1"),
+        browser.served("rollouts", "teleop", "NoTask-v1"),
+    ):
+        pass
+
+
+def test_an_installation_without_playwright_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "playwright.sync_api", None)
+    with (
+        pytest.raises(MissingPackageError, match=r"pip install 'robot-layouts\[browser\]'"),
+        browser.running_browser(),
+    ):
+        pass
+
+
+def test_a_machine_without_chromium_says_what_to_install(monkeypatch, tmp_path):
+    pytest.importorskip("playwright")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with (
+        pytest.raises(MissingPackageError, match="apt-get install chromium"),
+        browser.running_browser(),
+    ):
+        pass
