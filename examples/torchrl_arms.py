@@ -95,20 +95,19 @@ class Arms(EnvBase):
         """Begin an episode in every world; after `set_seed` in worlds that are built anew."""
         seed, self._first_seed = self._first_seed, None
         obs, _ = self._vector.reset(seed=seed, options={"reconfigure": seed is not None})
-        return TensorDict(self._seen(obs), batch_size=self.batch_size)
+        return self._of_agents(observation=self._seen(obs))
 
     def _step(self, tensordict: TensorDictBase) -> TensorDict:
         action: Tensor = tensordict[ACTION].flatten(1)
         obs, reward, terminated, truncated, info = self._vector.step(action.clamp(-1, 1).numpy())
         self.succeeded: NDArray[np.bool_] = info["success"]
-        shared = {
-            "reward": reward,
+        flags = {
             "terminated": terminated,
             "truncated": truncated,
             "done": terminated | truncated,
         }
-        parts = {("agents", name): self._for_each(column) for name, column in shared.items()}
-        return TensorDict({**self._seen(obs), **parts}, batch_size=self.batch_size)
+        shared = {name: self._for_each(column) for name, column in flags.items()}
+        return self._of_agents(observation=self._seen(obs), reward=self._for_each(reward), **shared)
 
     def _set_seed(self, seed: int | None) -> None:
         self._first_seed = seed
@@ -117,8 +116,13 @@ class Arms(EnvBase):
         """Give every agent what is a world's, (N,) → (N, A, 1)."""
         return torch.from_numpy(column)[:, None, None].expand(-1, self._agents, 1).clone()
 
-    def _seen(self, obs: NDArray[np.float32]) -> dict[Any, Tensor]:
-        return {OBSERVATION: torch.from_numpy(obs)[:, self.observed]}
+    def _seen(self, obs: NDArray[np.float32]) -> Tensor:
+        """Return what each agent observes, (N, A, D)."""
+        return torch.from_numpy(obs)[:, self.observed]
+
+    def _of_agents(self, **parts: Tensor) -> TensorDict:
+        agents = TensorDict(parts, batch_size=(self.num_envs, self._agents))
+        return TensorDict({"agents": agents}, batch_size=self.batch_size)
 
     def close(self, **_: Any) -> None:
         """End the workers."""
