@@ -2,6 +2,8 @@
 
 import json
 import pickle
+from contextlib import closing
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -82,6 +84,22 @@ def test_a_killed_run_and_another_have_the_same_weights(ppo, tmp_path):
     assert not list((tmp_path / "killed").glob("*.partial"))
     ppo.run([*WORDS, "--workers", "0", "--out", str(tmp_path / "whole")])
     assert_same(last(tmp_path / "killed"), last(tmp_path / "whole"))
+
+
+def test_every_checkpoint_has_worlds_of_its_own(ppo, tmp_path):
+    words = [*WORDS, "--task", "PushCube-v1", "--workers", "0", "--seed", "3"]
+    options = ppo.read_arguments("", "", words)
+    recipe = replace(ppo.RECIPES["PushCube-v1"], every=1)
+    with closing(ppo.PPOLearner(recipe, options)) as learner:
+        folders = [tmp_path / str(number) for number in range(3)]
+        for folder in folders:
+            folder.mkdir()
+        learner.begin(folders[0])
+        seeds = []
+        for number, (before, after) in enumerate(pairwise(folders)):
+            learner.learn(before, after, number, lambda _: None)
+            seeds += [info["seed"] for info in learner._env.reset_infos]
+    assert seeds == [10_300_000, 10_300_001, 10_300_002, 10_300_003]
 
 
 def test_other_seeds_give_other_weights(ppo, tmp_path):
