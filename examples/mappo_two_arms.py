@@ -60,7 +60,7 @@ VALUE, LOC, SCALE = (("agents", name) for name in ("value", "loc", "scale"))
 class Recipe:
     """How a task is learned; PPO's of `ppo_two_arms`, where there is no reason for another."""
 
-    steps: int = 20_000_000
+    steps: int = 16_000_000
     control_mode: str = "pd_ee_delta_pos"
     every: int = 40  # iterations from one checkpoint to the next; one is an episode of each world
     learning_rate: float = 3e-4  # at first; it falls to 0
@@ -220,7 +220,8 @@ class MAPPOLearner(Learner):
             losses = loss(steps[rows])
             optimizer.zero_grad()
             (losses["loss_objective"] + losses["loss_critic"]).backward()
-            nn.utils.clip_grad_norm_(loss.parameters(), self._recipe.max_grad_norm)
+            for part in (loss.actor_network, loss.critic_network):  # their losses differ in scale
+                nn.utils.clip_grad_norm_(part.parameters(), self._recipe.max_grad_norm)
             optimizer.step()
 
     def _networks(self) -> Networks:
@@ -234,10 +235,7 @@ class MAPPOLearner(Learner):
 
 
 def _write(networks: Networks, optimizer: Adam, folder: Path) -> None:
-    state = {
-        "networks": networks.state_dict(),
-        "optimizer": optimizer.state_dict()["state"],
-    }
+    state = {"networks": networks.state_dict(), "optimizer": optimizer.state_dict()["state"]}
     torch.save(state, folder / FILES[0])
 
 
