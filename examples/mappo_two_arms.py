@@ -1,0 +1,286 @@
+"""torchrl's MAPPO learns what several arms shall do, with one policy per arm and a shared critic.
+
+    pip install 'robot-layouts[pettingzoo,preview]' torchrl
+    python examples/mappo_two_arms.py                     # TwoRobotPickCube, in hours
+
+An arm is an agent as in `tasks.parallel_env`: it observes its own joints and the task's objects,
+and decides its own action numbers. The critic sees what all observe, and is needed only to learn.
+Two runs give the same weights, and so does one that is killed and started again. What was learned
+is a policy that can be imported:
+
+    PYTHONPATH=examples robot-layouts evaluate --policy mappo_two_arms:policy \
+        --task TwoRobotPickCube-v1 --control-mode pd_ee_delta_pos
+"""
+
+# torchrl need not be installed where types are checked.
+# pyright: reportMissingImports=false, reportUntypedBaseClass=false
+# pyright: reportUnknownParameterType=false
+
+from __future__ import annotations
+
+import os
+import sys
+from argparse import Namespace
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from importlib.metadata import version
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from learning_runs import (
+    LearnedPolicy,
+    Learner,
+    first_seed,
+    main,
+    read_arguments,
+)
+from numpy.typing import NDArray
+from tensordict import TensorDictBase
+from tensordict.nn import AddStateIndependentNormalScale, TensorDictModule
+from torch import Tensor, nn
+from torch.distributions import Independent, Normal
+from torch.optim import Adam
+from torchrl.modules import MultiAgentMLP, ProbabilisticActor, ValueOperator
+from torchrl.objectives import ClipPPOLoss
+from torchrl_arms import ACTION, OBSERVATION, REWARD, Arms
+
+from tasks import get_task_class
+
+FOLDER = "runs/mappo_two_arms"
+FILES = ("policy.pt",)
+
+VALUE, LOC, SCALE = (("agents", name) for name in ("value", "loc", "scale"))
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How a task is learned; PPO's of `ppo_two_arms`, where there is no reason for another."""
+
+    steps: int = 16_000_000
+    control_mode: str = "pd_ee_delta_pos"
+    every: int = 40  # iterations from one checkpoint to the next; one is an episode of each world
+    learning_rate: float = 3e-4  # at first; it falls to 0
+    batch_size: int = 800
+    epochs: int = 4
+    gamma: float = 0.9
+    gae_lambda: float = 0.95
+    clip: float = 0.2
+    max_grad_norm: float = 0.5
+    width: int = 256
+    depth: int = 2
+    log_std: float = -1.0
+
+
+class _Gaussian(Independent[Normal]):
+    """Actions of one agent, drawn together: one probability for all its numbers."""
+
+    def __init__(self, loc: Tensor, scale: Tensor) -> None:
+        super().__init__(Normal(loc, scale), 1)
+
+
+class Normalized(nn.BatchNorm1d):
+    """Observations (…, A, D) by their mean and deviation, as they were when it last looked."""
+
+    def __init__(self, agents: int, seen: int) -> None:
+        """Know nothing yet of what ``agents`` observe, ``seen`` numbers each."""
+        super().__init__(agents * seen, affine=False, momentum=None)
+        self.eval()
+
+    def forward(self, input: Tensor) -> Tensor:
+        """Return them normalized, at most 5 deviations from the mean."""
+        flat = input.flatten(-2)
+        rows = super().forward(flat.reshape(-1, flat.shape[-1]))
+        return rows.clamp(-5.0, 5.0).reshape(input.shape)
+
+    def look(self, obs: Tensor) -> None:
+        """Take more observations into the mean and the deviation."""
+        self.train()
+        self(obs)
+        self.eval()
+
+
+class Networks(nn.Module):
+    """An actor for each agent, and a critic of all; a checkpoint holds its state."""
+
+    observed: Tensor
+
+    def __init__(self, observed: Tensor, width: int, recipe: Recipe) -> None:
+        """Draw weights.
+
+        Args:
+            observed: As `Arms.observed`, (A, D).
+            width: How many numbers an agent does.
+            recipe: Sizes of the networks.
+        """
+        super().__init__()
+        agents, seen = observed.shape
+        sizes: dict[str, Any] = {
+            "depth": recipe.depth,
+            "num_cells": recipe.width,
+            "activation_class": nn.Tanh,
+        }
+        self.register_buffer("observed", observed)
+        self.normalized = Normalized(agents, seen)
+        self.actors = nn.Sequential(
+            self.normalized,
+            MultiAgentMLP(seen, width, agents, centralized=False, share_params=False, **sizes),
+            AddStateIndependentNormalScale((agents, width), init_value=recipe.log_std),
+        )
+        self.critic = nn.Sequential(
+            self.normalized,
+            MultiAgentMLP(seen, 1, agents, centralized=True, share_params=True, **sizes),
+        )
+
+    def loss(self, recipe: Recipe) -> ClipPPOLoss:
+        """Return PPO's loss, in which each agent's actions are clipped for themselves."""
+        loss = ClipPPOLoss(
+            ProbabilisticActor(
+                TensorDictModule(self.actors, [OBSERVATION], [LOC, SCALE]),
+                in_keys=[LOC, SCALE],
+                out_keys=[ACTION],
+                distribution_class=_Gaussian,
+                return_log_prob=True,
+            ),
+            ValueOperator(self.critic, in_keys=[OBSERVATION], out_keys=[VALUE]),
+            clip_epsilon=recipe.clip,
+            entropy_bonus=False,
+            loss_critic_type="l2",
+            critic_coeff=0.5,
+            normalize_advantage=True,
+            normalize_advantage_exclude_dims=(-2,),
+            functional=False,
+        )
+        loss.set_keys(
+            value=VALUE, **{name: ("agents", name) for name in ("reward", "done", "terminated")}
+        )
+        loss.make_value_estimator(gamma=recipe.gamma, lmbda=recipe.gae_lambda)
+        return loss
+
+
+class MAPPOLearner(Learner):
+    """Learns by PPO with an actor for each arm and a critic that sees all."""
+
+    def __init__(self, recipe: Recipe, options: Namespace) -> None:
+        """Make the environments to learn in."""
+        self.task, self.making = options.task, {"control_mode": recipe.control_mode}
+        self._recipe, self._options = recipe, options
+        self._arms = Arms(options.task, options.envs, options.workers, **self.making)
+        self._episode = options.envs * get_task_class(options.task).max_episode_steps
+        self.segment = recipe.every * self._episode
+
+    def close(self) -> None:
+        """Let the environments go."""
+        self._arms.close()
+
+    def begin(self, folder: Path) -> None:
+        """Write policies that have learned nothing."""
+        torch.manual_seed(self._options.seed)
+        networks = self._networks()
+        _write(networks, self._optimizer(networks, 0), folder)
+
+    def learn(
+        self, before: Path, after: Path, number: int, notice: Callable[[int], None]
+    ) -> tuple[float, float]:
+        """Learn from one checkpoint to the next; see `Learner`."""
+        torch.set_num_threads(self._options.threads)
+        seed = first_seed(self._options, number)
+        torch.manual_seed(seed)
+        self._arms.set_seed(seed)
+        networks = self._networks()
+        optimizer = self._optimizer(networks, number)
+        _read(before, networks, optimizer)
+        loss = networks.loss(self._recipe)
+        rewards: list[float] = []
+        ends: list[float] = []
+        for iteration in range(self._recipe.every):
+            with torch.no_grad():
+                episodes = self._arms.rollout(10**6, loss.actor_network)
+                loss.value_estimator(episodes)
+            rewards.append(float(episodes["next", REWARD].mean()))
+            ends.append(float(self._arms.succeeded.mean()))
+            self._improve(loss, optimizer, episodes.reshape(-1))
+            networks.normalized.look(episodes[OBSERVATION])
+            notice((iteration + 1) * self._episode)
+        _write(networks, optimizer, after)
+        return float(np.mean(rewards)), float(np.mean(ends))
+
+    def policy(self, folder: Path) -> LearnedPolicy:
+        """Return the policy of a checkpoint."""
+        return LearnedPolicy(folder, FILES, _loaded)
+
+    def _improve(self, loss: ClipPPOLoss, optimizer: Adam, steps: TensorDictBase) -> None:
+        """Take the optimizer's steps for what was played."""
+        size = self._recipe.batch_size
+        shuffled = (torch.randperm(len(steps)).split(size) for _ in range(self._recipe.epochs))
+        for rows in chain.from_iterable(shuffled):
+            losses = loss(steps[rows])
+            optimizer.zero_grad()
+            (losses["loss_objective"] + losses["loss_critic"]).backward()
+            for part in (loss.actor_network, loss.critic_network):  # their losses differ in scale
+                nn.utils.clip_grad_norm_(part.parameters(), self._recipe.max_grad_norm)
+            optimizer.step()
+
+    def _networks(self) -> Networks:
+        return Networks(
+            self._arms.observed, self._arms.full_action_spec[ACTION].shape[-1], self._recipe
+        )
+
+    def _optimizer(self, networks: Networks, number: int) -> Adam:
+        left = max(0.0, 1.0 - number * self.segment / self._options.steps)
+        return Adam(networks.parameters(), self._recipe.learning_rate * left, eps=1e-5)
+
+
+def _write(networks: Networks, optimizer: Adam, folder: Path) -> None:
+    state = {"networks": networks.state_dict(), "optimizer": optimizer.state_dict()["state"]}
+    torch.save(state, folder / FILES[0])
+
+
+def _read(folder: Path, networks: Networks, optimizer: Adam) -> None:
+    state = torch.load(folder / FILES[0], weights_only=True)
+    networks.load_state_dict(state["networks"])
+    groups = optimizer.state_dict()["param_groups"]  # with the learning rate of now
+    optimizer.load_state_dict({"state": state["optimizer"], "param_groups": groups})
+
+
+@cache
+def _loaded(path: Path) -> Callable[[Any], NDArray[np.float32]]:
+    """Return a checkpoint's policy: observation (1, D) → action of all robots (A,)."""
+    state = torch.load(path, weights_only=True)["networks"]
+    width = state["actors.2.state_independent_scale"].shape[-1]
+    networks = Networks(state["observed"], width, Recipe())
+    networks.load_state_dict(state)
+
+    def act(obs: Any) -> NDArray[np.float32]:
+        with torch.no_grad():
+            loc, _ = networks.actors(torch.as_tensor(obs)[:, networks.observed])
+        return loc.flatten().clamp(-1.0, 1.0).numpy()
+
+    return act
+
+
+policy = LearnedPolicy(Path(os.environ.get("MAPPO_RUN", FOLDER)), FILES, _loaded)
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the example.
+
+    Args:
+        arguments: Words of the command line; by default those of this process.
+
+    Returns:
+        0 if nine of ten test episodes succeed at the end, else 1.
+    """
+    options = read_arguments((__doc__ or "").splitlines()[0], FOLDER, arguments)
+    recipe = Recipe()
+    options.steps = options.steps or recipe.steps
+    recipe = replace(recipe, every=options.every or recipe.every)
+    settings = {"recipe": asdict(recipe), "torchrl": version("torchrl")}
+    return main(options, lambda: MAPPOLearner(recipe, options), settings)
+
+
+if __name__ == "__main__":  # the workers are processes of their own
+    sys.exit(run())
