@@ -1,0 +1,437 @@
+"""A network learns a task of one arm or two from an expert's episodes: behaviour cloning in chunks.
+
+    pip install 'robot-layouts[preview]'
+    python examples/imitate.py TwoRobotPickCube-v1
+
+It records the expert, plays the episodes again, as they were and with shaken arms, notes what is
+observed before each action, and lets a network predict the next actions from that. The network is
+examined on seeds that were never recorded. The same command goes on where it was stopped or killed,
+and equal commands make equal networks, to the last bit.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass
+from math import cos, pi
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+import tasks
+from robots import RobotLayoutsError, TaskError
+from robots.action_split import is_gripper
+from rollouts import Evaluation, evaluate, record
+from rollouts.progress import LiveLine
+from rollouts.reading.recording import open_trajectories
+from rollouts.reading.trajectory import Trajectory
+from tasks.driving import driven_groups
+from tasks.episode import moments
+
+MODE = "pd_joint_pos"  # actions say where to go, which stays right when an arm was shaken
+EXAMINED_SEED = 500_000  # of the first episode that is played while it learns
+TEST_SEED = 1_000_000  # of the first test episode; recorded ones begin with 0
+TOGETHER = 25  # episodes played at once
+EXAMINATIONS = 20  # while it learns; after each, what it has learned is kept
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What decides the weights.
+
+    Attributes:
+        task: Id of the task.
+        episodes: How many of the expert's are learned from.
+        steps: How many batches.
+        seed: Of the first weights and of the batches.
+        shaken: How often each episode is played again with shaken arms.
+        shake: How far beside its target each joint is driven then, so that the network sees how to
+            come back (rad, standard deviation).
+        hold: Steps that a shaken episode may take longer, its last action held.
+        chunk: How many actions are predicted at once.
+        played: How many of these are carried out before it looks again.
+        width: Of the network's layers.
+        blocks: How many pairs of layers it has.
+        batch: Moments in a batch.
+        learning_rate: At first, after 200 batches; it falls to 0.
+    """
+
+    task: str
+    episodes: int = 1000
+    steps: int = 20_000
+    seed: int = 0
+    shaken: int = 2
+    shake: float = 0.02
+    hold: int = 6
+    chunk: int = 8
+    played: int = 4
+    width: int = 256
+    blocks: int = 3
+    batch: int = 256
+    learning_rate: float = 1e-3
+
+
+@dataclass(frozen=True)
+class Examination:
+    """How well the network does.
+
+    Attributes:
+        steps: Batches that it has learned from.
+        error: Mean since the last examination, in units of what a linear fit leaves.
+        success: Share of episodes that succeed.
+    """
+
+    steps: int
+    error: float
+    success: float
+
+
+def demonstrate(recipe: Recipe, folder: Path, workers: int | None) -> None:
+    """Record the expert's episodes that are not in the folder yet."""
+    with LiveLine(recipe.episodes, "episodes") as line:
+        record(
+            recipe.task,
+            range(recipe.episodes),
+            folder,
+            workers=workers,
+            control_mode=MODE,
+            on_event=lambda so_far, _: line.update(so_far.recorded, "recording"),
+        )
+
+
+class Rehearsal:
+    """Plays recorded episodes again, and notes what is observed before every action."""
+
+    def __init__(self, recipe: Recipe) -> None:
+        """Make the task, in which arms are driven to joint positions."""
+        self.env = tasks.make(recipe.task, control_mode=MODE, reward_mode="none")
+        self._recipe, self._size = recipe, np.zeros(self.env.layout.action_dim)
+        for driven in driven_groups(self.env.layout):
+            self._size[driven.numbers] = 0.0 if is_gripper(driven.name) else recipe.shake
+
+    def __call__(self, episode: Trajectory) -> Iterator[tuple[Floats, Floats]]:
+        """Yield observations (T, D) and right actions (T, A), for each time that succeeds."""
+        held = episode.actions[-1:].repeat(self._recipe.hold, axis=0)
+        right = np.concatenate([episode.actions, held])
+        for time in range(1 + self._recipe.shaken):
+            noise = _noise((episode.seed or 0, time), episode.actions.shape) * self._size
+            noise = np.pad(noise * bool(time), ((0, len(held)), (0, 0)))
+            seen = self._play(episode.seed or 0, (right + noise).astype(np.float32))
+            if seen is not None:
+                yield seen, right[: len(seen)]
+
+    def _play(self, seed: int, actions: Floats) -> Floats | None:
+        left, seen = iter(actions), list[Floats]()
+        for moment in moments(self.env, seed, lambda _: next(left), len(actions)):
+            if moment.success:
+                return np.stack(seen)
+            seen.append(moment.observation[0].numpy())
+        return None
+
+
+def _noise(seed: tuple[int, int], shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return normal noise, each step of which is half like the one before."""
+    noise = np.random.default_rng(seed).normal(size=shape)
+    for step in range(1, len(noise)):
+        noise[step] = 0.5 * noise[step - 1] + 0.75**0.5 * noise[step]
+    return noise
+
+
+def rehearse(recipe: Recipe, recording: Path) -> tuple[Tensor, Tensor]:
+    """Return what was observed, (N, D), and the actions that follow, (N, chunk · A).
+
+    Raises:
+        TaskError: If the recording has too few episodes, or is in another control mode.
+        TrajectoryError: If it cannot be read, or is of another world.
+    """
+    rehearsal, samples = Rehearsal(recipe), list[tuple[Floats, Floats]]()
+    with closing(rehearsal.env), open_trajectories(recording) as file:
+        if file.control_mode != MODE or len(file) < recipe.episodes:
+            raise TaskError(
+                f"{recording} has {len(file)} episodes in {file.control_mode!r}; it must have"
+                f" {recipe.episodes} in {MODE!r}"
+            )
+        file.expect_world(rehearsal.env)
+        with LiveLine(recipe.episodes, "episodes") as line:
+            for number in range(recipe.episodes):
+                samples += rehearsal(file[number])
+                line.update(number + 1, "playing again")
+    seen = np.concatenate([observations for observations, _ in samples])
+    chunks = np.concatenate([_chunks(actions, recipe.chunk) for _, actions in samples])
+    return torch.from_numpy(seen), torch.from_numpy(chunks)
+
+
+def _chunks(actions: Floats, size: int) -> Floats:
+    """Return the actions from each step on, (T, size · A); the last one is held."""
+    steps = np.arange(len(actions))[:, None] + np.arange(size)
+    return actions[steps.clip(max=len(actions) - 1)].reshape(len(actions), -1)
+
+
+class Block(nn.Module):
+    """Two layers whose outcome is added to what came in."""
+
+    def __init__(self, width: int) -> None:
+        """Make both as wide as what comes in."""
+        super().__init__()
+        inner, outer = nn.Linear(width, width), nn.Linear(width, width)
+        self.layers = nn.Sequential(nn.LayerNorm(width), inner, nn.GELU(), outer)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Map (N, width) to (N, width)."""
+        return x + self.layers(x)
+
+
+class ChunkNetwork(nn.Module):
+    """Predicts the next actions: a linear fit, and what a network adds to it.
+
+    Most of an action is where the arm is already. The fit takes that away, and the rest is given to
+    the network in units in which it is neither small nor large.
+    """
+
+    mean: Tensor
+    scale: Tensor
+    unit: Tensor
+
+    def __init__(self, inputs: int, outputs: int, width: int, blocks: int) -> None:
+        """Make it, for observations of ``inputs`` numbers and chunks of ``outputs``."""
+        super().__init__()
+        middle = (Block(width) for _ in range(blocks))
+        first, last = nn.Linear(inputs, width), nn.Linear(width, outputs)
+        self.network = nn.Sequential(first, *middle, nn.LayerNorm(width), last)
+        self.linear = nn.Linear(inputs, outputs).requires_grad_(False)
+        for name, size in (("mean", inputs), ("scale", inputs), ("unit", outputs)):
+            self.register_buffer(name, torch.ones(size))
+
+    @torch.no_grad()
+    def fit(self, observations: Tensor, chunks: Tensor) -> None:
+        """Fit the linear part by least squares, and measure the units."""
+        self.mean.copy_(observations.mean(0))
+        self.scale.copy_(observations.std(0).clamp(min=1e-2))
+        seen, middle = self.normalised(observations), chunks.mean(0)
+        x, y = seen.double(), (chunks - middle).double()
+        ridge = 1e-3 * len(x) * torch.eye(x.shape[1], dtype=x.dtype)
+        self.linear.weight.copy_(torch.linalg.solve(x.T @ x + ridge, x.T @ y).T)
+        self.linear.bias.copy_(middle)
+        self.unit.copy_((chunks - self.linear(seen)).std(0).clamp(min=1e-2))
+
+    def normalised(self, observations: Tensor) -> Tensor:
+        """Return observations in units of their standard deviation."""
+        return ((observations - self.mean) / self.scale).clamp(-6.0, 6.0)
+
+    def forward(self, observations: Tensor) -> Tensor:
+        """Predict chunks, (N, outputs)."""
+        seen = self.normalised(observations)
+        return self.linear(seen) + self.unit * self.network(seen)
+
+
+class ClonedPolicy:
+    """Plays what a network predicts; each episode is played by a copy of its own.
+
+    Attributes:
+        recipe: What it learned, and how.
+        file: Where it was loaded from, or None.
+    """
+
+    def __init__(self, recipe: Recipe, network: ChunkNetwork, file: str | None = None) -> None:
+        """Play with a network."""
+        self.recipe, self.file = recipe, file
+        self._network, self._left = network, list[Tensor]()
+
+    @classmethod
+    def load(cls, file: str | Path) -> ClonedPolicy:
+        """Load what `Training.save` wrote."""
+        saved: dict[str, Any] = torch.load(file, weights_only=True)
+        recipe, weights = Recipe(**saved["recipe"]), saved["network"]
+        outputs, inputs = weights["linear.weight"].shape
+        network = ChunkNetwork(inputs, outputs, recipe.width, recipe.blocks)
+        network.load_state_dict(weights)
+        return cls(recipe, network, str(file))
+
+    @torch.no_grad()
+    def __call__(self, observation: Tensor) -> Tensor:
+        """Return the next action, (A,), after an observation (1, D)."""
+        if not self._left:
+            chunk = self._network(observation).reshape(self.recipe.chunk, -1)
+            self._left = [*chunk[: self.recipe.played]]
+        return self._left.pop(0)
+
+    def examine(self, first: int, count: int, on_event: Callable[[Any], None]) -> Evaluation:
+        """Play the episodes of some seeds."""
+        task, seeds = self.recipe.task, range(first, first + count)
+        how: dict[str, Any] = {"control_mode": MODE, "num_envs": TOGETHER, "workers": 0}
+        return evaluate(self, task, seeds, on_event=on_event, **how)
+
+
+class Training:
+    """A network, and how far it has learned.
+
+    Attributes:
+        network: The network.
+        steps: Batches that it has learned from.
+        curve: How well it did, in order.
+    """
+
+    def __init__(self, recipe: Recipe, observations: Tensor, chunks: Tensor) -> None:
+        """Make a network that has learned nothing but the linear fit."""
+        self.steps, self.curve = 0, list[Examination]()
+        self._recipe, self._observations, self._chunks = recipe, observations, chunks
+        self._random = torch.Generator().manual_seed(recipe.seed)
+        self._errors = list[float]()
+        torch.manual_seed(recipe.seed)  # of the first weights
+        sizes = observations.shape[1], chunks.shape[1], recipe.width, recipe.blocks
+        self.network = ChunkNetwork(*sizes)
+        self.network.fit(observations, chunks)
+        self._optimizer = torch.optim.AdamW(self.network.network.parameters())
+
+    def step(self) -> None:
+        """Learn from a batch."""
+        recipe, network = self._recipe, self.network
+        pace = min(1.0, (self.steps + 1) / 200) * (1 + cos(pi * self.steps / recipe.steps)) / 2
+        self._optimizer.param_groups[0]["lr"] = recipe.learning_rate * pace
+        batch = torch.randint(len(self._chunks), (recipe.batch,), generator=self._random)
+        missed = network(self._observations[batch]) - self._chunks[batch]
+        error = (missed / network.unit).abs().mean()
+        self._optimizer.zero_grad()
+        error.backward()
+        self._optimizer.step()
+        self.steps += 1
+        self._errors.append(error.item())
+
+    def note(self, success: float) -> str:
+        """Add an examination to the curve, and return it as a line."""
+        found = Examination(self.steps, round(float(np.mean(self._errors)), 4), success)
+        self.curve, self._errors = [*self.curve, found], []
+        return f"{self.steps:>7} batches  error {found.error:.3f}  success {success:>4.0%}"
+
+    def save(self, path: Path) -> None:
+        """Write all that it takes to go on, whole or not at all."""
+        state = {
+            "recipe": asdict(self._recipe),
+            "network": self.network.state_dict(),
+            "optimizer": self._optimizer.state_dict(),
+            "random": self._random.get_state(),
+            "steps": self.steps,
+            "errors": self._errors,
+            "curve": [asdict(found) for found in self.curve],
+        }
+        torch.save(state, beside := path.with_name(f"{path.name}.new"))
+        os.replace(beside, path)
+
+    def load(self, path: Path) -> None:
+        """Go on where another one was saved.
+
+        Raises:
+            TaskError: If that one followed another recipe.
+        """
+        state: dict[str, Any] = torch.load(path, weights_only=True)
+        if state["recipe"] != asdict(self._recipe):
+            raise TaskError(f"{path} follows another recipe; choose another folder with --out")
+        self.network.load_state_dict(state["network"])
+        self._optimizer.load_state_dict(state["optimizer"])
+        self._random.set_state(state["random"])
+        self.steps, self._errors = state["steps"], state["errors"]
+        self.curve = [Examination(**found) for found in state["curve"]]
+
+
+def learn(training: Training, recipe: Recipe, examined: int, file: Path) -> ClonedPolicy:
+    """Learn all steps; examine the network and keep everything now and then."""
+    policy, every = ClonedPolicy(recipe, training.network), -(-recipe.steps // EXAMINATIONS)
+    with LiveLine(recipe.steps, "batches") as line:
+        while training.steps < recipe.steps:
+            training.step()
+            line.update(training.steps, "learning")
+            if training.steps % every == 0 or training.steps == recipe.steps:
+                found = policy.examine(EXAMINED_SEED, examined, lambda _: None)
+                line.say(training.note(found.success_rate))
+                training.save(file)
+    return ClonedPolicy.load(file)
+
+
+def draw(curve: Sequence[Examination], title: str, path: Path) -> None:
+    """Save the learning curve as a picture."""
+    steps = [found.steps / 1000 for found in curve]
+    figure = Figure(figsize=(7, 4), dpi=110, layout="constrained")
+    success = figure.add_subplot()
+    success.plot(steps, [100 * found.success for found in curve], "o-", color="#0072B2")
+    success.set(ylim=(0, 102), xlabel="batches (thousands)", title=title)
+    success.set_ylabel("success on unseen seeds (%)", color="#0072B2")
+    success.grid(alpha=0.3)
+    error = success.twinx()
+    error.plot(steps, [found.error for found in curve], "s--", color="#D55E00")
+    error.set_ylabel("error on what it learns from", color="#D55E00")
+    figure.savefig(path)
+
+
+def imitate(recipe: Recipe, options: argparse.Namespace, out: Path) -> Evaluation:
+    """Record, learn, and play the test seeds; leave weights, curve and numbers in a folder."""
+    torch.set_num_threads(1)  # several would add up in other orders
+    warnings.filterwarnings("ignore", "robot .* is thrown about")  # beginners hit the table
+    out.mkdir(parents=True, exist_ok=True)
+    if options.recording is None:
+        demonstrate(recipe, out / "recording", options.workers)
+    training = Training(recipe, *rehearse(recipe, options.recording or out / "recording"))
+    if (out / "policy.pt").exists():
+        training.load(out / "policy.pt")
+    policy = learn(training, recipe, options.examined, out / "policy.pt")
+    with LiveLine(options.tests, "episodes") as line:
+        result = policy.examine(TEST_SEED, options.tests, lambda _: line.advance(1, "examining"))
+    numbers = {
+        "recipe": asdict(recipe),
+        "test_seeds": [TEST_SEED, TEST_SEED + options.tests - 1],
+        "success": result.success_rate,
+        "failed": [seed for seed, success in result.successes.items() if not success],
+        "curve": [asdict(found) for found in training.curve],
+    }
+    (out / "learning_curve.json").write_text(json.dumps(numbers, indent=2) + "\n")
+    title = f"{recipe.task}, learned from {recipe.episodes} episodes"
+    draw(training.curve, title, out / "learning_curve.png")
+    return result
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the example.
+
+    Args:
+        arguments: Words of the command line; by default those of this process.
+
+    Returns:
+        0 if 85 of 100 test episodes succeed, else 1.
+    """
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    add = parser.add_argument
+    add("task", nargs="?", default="TwoRobotPickCube-v1", help="task id (default %(default)s)")
+    add("--episodes", type=int, default=Recipe.episodes, help="to learn from (%(default)s)")
+    add("--steps", type=int, default=Recipe.steps, help="batches to learn from (%(default)s)")
+    add("--seed", type=int, default=Recipe.seed, help="of weights and batches (%(default)s)")
+    add("--examined", type=int, default=25, help="episodes now and then (%(default)s)")
+    add("--tests", type=int, default=100, help="test episodes (%(default)s)")
+    add("--workers", type=int, help="processes that record (default: one per core)")
+    add("--recording", type=Path, help="folder of a recording that is there already")
+    add("--out", type=Path, help="folder (default: runs/imitate/TASK)")
+    options = parser.parse_args(arguments)
+    recipe = Recipe(options.task, options.episodes, options.steps, options.seed)
+    out = options.out or Path("runs/imitate") / options.task.rpartition(":")[2]
+    try:
+        result = imitate(recipe, options, out)
+    except RobotLayoutsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    print(f"{result}\nsee {out}")
+    return 0 if result.success_rate >= 0.85 else 1
+
+
+if __name__ == "__main__":  # the workers are processes of their own
+    sys.exit(main())
