@@ -84,21 +84,6 @@ class Recipe:
     learning_rate: float = 1e-3
 
 
-@dataclass(frozen=True)
-class Examination:
-    """How well the network does.
-
-    Attributes:
-        steps: Batches that it has learned from.
-        error: Mean since the last examination, in units of what a linear fit leaves.
-        success: Share of episodes that succeed.
-    """
-
-    steps: int
-    error: float
-    success: float
-
-
 def demonstrate(recipe: Recipe, folder: Path, workers: int | None) -> None:
     """Record the expert's episodes that are not in the folder yet."""
     with LiveLine(recipe.episodes, "episodes") as line:
@@ -281,12 +266,13 @@ class Training:
     Attributes:
         network: The network.
         steps: Batches that it has learned from.
-        curve: How well it did, in order.
+        curve: How well it did: batches learned from, mean error since the last examination in units
+            of what the linear fit leaves, share of episodes that succeeded.
     """
 
     def __init__(self, recipe: Recipe, observations: Tensor, chunks: Tensor) -> None:
         """Make a network that has learned nothing but the linear fit."""
-        self.steps, self.curve = 0, list[Examination]()
+        self.steps, self.curve = 0, list[tuple[int, float, float]]()
         self._recipe, self._observations, self._chunks = recipe, observations, chunks
         self._random = torch.Generator().manual_seed(recipe.seed)
         self._errors = list[float]()
@@ -312,9 +298,10 @@ class Training:
 
     def note(self, success: float) -> str:
         """Add an examination to the curve, and return it as a line."""
-        found = Examination(self.steps, round(float(np.mean(self._errors)), 4), success)
-        self.curve, self._errors = [*self.curve, found], []
-        return f"{self.steps:>7} batches  error {found.error:.3f}  success {success:>4.0%}"
+        error = round(float(np.mean(self._errors)), 4)
+        self.curve.append((self.steps, error, success))
+        self._errors = []
+        return f"{self.steps:>7} batches  error {error:.3f}  success {success:>4.0%}"
 
     def save(self, path: Path) -> None:
         """Write all that it takes to go on, whole or not at all."""
@@ -325,7 +312,7 @@ class Training:
             "random": self._random.get_state(),
             "steps": self.steps,
             "errors": self._errors,
-            "curve": [asdict(found) for found in self.curve],
+            "curve": self.curve,
         }
         torch.save(state, beside := path.with_name(f"{path.name}.new"))
         os.replace(beside, path)
@@ -343,7 +330,7 @@ class Training:
         self._optimizer.load_state_dict(state["optimizer"])
         self._random.set_state(state["random"])
         self.steps, self._errors = state["steps"], state["errors"]
-        self.curve = [Examination(**found) for found in state["curve"]]
+        self.curve = state["curve"]
 
 
 def learn(training: Training, recipe: Recipe, examined: int, file: Path) -> ClonedPolicy:
@@ -360,17 +347,16 @@ def learn(training: Training, recipe: Recipe, examined: int, file: Path) -> Clon
     return ClonedPolicy.load(file)
 
 
-def draw(curve: Sequence[Examination], title: str, path: Path) -> None:
+def draw(curve: Sequence[tuple[int, float, float]], title: str, path: Path) -> None:
     """Save the learning curve as a picture."""
-    steps = [found.steps / 1000 for found in curve]
+    steps, errors, successes = np.array(curve).T
     figure = Figure(figsize=(7, 4), dpi=110, layout="constrained")
-    success = figure.add_subplot()
-    success.plot(steps, [100 * found.success for found in curve], "o-", color="#0072B2")
-    success.set(ylim=(0, 102), xlabel="batches (thousands)", title=title)
+    success = figure.add_subplot(title=title, xlabel="batches", ylim=(0, 102))
+    success.plot(steps, 100 * successes, "o-", color="#0072B2")
     success.set_ylabel("success on unseen seeds (%)", color="#0072B2")
     success.grid(alpha=0.3)
     error = success.twinx()
-    error.plot(steps, [found.error for found in curve], "s--", color="#D55E00")
+    error.plot(steps, errors, "s--", color="#D55E00")
     error.set_ylabel("error on what it learns from", color="#D55E00")
     figure.savefig(path)
 
@@ -393,7 +379,9 @@ def imitate(recipe: Recipe, options: argparse.Namespace, out: Path) -> Evaluatio
         "test_seeds": [TEST_SEED, TEST_SEED + options.tests - 1],
         "success": result.success_rate,
         "failed": [seed for seed, success in result.successes.items() if not success],
-        "curve": [asdict(found) for found in training.curve],
+        "curve": [
+            dict(zip(("steps", "error", "success"), row, strict=True)) for row in training.curve
+        ],
     }
     (out / "learning_curve.json").write_text(json.dumps(numbers, indent=2) + "\n")
     title = f"{recipe.task}, learned from {recipe.episodes} episodes"
