@@ -3,10 +3,10 @@
     pip install 'robot-layouts[preview]'
     python examples/imitate.py TwoRobotPickCube-v1
 
-It records the expert, plays the episodes again, as they were and with shaken arms, notes what is
-observed before each action, and lets a network predict the next actions from that. The network is
-examined on seeds that were never recorded. The same command goes on where it was stopped or killed,
-and equal commands make equal networks, to the last bit.
+It records the expert while its arms are shaken, plays that again, notes what is observed before
+each action, and lets a network predict the next actions from it. The network is examined on seeds
+that were never recorded, with arms that nothing shakes. The same command goes on where it was
+stopped or killed, and equal commands make equal networks, to the last bit.
 """
 
 from __future__ import annotations
@@ -30,16 +30,17 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 import tasks
+from layouts import Layout
 from robots import RobotLayoutsError, TaskError
-from robots.action_split import is_gripper
 from rollouts import Evaluation, evaluate, record
 from rollouts.progress import LiveLine
 from rollouts.reading.recording import open_trajectories
 from rollouts.reading.trajectory import Trajectory
-from tasks.driving import driven_groups
+from tasks import Normal, Randomization
+from tasks.driving import DrivenGroup, driven_groups
 from tasks.episode import moments
 
-MODE = "pd_joint_pos"  # actions say where to go, which stays right when an arm was shaken
+MODE = "pd_joint_pos"  # of the network: it says where to go, which is smooth; the expert, how far
 EXAMINED_SEED = 500_000  # of the first episode that is played while it learns
 TEST_SEED = 1_000_000  # of the first test episode; recorded ones begin with 0
 TOGETHER = 25  # episodes played at once
@@ -57,10 +58,8 @@ class Recipe:
         episodes: How many of the expert's are learned from.
         steps: How many batches.
         seed: Of the first weights and of the batches.
-        shaken: How often each episode is played again with shaken arms.
-        shake: How far beside its target each joint is driven then, so that the network sees how to
-            come back (rad, standard deviation).
-        hold: Steps that a shaken episode may take longer, its last action held.
+        shake: Noise of the expert's turns, which it does not know of, so that the network sees how
+            it comes back (action numbers, standard deviation; 1 is 0.1 rad).
         chunk: How many actions are predicted at once.
         played: How many of these are carried out before it looks again.
         width: Of the network's layers.
@@ -73,9 +72,7 @@ class Recipe:
     episodes: int = 1000
     steps: int = 20_000
     seed: int = 0
-    shaken: int = 2
-    shake: float = 0.02
-    hold: int = 6
+    shake: float = 0.15
     chunk: int = 8
     played: int = 4
     width: int = 256
@@ -84,76 +81,76 @@ class Recipe:
     learning_rate: float = 1e-3
 
 
+def shaking(recipe: Recipe) -> Randomization:
+    """Return the noise that moves arms aside while the expert brings them back."""
+    env = tasks.make(recipe.task)
+    env.close()
+    groups = [f"{driven.robot}.{driven.name}" for driven in _arms(env.layout)]
+    return Randomization(action_noise=dict.fromkeys(groups, Normal(recipe.shake)))
+
+
+def _arms(layout: Layout) -> Iterator[DrivenGroup]:
+    """Yield the joint groups whose action numbers are turns of their joints."""
+    return (driven for driven in driven_groups(layout) if driven.group.delta)
+
+
 def demonstrate(recipe: Recipe, folder: Path, workers: int | None) -> None:
     """Record the expert's episodes that are not in the folder yet."""
+    how: dict[str, Any] = {"workers": workers, "randomization": shaking(recipe)}
     with LiveLine(recipe.episodes, "episodes") as line:
-        record(
-            recipe.task,
-            range(recipe.episodes),
-            folder,
-            workers=workers,
-            control_mode=MODE,
-            on_event=lambda so_far, _: line.update(so_far.recorded, "recording"),
-        )
+        how["on_event"] = lambda so_far, _: line.update(so_far.recorded, "recording")
+        record(recipe.task, range(recipe.episodes), folder, **how)
 
 
-class Rehearsal:
+class Observer:
     """Plays recorded episodes again, and notes what is observed before every action."""
 
     def __init__(self, recipe: Recipe) -> None:
-        """Make the task, in which arms are driven to joint positions."""
-        self.env = tasks.make(recipe.task, control_mode=MODE, reward_mode="none")
-        self._recipe, self._size = recipe, np.zeros(self.env.layout.action_dim)
-        for driven in driven_groups(self.env.layout):
-            self._size[driven.numbers] = 0.0 if is_gripper(driven.name) else recipe.shake
+        """Make the task as it was recorded."""
+        shaken = shaking(recipe)
+        self.env = tasks.make(recipe.task, reward_mode="none", randomization=shaken)
+        self._arms = list(_arms(self.env.layout))
 
-    def __call__(self, episode: Trajectory) -> Iterator[tuple[Floats, Floats]]:
-        """Yield observations (T, D) and right actions (T, A), for each time that succeeds."""
-        held = episode.actions[-1:].repeat(self._recipe.hold, axis=0)
-        right = np.concatenate([episode.actions, held])
-        for time in range(1 + self._recipe.shaken):
-            noise = _noise((episode.seed or 0, time), episode.actions.shape) * self._size
-            noise = np.pad(noise * bool(time), ((0, len(held)), (0, 0)))
-            seen = self._play(episode.seed or 0, (right + noise).astype(np.float32))
-            if seen is not None:
-                yield seen, right[: len(seen)]
-
-    def _play(self, seed: int, actions: Floats) -> Floats | None:
-        left, seen = iter(actions), list[Floats]()
-        for moment in moments(self.env, seed, lambda _: next(left), len(actions)):
-            if moment.success:
-                return np.stack(seen)
+    def __call__(self, episode: Trajectory) -> tuple[Floats, Floats]:
+        """Return observations (T, D), and actions (T, A) as positions of joints."""
+        actions, seen, positions = iter(episode.actions), list[Floats](), list[Floats]()
+        steps, seed = len(episode.actions), episode.seed or 0
+        happening = moments(self.env, seed, lambda _: next(actions), steps)
+        for action, moment in zip(episode.actions, happening, strict=False):
             seen.append(moment.observation[0].numpy())
-        return None
+            positions.append(self._positions(action))
+        return np.stack(seen), np.stack(positions)
+
+    def _positions(self, action: Floats) -> Floats:
+        """Return an action with the positions that it turns joints to, from where they are."""
+        joints, wanted = self.env.simulation.read().joint_positions[0], action.copy()
+        for arm in self._arms:
+            low, high = np.array(arm.group.ranges).T
+            turn = low + (high - low) * (action[arm.numbers].clip(-1, 1) + 1) / 2
+            wanted[arm.numbers] = joints[arm.joints] + turn
+        return wanted
 
 
-def _noise(seed: tuple[int, int], shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return normal noise, each step of which is half like the one before."""
-    noise = np.random.default_rng(seed).normal(size=shape)
-    for step in range(1, len(noise)):
-        noise[step] = 0.5 * noise[step - 1] + 0.75**0.5 * noise[step]
-    return noise
-
-
-def rehearse(recipe: Recipe, recording: Path) -> tuple[Tensor, Tensor]:
+def observe(recipe: Recipe, recording: Path) -> tuple[Tensor, Tensor]:
     """Return what was observed, (N, D), and the actions that follow, (N, chunk · A).
 
+    Episodes that the expert did not solve are left out.
+
     Raises:
-        TaskError: If the recording has too few episodes, or is in another control mode.
+        TaskError: If the recording has too few episodes.
         TrajectoryError: If it cannot be read, or is of another world.
     """
-    rehearsal, samples = Rehearsal(recipe), list[tuple[Floats, Floats]]()
-    with closing(rehearsal.env), open_trajectories(recording) as file:
-        if file.control_mode != MODE or len(file) < recipe.episodes:
-            raise TaskError(
-                f"{recording} has {len(file)} episodes in {file.control_mode!r}; it must have"
-                f" {recipe.episodes} in {MODE!r}"
-            )
-        file.expect_world(rehearsal.env)
+    observer, samples = Observer(recipe), list[tuple[Floats, Floats]]()
+    with closing(observer.env), open_trajectories(recording) as file:
+        file.expect(observer.env.task_id, observer.env.layout.action_dim)
+        file.expect_world(observer.env)
+        if len(file) < recipe.episodes:
+            raise TaskError(f"{recording} has {len(file)} episodes, not {recipe.episodes}")
         with LiveLine(recipe.episodes, "episodes") as line:
             for number in range(recipe.episodes):
-                samples += rehearsal(file[number])
-                line.update(number + 1, "playing again")
+                if (episode := file[number]).solved:
+                    samples.append(observer(episode))
+                line.update(number + 1, "observing")
     seen = np.concatenate([observations for observations, _ in samples])
     chunks = np.concatenate([_chunks(actions, recipe.chunk) for _, actions in samples])
     return torch.from_numpy(seen), torch.from_numpy(chunks)
@@ -368,7 +365,7 @@ def imitate(recipe: Recipe, options: argparse.Namespace, out: Path) -> Evaluatio
     out.mkdir(parents=True, exist_ok=True)
     if options.recording is None:
         demonstrate(recipe, out / "recording", options.workers)
-    training = Training(recipe, *rehearse(recipe, options.recording or out / "recording"))
+    training = Training(recipe, *observe(recipe, options.recording or out / "recording"))
     if (out / "policy.pt").exists():
         training.load(out / "policy.pt")
     policy = learn(training, recipe, options.examined, out / "policy.pt")

@@ -16,7 +16,7 @@ import torch
 
 pytest.importorskip("matplotlib")
 
-from rollouts import evaluate, record
+from rollouts import evaluate
 from rollouts.reading.trajectory import TrajectoryFile
 
 ROOT = Path(__file__).parent.parent.parent
@@ -36,9 +36,9 @@ def example():
 
 
 @pytest.fixture(scope="module")
-def recording(tmp_path_factory):
+def recording(example, tmp_path_factory):
     folder = tmp_path_factory.mktemp("recording")
-    record(TASK, range(2), folder, workers=0, control_mode=MODE)
+    example.demonstrate(example.Recipe(TASK, episodes=2), folder, workers=0)
     return folder
 
 
@@ -97,31 +97,34 @@ def test_a_killed_run_goes_on_to_the_same_weights(example, learned, recording, t
     assert kept.read_bytes() == (learned / "policy.pt").read_bytes()
 
 
-def test_shaken_arms_still_get_the_right_actions(example, recording):
-    recipe = example.Recipe(TASK, episodes=1, shaken=3)
-    rehearsal = example.Rehearsal(recipe)
+def observed(example, recording):
+    """An episode as it was recorded, and what the network learns from it."""
+    observer = example.Observer(example.Recipe(TASK))
     with TrajectoryFile(recording / "trajectory.h5") as file:
         episode = file[0]
-    played = list(rehearsal(episode))
-    rehearsal.env.close()
-    assert len(played) > 1
-    for _, actions in played:
-        same = min(len(actions), len(episode.actions))
-        assert np.array_equal(actions[:same], episode.actions[:same])
-    first, shaken = played[0][0], played[1][0]
-    assert np.array_equal(first[0], shaken[0])
-    assert not np.array_equal(first[5], shaken[5])
+    seen, positions = observer(episode)
+    observer.env.close()
+    return episode, seen, positions
 
 
-def test_what_is_noted_is_what_was_observed(example, recording):
-    """The states that were recorded are those that the network learns from."""
-    rehearsal = example.Rehearsal(example.Recipe(TASK, episodes=1, shaken=0))
-    with TrajectoryFile(recording / "trajectory.h5") as file:
-        episode = file[0]
-    ((seen, _),) = rehearsal(episode)
-    rehearsal.env.close()
+def test_what_is_observed_is_what_the_expert_had_before_it(example, recording):
+    episode, seen, _ = observed(example, recording)
     (arm,) = episode.states["articulations"].values()
-    assert np.array_equal(seen[:, :9], arm[: len(seen), 13:22])
+    assert len(seen) == len(episode.actions)
+    assert np.array_equal(seen[:, :9], arm[:-1, 13:22])
+
+
+def test_actions_become_the_positions_that_they_turn_to(example, recording):
+    episode, seen, positions = observed(example, recording)
+    turns = 0.1 * episode.actions[:, :7]  # rad: the range of pd_joint_delta_pos
+    assert np.allclose(positions[:, :7], seen[:, :7] + turns, atol=1e-6)
+    assert np.array_equal(positions[:, 7], episode.actions[:, 7])  # the gripper's
+
+
+def test_arms_are_shaken_and_grippers_are_not(example):
+    noise = example.shaking(example.Recipe("TwoRobotPickCube-v1", shake=0.3)).action_noise
+    assert set(noise) == {"left.arm", "right.arm"}
+    assert {size.std for size in noise.values()} == {0.3}
 
 
 def test_chunks_hold_the_last_action(example):
@@ -156,5 +159,5 @@ def test_a_folder_of_another_recipe_is_refused(example, learned, recording, caps
 def test_a_recording_that_does_not_serve_is_refused(example, recording, tmp_path, capsys):
     words = [*WORDS, "--episodes", "3", "--recording", str(recording), "--out", str(tmp_path)]
     assert example.main(words) == 1
-    assert "has 2 episodes in 'pd_joint_pos'; it must have 3" in capsys.readouterr().err
+    assert "has 2 episodes, not 3" in capsys.readouterr().err
     assert not (tmp_path / "policy.pt").exists()
