@@ -1,0 +1,163 @@
+"""The example that learns from an expert's episodes."""
+
+import importlib.util
+import json
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+pytest.importorskip("matplotlib")
+
+from rollouts import evaluate
+from rollouts.reading.trajectory import TrajectoryFile
+
+ROOT = Path(__file__).parent.parent.parent
+EXAMPLE = ROOT / "examples" / "imitate.py"
+TASK, MODE = "PushCube-v1", "pd_joint_pos"
+WORDS = [TASK, "--episodes", "2", "--steps", "60", "--examined", "1", "--tests", "2"]
+
+
+@pytest.fixture(scope="module")
+def example():
+    spec = importlib.util.spec_from_file_location("imitate", EXAMPLE)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["imitate"] = module
+    spec.loader.exec_module(module)
+    yield module
+    del sys.modules["imitate"]
+
+
+@pytest.fixture(scope="module")
+def recording(example, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recording")
+    example.demonstrate(example.Recipe(TASK, episodes=2), folder, workers=0)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def learned(example, recording, tmp_path_factory):
+    """The folder of a run that nothing interrupted."""
+    out = tmp_path_factory.mktemp("learned")
+    assert example.main([*WORDS, "--recording", str(recording), "--out", str(out)]) in (0, 1)
+    return out
+
+
+def weights(folder):
+    return torch.load(folder / "policy.pt", weights_only=True)["network"]
+
+
+def expect_equal(found, expected):
+    assert found.keys() == expected.keys()
+    for name, values in expected.items():
+        assert torch.equal(found[name], values), name
+
+
+def test_it_records_learns_and_leaves_its_files(example, learned, tmp_path, capsys):
+    assert example.main([*WORDS, "--workers", "0", "--out", str(tmp_path)]) in (0, 1)
+    names = {"learning_curve.json", "learning_curve.png", "policy.pt"}
+    assert {path.name for path in tmp_path.iterdir()} == names | {"recording"}
+    numbers = json.loads((tmp_path / "learning_curve.json").read_text())
+    assert [found["steps"] for found in numbers["curve"]] == [*range(3, 61, 3)]
+    errors = [found["error"] for found in numbers["curve"]]
+    assert errors[-1] < 0.8 * errors[0]
+    assert numbers["test_seeds"] == [1_000_000, 1_000_001]
+    assert "of 2 episodes with success" in capsys.readouterr().out
+    expect_equal(weights(tmp_path), weights(learned))  # two runs, the same weights
+    assert (tmp_path / "policy.pt").read_bytes() == (learned / "policy.pt").read_bytes()
+
+
+def test_another_seed_makes_other_weights(example, learned, recording, tmp_path):
+    words = [*WORDS, "--seed", "1", "--recording", str(recording), "--out", str(tmp_path)]
+    example.main(words)
+    found, other = weights(tmp_path), weights(learned)
+    assert not torch.equal(found["network.0.weight"], other["network.0.weight"])
+    assert torch.equal(found["linear.weight"], other["linear.weight"])
+
+
+def test_a_killed_run_goes_on_to_the_same_weights(example, learned, recording, tmp_path):
+    words = [*WORDS, "--recording", str(recording), "--out", str(tmp_path)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    run = subprocess.Popen([sys.executable, str(EXAMPLE), *words], env=environment)
+    kept, since = tmp_path / "policy.pt", time.monotonic()
+    while not kept.exists() and time.monotonic() < since + 300 and run.poll() is None:
+        time.sleep(0.01)
+    run.send_signal(signal.SIGKILL)
+    assert run.wait() == -signal.SIGKILL
+    assert 0 < torch.load(kept, weights_only=True)["steps"] < 60
+    example.main(words)
+    expect_equal(weights(tmp_path), weights(learned))
+    assert kept.read_bytes() == (learned / "policy.pt").read_bytes()
+
+
+def observed(example, recording):
+    """An episode as it was recorded, and what the network learns from it."""
+    observer = example.Observer(example.Recipe(TASK))
+    with TrajectoryFile(recording / "trajectory.h5") as file:
+        episode = file[0]
+    seen, positions = observer(episode)
+    observer.env.close()
+    return episode, seen, positions
+
+
+def test_what_is_observed_is_what_the_expert_had_before_it(example, recording):
+    episode, seen, _ = observed(example, recording)
+    (arm,) = episode.states["articulations"].values()
+    assert len(seen) == len(episode.actions)
+    assert np.array_equal(seen[:, :9], arm[:-1, 13:22])
+
+
+def test_actions_become_the_positions_that_they_turn_to(example, recording):
+    episode, seen, positions = observed(example, recording)
+    turns = 0.1 * episode.actions[:, :7]  # rad: the range of pd_joint_delta_pos
+    assert np.allclose(positions[:, :7], seen[:, :7] + turns, atol=1e-6)
+    assert np.array_equal(positions[:, 7], episode.actions[:, 7])  # the gripper's
+
+
+def test_arms_are_shaken_and_grippers_are_not(example):
+    noise = example.shaking(example.Recipe("TwoRobotPickCube-v1", shake=0.3)).action_noise
+    assert set(noise) == {"left.arm", "right.arm"}
+    assert {size.std for size in noise.values()} == {0.3}
+
+
+def test_chunks_hold_the_last_action(example):
+    actions = np.arange(6, dtype=np.float32).reshape(3, 2)
+    chunks = example._chunks(actions, 2)
+    assert chunks.tolist() == [[0, 1, 2, 3], [2, 3, 4, 5], [4, 5, 4, 5]]
+
+
+def test_the_policy_plays_alike_alone_and_beside_others(example, learned):
+    policy = example.ClonedPolicy.load(learned / "policy.pt")
+    how = {"control_mode": MODE, "workers": 0}
+    alone = evaluate(policy, TASK, range(50, 53), **how)
+    beside = evaluate(pickle.loads(pickle.dumps(policy)), TASK, range(50, 53), num_envs=3, **how)
+    assert alone.scores == beside.scores
+    assert policy.file == str(learned / "policy.pt")
+
+
+def test_the_policy_looks_again_after_the_actions_it_plays(example, learned):
+    policy = example.ClonedPolicy.load(learned / "policy.pt")
+    still = torch.zeros(1, policy._network.linear.in_features)
+    first = [policy(still) for _ in range(policy.recipe.played)]
+    assert not torch.equal(first[0], first[1])
+    assert torch.equal(policy(still), first[0])
+
+
+def test_a_folder_of_another_recipe_is_refused(example, learned, recording, capsys):
+    words = [*WORDS, "--steps", "61", "--recording", str(recording), "--out", str(learned)]
+    assert example.main(words) == 1
+    assert "policy.pt follows another recipe; choose another folder" in capsys.readouterr().err
+
+
+def test_a_recording_that_does_not_serve_is_refused(example, recording, tmp_path, capsys):
+    words = [*WORDS, "--episodes", "3", "--recording", str(recording), "--out", str(tmp_path)]
+    assert example.main(words) == 1
+    assert "has 2 episodes, not 3" in capsys.readouterr().err
+    assert not (tmp_path / "policy.pt").exists()
