@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from robots.common.portable import is_portable
 from robots.common.rooms import PLAYING
 
 # What computes states, and what experts plan with.
@@ -44,7 +45,6 @@ _VARIABLES = (
     "ONEDNN_MAX_CPU_ISA",
     "OPENBLAS_CORETYPE",
 )
-_PORTABLE = "ROBOT_LAYOUTS_PORTABLE"  # set, and not to 0, in processes that compute portably
 
 _ROOT = Path(__file__).parents[2]
 _PLAYING = (*PLAYING[:-1], "rollouts/playing")  # the rest of rollouts only writes things down
@@ -72,7 +72,7 @@ def environment() -> dict[str, Any]:
             "name": _processor(),
             "torch": torch.backends.cpu.get_cpu_capability(),
             "numpy": " ".join(_numpy_features()),
-            "portable": _is_portable(),
+            "portable": is_portable(),
             "variables": " ".join(f"{n}={os.environ[n]}" for n in _VARIABLES if n in os.environ),
         },
     }
@@ -85,10 +85,6 @@ def versions(packages: Iterable[str]) -> dict[str, str]:
         with suppress(PackageNotFoundError):
             found[package] = version(package)
     return found
-
-
-def _is_portable() -> bool:
-    return os.environ.get(_PORTABLE, "0") != "0"
 
 
 def _source() -> str:
