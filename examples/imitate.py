@@ -76,7 +76,7 @@ class Recipe:
     seed: int = 0
     shake: float = 0.15
     chunk: int = 8
-    played: int = 8
+    played: int = 6
     width: int = 256
     blocks: int = 3
     batch: int = 256
@@ -218,6 +218,7 @@ class ChunkNetwork(nn.Module):
     mean: Tensor
     scale: Tensor
     unit: Tensor
+    switches: Tensor
 
     def __init__(self, inputs: int, outputs: int, width: int, blocks: int) -> None:
         """Make it, for observations of ``inputs`` numbers and chunks of ``outputs``."""
@@ -228,6 +229,7 @@ class ChunkNetwork(nn.Module):
         self.linear = nn.Linear(inputs, outputs).requires_grad_(False)
         for name, size in (("mean", inputs), ("scale", inputs), ("unit", outputs)):
             self.register_buffer(name, torch.ones(size))
+        self.register_buffer("switches", torch.zeros(outputs, dtype=torch.bool))
 
     @torch.no_grad()
     def fit(self, observations: Tensor, chunks: Tensor) -> None:
@@ -240,6 +242,7 @@ class ChunkNetwork(nn.Module):
         self.linear.weight.copy_(torch.linalg.solve(x.T @ x + ridge, x.T @ y).T)
         self.linear.bias.copy_(middle)
         self.unit.copy_((chunks - self.linear(seen)).std(0).clamp(min=1e-2))
+        self.switches.copy_((chunks.abs() == 1).all(0))
 
     def normalised(self, observations: Tensor) -> Tensor:
         """Return observations in units of their standard deviation."""
@@ -249,6 +252,14 @@ class ChunkNetwork(nn.Module):
         """Predict chunks, (N, outputs)."""
         seen = self.normalised(observations)
         return self.linear(seen) + self.unit * self.network(seen)
+
+    def choose(self, observations: Tensor) -> Tensor:
+        """Predict chunks whose grippers are opened or closed, as the expert's are.
+
+        Half closed they would look as if they were closing, and be closed.
+        """
+        chunks = self(observations)
+        return torch.where(self.switches, chunks.sign(), chunks)
 
 
 class ClonedPolicy:
@@ -278,7 +289,7 @@ class ClonedPolicy:
     def __call__(self, observation: Mapping[str, Any]) -> Tensor:
         """Return the next action, (A,), after an observation of one environment."""
         if not self._left:
-            chunk = self._network(self._senses(observation)).reshape(self.recipe.chunk, -1)
+            chunk = self._network.choose(self._senses(observation)).reshape(self.recipe.chunk, -1)
             self._left = [*chunk[: self.recipe.played]]
         return self._left.pop(0)
 

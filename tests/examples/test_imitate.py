@@ -160,6 +160,13 @@ def test_the_policy_looks_again_after_the_actions_it_plays(example, learned):
     assert torch.equal(policy(still), first[0])
 
 
+def test_grippers_are_opened_or_closed_and_nothing_between(example, learned):
+    policy = example.ClonedPolicy.load(learned / "policy.pt")
+    played = torch.stack([policy(seen_in(TASK)) for _ in range(policy.recipe.played)])
+    assert set(played[:, 7].tolist()) <= {-1.0, 1.0}
+    assert not set(played[:, :7].flatten().tolist()) & {-1.0, 1.0}
+
+
 def test_a_cube_looks_the_same_after_a_quarter_turn(example):
     senses, observation = example.Senses("StackCube-v1"), seen_in("StackCube-v1")
     before = senses(observation)
