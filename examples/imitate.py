@@ -16,7 +16,7 @@ import json
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from math import cos, pi
@@ -30,17 +30,19 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 import tasks
+from kinematics.rotations import rotation_of
 from layouts import Layout
 from robots import RobotLayoutsError, TaskError
 from rollouts import Evaluation, evaluate, record
 from rollouts.progress import LiveLine
 from rollouts.reading.recording import open_trajectories
 from rollouts.reading.trajectory import Trajectory
-from tasks import Normal, Randomization
+from tasks import Cube, Normal, Randomization
 from tasks.driving import DrivenGroup, driven_groups
 from tasks.episode import moments
 
 MODE = "pd_joint_pos"  # of the network: it says where to go, which is smooth; the expert, how far
+OBSERVED = "state_dict"
 EXAMINED_SEED = 500_000  # of the first episode that is played while it learns
 TEST_SEED = 1_000_000  # of the first test episode; recorded ones begin with 0
 TOGETHER = 25  # episodes played at once
@@ -74,7 +76,7 @@ class Recipe:
     seed: int = 0
     shake: float = 0.15
     chunk: int = 8
-    played: int = 4
+    played: int = 6
     width: int = 256
     blocks: int = 3
     batch: int = 256
@@ -102,14 +104,44 @@ def demonstrate(recipe: Recipe, folder: Path, workers: int | None) -> None:
         record(recipe.task, range(recipe.episodes), folder, **how)
 
 
+class Senses:
+    """What the network gets of an observation: positions and poses, as numbers.
+
+    Speeds are left out: from how an arm moves one can guess what it will do, but not what it
+    should. A cube looks the same after a quarter turn, and nobody shall have to learn that: its
+    rotation is given in numbers that are the same, too.
+    """
+
+    def __init__(self, task: str) -> None:
+        """Ask the task which of its bodies are cubes."""
+        bodies = tasks.get_task_class(task).bodies.items()
+        self._cubes = {f"{name}_pose" for name, body in bodies if isinstance(body, Cube)}
+
+    def __call__(self, observation: Mapping[str, Any]) -> Tensor:
+        """Return the numbers, (N, D), of what ``obs_mode="state_dict"`` observes."""
+        return torch.cat([*self._numbers(observation)], dim=1)
+
+    def _numbers(self, observation: Mapping[str, Any]) -> Iterator[Tensor]:
+        for name, part in observation.items():
+            if isinstance(part, Mapping):
+                yield from self._numbers(part)
+            elif name in self._cubes:
+                yield part[:, :3]
+                turned = torch.from_numpy(rotation_of(part[:, 3:].numpy())).float()
+                yield (turned**3 @ turned.mT).flatten(1)
+            elif name != "qvel":
+                yield part.reshape(len(part), -1).float()
+
+
 class Observer:
     """Plays recorded episodes again, and notes what is observed before every action."""
 
     def __init__(self, recipe: Recipe) -> None:
         """Make the task as it was recorded."""
         shaken = shaking(recipe)
-        self.env = tasks.make(recipe.task, reward_mode="none", randomization=shaken)
-        self._arms = list(_arms(self.env.layout))
+        how: dict[str, Any] = {"obs_mode": OBSERVED, "reward_mode": "none"}
+        self.env = tasks.make(recipe.task, randomization=shaken, **how)
+        self._senses, self._arms = Senses(recipe.task), list(_arms(self.env.layout))
 
     def __call__(self, episode: Trajectory) -> tuple[Floats, Floats]:
         """Return observations (T, D), and actions (T, A) as positions of joints."""
@@ -117,7 +149,7 @@ class Observer:
         steps, seed = len(episode.actions), episode.seed or 0
         happening = moments(self.env, seed, lambda _: next(actions), steps)
         for action, moment in zip(episode.actions, happening, strict=False):
-            seen.append(moment.observation[0].numpy())
+            seen.append(self._senses(moment.observation)[0].numpy())
             positions.append(self._positions(action))
         return np.stack(seen), np.stack(positions)
 
@@ -186,6 +218,7 @@ class ChunkNetwork(nn.Module):
     mean: Tensor
     scale: Tensor
     unit: Tensor
+    switches: Tensor
 
     def __init__(self, inputs: int, outputs: int, width: int, blocks: int) -> None:
         """Make it, for observations of ``inputs`` numbers and chunks of ``outputs``."""
@@ -196,6 +229,7 @@ class ChunkNetwork(nn.Module):
         self.linear = nn.Linear(inputs, outputs).requires_grad_(False)
         for name, size in (("mean", inputs), ("scale", inputs), ("unit", outputs)):
             self.register_buffer(name, torch.ones(size))
+        self.register_buffer("switches", torch.zeros(outputs, dtype=torch.bool))
 
     @torch.no_grad()
     def fit(self, observations: Tensor, chunks: Tensor) -> None:
@@ -208,6 +242,7 @@ class ChunkNetwork(nn.Module):
         self.linear.weight.copy_(torch.linalg.solve(x.T @ x + ridge, x.T @ y).T)
         self.linear.bias.copy_(middle)
         self.unit.copy_((chunks - self.linear(seen)).std(0).clamp(min=1e-2))
+        self.switches.copy_((chunks.abs() == 1).all(0))
 
     def normalised(self, observations: Tensor) -> Tensor:
         """Return observations in units of their standard deviation."""
@@ -217,6 +252,14 @@ class ChunkNetwork(nn.Module):
         """Predict chunks, (N, outputs)."""
         seen = self.normalised(observations)
         return self.linear(seen) + self.unit * self.network(seen)
+
+    def choose(self, observations: Tensor) -> Tensor:
+        """Predict chunks whose grippers are opened or closed, as the expert's are.
+
+        Half closed they would look as if they were closing, and be closed.
+        """
+        chunks = self(observations)
+        return torch.where(self.switches, chunks.sign(), chunks)
 
 
 class ClonedPolicy:
@@ -230,7 +273,7 @@ class ClonedPolicy:
     def __init__(self, recipe: Recipe, network: ChunkNetwork, file: str | None = None) -> None:
         """Play with a network."""
         self.recipe, self.file = recipe, file
-        self._network, self._left = network, list[Tensor]()
+        self._senses, self._network, self._left = Senses(recipe.task), network, list[Tensor]()
 
     @classmethod
     def load(cls, file: str | Path) -> ClonedPolicy:
@@ -243,18 +286,18 @@ class ClonedPolicy:
         return cls(recipe, network, str(file))
 
     @torch.no_grad()
-    def __call__(self, observation: Tensor) -> Tensor:
-        """Return the next action, (A,), after an observation (1, D)."""
+    def __call__(self, observation: Mapping[str, Any]) -> Tensor:
+        """Return the next action, (A,), after an observation of one environment."""
         if not self._left:
-            chunk = self._network(observation).reshape(self.recipe.chunk, -1)
+            chunk = self._network.choose(self._senses(observation)).reshape(self.recipe.chunk, -1)
             self._left = [*chunk[: self.recipe.played]]
         return self._left.pop(0)
 
     def examine(self, first: int, count: int, on_event: Callable[[Any], None]) -> Evaluation:
         """Play the episodes of some seeds."""
         task, seeds = self.recipe.task, range(first, first + count)
-        how: dict[str, Any] = {"control_mode": MODE, "num_envs": TOGETHER, "workers": 0}
-        return evaluate(self, task, seeds, on_event=on_event, **how)
+        how: dict[str, Any] = {"control_mode": MODE, "obs_mode": OBSERVED, "workers": 0}
+        return evaluate(self, task, seeds, num_envs=TOGETHER, on_event=on_event, **how)
 
 
 class Training:

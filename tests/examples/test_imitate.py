@@ -16,6 +16,8 @@ import torch
 
 pytest.importorskip("matplotlib")
 
+import tasks
+from kinematics.rotations import multiply
 from rollouts import evaluate
 from rollouts.reading.trajectory import TrajectoryFile
 
@@ -135,19 +137,50 @@ def test_chunks_hold_the_last_action(example):
 
 def test_the_policy_plays_alike_alone_and_beside_others(example, learned):
     policy = example.ClonedPolicy.load(learned / "policy.pt")
-    how = {"control_mode": MODE, "workers": 0}
+    how = {"control_mode": MODE, "obs_mode": "state_dict", "workers": 0}
     alone = evaluate(policy, TASK, range(50, 53), **how)
     beside = evaluate(pickle.loads(pickle.dumps(policy)), TASK, range(50, 53), num_envs=3, **how)
     assert alone.scores == beside.scores
     assert policy.file == str(learned / "policy.pt")
 
 
+def seen_in(task):
+    """What is observed after a reset."""
+    env = tasks.make(task, obs_mode="state_dict")
+    observation, _ = env.reset(seed=7)
+    env.close()
+    return observation
+
+
 def test_the_policy_looks_again_after_the_actions_it_plays(example, learned):
     policy = example.ClonedPolicy.load(learned / "policy.pt")
-    still = torch.zeros(1, policy._network.linear.in_features)
+    still = seen_in(TASK)
     first = [policy(still) for _ in range(policy.recipe.played)]
     assert not torch.equal(first[0], first[1])
     assert torch.equal(policy(still), first[0])
+
+
+def test_grippers_are_opened_or_closed_and_nothing_between(example, learned):
+    policy = example.ClonedPolicy.load(learned / "policy.pt")
+    played = torch.stack([policy(seen_in(TASK)) for _ in range(policy.recipe.played)])
+    assert set(played[:, 7].tolist()) <= {-1.0, 1.0}
+    assert not set(played[:, :7].flatten().tolist()) & {-1.0, 1.0}
+
+
+def test_a_cube_looks_the_same_after_a_quarter_turn(example):
+    senses, observation = example.Senses("StackCube-v1"), seen_in("StackCube-v1")
+    before = senses(observation)
+    pose = observation["extra"]["cubeA_pose"]
+
+    def turned(angle):
+        half = torch.tensor([0.5 * angle])
+        by = torch.cat([torch.cos(half), torch.zeros(2), torch.sin(half)])
+        quaternion = multiply(pose[:, 3:].numpy(), by.numpy())
+        again = torch.cat([pose[:, :3], torch.from_numpy(quaternion).float()], 1)
+        return senses({**observation, "extra": {**observation["extra"], "cubeA_pose": again}})
+
+    assert torch.allclose(turned(np.pi / 2), before, atol=1e-5)
+    assert not torch.allclose(turned(np.pi / 8), before, atol=1e-2)
 
 
 def test_a_folder_of_another_recipe_is_refused(example, learned, recording, capsys):
