@@ -40,7 +40,7 @@ from learning_runs import (
 )
 from numpy.typing import NDArray
 from tensordict import TensorDictBase
-from tensordict.nn import AddStateIndependentNormalScale, TensorDictModule
+from tensordict.nn import AddStateIndependentNormalScale, InteractionType, TensorDictModule
 from torch import Tensor, nn
 from torch.distributions import Independent, Normal
 from torch.optim import Adam
@@ -82,25 +82,62 @@ class _Gaussian(Independent[Normal]):
         super().__init__(Normal(loc, scale), 1)
 
 
-class Normalized(nn.BatchNorm1d):
+class Statistics(nn.BatchNorm1d):
+    """Mean and deviation of all that it was shown, for each number."""
+
+    def __init__(self, numbers: int) -> None:
+        """Know nothing yet of rows of so many numbers."""
+        super().__init__(numbers, affine=False, momentum=None)
+        self.eval()
+
+    def look(self, rows: Tensor) -> None:
+        """Take more rows, (n, numbers), into the mean and the deviation."""
+        self.train()
+        self(rows)
+        self.eval()
+
+
+class Normalized(nn.Module):
     """Observations (…, A, D) by their mean and deviation, as they were when it last looked."""
 
     def __init__(self, agents: int, seen: int) -> None:
         """Know nothing yet of what ``agents`` observe, ``seen`` numbers each."""
-        super().__init__(agents * seen, affine=False, momentum=None)
-        self.eval()
+        super().__init__()
+        self.statistics = Statistics(agents * seen)
 
-    def forward(self, input: Tensor) -> Tensor:
+    def forward(self, obs: Tensor) -> Tensor:
         """Return them normalized, at most 5 deviations from the mean."""
-        flat = input.flatten(-2)
-        rows = super().forward(flat.reshape(-1, flat.shape[-1]))
-        return rows.clamp(-5.0, 5.0).reshape(input.shape)
+        return self.statistics(_rows(obs)).clamp(-5.0, 5.0).reshape(obs.shape)
 
     def look(self, obs: Tensor) -> None:
         """Take more observations into the mean and the deviation."""
-        self.train()
-        self(obs)
-        self.eval()
+        self.statistics.look(_rows(obs))
+
+
+def _rows(obs: Tensor) -> Tensor:
+    return obs.flatten(-2).flatten(0, -2)
+
+
+class Scaled(nn.Module):
+    """Rewards by the deviation of what is earned from an episode's beginning, discounted.
+
+    Were they as small as a task's first rewards are, the critic's errors would hide them.
+    """
+
+    def __init__(self, gamma: float) -> None:
+        """Know no rewards yet."""
+        super().__init__()
+        self._gamma, self.statistics = gamma, Statistics(1)
+
+    def forward(self, reward: Tensor) -> Tensor:
+        """Look at whole episodes' rewards, (N, T, A, 1), and return them scaled."""
+        earned = torch.zeros_like(reward[:, 0])
+        totals: list[Tensor] = []
+        for step in reward.unbind(1):
+            earned = earned * self._gamma + step
+            totals.append(earned)
+        self.statistics.look(torch.cat(totals).reshape(-1, 1))
+        return reward / (self.statistics.running_var + 1e-8).sqrt()
 
 
 class Networks(nn.Module):
@@ -125,9 +162,13 @@ class Networks(nn.Module):
         }
         self.register_buffer("observed", observed)
         self.normalized = Normalized(agents, seen)
+        self.scaled = Scaled(recipe.gamma)
+        own = MultiAgentMLP(seen, width, agents, centralized=False, share_params=False, **sizes)
+        for last in own.params[str(2 * recipe.depth)].values():
+            last.data.mul_(0.01)  # arms stay near where they begin, and explore from there
         self.actors = nn.Sequential(
             self.normalized,
-            MultiAgentMLP(seen, width, agents, centralized=False, share_params=False, **sizes),
+            own,
             AddStateIndependentNormalScale((agents, width), init_value=recipe.log_std),
         )
         self.critic = nn.Sequential(
@@ -143,6 +184,7 @@ class Networks(nn.Module):
                 in_keys=[LOC, SCALE],
                 out_keys=[ACTION],
                 distribution_class=_Gaussian,
+                default_interaction_type=InteractionType.RANDOM,
                 return_log_prob=True,
             ),
             ValueOperator(self.critic, in_keys=[OBSERVATION], out_keys=[VALUE]),
@@ -199,10 +241,11 @@ class MAPPOLearner(Learner):
         for iteration in range(self._recipe.every):
             with torch.no_grad():
                 episodes = self._arms.rollout(10**6, loss.actor_network)
+                rewards.append(float(episodes["next", REWARD].mean()))
+                episodes["next", REWARD] = networks.scaled(episodes["next", REWARD])
                 loss.value_estimator(episodes)
-            rewards.append(float(episodes["next", REWARD].mean()))
             ends.append(float(self._arms.succeeded.mean()))
-            self._improve(loss, optimizer, episodes.reshape(-1))
+            improve(loss, optimizer, episodes.reshape(-1), self._recipe)
             networks.normalized.look(episodes[OBSERVATION])
             notice((iteration + 1) * self._episode)
         _write(networks, optimizer, after)
@@ -212,18 +255,6 @@ class MAPPOLearner(Learner):
         """Return the policy of a checkpoint."""
         return LearnedPolicy(folder, FILES, _loaded)
 
-    def _improve(self, loss: ClipPPOLoss, optimizer: Adam, steps: TensorDictBase) -> None:
-        """Take the optimizer's steps for what was played."""
-        size = self._recipe.batch_size
-        shuffled = (torch.randperm(len(steps)).split(size) for _ in range(self._recipe.epochs))
-        for rows in chain.from_iterable(shuffled):
-            losses = loss(steps[rows])
-            optimizer.zero_grad()
-            (losses["loss_objective"] + losses["loss_critic"]).backward()
-            for part in (loss.actor_network, loss.critic_network):  # their losses differ in scale
-                nn.utils.clip_grad_norm_(part.parameters(), self._recipe.max_grad_norm)
-            optimizer.step()
-
     def _networks(self) -> Networks:
         return Networks(
             self._arms.observed, self._arms.full_action_spec[ACTION].shape[-1], self._recipe
@@ -232,6 +263,18 @@ class MAPPOLearner(Learner):
     def _optimizer(self, networks: Networks, number: int) -> Adam:
         left = max(0.0, 1.0 - number * self.segment / self._options.steps)
         return Adam(networks.parameters(), self._recipe.learning_rate * left, eps=1e-5)
+
+
+def improve(loss: ClipPPOLoss, optimizer: Adam, steps: TensorDictBase, recipe: Recipe) -> None:
+    """Take the optimizer's steps for what was played, in batches drawn by chance."""
+    shuffled = (torch.randperm(len(steps)).split(recipe.batch_size) for _ in range(recipe.epochs))
+    for rows in chain.from_iterable(shuffled):
+        losses = loss(steps[rows])
+        optimizer.zero_grad()
+        (losses["loss_objective"] + losses["loss_critic"]).backward()
+        for part in (loss.actor_network, loss.critic_network):  # their losses differ in scale
+            nn.utils.clip_grad_norm_(part.parameters(), recipe.max_grad_norm)
+        optimizer.step()
 
 
 def _write(networks: Networks, optimizer: Adam, folder: Path) -> None:

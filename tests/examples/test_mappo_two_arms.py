@@ -58,7 +58,7 @@ def test_actors_and_critic_learn(whole):
     assert any(name.startswith("actors") for name in trained)
     assert any(name.startswith("critic") for name in trained)
     assert not any(before[name].equal(after[name]) for name in trained)
-    seen = "normalized.running_mean"
+    seen = "normalized.statistics.running_mean"
     assert not before[seen].equal(after[seen])
 
 
