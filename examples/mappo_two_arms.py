@@ -137,7 +137,7 @@ class Scaled(nn.Module):
             earned = earned * self._gamma + step
             totals.append(earned)
         self.statistics.look(torch.cat(totals).reshape(-1, 1))
-        return reward / (self.statistics.running_var + 1e-8).sqrt()
+        return reward / (self.statistics.get_buffer("running_var") + 1e-8).sqrt()
 
 
 class Networks(nn.Module):
