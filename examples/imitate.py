@@ -19,6 +19,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
+from functools import cache
 from math import cos, pi
 from pathlib import Path
 from typing import Any
@@ -43,6 +44,7 @@ from tasks.episode import moments
 
 MODE = "pd_joint_pos"  # of the network: it says where to go, which is smooth; the expert, how far
 OBSERVED = "state_dict"
+FILE = "runs/imitate/TwoRobotPickCube-v1/policy.pt"  # or what IMITATE_POLICY says: the `policy`
 EXAMINED_SEED = 500_000  # of the first episode that is played while it learns
 TEST_SEED = 1_000_000  # of the first test episode; recorded ones begin with 0
 TOGETHER = 25  # episodes played at once
@@ -459,6 +461,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     print(f"{result}\nsee {out}")
     return 0 if result.success_rate >= 0.85 else 1
+
+
+@cache
+def _learned() -> ClonedPolicy:
+    return ClonedPolicy.load(os.environ.get("IMITATE_POLICY", FILE))
+
+
+def __getattr__(name: str) -> Any:
+    """Return what was learned, as `policy`, so that commands and receipts can name it."""
+    if name == "policy":
+        return _learned()
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 if __name__ == "__main__":  # the workers are processes of their own

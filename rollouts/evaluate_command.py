@@ -37,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     workers.add_arguments(parser)
     add("--seed", type=zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
     add("--receipt", type=Path, metavar="JSON", help="write a receipt, which `verify` plays again")
+    workers.add_obs_mode(parser)
     workers.add_control_mode(parser)
     add_cell_options(parser)
 
@@ -60,6 +61,7 @@ def run(options: argparse.Namespace) -> int:
                 executor=executor,
                 receipt=options.receipt,
                 on_event=_Status(line).show,
+                obs_mode=options.obs_mode,
                 control_mode=options.control_mode,
                 **chosen_cell(options),
             )

@@ -132,6 +132,16 @@ def _at_least(least: int, text: str) -> int:
     return number
 
 
+def add_obs_mode(parser: argparse.ArgumentParser) -> None:
+    """Add the option that says what policies observe."""
+    parser.add_argument(
+        "--obs-mode",
+        default="state",
+        metavar="MODE",
+        help="what they observe: state, state_dict, rgb and others (%(default)s)",
+    )
+
+
 def add_control_mode(
     parser: argparse.ArgumentParser, name: str = "--control-mode", **details: Any
 ) -> None:

@@ -51,12 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="MODULE:NAME",
         help="says at every step what it would do, which is recorded beside what is done",
     )
-    add(
-        "--obs-mode",
-        default="state",
-        metavar="MODE",
-        help="what they observe: state, state_dict, rgb and others (%(default)s)",
-    )
+    workers.add_obs_mode(parser)
     add(
         "--num-envs",
         type=one_or_more,
