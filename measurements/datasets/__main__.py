@@ -52,7 +52,8 @@ def main(arguments: list[str] | None = None) -> int:
     add = large.add_argument
     add("--tasks", nargs="+", default=LARGE, metavar="TASK", help=f"({' '.join(LARGE)})")
     add("--episodes", type=one_or_more, default=10_000, metavar="N", help="of each (%(default)s)")
-    add("--layouts", type=one_or_more, default=10, metavar="N", help="of each task (%(default)s)")
+    words = "numbers of the layouts of each task (0 to 9)"
+    add("--layouts", nargs="+", type=zero_or_more, default=range(10), metavar="K", help=words)
     add("--workers", type=one_or_more, default=2, metavar="W", help="(%(default)s)")
     add("--clips", type=zero_or_more, default=4, metavar="N", help="of each layout (%(default)s)")
     add("--out", type=Path, required=True, metavar="DIR", help="folder of all")

@@ -44,7 +44,7 @@ def make_large(
     out: Path,
     tasks: Sequence[str],
     episodes: int,
-    layouts: int,
+    layouts: Sequence[int],
     executor: Callable[[], Executor],
     *,
     clips: int = 4,
@@ -60,7 +60,7 @@ def make_large(
         out: Folder of all.
         tasks: Ids of tasks that `measurements.experts.cells` knows.
         episodes: Of each task.
-        layouts: In how many layouts of each.
+        layouts: In which of its layouts, by their numbers; as many in each.
         executor: Makes who plays.
         clips: How many episodes of each recording are filmed.
         say: Told of each recording that is done.
@@ -70,11 +70,11 @@ def make_large(
         What came of each recording, by its folder; also in ``OUT/summary.json``.
     """
     summary = _read(out / SUMMARY)
-    each = -(-episodes // layouts)
+    each = -(-episodes // len(layouts))
     for task_id in tasks:
-        for number in range(layouts):
+        for place, number in enumerate(layouts):
             name = f"{task_id}/layout_{number}"
-            seeds = range(number * each, min((number + 1) * each, episodes))
+            seeds = range(place * each, min((place + 1) * each, episodes))
             if len(seeds) and summary.get(name, {}).get("episodes") != len(seeds):
                 folder = out / task_id / f"layout_{number}"
                 layout = find_layout(task_id, number, folder)

@@ -40,7 +40,7 @@ def test_a_large_one_goes_on(tmp_path):
             tmp_path,
             ["FourRobotStack-v1"],
             episodes,
-            1,
+            [0],
             InProcessExecutor,
             clips=0,
             say=said.append,
