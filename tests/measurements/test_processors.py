@@ -48,6 +48,7 @@ def test_what_depends_on_the_processor_is_seen():
     assert summary(found)["states"] == len([kinds for kinds in found.values() if "states" in kinds])
 
 
+@pytest.mark.long
 def test_portable_physics_is_the_recorded_one():
     was = recorded()
     now = {**{name: version(name) for name in PACKAGES}, "glibc": libc_ver()[1]}
