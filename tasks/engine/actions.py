@@ -26,27 +26,31 @@ class ActionReader:
         self.checked: NDArray[np.float32] | None = None
         """An array, (N, A), whose numbers were checked by whoever writes them there."""
 
-    def read(self, action: Any) -> NDArray[np.float32]:
+    def read(
+        self, action: Any, env_ids: NDArray[np.integer[Any]] | None = None
+    ) -> NDArray[np.float32]:
         """Return the action as a float32 array of shape (N, A), in the layout's order.
 
         Args:
             action: Tensor or array (N, A), or a mapping robot name → (N, a). With one
                 environment the first dimension may be left out.
+            env_ids: The environments whose rows these are; all if None.
 
         Raises:
             ActionError: If its shape, type or a number is wrong; says which robot's.
         """
         if action is self.checked and self.checked is not None:
             return self.checked
+        count = self._num_envs if env_ids is None else len(env_ids)
         if type(action) is not torch.Tensor and isinstance(action, Mapping):
-            flat = self._join(action)
+            flat = self._join(action, count)
         else:
-            flat = self._array(action, self._width, "the action")
+            flat = self._array(action, count, self._width, "the action")
         if not all_finite(flat):
-            self._refuse_number(flat)
+            self._refuse_number(flat, env_ids)
         return flat
 
-    def _join(self, action: Mapping[str, Any]) -> NDArray[np.float32]:
+    def _join(self, action: Mapping[str, Any], count: int) -> NDArray[np.float32]:
         for name in action:
             if name not in self._split:
                 raise UnknownNameError("robot of this layout", name, self._split)
@@ -57,22 +61,22 @@ class ActionReader:
                 f"the action has no numbers for {missing}; the robots are {list(self._split)}"
             )
         parts = [
-            self._array(action[name], part.stop - part.start, f"the action of {name!r}")
+            self._array(action[name], count, part.stop - part.start, f"the action of {name!r}")
             for name, part in self._split.items()
             if name in action
         ]
         return np.concatenate(parts, axis=1)
 
-    def _array(self, value: Any, width: int, what: str) -> NDArray[np.float32]:
+    def _array(self, value: Any, count: int, width: int, what: str) -> NDArray[np.float32]:
         array = array_of(value, what, ActionError)
         if array.dtype.kind != "f":
             raise ActionError(f"{what} has dtype {array.dtype}; it must be floating (float32)")
-        if array.ndim == 1 and self._num_envs == 1:
+        if array.ndim == 1 and count == 1:
             array = array[None]
-        if array.shape != (self._num_envs, width):
+        if array.shape != (count, width):
             raise ActionError(
-                f"{what} has shape {array.shape}; it must be {(self._num_envs, width)}:"
-                f" {self._num_envs} environment(s), {self._describe(width)}"
+                f"{what} has shape {array.shape}; it must be {(count, width)}:"
+                f" {count} environment(s), {self._describe(width)}"
             )
         if array.dtype == np.float32:
             return array
@@ -85,11 +89,14 @@ class ActionReader:
         sizes = " + ".join(f"{p.stop - p.start} ({n})" for n, p in self._split.items())
         return f"{width} = {sizes} numbers"
 
-    def _refuse_number(self, flat: NDArray[np.float32]) -> None:
-        env, column = (int(i) for i in np.argwhere(~np.isfinite(flat))[0])
+    def _refuse_number(
+        self, flat: NDArray[np.float32], env_ids: NDArray[np.integer[Any]] | None
+    ) -> None:
+        row, column = (int(i) for i in np.argwhere(~np.isfinite(flat))[0])
+        env = row if env_ids is None else int(env_ids[row])
         name, part = next((n, p) for n, p in self._split.items() if p.start <= column < p.stop)
         number = self._layout.arm(name).robot.describe_action()[column - part.start]
         raise ActionError(
-            f"action number {column} is {flat[env, column]} in environment {env}: that is number"
+            f"action number {column} is {flat[row, column]} in environment {env}: that is number"
             f" {number.index} ({number.name}) of robot {name!r}; nothing was moved"
         )

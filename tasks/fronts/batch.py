@@ -77,7 +77,8 @@ class Batch:
         scenario = replace(part.scenario, num_envs=len(part.env_ids))
         self._task = part.task(scenario, first_seed=part.task.first_seed + part.start)
         self._step, self._part = stepper(self._task), part
-        self._over = np.zeros(len(part.env_ids), bool)  # begin anew at the next step
+        self._everywhere = np.ones(len(part.env_ids), bool)
+        self._over = ~self._everywhere  # begin anew at the next step
         self._rows: Arrays = {}
 
     def shapes(self) -> Shapes:
@@ -116,13 +117,18 @@ class Batch:
         self._rows[SEEDS][:] = self._task.seeds
         self._clear_flags(ids)
 
-    def step(self) -> None:
-        """Advance by one control step with the actions on the board."""
-        rows, over = self._rows, np.flatnonzero(self._over).tolist()
+    def step(self, env_ids: list[int] | None = None) -> None:
+        """Advance environments by one control step with the actions on the board.
+
+        Args:
+            env_ids: Their numbers in the batch; all if None. The rows of others stay.
+        """
+        rows, chosen = self._rows, self._chosen(env_ids)
+        over = np.flatnonzero(self._over & chosen).tolist()
         if not over:
-            self._move(rows["action"], None)
+            self._move(rows["action"], env_ids)
         else:
-            moving = np.flatnonzero(~self._over).tolist()
+            moving = np.flatnonzero(chosen & ~self._over).tolist()
             if moving:
                 self._move(np.where(self._over[:, None], np.float32(0.0), rows["action"]), moving)
             self._write(*self._task.reset(env_ids=over), over)
@@ -132,7 +138,7 @@ class Batch:
         if self._part.autoreset is AutoresetMode.NEXT_STEP:
             self._over = ended
         elif self._part.autoreset is AutoresetMode.SAME_STEP:
-            self._restart(ended)
+            self._restart(ended & chosen, chosen)
 
     def render(self) -> NDArray[np.uint8]:
         """Return a picture of every environment."""
@@ -145,18 +151,25 @@ class Batch:
 
     # -- inside ------------------------------------------------------------------------------
 
+    def _chosen(self, env_ids: list[int] | None) -> NDArray[np.bool_]:
+        if env_ids is None:
+            return self._everywhere
+        chosen = np.zeros_like(self._everywhere)
+        chosen[env_ids] = True
+        return chosen
+
     def _move(self, action: NDArray[np.float32], env_ids: list[int] | None) -> None:
         obs, reward, terminated, truncated, info = self._step(action, env_ids)
-        self._write(obs, info)
-        rows = self._rows
-        rows["reward"][:] = as_array(reward)
+        self._write(obs, info, env_ids)
+        rows, which = self._rows, slice(None) if env_ids is None else env_ids
         ends = not self._part.ignore_terminations
-        rows["terminated"][:] = as_array(terminated) if ends else False
-        rows["truncated"][:] = as_array(truncated)
+        rows["reward"][which] = as_array(reward)[which]
+        rows["terminated"][which] = as_array(terminated)[which] if ends else False
+        rows["truncated"][which] = as_array(truncated)[which]
 
-    def _restart(self, ended: NDArray[np.bool_]) -> None:
+    def _restart(self, ended: NDArray[np.bool_], chosen: NDArray[np.bool_]) -> None:
         rows, ids = self._rows, np.flatnonzero(ended).tolist()
-        rows["restarted"][:] = ended
+        rows["restarted"][chosen] = ended[chosen]
         if ids:
             for name in [name for name in rows if name.startswith(FINAL)]:
                 rows[name][ids] = rows[name.removeprefix(FINAL)][ids]

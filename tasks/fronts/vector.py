@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import weakref
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import wraps
 from threading import Lock
 from typing import Any, ClassVar, Concatenate, ParamSpec, TypeVar
@@ -16,17 +16,23 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from robots import SimulationError, TaskError, unknown_name_message
+from robots.common.bounds import checked_whole
 from tasks.engine.actions import ActionReader
 from tasks.engine.arguments import RECONFIGURE, SUCCESS, checked_options, checked_seeds
 from tasks.engine.observation import space_of
 from tasks.engine.remade import Remade
 from tasks.fronts.batch import FINAL, INFO, OBSERVATION, Beginning, Part
 from tasks.fronts.gymnasium import RENDER_MODES
-from tasks.fronts.workers import Failure, InProcess, WorkerError, Workers, WorkersFailed
+from tasks.fronts.in_process import InProcess
+from tasks.fronts.lost import Failure, WorkerError, WorkersFailed
+from tasks.fronts.shares import Sharing
+from tasks.fronts.workers import Workers
 from tasks.language.randomness import FirstSeeds
 from tasks.registry import get_task_class, make_scenario
 
 _Flags = NDArray[np.bool_]
+_Rows = slice | NDArray[np.intp]
+_ALL = slice(None)
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
 
@@ -56,6 +62,9 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
     whatever the number of workers. Every worker holds some consecutive environments; actions and
     results go through memory that all processes share.
 
+    `step` waits for all environments. With a ``batch_size``, `send` and `recv` wait for nobody:
+    they give actions to any environments, and return the first ones that are ready.
+
     A worker that dies, hangs or fails is reported as a `WorkerError` with its environments and
     their seeds. The others are as if nothing had happened, and `restart` replaces it. If Ctrl-C
     interrupts a call, some environments may have taken the step and others not.
@@ -66,6 +75,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
     Attributes:
         num_envs: Number of environments N.
         num_workers: Number of worker processes; 0 if the environments are in this one.
+        batch_size: How many environments `recv` returns.
         autoreset_mode: What happens after an episode's last step.
         action_split: Robot name → slice of one environment's action.
         busy: Locked while a thread calls it.
@@ -78,6 +88,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         task_id: str,
         num_envs: int = 1,
         num_workers: int | None = None,
+        batch_size: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         ignore_terminations: bool = False,
         timeout: float | None = 60.0,
@@ -90,6 +101,8 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             task_id: The task's id or another of its names.
             num_envs: Number of environments.
             num_workers: Number of processes; None takes one per core, 0 this process.
+            batch_size: How many environments `recv` returns; all if None. With half of them or
+                fewer, workers go on with others while a policy looks at these.
             autoreset_mode: What happens after an episode's last step. With ``NEXT_STEP`` the next
                 step begins a new one, without reading the action; with ``SAME_STEP`` the same
                 step does, and ``info`` keeps ``final_obs`` and ``final_info``; with ``DISABLED``
@@ -123,22 +136,23 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         self._seeds = [cls.first_seed + i for i in range(num_envs)]
         self._first = FirstSeeds(num_envs)
         self._everywhere = np.ones(num_envs, bool)
-        bounds = [(i * num_envs) // max(workers, 1) for i in range(max(workers, 1) + 1)]
-        parts = [
-            Part(cls, scenario, start, stop, mode, ignore_terminations)
-            for start, stop in zip(bounds, bounds[1:], strict=False)
+        self.batch_size = _checked_batch_size(batch_size, num_envs)
+        self._sharing = Sharing(num_envs, workers, self.batch_size)
+        shares = [
+            [Part(cls, scenario, ids.start, ids.stop, mode, ignore_terminations) for ids in share]
+            for share in self._sharing.shares
         ]
         for placement in layout.values():  # fetched here, not by all workers at once
             placement.robot.urdf.locate(pictures=scenario.draws)
         try:
-            self._crew = Workers(parts, timeout) if workers else InProcess(parts[0])
+            self._crew = Workers(shares, timeout) if workers else InProcess(shares[0])
         except WorkersFailed as failed:
             raise self._error(failed.failures, None) from failed.where
         self._close = weakref.finalize(self, self._crew.close)
         low, high = np.array(layout.action_bounds, np.float32).T
         self.single_action_space = Box(low, high, dtype=np.float32)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self.single_observation_space = space_of(self._observation(), batched=True)
+        self.single_observation_space = space_of(self._observation(_ALL), batched=True)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
 
     @_alone
@@ -171,6 +185,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             super().reset(seed=seed)
         ids = np.flatnonzero(mask).tolist()
         self._call("reset", self._beginnings(ids, seeds, reconfigure), lambda: self._begun(mask))
+        self._crew.steps.forget(ids)
         self._first.given(ids)
         self._note(ids, seeds)
         return self._begun(mask)
@@ -188,12 +203,65 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
 
         Raises:
             ActionError: If the action has a wrong shape, type or number; nothing moves then.
+            SimulationError: If environments were sent actions and not received since.
             WorkerError: If workers die, hang or fail; its ``results`` are what the others give.
         """
         self._expect_workers()
+        self._expect_idle(self._crew.steps.away)
         self._crew.arrays["action"][:] = self._reader.read(actions)
         self._call("step", {i: () for i in range(len(self._crew.parts))}, self._results)
         return self._results()
+
+    @_alone
+    def send(self, actions: Any, env_ids: Sequence[int] | NDArray[np.integer[Any]]) -> None:
+        """Let some environments take a step, and wait for none.
+
+        Args:
+            actions: A row for each of them, (n, A) floating, or a mapping robot name → (n, a).
+            env_ids: Their numbers, such as ``info["env_id"]`` of `recv`.
+
+        Raises:
+            ActionError: If the action has a wrong shape, type or number; nothing moves then.
+            TaskError: If an environment is none, or named twice.
+            SimulationError: If one was sent an action before and not received since.
+            WorkerError: If workers are gone.
+        """
+        self._expect_workers()
+        ids = self._sharing.checked(env_ids)
+        self._expect_idle(set(self._crew.steps.away).intersection(ids.tolist()))
+        rows = self._reader.read(actions, ids)
+        self._crew.arrays["action"][ids] = rows
+        for part, own in self._sharing.by_part(ids):
+            self._crew.send(part, own)
+
+    @_alone
+    def recv(self) -> tuple[Any, NDArray[np.float32], _Flags, _Flags, dict[str, Any]]:
+        """Wait until ``batch_size`` environments have taken the step that they were sent.
+
+        Those that are ready first come back, in ascending order; the others go on. Each
+        environment's episodes are what they would be in `step`, bit for bit.
+
+        Returns:
+            Observation, reward, terminated, truncated and info as `step` returns them, with a row
+            for each environment that came back; ``info["env_id"]`` tells which those are, (n,).
+
+        Raises:
+            SimulationError: If fewer environments were sent actions.
+            WorkerError: If workers die, hang or fail. What the others were sent can be received
+                after `restart`.
+        """
+        self._expect_workers()
+        if (away := len(self._crew.steps.away)) < self.batch_size:
+            raise SimulationError(
+                f"recv() returns {self.batch_size} environments, and {away} were sent actions;"
+                " send() more, or make the vector with a smaller batch_size"
+            )
+        try:
+            ids = np.array(self._crew.take(self.batch_size))
+        except WorkersFailed as failed:
+            raise self._error(failed.failures, None) from failed.where
+        obs, reward, terminated, truncated, info = self._results(ids)
+        return obs, reward, terminated, truncated, {**info, "env_id": ids}
 
     @_alone
     def restart(self, seed: Mapping[int, int] | None = None) -> tuple[Any, dict[str, Any]]:
@@ -212,7 +280,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         """
         self._expect_open()
         gone = sorted(self._crew.failures)
-        ids = [i for part in gone for i in self._crew.parts[part].env_ids]
+        ids = [i for worker in gone for i in self._crew.env_ids(worker)]
         given = dict(seed or {})
         if wrong := [i for i in given if i not in ids]:
             raise TaskError(f"environments {wrong} are not gone; those that are: {ids}")
@@ -270,6 +338,12 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         if self._crew.failures:
             raise self._error(list(self._crew.failures.values()), None)
 
+    def _expect_idle(self, away: Collection[int]) -> None:
+        if away:
+            raise SimulationError(
+                f"environments {sorted(away)} were sent actions before; recv() them first"
+            )
+
     def _error(self, failures: list[Failure], results: Any) -> WorkerError:
         lines: list[str] = []
         seeds: list[int] = []
@@ -306,21 +380,24 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
     # -- results -----------------------------------------------------------------------------
 
     def _begun(self, mask: _Flags) -> tuple[Any, dict[str, Any]]:
-        return self._observation(), self._info(INFO, mask)
+        return self._observation(_ALL), self._info(INFO, mask, _ALL)
 
-    def _results(self) -> tuple[Any, NDArray[np.float32], _Flags, _Flags, dict[str, Any]]:
+    def _results(
+        self, ids: _Rows = _ALL
+    ) -> tuple[Any, NDArray[np.float32], _Flags, _Flags, dict[str, Any]]:
+        """Return what is on the board of some environments, as copies."""
         arrays = self._crew.arrays
-        info = self._info(INFO, self._everywhere)
+        info = self._info(INFO, self._everywhere[ids], ids)
         restarted = arrays.get("restarted")
-        if restarted is not None and restarted.any():
-            info.update(self._final(restarted.copy()))
-        flags = (arrays[name].copy() for name in ("reward", "terminated", "truncated"))
-        return self._observation(), *flags, info
+        if restarted is not None and restarted[ids].any():
+            info.update(self._final(restarted[ids].copy(), ids))
+        flags = (arrays[name][ids].copy() for name in ("reward", "terminated", "truncated"))
+        return self._observation(ids), *flags, info
 
-    def _observation(self, prefix: str = "") -> Any:
+    def _observation(self, ids: _Rows, prefix: str = "") -> Any:
         arrays = self._crew.arrays
         if prefix + OBSERVATION in arrays:
-            return arrays[prefix + OBSERVATION].copy()
+            return arrays[prefix + OBSERVATION][ids].copy()
         tree: dict[str, Any] = {}
         for name, array in arrays.items():
             first, *way = name.split("/")
@@ -328,31 +405,38 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
                 branch = tree
                 for key in way[:-1]:
                     branch = branch.setdefault(key, {})
-                branch[way[-1]] = array.copy()
-        return tree or np.empty((self.num_envs, 0), np.float32)
+                branch[way[-1]] = array[ids].copy()
+        return tree or np.empty((len(self._everywhere[ids]), 0), np.float32)
 
-    def _info(self, prefix: str, mask: _Flags) -> dict[str, Any]:
-        """Return what is known of some environments, as Gymnasium's own vectors tell it."""
+    def _info(self, prefix: str, mask: _Flags, ids: _Rows) -> dict[str, Any]:
+        """Return what is known of some environments, as Gymnasium's own vectors tell it.
+
+        Args:
+            prefix: What the names of the arrays begin with.
+            mask: Of which of these environments it is told.
+            ids: The environments.
+        """
         info: dict[str, Any] = {}
+        everywhere = mask.all()
         for name, array in self._crew.arrays.items():
             first, _, key = name.partition("/")
             if first == prefix:
                 for called in (key, SUCCESS) if key == "success" else (key,):
-                    info[called] = array.copy()
-                    if mask is not self._everywhere:
+                    info[called] = array[ids].copy()
+                    if not everywhere:
                         info[called][~mask] = 0
                     info[f"_{called}"] = mask.copy()
         return info
 
-    def _final(self, ended: _Flags) -> dict[str, Any]:
-        observations = np.full(self.num_envs, None, object)
-        batch = self._observation(FINAL)
+    def _final(self, ended: _Flags, ids: _Rows) -> dict[str, Any]:
+        observations = np.full(len(ended), None, object)
+        batch = self._observation(ids, FINAL)
         for i in np.flatnonzero(ended).tolist():
             observations[i] = _row(batch, i)
         return {
             "final_obs": observations,
             "_final_obs": ended,
-            "final_info": self._info(FINAL + INFO, ended),
+            "final_info": self._info(FINAL + INFO, ended, ids),
             "_final_info": ended.copy(),
         }
 
@@ -391,6 +475,12 @@ def _checked_workers(num_workers: int | None, num_envs: int) -> int:
             f" environments, {num_envs}"
         )
     return num_workers
+
+
+def _checked_batch_size(batch_size: int | None, num_envs: int) -> int:
+    if batch_size is None:
+        return num_envs
+    return checked_whole("batch_size", batch_size, 1, num_envs, TaskError)
 
 
 def _row(batch: Any, env: int) -> Any:

@@ -57,7 +57,7 @@ def task_of(env):
     """Return the task behind a front."""
     env = getattr(env, "unwrapped", env)
     env = getattr(env, "vector", env)
-    return env._crew._batch._task if hasattr(env, "_crew") else getattr(env, "task", env)
+    return env._crew._batches[0]._task if hasattr(env, "_crew") else getattr(env, "task", env)
 
 
 # -- what is left ---------------------------------------------------------------------------------

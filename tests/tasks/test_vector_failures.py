@@ -14,7 +14,7 @@ import pytest
 
 from layouts import face_to_face
 from robots import SimulationError, TaskError
-from tasks.fronts import workers as workers_module
+from tasks.fronts.holder import Holder
 from tasks.fronts.vector import VectorTask
 from tasks.fronts.workers import WorkerError
 from tests.tasks import breaking
@@ -136,7 +136,7 @@ def interrupted(moment, event, matches, call):
 
 def test_a_vector_is_of_use_after_an_interrupt_at_any_instruction_of_a_conversation():
     def talks(code):
-        return code.co_filename.endswith(("fronts/workers.py", "fronts/channel.py"))
+        return code.co_filename.endswith(("fronts/workers.py", "fronts/holder.py", "processes/channel.py"))
 
     with closing(VectorTask("PushCube-v1", num_envs=2, num_workers=2, timeout=5.0)) as env:
         action = np.full((2, 8), 0.2, np.float32)
@@ -175,15 +175,15 @@ def test_a_restart_that_fails_may_be_tried_again(shared, monkeypatch):
         os.kill(worker.pid, signal.SIGKILL)
     with pytest.raises(WorkerError, match=r"environments \[0, 1\].*environments \[2, 3\]"):
         shared.step(ACTION)
-    start = workers_module._Worker.__init__
+    start = Holder.__init__
 
-    def doomed(self, part, timeout):
-        start(self, part, timeout)
-        if part.start == 0:
+    def doomed(self, share, timeout):
+        start(self, share, timeout)
+        if share[0].start == 0:
             os.kill(self.pid, signal.SIGKILL)
 
     with monkeypatch.context() as patch:
-        patch.setattr(workers_module._Worker, "__init__", doomed)
+        patch.setattr(Holder, "__init__", doomed)
         with pytest.raises(WorkerError, match=r"environments \[0, 1\].*died by SIGKILL"):
             shared.restart()
     assert not {living, *(worker.pid for worker in crew._crew.values())} & {*workers()}
