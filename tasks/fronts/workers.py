@@ -114,7 +114,6 @@ class Workers:
         Raises:
             WorkersFailed: If workers die, hang or fail; the others have done it.
         """
-        self._settle()
         asked: dict[int, Asked] = {}
         for number, own in arguments.items():
             worker, place = self._places[number]
@@ -129,7 +128,6 @@ class Workers:
             number: The part's number.
             env_ids: The environments' numbers in the vector; their actions are on the board.
         """
-        self._settle()
         worker, place = self._places[number]
         part = self.parts[number]
         some = () if len(env_ids) == len(part.env_ids) else ([i - part.start for i in env_ids],)

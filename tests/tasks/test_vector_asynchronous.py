@@ -101,6 +101,17 @@ def test_some_environments_of_a_part_step_without_the_others(lockstep):
         assert differences(dict(told), {i: wanted[i][: len(told[i])] for i in told}) == []
 
 
+def test_a_step_of_one_leaves_what_was_said_of_another_of_its_part():
+    """The step in which an environment begins anew has no reward."""
+    with closing(make(num_envs=2, num_workers=0)) as env:
+        env.reset(seed=3)
+        for _ in range(STEPS):
+            env.send(np.ones((1, 8), np.float32), [0])
+            env.send(np.ones((1, 8), np.float32), [1])
+            _, reward, *_, info = env.recv()
+            assert ((info["elapsed_steps"] > 0) == (reward > 0)).all()
+
+
 def test_nobody_waits_for_the_slowest(shared):
     shared.reset(seed=0)
     slow, quick = shared._crew._crew[0], [2, 3, 4]
@@ -199,6 +210,8 @@ def test_it_is_of_use_after_an_interrupt_at_any_instruction(shared):
 
     moment, met = 1, 0
     while interrupted(moment, "opcode", talks, both):
+        while len(shared._crew.steps.away) >= shared.batch_size:
+            shared.recv()
         shared.reset(seed=3)
         np.testing.assert_array_equal(shared.step(first)[0], wanted)
         shared.reset(seed=3)
