@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import torch
 
-from measurements.bench import episodes, looks, processes, steps, varying
+from measurements.bench import episodes, looks, processes, steps, varying, vectors
 from measurements.bench.measurement import BenchmarkError, Measurement
 from measurements.bench.report import Report, machine
 from measurements.bench.settings import Benchmark, Settings
@@ -18,6 +18,7 @@ from rollouts.progress import LiveLine
 BENCHMARKS: Mapping[str, Benchmark] = {
     "step": Benchmark("a step of one environment", steps.step),
     "reset": Benchmark("a reset of one environment", episodes.reset),
+    "vector": Benchmark("vectors of many environments on two cores", vectors.vectors),
     "varying": Benchmark("resets and steps of worlds that vary", varying.varying),
     "looks": Benchmark("resets and first pictures of worlds that look different", looks.looks),
     "environments": Benchmark("a step by number of environments", steps.environments),

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 DESCRIPTION = "measure what steps, resets, workers and recordings cost, beside the physics alone"
 EPILOG = (
-    "Benchmarks: step, reset, varying, looks, environments, workers, robots, contacts, memory,"
-    " start, recording, validation. One after the other, they take about two minutes."
+    "Benchmarks: step, reset, vector, varying, looks, environments, workers, robots, contacts,"
+    " memory, start, recording, validation. One after the other, they take about two minutes."
 )
 
 
@@ -131,8 +131,10 @@ def settings_of(options: argparse.Namespace) -> Settings:
             raise BenchmarkError(f"--{name} {wrong[0]}: it takes numbers of {least} or more")
     if wrong := [n for n in options.robots or () if n > MOST_ROBOTS]:
         raise BenchmarkError(f"--robots {wrong[0]}: it takes numbers from 1 to {MOST_ROBOTS}")
+    task_ids = tuple(full_name(get_task_class(task)) for task in options.task or ())
     given = {
-        "tasks": tuple(full_name(get_task_class(task)) for task in options.task or ()),
+        "tasks": task_ids,
+        "vector_tasks": task_ids,
         "making": making,
         "rounds": options.rounds,
         **{

@@ -18,32 +18,28 @@ from measurements.bench.catalogue import BENCHMARKS
 from measurements.bench.command import add_arguments, run_benchmarks, settings_of
 from measurements.bench.episodes import timed_resets
 from measurements.bench.measurement import BenchmarkError, Measurement, by_series
-from measurements.bench.processes import PhysicsProcesses, TimedVector, vector
 from measurements.bench.report import Report
 from measurements.bench.settings import Benchmark, Settings
 from measurements.bench.steps import PHYSICS, Played
 from measurements.bench.tables import RECORD
+from measurements.bench.vectors import HERE, NATIVE, PROCESSES, vectors
 from parity.compare.native_env import make_native, make_native_front, native_action
 from robots import RobotLayoutsError, TaskError
 from robots.common.commands import program, start
 from robots.common.writing import write_whole
 from tasks import MultiRobotTask, get_task_class, list_clones
 
-NATIVE, HERE = "native", "here"
-PROCESSES = 2  # of native's vector and of ours
-FRONT_TASKS = 2  # of a run, whose vectors are timed
-
 Variants = dict[tuple[str, str], Callable[[int], float]]
 
 
 def benchmarks(task_ids: Sequence[str]) -> dict[str, Benchmark]:
     """Return every benchmark; those that native can run are run beside it, on some tasks."""
-    return {
+    beside = {
         "step": Benchmark("a step of one environment", partial(step, task_ids)),
         "reset": Benchmark("a reset of one environment", partial(reset, task_ids)),
-        "vector": Benchmark("many environments on two cores", vectors),
-        **{name: one for name, one in BENCHMARKS.items() if name not in ("step", "reset")},
+        "vector": Benchmark("vectors on two cores", partial(vectors, native=_native_vector)),
     }
+    return {**beside, **{name: one for name, one in BENCHMARKS.items() if name not in beside}}
 
 
 def step(task_ids: Sequence[str], settings: Settings) -> Measurement:
@@ -89,35 +85,6 @@ def reset(task_ids: Sequence[str], settings: Settings) -> Measurement:
     )
 
 
-def vectors(settings: Settings) -> Measurement:
-    """Measure the rate of a vector beside Gymnasium's own vector over native, on as many cores."""
-    share, clock, steps = settings.worker_envs, settings.clock, settings.batch_steps
-    task_ids = settings.tasks[:FRONT_TASKS]
-    samples: dict[tuple[str, str], list[float]] = {}
-    for task_id in task_ids:
-        with (
-            _native_vector(task_id) as native,
-            PhysicsProcesses(task_id, PROCESSES, share) as floor,
-            vector(task_id, PROCESSES * share, PROCESSES) as ours,
-        ):
-            here = TimedVector(ours, clock, steps)
-            variants: Variants = {(HERE, task_id): here.rate}
-            if native is not None:
-                variants[NATIVE, task_id] = TimedVector(native, clock, steps).rate
-            variants[PHYSICS, task_id] = lambda number, here=here: floor.rate(here, number)
-            samples.update(settings.interleave(variants, part=1 / len(task_ids)))
-    return Measurement(
-        name="vector",
-        title=f"Rate of {PROCESSES} × {share} environments; native: AsyncVectorEnv of {PROCESSES}",
-        unit=clock.rate_unit,
-        variable="task",
-        values=task_ids,
-        samples=by_series(task_ids, samples),
-        floors=(PHYSICS,),
-        ratios=((HERE, NATIVE), (HERE, PHYSICS)),
-    )
-
-
 def _beside_native(
     task_ids: Sequence[str],
     settings: Settings,
@@ -148,8 +115,11 @@ def _native_steps(native: Any, played: Played, number: int, settings: Settings) 
 
 @contextmanager
 def _native_vector(task_id: str) -> Generator[AsyncVectorEnv | None]:
-    """Give Gymnasium's vector over native; native's wrapper cannot run several robots: None."""
-    if len(get_task_class(task_id).layout) > 1:
+    """Give Gymnasium's vector over native; None where native has no task, or several robots.
+
+    Its wrapper cannot run these.
+    """
+    if task_id not in list_clones() or len(get_task_class(task_id).layout) > 1:
         yield None
         return
     make = [partial(make_native_front, task_id)] * PROCESSES

@@ -116,6 +116,35 @@ class TimedVector:
         return random_actions(number, self.steps, self.num_envs, numbers)
 
 
+class TimedAsynchronously(TimedVector):
+    """A vector that is sent actions and received from, whoever is ready."""
+
+    def rate(self, number: int) -> float:
+        """Return how many environment steps it does per second, once it runs.
+
+        As many are under way at the end as at the beginning.
+        """
+        actions, size = self.actions(number), self._env.batch_size
+        everyone = np.arange(self.num_envs)
+        steps = np.zeros(self.num_envs, np.intp)
+        self._env.reset(seed=number)
+        self._env.send(actions[0], everyone)
+
+        def turn() -> None:
+            ids = self._env.recv()[4]["env_id"]
+            steps[ids] += 1
+            self._env.send(actions[steps[ids] % self.steps, ids], ids)
+
+        turn()
+        count = self.steps * self.num_envs // size
+        start = self.clock.now(self._others)
+        for _ in range(count):
+            turn()
+        seconds = self.clock.now(self._others) - start
+        self._env.reset(seed=number)
+        return count * size / seconds
+
+
 class PhysicsProcesses:
     """Processes that all do nothing but physics: what any vector is measured against."""
 

@@ -74,6 +74,7 @@ class Settings:
         started: Numbers of environments whose start is timed.
         episodes: Episodes of a recording.
         checked: Numbers of robots whose layout is validated.
+        vector_tasks: Task ids of which vectors are measured.
         making: Arguments of `tasks.make`, with which the tasks are made.
     """
 
@@ -92,6 +93,7 @@ class Settings:
     started: tuple[int, ...] = (1, 64)
     episodes: int = 12
     checked: tuple[int, ...] = (1, 2, 4)
+    vector_tasks: tuple[str, ...] = ("PickCube-v1", "TwoRobotPickCube-v1", "FourRobotStack-v1")
     making: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def interleave(

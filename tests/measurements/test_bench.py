@@ -37,6 +37,7 @@ TINY = Settings(
     robots=(1, 2),
     cubes=(0, 8),
     started=(1,),
+    vector_tasks=("PickCube-v1",),
     episodes=1,
     checked=(1, 2),
 )

@@ -9,16 +9,22 @@ import pytest
 import tasks
 from measurements.bench import native as bench
 from measurements.bench import tables as bench_table
-from measurements.bench.native import benchmarks, vectors
+from measurements.bench.native import benchmarks
 from measurements.bench.report import read
 from measurements.bench.settings import Settings
 from measurements.bench.steps import Played
+from measurements.bench.vectors import vectors
 from parity.__main__ import main
 from parity.compare.native_env import make_native
 from tests.native import NATIVE
 
 TINY = Settings(
-    rounds=1, steps=3, batch_steps=3, worker_envs=2, tasks=("PickCube-v1", "TwoRobotPickCube-v1")
+    rounds=1,
+    steps=3,
+    batch_steps=3,
+    worker_envs=2,
+    tasks=("PickCube-v1",),
+    vector_tasks=("PickCube-v1", "FourRobotStack-v1"),
 )
 
 
@@ -49,17 +55,18 @@ class TestBesideNative:
 
     @pytest.mark.long
     def test_vectors(self):
-        found = vectors(TINY)
+        found = vectors(TINY, bench._native_vector)
         assert found.median("native", "PickCube-v1") > 0
-        assert found.median("native", "TwoRobotPickCube-v1") is None
-        for task_id in TINY.tasks:
-            assert found.ratio("here", "physics alone", task_id) > 0
+        assert found.median("native", "FourRobotStack-v1") is None
+        for value in (x for t in TINY.vector_tasks for x in (t, f"{t}, one core disturbed")):
+            assert found.ratio("here", "physics alone", value) > 0
+            assert found.ratio("asynchronous", "physics alone", value) > 0
 
 
 def test_it_has_every_benchmark_of_rollouts():
     from measurements.bench.catalogue import BENCHMARKS
 
-    assert {*BENCHMARKS} | {"vector"} == {*benchmarks(("PickCube-v1",))}
+    assert {*BENCHMARKS} == {*benchmarks(("PickCube-v1",))}
 
 
 @pytest.mark.parametrize(

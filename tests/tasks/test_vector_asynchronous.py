@@ -186,8 +186,7 @@ def test_a_worker_that_dies_is_told_and_the_others_can_be_received(shared):
     shared.send(np.zeros((NUM_ENVS, 8), np.float32), EVERYONE)
     os.kill(shared._crew._crew[0].pid, signal.SIGKILL)
     with pytest.raises(WorkerError, match=r"environments \[0, 1\] of seeds \[7, 8\]"):
-        for _ in range(2):
-            shared.recv()
+        [shared.recv() for _ in range(2)]
     shared.restart()
     away = sorted(shared._crew.steps.away)
     assert set(away) <= {2, 3, 4}

@@ -136,7 +136,9 @@ def interrupted(moment, event, matches, call):
 
 def test_a_vector_is_of_use_after_an_interrupt_at_any_instruction_of_a_conversation():
     def talks(code):
-        return code.co_filename.endswith(("fronts/workers.py", "fronts/holder.py", "processes/channel.py"))
+        return code.co_filename.endswith(
+            ("fronts/workers.py", "fronts/holder.py", "processes/channel.py")
+        )
 
     with closing(VectorTask("PushCube-v1", num_envs=2, num_workers=2, timeout=5.0)) as env:
         action = np.full((2, 8), 0.2, np.float32)
