@@ -1,4 +1,4 @@
-"""``python -m parity tables``: the records as tables in docs/parity.md, and their check."""
+"""``python -m parity tables``: the records as tables in docs, and their check."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ from parity.compare.results import RESULTS, ResultsError, read
 from parity.compare.task_summary import REWARD_MODES, number_text, reward_text, success_text
 from robots import RobotLayoutsError
 from robots.common.commands import program
+from robots.common.writing import write_whole
 from tasks import list_clones
 
-PAGE = Path(__file__).parents[1] / "docs" / "parity.md"
+DOCS = Path(__file__).parents[1] / "docs"
+PAGE, BENCHMARKS = DOCS / "parity.md", DOCS / "benchmarks.md"
 PARITY_TABLE, BENCH_TABLES = "parity table", "benchmarks"  # what the markers call them
 DIFFERENCES = ("object pose", "qpos", "observation")  # the rest stands in the record
 
@@ -24,17 +26,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
     Returns:
-        0 if the page shows the records, 1 if a check finds that it does not or that the record
+        0 if the pages show the records, 1 if a check finds that it does not or that the record
         of parity does not hold exactly the tasks there are, 2 if a file cannot be read.
     """
     parser = argparse.ArgumentParser(
         prog=f"{program('parity')} tables",
         description="Write what `python -m parity compare --all --record` and `python -m parity"
-        " bench --record` found into docs/parity.md.",
+        " bench --record` found into docs/parity.md, and all of the latter into"
+        " docs/benchmarks.md.",
     )
     add = parser.add_argument
     add("--check", action="store_true", help="write nothing; tell what is stale")
     add("--page", type=Path, default=PAGE, help="the page (this project's)")
+    add("--benchmarks", type=Path, default=BENCHMARKS, help="the page of all benchmarks")
     add("--results", type=Path, default=RESULTS, help="the comparison (this project's)")
     add("--bench", type=Path, default=bench_table.RECORD, help="the benchmarks (this project's)")
     args = parser.parse_args(argv)
@@ -43,15 +47,20 @@ def main(argv: Sequence[str] | None = None) -> int:
         text = _read_text(args.page)
         fresh = with_lines(text, PARITY_TABLE, _lines(markdown(record), "make parity"))
         shown = _lines(bench_table.markdown(measured), bench_table.COMMAND)
-        fresh = with_lines(fresh, BENCH_TABLES, shown)
-        if not args.check and fresh != text:
-            args.page.write_text(fresh, encoding="utf-8")
+        pages = {
+            args.page: (text, with_lines(fresh, BENCH_TABLES, shown)),
+            args.benchmarks: (_text_or_nothing(args.benchmarks), bench_table.page(measured)),
+        }
+        stale = {page: fresh for page, (text, fresh) in pages.items() if fresh != text}
+        if not args.check:
+            for page, fresh in stale.items():
+                write_whole(page, fresh)
     except (RobotLayoutsError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     complaints = list(missing_and_extra(record["tasks"], list_clones()))
-    if args.check and fresh != text:
-        complaints.append(f"{args.page.name} is stale; run `python -m parity tables`")
+    if args.check:
+        complaints += [f"{page.name} is stale; run `python -m parity tables`" for page in stale]
     for complaint in complaints:
         print(complaint, file=sys.stderr)
     return 1 if args.check and complaints else 0
@@ -132,6 +141,10 @@ def _lines(lines: Iterable[str], command: str) -> list[str]:
 
 def _row(*cells: str) -> str:
     return f"| {' | '.join(cells)} |"
+
+
+def _text_or_nothing(path: Path) -> str:
+    return path.read_text(encoding="utf-8") if path.exists() else ""
 
 
 def _read_text(path: Path) -> str:

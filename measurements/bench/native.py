@@ -18,10 +18,10 @@ from measurements.bench.catalogue import BENCHMARKS
 from measurements.bench.command import add_arguments, run_benchmarks, settings_of
 from measurements.bench.episodes import timed_resets
 from measurements.bench.measurement import BenchmarkError, Measurement, by_series
-from measurements.bench.report import Report
+from measurements.bench.report import Report, save
 from measurements.bench.settings import Benchmark, Settings
 from measurements.bench.steps import PHYSICS, Played
-from measurements.bench.tables import RECORD
+from measurements.bench.tables import PICTURE, RECORD
 from measurements.bench.vectors import HERE, NATIVE, PROCESSES, vectors
 from parity.compare.native_env import make_native, make_native_front, native_action
 from robots import RobotLayoutsError, TaskError
@@ -162,7 +162,8 @@ def _keep(report: Report) -> None:
     if report.left_out:
         raise BenchmarkError(f"nothing is recorded, as {', '.join(report.left_out)} was left out")
     write_whole(RECORD, report.as_json())
-    print(f"{RECORD}: recorded; `python -m parity tables` shows it in docs/parity.md")
+    save(report, PICTURE)
+    print(f"{RECORD}: recorded; `python -m parity tables` shows it in docs")
 
 
 if __name__ == "__main__":

@@ -103,10 +103,20 @@ class Report:
             (markdown_path, "\n".join(self.markdown()) + "\n"),
         ):
             write_whole(path, text)
-        figure = draw(self.measurements, self.conditions())
-        with written_whole(plot_path) as unfinished:
-            figure.savefig(unfinished, format="png")
+        save(self, plot_path)
         return [json_path, markdown_path, plot_path]
+
+
+def save(report: Report, path: Path) -> None:
+    """Draw a report's plot into a file.
+
+    Raises:
+        MissingPackageError: If there is no matplotlib.
+        UnwritableFileError: If it cannot be written (also an ``OSError``).
+    """
+    figure = draw(report.measurements, report.conditions())
+    with written_whole(path) as unfinished:
+        figure.savefig(unfinished, format="png")
 
 
 def read(path: Path) -> Report:

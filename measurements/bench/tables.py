@@ -12,6 +12,7 @@ from parity.compare.results import ResultsError
 
 RECORD = Path(__file__).parents[1] / "bench.json"
 COMMAND = "make bench ARGS=--record"
+PICTURE = Path(__file__).parents[2] / "docs" / "images" / "benchmarks.png"
 SMALL = ("start", "memory", "recording", "validation")  # go into one table, a row each
 
 
@@ -48,6 +49,18 @@ def markdown(recorded: Report) -> Iterator[str]:
     yield from markdown_table(["besides", "median"], _small(recorded))
     yield ""
     yield recorded.conditions()
+
+
+def page(recorded: Report) -> str:
+    """Return the page of all benchmarks."""
+    title, *lines = recorded.markdown()
+    about = (
+        "What things cost, beside the physics alone. `make bench ARGS=--record` measures all of it"
+        " again, beside native\nManiSkill, and writes this page; `robot-layouts bench` needs no"
+        " native. What the figures mean for tasks is told on\n[Parity and speed](parity.md#speed)."
+    )
+    picture = f"![All benchmarks, a panel each](images/{PICTURE.name})"
+    return "\n".join([title, "", about, "", picture, *lines, ""])
 
 
 def _headings(measurement: Measurement, what: str) -> list[str]:

@@ -80,7 +80,7 @@ class Files:
 
     def __init__(self, folder: Path, record: dict) -> None:
         self.page, self.results = folder / "parity.md", folder / "results.json"
-        self.bench = folder / "bench.json"
+        self.bench, self.benchmarks = folder / "bench.json", folder / "benchmarks.md"
         self.page.write_text(MARKERS, encoding="utf-8")
         self.write(record)
         self.write_bench(some_benchmarks(*CATALOGUE))
@@ -93,7 +93,7 @@ class Files:
 
     def run(self, *options: str) -> int:
         paths = ("--page", str(self.page), "--results", str(self.results))
-        paths += ("--bench", str(self.bench))
+        paths += ("--bench", str(self.bench), "--benchmarks", str(self.benchmarks))
         return main(["tables", *paths, *options])
 
 
@@ -148,6 +148,17 @@ def test_benchmarks_are_shown(files):
     assert "| About start (s) | 1 task: 4.50; 64 task: 4.50 |" in lines
     assert "| About recording (ms) | `A-v1`: 11.0 (recorded / stepped 1.10) |" in lines
     assert "A processor (Linux), 2 cores, load average 0.5 to 1.5; time that went by" in shown
+
+
+def test_all_benchmarks_are_on_a_page(files, capsys):
+    files.run()
+    page = files.benchmarks.read_text(encoding="utf-8")
+    assert page.startswith("# Benchmarks\n\nWhat things cost")
+    assert "](images/benchmarks.png)" in page
+    assert "| PushT-v1 | 2.00 | 6.00 | 1.00 | 3.00 | 2.00 |" in page
+    files.benchmarks.write_text(page.replace("6.00", "7.00"), encoding="utf-8")
+    assert files.run("--check") == 1
+    assert "benchmarks.md is stale; run `python -m parity tables`" in capsys.readouterr().err
 
 
 def test_a_fresh_table_passes_and_stays(files, capsys):
