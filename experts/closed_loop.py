@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.rehearsal import Attempt, Plan, Rehearsal
+from experts.rehearsal import Attempt, Plan, Rehearsal, rehearsing
 from experts.script import Scene
 from tasks import MultiRobotTask
 from tasks.engine.actions import ActionReader
@@ -31,11 +31,8 @@ def rehearse(task: MultiRobotTask, seed: int, act: Callable[[Scene], Any]) -> Pl
     Raises:
         ActionError: If an action has the wrong shape or numbers that are not finite.
     """
-    rehearsal = Rehearsal(task)
-    try:
+    with rehearsing(task) as rehearsal:
         return Plan.of(_attempt(rehearsal, seed, act))
-    finally:
-        rehearsal.task.close()
 
 
 def _attempt(rehearsal: Rehearsal, seed: int, act: Callable[[Scene], Any]) -> Attempt:
@@ -48,4 +45,5 @@ def _attempt(rehearsal: Rehearsal, seed: int, act: Callable[[Scene], Any]) -> At
         scene = rehearsal.scene()
     success = success and not touching
     reason = "" if success else touching or f"no success within {len(actions)} steps"
-    return Attempt(np.stack(actions), success, reason)
+    done = np.stack(actions)
+    return Attempt(done, success, reason, episode=rehearsal.episode(done))

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +18,7 @@ from experts.ways import Ways, without_planner
 from robots import TaskError, UnknownNameError
 from simulation.overlaps import RobotsAlone
 from tasks import MultiRobotTask
-from tasks.episode import REBUILT
+from tasks.episode import REBUILT, EpisodeTape, PlayedEpisode, take_step
 
 
 @dataclass(frozen=True)
@@ -28,12 +30,14 @@ class Attempt:
         success: Whether the task's own success was reached, at the last action.
         reason: Why not, in words.
         obstructed: Whether it failed because something was in an arm's way.
+        episode: What happened, if it was kept; see `Rehearsal.episode`.
     """
 
     actions: NDArray[np.float32]
     success: bool
     reason: str = ""
     obstructed: bool = False
+    episode: PlayedEpisode | None = None
 
 
 class Plan(NDArray[np.float32] if TYPE_CHECKING else np.ndarray):
@@ -41,29 +45,40 @@ class Plan(NDArray[np.float32] if TYPE_CHECKING else np.ndarray):
 
     Attributes:
         reason: In words; empty if they do.
+        episode: What happened when they were tried, if it was kept; see `rehearsed`.
     """
 
     reason: str = ""
+    episode: PlayedEpisode | None = None
 
     @classmethod
     def of(cls, attempt: Attempt) -> Plan:
         """Return what came of an attempt."""
         plan = attempt.actions.view(cls)
-        plan.reason = attempt.reason
+        plan.reason, plan.episode = attempt.reason, attempt.episode
         return plan
+
+
+def rehearsed(actions: NDArray[np.float32]) -> PlayedEpisode | None:
+    """Return the episode that a plan's rehearsal was, or None if it has to be played first.
+
+    A rehearsal begins in a freshly built world, with the physics and rewards of the task that is
+    planned for. So these actions, played there, would give the same states again, bit for bit.
+    """
+    episode: PlayedEpisode | None = getattr(actions, "episode", None)
+    same = episode is not None and np.array_equal(episode.actions, actions)
+    return episode if same else None
 
 
 class Rehearsal:
     """A private copy of a task, in which scripts are tried out from fresh worlds."""
 
     def __init__(self, task: MultiRobotTask) -> None:
-        """Build one environment with the layout and physics of ``task``, without pictures."""
-        cheapest = "none" if "none" in task.reward_modes else None
+        """Build one environment with layout, physics and rewards of ``task``, without pictures."""
         scenario = replace(
             task.scenario,
             num_envs=1,
             obs_mode="none",
-            reward_mode=cheapest,
             render_mode=None,
             check_layout=False,  # it was checked when the task was made
         )
@@ -71,10 +86,12 @@ class Rehearsal:
         several = len(self.task.layout.arms) > 1
         self._watch = ArmWatch(self.task, strict=False) if several else None
         self._alone = RobotsAlone(self.task.layout, scenario.physics)
+        self._tape: EpisodeTape | None = None
 
     def begin(self, seed: int) -> Scene:
         """Start the episode of a seed in a freshly built world, and return what it looks like."""
         self.task.reset(seed, options=REBUILT)
+        self._tape = EpisodeTape(self.task, seed)
         return self.scene()
 
     def scene(self) -> Scene:
@@ -87,9 +104,22 @@ class Rehearsal:
         Returns:
             Whether the task is solved then, and which arms touched in it, in words.
         """
-        *_, info = self.task.step(action)
+        moment = take_step(self.task, action)
+        if self._tape is not None:
+            self._tape.add(action, moment)
         touching = self._watch.touching() if self._watch is not None else []
-        return bool(info["success"][0]), ", ".join(f"{a} touches {b}" for a, b in touching[:1])
+        return moment.success, ", ".join(f"{a} touches {b}" for a, b in touching[:1])
+
+    def episode(self, actions: NDArray[np.float32]) -> PlayedEpisode | None:
+        """Return what happened since `begin`, if it followed from these actions, (T, A), alone.
+
+        That is, if `step` took all of them and no others, and nobody set the task's state; else
+        return None.
+        """
+        if self._tape is None or not len(actions) or not self._tape.unbroken:
+            return None
+        episode = self._tape.read()
+        return episode if np.array_equal(episode.actions, actions) else None
 
     def play(self, script: Script, *, around: bool = False) -> Attempt:
         """Play a script from the present state until success or the end of the episode.
@@ -130,6 +160,21 @@ class Rehearsal:
                 return Attempt(_stack(actions, task), True)
         places = ", ".join(player.place for player in players)
         return Attempt(_stack(actions, task), False, f"the episode ended at {places}")
+
+
+# Making one takes as long as half an episode, and each episode begins in a world built anew.
+_idle: WeakKeyDictionary[MultiRobotTask, Rehearsal] = WeakKeyDictionary()
+
+
+@contextmanager
+def rehearsing(task: MultiRobotTask) -> Generator[Rehearsal]:
+    """Lend the private copy of a task, which lasts as long as the task does.
+
+    One that is lent already, or was left by an error, is not lent again: another is made.
+    """
+    rehearsal = _idle.pop(task, None) or Rehearsal(task)
+    yield rehearsal
+    _idle[task] = rehearsal
 
 
 def _players(
@@ -200,13 +245,12 @@ def search(
     Raises:
         TaskError: If no attempt could even be begun.
     """
-    rehearsal = Rehearsal(task)
     made: list[Attempt] = []
-    for attempt in attempts(rehearsal):
-        made.append(attempt)
-        if attempt.success:
-            break
-    rehearsal.task.close()
+    with rehearsing(task) as rehearsal:
+        for attempt in attempts(rehearsal):
+            made.append(replace(attempt, episode=rehearsal.episode(attempt.actions)))
+            if attempt.success:
+                break
     best = max(made, key=lambda attempt: (attempt.success, len(attempt.actions)))
     if not len(best.actions):
         raise TaskError(f"{task.task_id}, seed {seed}: no plan: {best.reason}")

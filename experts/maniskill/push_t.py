@@ -49,7 +49,7 @@ def push_onto_outline(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
         for chance in range(ATTEMPTS):
             scene = rehearsal.begin(seed)
             random = np.random.default_rng((seed, chance))
-            yield _Pusher(rehearsal.task, scene, random).play()
+            yield _Pusher(rehearsal, scene, random).play()
 
     return search(task, seed, attempts)
 
@@ -65,8 +65,9 @@ class _OutOfReachError(Exception):
 class _Pusher:
     """One attempt: pushes the T in a private task, from its present state."""
 
-    def __init__(self, task: MultiRobotTask, scene: Scene, random: np.random.Generator) -> None:
-        self._task, self._scene = task, scene
+    def __init__(self, rehearsal: Rehearsal, scene: Scene, random: np.random.Generator) -> None:
+        self._rehearsal, self._scene = rehearsal, scene
+        self._task = task = rehearsal.task
         self._kinematics = task.simulation.inverse_kinematics(ARM)
         self._driver = ArmDriver(task.layout.arm(ARM).robot)
         self._base = scene.base(ARM)
@@ -167,9 +168,8 @@ class _Pusher:
             _EndedError: If the episode is over then.
         """
         self._actions.append(action.astype(np.float32))
-        *_, info = self._task.step(self._actions[-1])
-        self._scene = Scene(self._task)
-        self._success = bool(info["success"][0])
+        self._success, _ = self._rehearsal.step(self._actions[-1])
+        self._scene = self._rehearsal.scene()
         if self._success or len(self._actions) == self._task.max_episode_steps:
             raise _EndedError
 

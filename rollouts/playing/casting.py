@@ -15,7 +15,7 @@ from rollouts.playing.together import Player, is_batched
 from rollouts.sources.actors import is_person
 from rollouts.sources.policies import EXPERT, check_policy, find_policy
 from tasks import MultiRobotTask
-from tasks.episode import Policy, follow
+from tasks.episode import PlayedEpisode, Policy, follow
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,15 @@ class Casting:
             return Player(seed, follow(()), 0, random_states(), str(error))
         to_the_end = self._cast.to_the_end
         states, reason = random_states(), planner.reason
-        return Player(seed, follow(plan), len(plan), states, reason, True, to_the_end)
+        player = Player(seed, follow(plan), len(plan), states, reason, True, to_the_end)
+        if planner.rehearsed is not None and (to_the_end or _ends_at_last(planner.rehearsed)):
+            player.rehearsed = planner.rehearsed
+        return player
+
+
+def _ends_at_last(episode: PlayedEpisode) -> bool:
+    """Tell whether no step but the last ended an episode or was out of time."""
+    return not (episode.terminated | episode.truncated)[:-1].any()
 
 
 def _fresh(policy: Any) -> Any:

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experts.registry import Expert
+from experts.rehearsal import rehearsed
 from robots import CONTROL_MODES, RobotDescriptor, TaskError
 from rollouts.playing.mode_conversion import converted
 from tasks import MultiRobotTask
-from tasks.episode import follow, moments
+from tasks.episode import PlayedEpisode, follow, moments
 
 DELTAS, POSITIONS = CONTROL_MODES[:2]  # all experts plan in deltas
 
@@ -22,11 +23,14 @@ class Planner:
 
     Attributes:
         reason: Why its last plan does not solve the episode, in words, if the expert says so.
+        rehearsed: The episode of its last plan, if that has happened already; see
+            `experts.rehearsal.rehearsed`.
     """
 
     def __init__(self, task: MultiRobotTask, expert: Expert) -> None:
         """Make a task in deltas for the expert to plan for, if this one is in another mode."""
         self._task, self._expert, self._played, self.reason = task, expert, task, ""
+        self.rehearsed: PlayedEpisode | None = None
         self._converts = task.control_mode != DELTAS
         if self._converts:
             self._task = type(task)(replace(task.scenario, control_mode=DELTAS))
@@ -40,6 +44,7 @@ class Planner:
         actions = self._expert(self._task, seed)
         self.reason = getattr(actions, "reason", "")
         if not self._converts:
+            self.rehearsed = rehearsed(actions)
             return actions
         if self._played.control_mode == POSITIONS:
             return as_positions(self._task, seed, actions)

@@ -65,6 +65,8 @@ class Player:
         to_the_end: Whether it plays all its steps, those after a success or out of time included.
         takeover: May act in place of the policy: obs → action, or None to let the policy act.
         corrector: Says at every step what it would do: obs → action.
+        rehearsed: Its episode, if that has happened already, in the rehearsal of its plan; then
+            there is nothing left to play.
         steps: The steps so far.
     """
 
@@ -77,6 +79,7 @@ class Player:
     to_the_end: bool = False
     takeover: Policy | None = None
     corrector: Policy | None = None
+    rehearsed: PlayedEpisode | None = None
     steps: list[Step] = field(default_factory=list[Step])
 
     @property
@@ -90,6 +93,9 @@ class Player:
     @property
     def score(self) -> Score:
         """How its episode went."""
+        if self.rehearsed is not None:
+            score = self.rehearsed.score
+            return replace(score, reason="" if score.success else self.reason)
         success = bool(self.steps) and self.steps[-1].success
         total = fsum(step.reward for step in self.steps)
         return Score(success, total, len(self.steps), "" if success else self.reason)
@@ -136,8 +142,9 @@ def one_by_one(event: Event) -> list[Event]:
 
 def play_together(env: MultiRobotTask, players: Sequence[Player]) -> None:
     """Play an episode for each player until all are over; see `steps_together`."""
-    for _ in steps_together(env, players):
-        pass
+    if acting := _acting(players):
+        for _ in steps_together(env, acting):
+            pass
 
 
 def states_together(env: MultiRobotTask, players: Sequence[Player]) -> list[States]:
@@ -147,6 +154,30 @@ def states_together(env: MultiRobotTask, players: Sequence[Player]) -> list[Stat
         State dicts of `MultiRobotTask.get_state_dict`, each entry (T + 1, k) for T steps of its
         player.
     """
+    played = iter(_played_states(env, _acting(players)))
+    return [next(played) if p.rehearsed is None else p.rehearsed.states for p in players]
+
+
+def record_together(env: MultiRobotTask, players: Sequence[Player]) -> list[PlayedEpisode]:
+    """Play an episode for each player, as `steps_together` does, and keep what happens.
+
+    Raises:
+        TaskError: Also if a player takes no step.
+    """
+    acting = _acting(players)
+    states = _played_states(env, acting)
+    played = iter([p.episode(states[i], env.drawn(i)) for i, p in enumerate(acting)])
+    return [next(played) if p.rehearsed is None else p.rehearsed for p in players]
+
+
+def _acting(players: Sequence[Player]) -> list[Player]:
+    """Return those whose episodes have not happened yet."""
+    return [player for player in players if player.rehearsed is None]
+
+
+def _played_states(env: MultiRobotTask, players: Sequence[Player]) -> list[States]:
+    if not players:
+        return []
     happening = steps_together(env, players)
     next(happening)
     tape = env.begin_tape()
@@ -161,16 +192,6 @@ def states_together(env: MultiRobotTask, players: Sequence[Player]) -> list[Stat
         }
         for i, player in enumerate(players)
     ]
-
-
-def record_together(env: MultiRobotTask, players: Sequence[Player]) -> list[PlayedEpisode]:
-    """Play an episode for each player, as `steps_together` does, and keep what happens.
-
-    Raises:
-        TaskError: Also if a player takes no step.
-    """
-    states = states_together(env, players)
-    return [player.episode(states[i], env.drawn(i)) for i, player in enumerate(players)]
 
 
 def steps_together(env: MultiRobotTask, players: Sequence[Player]) -> Generator[None]:

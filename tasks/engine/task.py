@@ -72,10 +72,13 @@ class MultiRobotTask(Declaration, Varied, Remade):
         memory: What `remember` returned, as attributes.
         observer: What puts its observations together, and its cameras.
         observation_slices: Where each named part stands in the flat observation.
+        state_was_set: Whether `set_state_dict` was called since all worlds were last built anew:
+            what happens then does not follow from seeds and actions alone.
         start: Observation and info of the first reset, when it was made.
     """
 
     scenario: Scenario = cast(Scenario, _FreshScenario())
+    state_was_set: bool = False
 
     # -- making and closing ------------------------------------------------------------------
 
@@ -235,6 +238,7 @@ class MultiRobotTask(Declaration, Varied, Remade):
         again = self._varying is not None and self._varying.rebuilds
         if reconfigure:
             self.simulation.rebuild(ids, self._build_world)
+            self.state_was_set &= len(ids) < self.num_envs
         elif again:
             self.simulation.rebuild(ids, self._build_again)
         return self._begin(ids, reconfigured=reconfigure or again)
@@ -328,6 +332,7 @@ class MultiRobotTask(Declaration, Varied, Remade):
         """
         ids = checked_ids(env_ids, self.num_envs)
         write_state_dict(self.simulation, state, ids)
+        self.state_was_set = True
         self.observer.changed(ids)
         self._read()
 

@@ -6,8 +6,9 @@ import torch
 
 import tasks
 from experts import find_expert, list_experts
+from experts.rehearsal import rehearsed
 from parity.compare.native_env import make_native, native_action
-from tests.rollouts.expert_plays import REBUILT, episode, plan, seeds, task
+from tests.rollouts.expert_plays import REBUILT, episode, plan, same_episodes, seeds, task
 
 pytestmark = pytest.mark.xdist_group("experts")  # they share plans
 
@@ -40,6 +41,14 @@ def test_it_solves_its_task_in_time(name: str, seed: int):
     success = episode(name, seed).success
     assert success[-1]
     assert not success[:-1].any()
+
+
+@pytest.mark.parametrize(("name", "seed"), EPISODES)
+def test_its_rehearsal_is_what_its_actions_do_again(name: str, seed: int):
+    """So an episode that was rehearsed need not be played once more to be recorded."""
+    happened = rehearsed(plan(name, seed))
+    assert happened is not None
+    assert same_episodes(happened, episode(name, seed))
 
 
 @pytest.mark.long

@@ -1,6 +1,8 @@
 """Scripts are played as they are written, for one arm as for two."""
 
+import gc
 import re
+import weakref
 from collections.abc import Iterator
 from functools import partial
 
@@ -8,13 +10,23 @@ import numpy as np
 import pytest
 
 import tasks
+from experts import find_expert
 from experts.closed_loop import rehearse
 from experts.geometry import gripper_facing, nearest_quarter_turn, turn, yaw_of
-from experts.rehearsal import Attempt, Rehearsal, first_success, search
+from experts.rehearsal import (
+    Attempt,
+    Rehearsal,
+    first_success,
+    rehearsed,
+    rehearsing,
+    search,
+)
 from experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
 from kinematics.rotations import rotate
 from robots import TaskError, UnknownNameError
 from tasks.episode import play
+from tests.rollouts.expert_plays import same_episodes
+from tests.tasks.varying.declarations import TASK, VARIED
 
 FORWARD, DOWN = 0.0, gripper_facing(0.0, 0.0)
 
@@ -87,6 +99,89 @@ def test_attempts_end_with_the_first_that_succeeds():
     actions = search(task, 0, attempts)
     assert lifted == [True]
     np.testing.assert_array_equal(actions, first_success(task, 0, lambda scene: [PICK]))
+
+
+def test_a_rehearsal_of_a_world_that_varies_is_what_its_actions_do_again():
+    task = tasks.make(TASK, randomization=VARIED)
+    plan = find_expert(TASK)(task, 0)
+    happened = rehearsed(plan)
+    assert happened is not None
+    assert happened.drawn is not None
+    assert same_episodes(happened, play(task, 0, plan))
+
+
+def test_a_closed_loop_that_fails_was_an_episode_too():
+    task = tasks.make("PickCube-v1", reward_mode="sparse", max_episode_steps=9)
+    plan = rehearse(task, 4, lambda scene: np.full(8, 0.1))
+    happened = rehearsed(plan)
+    assert happened is not None
+    assert same_episodes(happened, play(task, 4, plan))
+
+
+def test_other_actions_than_those_rehearsed_have_no_episode_yet():
+    plan = rehearse(tasks.make("PickCube-v1", max_episode_steps=9), 0, lambda scene: np.zeros(8))
+    assert rehearsed(plan) is not None
+    assert rehearsed(plan[:-1]) is None
+    plan[3, 2] = 0.5
+    assert rehearsed(plan) is None
+    assert rehearsed(np.zeros((9, 8), np.float32)) is None
+
+
+STILL = np.zeros((4, 8), np.float32)
+
+
+def sets_state_back(rehearsal: Rehearsal) -> None:
+    before = rehearsal.task.get_state_dict()
+    rehearsal.task.step(STILL[:1] + 1.0)
+    rehearsal.task.set_state_dict(before)
+
+
+@pytest.mark.parametrize(
+    ("interlude", "kept"),
+    [
+        (lambda rehearsal: None, True),
+        (lambda rehearsal: rehearsal.task.step(STILL[:1]), False),
+        (lambda rehearsal: rehearsal.task.reset(0), False),
+        (lambda rehearsal: rehearsal.task.set_state_dict(rehearsal.task.get_state_dict()), False),
+        (sets_state_back, False),
+    ],
+    ids=["nothing", "a step", "a reset", "a state", "a look ahead"],
+)
+def test_what_does_not_follow_from_the_actions_alone_is_no_episode(interlude, kept: bool):
+    """Another begin forgets it."""
+    rehearsal = Rehearsal(tasks.make("PickCube-v1"))
+    rehearsal.begin(0)
+    rehearsal.step(STILL[0])
+    interlude(rehearsal)
+    for action in STILL[1:]:
+        rehearsal.step(action)
+    assert (rehearsal.episode(STILL) is not None) == kept
+    rehearsal.begin(0)
+    assert rehearsal.episode(STILL[:0]) is None
+    for action in STILL:
+        rehearsal.step(action)
+    assert rehearsal.episode(STILL) is not None
+
+
+def test_a_task_has_one_private_copy_which_is_lent_once():
+    task = tasks.make("PickCube-v1")
+    with rehearsing(task) as first, rehearsing(task) as inner:
+        assert inner is not first
+    with rehearsing(task) as again:
+        assert again is first
+    with pytest.raises(ZeroDivisionError), rehearsing(task) as lost:
+        1 / 0  # noqa: B018
+    with rehearsing(task) as fresh:
+        assert fresh is not lost
+
+
+def test_a_private_copy_goes_with_its_task():
+    task = tasks.make("PickCube-v1")
+    with rehearsing(task) as rehearsal:
+        copy = weakref.ref(rehearsal.task)
+    del rehearsal, task
+    gc.collect()
+    assert copy() is None
 
 
 def test_a_waypoint_turns_joints():

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +14,14 @@ import pytest
 
 import tasks
 from experts import registry
+from experts.maniskill.pick_cube import pick_cube
 from rollouts.__main__ import main
 from rollouts.playing.executor import WorkerError
 from rollouts.playing.in_process import InProcessExecutor
 from rollouts.reading.trajectory import TrajectoryFile
 from rollouts.recording.record import record
 from rollouts.recording.recorder import Recorder
+from tasks import MultiRobotTask
 from tasks.episode import play
 from tests.process_trees import workers_of
 from tests.rollouts.plays import NO_PLAN, TASK, at_random
@@ -128,6 +131,33 @@ def test_this_process_records_the_same(tmp_path, capsys):
     assert "recorded now 3" in capsys.readouterr().out
     direct = recorded_directly(tmp_path / "direct" / FILE, range(4, 7))
     assert same_files(tmp_path / FILE, direct)
+
+
+def planned(task, seed):
+    """The expert's plan as an expert would give it that keeps nothing of its rehearsal."""
+    return np.array(pick_cube(task, seed))
+
+
+@pytest.mark.parametrize("num_envs", [1, 2])
+def test_a_plan_that_was_rehearsed_is_recorded_without_being_played_again(
+    tmp_path, monkeypatch, num_envs
+):
+    """It is the same recording, with one control step of the task for each recorded one."""
+    steps = Counter[str]()
+    advance = MultiRobotTask.advance
+
+    def counted(self, action, env_ids=None):
+        steps[name] += 1
+        return advance(self, action, env_ids)
+
+    monkeypatch.setattr(MultiRobotTask, "advance", counted)
+    for name, expert in (("again", planned), ("once", pick_cube)):
+        monkeypatch.setitem(registry.EXPERTS.registered, "PickCube-v1", expert)
+        summary = record("PickCube-v1", range(3), tmp_path / name, workers=0, num_envs=num_envs)
+        assert [score.success for score in summary.played.values()] == [True] * 3
+    recorded = sum(score.steps for score in summary.played.values())
+    assert steps["once"] == recorded < steps["again"]
+    assert (tmp_path / "once" / FILE).read_bytes() == (tmp_path / "again" / FILE).read_bytes()
 
 
 def test_an_executor_that_forgets_episodes(tmp_path):
