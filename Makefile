@@ -4,6 +4,9 @@ PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python
 
+# Installed code is compiled when it is first imported, of the demo's a fifth; this keeps what was.
+export PYTHONDONTWRITEBYTECODE :=
+
 .PHONY: help demo test test-all faults check docs bench parity clean
 .NOTPARALLEL:
 
@@ -72,12 +75,12 @@ define install
 	@echo "Installing robot-layouts[$(1)] into $(VENV) (the first time takes some minutes)."
 	@test -x $(VENV)/bin/pip || $(PYTHON) -m venv $(VENV)
 	@touch $(VENV)/.unfinished
-	@$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[$(1)]'
+	@$(RUN) -m pip install --quiet --disable-pip-version-check $(2) -c constraints.txt -e '.[$(1)]'
 	@rm $(VENV)/.unfinished && touch $@
 endef
 
 $(VENV)/.demo: pyproject.toml constraints.txt
-	$(call install,demo)
+	$(call install,demo,--no-compile)
 
 $(VENV)/.test: pyproject.toml constraints.txt
 	$(call install,test)

@@ -11,12 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from robots import AssetError
+from robots import AssetError, RobotRegistry
 from robots.assets.fetching import ensure
 from robots.assets.manifest import load_manifest
 from robots.assets.packages import MANI_SKILL
 from robots.assets.store import AssetStore, FileState
 from robots.assets.wheel_source import PackageWheel
+from robots.fetch_assets import robot_files
 from tests.process_trees import children_of
 from tests.robots.conftest import PANDA, contents
 from tests.robots.processes import is_alive, wait_until
@@ -28,6 +29,8 @@ CHECKOUT = Path(__file__).parents[2]
 SMALL = [f for package in load_manifest().packages.values() for f in package.files]
 SMALL = [f for f in SMALL if f.bytes < 50_000 and f.origin.distribution == MANI_SKILL.name]
 FETCH = [sys.executable, "-m", "robots.fetch_assets", "panda", "--physics-only", "--source"]
+# What three programs lack, and whether they draw it.
+LACKING = {"panda": False, "so100": True, "koch": False}
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +82,35 @@ def test_two_processes_at_once_download_once(index, store, physics):
     assert [fetch.returncode for fetch in fetches] == [0, 0], said
     assert index.downloads == 1
     assert store.unusable(physics) == []
+
+
+def test_processes_that_lack_different_files_download_once(index, store):
+    """As they do when somebody starts several programs on a new machine."""
+    robots = {RobotRegistry.load(name): pictures for name, pictures in LACKING.items()}
+    files = {file for robot in robots for file in robot_files(robot, pictures=robots[robot])}
+    index.wheel = build_wheel(members(files, contents))
+    code = """
+import sys
+from robots.assets import fetching
+from robots.assets.packages import MANI_SKILL
+from robots.assets.wheel_source import PackageWheel
+from robots.registry import RobotRegistry
+fetching.default_sources = lambda: [PackageWheel(MANI_SKILL)]
+RobotRegistry.load(sys.argv[1]).urdf.locate(pictures=sys.argv[2] == "True")
+"""
+    started = [
+        subprocess.Popen(
+            [sys.executable, "-c", code, robot.name, str(pictures)],
+            cwd=CHECKOUT,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for robot, pictures in robots.items()
+    ]
+    said = [process.communicate(timeout=120)[1] for process in started]
+    assert [process.returncode for process in started] == [0, 0, 0], said
+    assert index.downloads == 1
+    assert sum("downloading the wheel" in words for words in said) == 1
 
 
 def test_a_fetch_killed_while_pip_downloads_leaves_nothing_behind(index, store, physics):
