@@ -123,7 +123,7 @@ def test_a_task_needs_the_verbs_alone_and_as_many_calls_for_many_worlds_as_for_o
     reset, step, *_ = one
     assert reset["clear"] == 1
     assert reset["place"] == 1
-    assert step["drive"] == step["step"] == 1
+    assert step["advance"] == 1
 
 
 def backwards(robot: RobotDescriptor) -> RobotDescriptor:
