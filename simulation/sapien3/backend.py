@@ -120,7 +120,10 @@ class SapienBackend:
         """Drive, advance and read world after world; see `Backend`."""
         goals = targets.tolist()
         speeds = None if velocities is None else velocities.tolist()
-        looks = [self._reader.look, *(x.look for x in self._lookouts if x.follows())]
+        looks = [self._reader.look]
+        for lookout in self._lookouts:
+            if lookout.follows():
+                looks.append(lookout.look)
         for i in range(len(self.worlds)):
             if i in env_ids:
                 for set_target, goal in zip(self._setters[i], goals[i], strict=True):

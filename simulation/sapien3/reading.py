@@ -24,32 +24,35 @@ class PoseReader:
     def __init__(self, worlds: Sequence[BuiltWorld]) -> None:
         """Look up what is asked of each world."""
         self._packers = [world.scene.pack_poses for world in worlds]
-        arms = [[robot.articulation for robot in world.robots.values()] for world in worlds]
-        self._positions = [[arm.get_qpos for arm in own] for own in arms]
-        self._velocities = [[arm.get_qvel for arm in own] for own in arms]
-        self._packed = [b""] * len(worlds)
-        self._qpos: list[list[Floats]] = [[]] * len(worlds)
-        self._qvel: list[list[Floats]] = [[]] * len(worlds)
+        self._robots = [
+            [(robot.get_qpos, robot.get_qvel) for robot in world.articulations] for world in worlds
+        ]
+        self._packed: list[bytes] = []
+        self._qpos: list[Floats] = []
+        self._qvel: list[Floats] = []
         self._places = _pose_places(len(worlds), len(worlds[0].scene.entities))
         self._order = _declared_order(worlds[0])
 
     def look(self, env: int) -> None:
-        """Read one world."""
-        self._packed[env] = self._packers[env]()
-        self._qpos[env] = [read() for read in self._positions[env]]
-        self._qvel[env] = [read() for read in self._velocities[env]]
+        """Read the next world."""
+        self._packed.append(self._packers[env]())
+        for positions, velocities in self._robots[env]:
+            self._qpos.append(positions())
+            self._qvel.append(velocities())
 
     def readout(self) -> Readout:
-        """Return what was read of all worlds."""
+        """Return what was read of all worlds, and forget it."""
         packed = np.frombuffer(b"".join(self._packed), np.float32)
-        return Readout(packed[self._places], self._joints(self._qpos), self._joints(self._qvel))
+        qpos, qvel = self._joints(self._qpos), self._joints(self._qvel)
+        self._packed, self._qpos, self._qvel = [], [], []
+        return Readout(packed[self._places], qpos, qvel)
 
-    def _joints(self, rows: list[list[Floats]]) -> Floats:
+    def _joints(self, rows: list[Floats]) -> Floats:
         """Return joints of all robots of all worlds as one row for each world."""
-        if len(rows) == 1 and len(rows[0]) == 1:
-            joints = rows[0][0][None]
+        if len(rows) == 1:
+            joints = rows[0][None]
         else:
-            joints = np.concatenate([row for own in rows for row in own]).reshape(len(rows), -1)
+            joints = np.concatenate(rows).reshape(len(self._packers), -1)
         return joints if self._order is None else joints.take(self._order, 1)
 
 
