@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from simulation.maths import Floats, arctan2, sqrt
+from simulation.maths import Floats, arctan2, number, sqrt
 
 # Products of quaternion entries (w = 0, x = 1, y = 2, z = 3) that each of the nine matrix entries,
 # row by row, is the sum or difference of.
@@ -21,7 +21,7 @@ _PAIRS = (
 _FIRST = np.array([4 * i + j for ((i, j), _), _ in _PAIRS])
 _SECOND = np.array([4 * i + j for (_, (i, j)), _ in _PAIRS])
 _SIGN = np.array([sign for _, sign in _PAIRS], np.float32)
-_TWO, _ONE = np.float32(2.0), np.float32(1.0)
+_TWO, _ONE = number(2.0), number(1.0)
 
 
 def rotation_matrix(quaternion: Floats) -> Floats:
@@ -36,7 +36,7 @@ def rotation_matrix(quaternion: Floats) -> Floats:
     # Sums of four depend on their order, so torch adds.
     scale = _TWO / torch.from_numpy(quaternion * quaternion).sum(-1, keepdim=True).numpy()
     products = (quaternion[:, :, None] * quaternion[:, None, :]).reshape(len(quaternion), 16)
-    entries = scale * (products[:, _FIRST] + _SIGN * products[:, _SECOND])
+    entries: Floats = scale * (products.take(_FIRST, 1) + _SIGN * products.take(_SECOND, 1))
     entries[:, ::4] = _ONE - entries[:, ::4]
     return entries.reshape(len(quaternion), 3, 3)
 

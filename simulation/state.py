@@ -15,7 +15,18 @@ from robots import Fingers, SimulationError
 from robots.descriptor import Vector3
 from simulation.backend import Readout, Velocity
 from simulation.grasps import grasped
-from simulation.maths import Array, Flags, Floats, concatenate, counted, full, like, norm, stack
+from simulation.maths import (
+    Array,
+    Flags,
+    Floats,
+    concatenate,
+    counted,
+    full,
+    like,
+    norm,
+    number,
+    stack,
+)
 from simulation.readout import Lost, MeanFrame, Moment, ReadoutIndex
 from simulation.rotations import last_euler_angle, rotation_matrix
 
@@ -32,11 +43,10 @@ def _remembered(
 
     Views of what was read cost less than a look-up and are not remembered.
     """
-    name = compute.__name__
 
     @wraps(compute)
     def look_up(self: State, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Value:
-        key = (name, args, *kwargs.items())
+        key = (compute, args, *kwargs.items()) if kwargs else (compute, args)
         found = self.memo.get(key)
         if found is None:
             found = self.memo[key] = compute(self, *args, **kwargs)
@@ -216,6 +226,12 @@ class State:
         """Joint velocities of a robot, ordered likewise, shape (N, dof) (rad/s, m/s)."""
         return self.joint_velocities[:, self._index.joints[robot]]
 
+    def native_joints(self, robot: str) -> list[Floats]:
+        """Joint positions and velocities of a robot in native's order, which is SAPIEN's."""
+        joints, order = self._index.joints[robot], self._index.loaded_order[robot]
+        rows = [self.joint_positions[:, joints], self.joint_velocities[:, joints]]
+        return rows if order is None else [row[:, order] for row in rows]
+
     def arm_qvel(self, robot: str) -> Floats:
         """Joint velocities of a robot without its gripper, shape (N, arm joints) (rad/s)."""
         return self.joint_velocities[:, self._index.arm_joints[robot]]
@@ -281,7 +297,7 @@ class State:
     def is_static(self, robot: str, threshold: float = 0.2) -> Flags:
         """Whether no arm joint is faster than ``threshold`` (rad/s), shape (N,) bool."""
         speeds = np.abs(self.joint_velocities[:, self._index.arm_joints[robot]])
-        return np.maximum.reduce(speeds, 1) <= np.float32(threshold)
+        return np.maximum.reduce(speeds, 1) <= number(threshold)
 
     # -- contacts ----------------------------------------------------------------------------
 

@@ -42,10 +42,10 @@ class ActionReader:
         if action is self.checked and self.checked is not None:
             return self.checked
         count = self._num_envs if env_ids is None else len(env_ids)
-        if type(action) is not torch.Tensor and isinstance(action, Mapping):
-            flat = self._join(action, count)
-        else:
+        if type(action) is torch.Tensor or not isinstance(action, Mapping):
             flat = self._array(action, count, self._width, "the action")
+        else:
+            flat = self._join(action, count)
         if not all_finite(flat):
             self._refuse_number(flat, env_ids)
         return flat

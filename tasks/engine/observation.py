@@ -28,7 +28,7 @@ from tasks.engine.columns import (
 )
 from tasks.engine.finite import NotFinite
 from tasks.native import controllers
-from tasks.native.format import native_joints, observation_keys
+from tasks.native.format import observation_keys
 from tasks.varying.noise import Noisy
 
 if TYPE_CHECKING:
@@ -276,14 +276,7 @@ class Observer:
         parts: Mapping[str, Array],
         noisy: Noisy | None,
     ) -> Any:
-        index = simulation.index
-        robots = [
-            [
-                native_joints(index, name, state.qpos(name)),
-                native_joints(index, name, state.qvel(name)),
-            ]
-            for name in self._robots
-        ]
+        robots = [state.native_joints(name) for name in self._robots]
         if noisy is not None:
             robots = [
                 [noisy(f"{name}.{joints}", row) for joints, row in zip(JOINTS, own, strict=True)]
@@ -296,8 +289,11 @@ class Observer:
         return self._flat(robots, parts) if self.mode.flat else self._named(robots, kept, parts)
 
     def _flat(self, robots: Sequence[Sequence[Floats]], parts: Mapping[str, Array]) -> Floats:
-        joined = [row for own in robots for row in own]
-        joined.extend(part if part.ndim == 2 else part[:, None] for part in parts.values())
+        joined: list[Array] = []
+        for own in robots:
+            joined += own
+        for part in parts.values():
+            joined.append(part if part.ndim == 2 else part[:, None])
         flat = np.concatenate(joined, 1, dtype=np.float32)
         if not all_finite(flat):
             raise NotFinite

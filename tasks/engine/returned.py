@@ -5,7 +5,7 @@ A wrong shape spreads as far as NaN does: rewards of shape (N, 1) become (N, N) 
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, NoReturn
 
@@ -48,9 +48,8 @@ class ReturnedArrays:
         """
         self.method = method
         self._num_envs, self._axes, self._judges = num_envs, axes, judges
-        self._names: list[str] = []
-        self._shapes: list[tuple[int, ...]] = []
-        self._types: list[np.dtype[Any]] | None = None
+        self._names: list[str] | None = None  # as long as it was not called
+        self._forms: list[tuple[np.dtype[Any], tuple[int, ...]]] = []
 
     def checked(self, values: Any) -> Mapping[str, NDArray[Any]]:
         """Return what was returned; it is looked at closely if it is not as at first.
@@ -60,9 +59,10 @@ class ReturnedArrays:
         """
         if type(values) is dict and list(values) == self._names:
             try:  # arrays; all else is looked at
-                arrays = values.values()
-                same = [x.dtype for x in arrays] == self._types
-                if same and [x.shape for x in arrays] == self._shapes:
+                for array, form in zip(values.values(), self._forms, strict=True):
+                    if (array.dtype, array.shape) != form:
+                        break
+                else:
                     return values
             except AttributeError:
                 pass
@@ -74,15 +74,15 @@ class ReturnedArrays:
                 f"{self.method} returned {_given(values)}; it must return a dict of arrays by name"
             )
         arrays = {name: self._array(name, value) for name, value in values.items()}
-        if self._types is None:
+        if self._names is None:
             self._check_first(arrays)
-            self._names, self._shapes = list(arrays), [x.shape for x in arrays.values()]
-            self._types = [x.dtype for x in arrays.values()]
+            self._names = list(arrays)
+            self._forms = [(x.dtype, x.shape) for x in arrays.values()]
         elif arrays.keys() != set(self._names):
-            self._refuse_names(arrays)
-        for name, shape, dtype in zip(self._names, self._shapes, self._types, strict=True):
+            self._refuse_names(arrays, self._names)
+        for name, (dtype, shape) in zip(self._names, self._forms, strict=True):
             array = arrays[name]
-            if (array.shape, array.dtype) != (shape, dtype):
+            if (array.dtype, array.shape) != (dtype, shape):
                 raise TaskError(
                     f"{self.method} returned {name!r} as {_form(array)}; at first it was"
                     f" {dtype} of shape {shape}, and must stay that"
@@ -105,13 +105,13 @@ class ReturnedArrays:
                 " as comparisons give it: distance <= 0.02"
             )
 
-    def _refuse_names(self, arrays: Mapping[str, NDArray[Any]]) -> NoReturn:
-        more = [name for name in arrays if name not in self._names]
-        less = [name for name in self._names if name not in arrays]
+    def _refuse_names(self, arrays: Mapping[str, NDArray[Any]], names: Sequence[str]) -> NoReturn:
+        more = [name for name in arrays if name not in names]
+        less = [name for name in names if name not in arrays]
         changes = [
-            f"{what} {', '.join(map(repr, names))}"
-            for what, names in (("it has", more), ("it lacks", less))
-            if names
+            f"{what} {', '.join(map(repr, changed))}"
+            for what, changed in (("it has", more), ("it lacks", less))
+            if changed
         ]
         raise TaskError(
             f"{self.method} returned other names than at first ({' and '.join(changes)}); it must"

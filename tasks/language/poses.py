@@ -12,10 +12,11 @@ import numpy as np
 
 from simulation.maths import (
     Floats,
+    added,
     arctan2,
     columns,
     concatenate,
-    like,
+    constant,
     minimum,
     norm,
     sin,
@@ -24,9 +25,10 @@ from simulation.maths import (
 )
 
 # Component j of a product is the sum over k of a[k] · b[_FACTOR[k, j]] · _SIGN[k, j], k = 0 first.
-_FACTOR = ((0, 1, 2, 3), (1, 0, 3, 2), (2, 3, 0, 1), (3, 2, 1, 0))
-_SIGN = ((1, 1, 1, 1), (-1, 1, -1, 1), (-1, 1, 1, -1), (-1, -1, 1, 1))
-_CONJUGATE = (1, -1, -1, -1)
+_FACTOR = np.array(((0, 1, 2, 3), (1, 0, 3, 2), (2, 3, 0, 1), (3, 2, 1, 0)))
+_SIGN = np.array(((1, 1, 1, 1), (-1, 1, -1, 1), (-1, 1, 1, -1), (-1, -1, 1, 1)), np.float32)
+_CONJUGATE = np.array((1, -1, -1, -1), np.float32)
+_BACK = _SIGN * _CONJUGATE[_FACTOR]  # of a product with the conjugate of b
 
 _SMALL_ANGLE = 1e-6  # below it sin(x / 2) / x is taken from its series (rad)
 
@@ -78,21 +80,20 @@ def angle_between(first: Floats, second: Floats) -> Floats:
     return minimum(turned, (2 * math.pi) - turned)
 
 
-def _product(a: Floats, b: Floats) -> Floats:
+def _product(a: Floats, b: Floats, signs: Floats = _SIGN) -> Floats:
     """Products of quaternions, (N, 4)."""
-    factors: Floats = columns(b, _FACTOR) * like(b, _SIGN)
-    terms: Floats = a[:, :, None] * factors
-    return terms[:, 0] + terms[:, 1] + terms[:, 2] + terms[:, 3]
+    factors: Floats = columns(b, _FACTOR) * constant(b, signs)
+    return added(a[:, :, None] * factors)
 
 
 def _rotated(quaternion: Floats, point: Floats) -> Floats:
     """Points (N, 3) turned by quaternions (N, 4)."""
     as_quaternion = concatenate((zeros(point[:, :1]), point), 1)
-    return _product(_product(quaternion, as_quaternion), _conjugate(quaternion))[:, 1:]
+    return _product(_product(quaternion, as_quaternion), quaternion, _BACK)[:, 1:]
 
 
 def _conjugate(quaternion: Floats) -> Floats:
-    return quaternion * like(quaternion, _CONJUGATE)
+    return quaternion * constant(quaternion, _CONJUGATE)
 
 
 def _with_positive_w(quaternion: Floats) -> Floats:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from simulation import State
 from simulation.maths import Flags, Floats, stack, tanh, where
+from simulation.maths import closeness as close
 
 
 def closeness(*distances: Floats) -> Sequence[Floats]:
@@ -15,7 +16,7 @@ def closeness(*distances: Floats) -> Sequence[Floats]:
         distances: Arrays of one shape, which are taken together, since calls cost more than
             numbers.
     """
-    return [*(1.0 - tanh(stack(distances) * 5.0))]
+    return [*close(stack(distances), 5.0)]
 
 
 def stillness(state: State, body: str) -> Floats:
