@@ -32,7 +32,7 @@ def rehearse(task: MultiRobotTask, seed: int, act: Callable[[Scene], Any]) -> Pl
         ActionError: If an action has the wrong shape or numbers that are not finite.
     """
     with rehearsing(task) as rehearsal:
-        return Plan.of(_attempt(rehearsal, seed, act))
+        return Plan.of(_attempt(rehearsal, seed, act), task)
 
 
 def _attempt(rehearsal: Rehearsal, seed: int, act: Callable[[Scene], Any]) -> Attempt:

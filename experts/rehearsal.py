@@ -6,7 +6,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
+from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,28 +46,33 @@ class Plan(NDArray[np.float32] if TYPE_CHECKING else np.ndarray):
     Attributes:
         reason: In words; empty if they do.
         episode: What happened when they were tried, if it was kept; see `rehearsed`.
+        task: The task that they were planned for; None if it is gone.
     """
 
     reason: str = ""
     episode: PlayedEpisode | None = None
+    task: Callable[[], MultiRobotTask | None] = staticmethod(lambda: None)
 
     @classmethod
-    def of(cls, attempt: Attempt) -> Plan:
-        """Return what came of an attempt."""
+    def of(cls, attempt: Attempt, task: MultiRobotTask) -> Plan:
+        """Return what came of an attempt at a task."""
         plan = attempt.actions.view(cls)
-        plan.reason, plan.episode = attempt.reason, attempt.episode
+        plan.reason, plan.episode, plan.task = attempt.reason, attempt.episode, ref(task)
         return plan
 
 
-def rehearsed(actions: NDArray[np.float32]) -> PlayedEpisode | None:
-    """Return the episode that a plan's rehearsal was, or None if it has to be played first.
+def rehearsed(
+    task: MultiRobotTask, seed: int, actions: NDArray[np.float32]
+) -> PlayedEpisode | None:
+    """Return the episode of a task that a plan's rehearsal was; None if it has to be played first.
 
     A rehearsal begins in a freshly built world, with the physics and rewards of the task that is
     planned for. So these actions, played there, would give the same states again, bit for bit.
     """
-    episode: PlayedEpisode | None = getattr(actions, "episode", None)
-    same = episode is not None and np.array_equal(episode.actions, actions)
-    return episode if same else None
+    if not isinstance(actions, Plan) or actions.episode is None or actions.task() is not task:
+        return None
+    same = actions.episode.seed == seed and np.array_equal(actions.episode.actions, actions)
+    return actions.episode if same else None
 
 
 class Rehearsal:
@@ -254,7 +259,7 @@ def search(
     best = max(made, key=lambda attempt: (attempt.success, len(attempt.actions)))
     if not len(best.actions):
         raise TaskError(f"{task.task_id}, seed {seed}: no plan: {best.reason}")
-    return Plan.of(best)
+    return Plan.of(best, task)
 
 
 def _stack(actions: list[NDArray[np.float32]], task: MultiRobotTask) -> NDArray[np.float32]:

@@ -80,7 +80,7 @@ def run_demo(options: DemoOptions, console: Console) -> bool:
         for seed in range(options.seeds):
             live.update(line, description=f"seed {seed}")
             actions = expert(task, seed)
-            episodes.append(rehearsed(actions) or play(task, seed, actions))
+            episodes.append(rehearsed(task, seed, actions) or play(task, seed, actions))
             recorder.add(episodes[-1])
             live.console.print(_episode_line(episodes[-1]), highlight=False)
     _report(episodes, console)

@@ -44,7 +44,7 @@ class Planner:
         actions = self._expert(self._task, seed)
         self.reason = getattr(actions, "reason", "")
         if not self._converts:
-            self.rehearsed = rehearsed(actions)
+            self.rehearsed = rehearsed(self._task, seed, actions)
             return actions
         if self._played.control_mode == POSITIONS:
             return as_positions(self._task, seed, actions)

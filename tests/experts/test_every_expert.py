@@ -46,7 +46,7 @@ def test_it_solves_its_task_in_time(name: str, seed: int):
 @pytest.mark.parametrize(("name", "seed"), EPISODES)
 def test_its_rehearsal_is_what_its_actions_do_again(name: str, seed: int):
     """So an episode that was rehearsed need not be played once more to be recorded."""
-    happened = rehearsed(plan(name, seed))
+    happened = rehearsed(task(name), seed, plan(name, seed))
     assert happened is not None
     assert same_episodes(happened, episode(name, seed))
 

@@ -104,7 +104,7 @@ def test_attempts_end_with_the_first_that_succeeds():
 def test_a_rehearsal_of_a_world_that_varies_is_what_its_actions_do_again():
     task = tasks.make(TASK, randomization=VARIED)
     plan = find_expert(TASK)(task, 0)
-    happened = rehearsed(plan)
+    happened = rehearsed(task, 0, plan)
     assert happened is not None
     assert happened.drawn is not None
     assert same_episodes(happened, play(task, 0, plan))
@@ -113,18 +113,21 @@ def test_a_rehearsal_of_a_world_that_varies_is_what_its_actions_do_again():
 def test_a_closed_loop_that_fails_was_an_episode_too():
     task = tasks.make("PickCube-v1", reward_mode="sparse", max_episode_steps=9)
     plan = rehearse(task, 4, lambda scene: np.full(8, 0.1))
-    happened = rehearsed(plan)
+    happened = rehearsed(task, 4, plan)
     assert happened is not None
     assert same_episodes(happened, play(task, 4, plan))
 
 
 def test_other_actions_than_those_rehearsed_have_no_episode_yet():
-    plan = rehearse(tasks.make("PickCube-v1", max_episode_steps=9), 0, lambda scene: np.zeros(8))
-    assert rehearsed(plan) is not None
-    assert rehearsed(plan[:-1]) is None
+    task, other = (tasks.make("PickCube-v1", max_episode_steps=9) for _ in range(2))
+    plan = rehearse(task, 0, lambda scene: np.zeros(8))
+    assert rehearsed(task, 0, plan) is not None
+    assert rehearsed(task, 1, plan) is None
+    assert rehearsed(other, 0, plan) is None
+    assert rehearsed(task, 0, plan[:-1]) is None
     plan[3, 2] = 0.5
-    assert rehearsed(plan) is None
-    assert rehearsed(np.zeros((9, 8), np.float32)) is None
+    assert rehearsed(task, 0, plan) is None
+    assert rehearsed(task, 0, np.zeros((9, 8), np.float32)) is None
 
 
 STILL = np.zeros((4, 8), np.float32)
