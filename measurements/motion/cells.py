@@ -37,6 +37,7 @@ SHARE_OF_SMALL = 0.15  # of the cells; arms of both sizes seldom share space
 CLOSENESS = 0.75, 1.05  # of distances that presets choose by themselves
 FLOOR: Rectangle = (-6.0, -6.0, 6.0, 6.0)  # m; robots stand on it
 TRIES = 400  # postures per robot
+ABOVE_FLOOR = 0.01  # m; the links of shoulders turn at less than 2 cm above what some arms stand on
 
 
 def random_cell(seed: int, arms: int, extra: Sequence[RobotDescriptor] = ()) -> Layout:
@@ -100,15 +101,21 @@ class RandomPostures:
 
         Args:
             cell: The cell.
-            clearance: How near robots may come to each other (m).
+            clearance: How near robots may come to each other (m); to a table, `ABOVE_FLOOR` at
+                most.
         """
         self._cell, self._whole = cell, cell.checker()
         limits = np.nan_to_num(cell.limits, posinf=np.pi, neginf=-np.pi)
         self._limits = np.clip(limits, cell.start[:, None] - np.pi, cell.start[:, None] + np.pi)
-        self._checkers: dict[str, Checker] = {}
+        self._checkers: dict[str, tuple[Checker, Checker]] = {}
         for i, name in enumerate(cell.robots):
+            earlier = [(name, other) for other in cell.robots[:i]]
             later = [(name, other) for other in cell.robots[i + 1 :]]
-            self._checkers[name] = cell.checker([name], clearance, except_=later)
+            tables = [(name, table) for table in cell.tables]
+            self._checkers[name] = (
+                cell.checker([name], clearance, own=None, except_=later + tables),
+                cell.checker([name], min(clearance, ABOVE_FLOOR), except_=later + earlier),
+            )
 
     def drawn(self, seed: Sequence[int]) -> Iterator[Floats]:
         """Yield postures, (D,) (rad, m), the same for the same seed."""
@@ -129,7 +136,7 @@ class RandomPostures:
         for _ in range(TRIES // 20):
             states = np.tile(state, (20, 1))
             states[:, columns] = random.uniform(low, high, (20, len(columns)))
-            free = self._checkers[name].free(states)
+            free = np.all([checker.free(states) for checker in self._checkers[name]], axis=0)
             if free.any():
                 return states[np.argmax(free)]
         return None

@@ -20,6 +20,7 @@ from typing import NamedTuple
 from kinematics.rotations import Floats
 from measurements.motion.answers import (
     CATALOGUE,
+    CLEARANCE,
     IN_COLLISION,
     INFEASIBLE,
     OUT_OF_REACH,
@@ -43,7 +44,6 @@ from robots.common.writing import write_whole
 from rollouts.progress import LiveLine
 
 RECORD = Path("runs/motion_queries.jsonl")
-CLEARANCE = 0.01  # m
 MODE = "pd_joint_pos"  # control mode
 HOPELESS = 1000  # number of the first question of a cell that has no answer
 WAIT = 1800.0  # s; wall time after which a query is given up, whatever else the machine does
