@@ -38,10 +38,10 @@ class ActionReader:
         """
         if action is self.checked and self.checked is not None:
             return self.checked
-        if type(action) is torch.Tensor or not isinstance(action, Mapping):
-            flat = self._array(action, self._width, "the action")
-        else:
+        if type(action) is not torch.Tensor and isinstance(action, Mapping):
             flat = self._join(action)
+        else:
+            flat = self._array(action, self._width, "the action")
         if not all_finite(flat):
             self._refuse_number(flat)
         return flat
