@@ -15,9 +15,8 @@ such simulations keep them, and none of the verbs is called once per world.
   frame's number is its row in the pose tensor. Later calls name the worlds that are built anew.
 - `place` gets what a reset placed in every world at once; it scatters rows into pose tensors and
   applies them.
-- `drive` writes the tensor of drive targets and `step` advances; `advance` does both and reads.
-  Worlds that are not in ``env_ids`` are to stand still; a simulation that can only advance all of
-  them saves and restores theirs.
+- `drive` writes the tensor of drive targets and `step` advances. Worlds that are not in ``env_ids``
+  are to stand still; a simulation that can only advance all of them saves and restores theirs.
 - Tasks compute with NumPy's arrays and torch's tensors alike, so tensors may be returned as they
   are. What lies between still takes NumPy's and is to learn of tensors then, none of it in a task:
   `simulation.controller`, `simulation.grasps`, `simulation.rotations`, and `State` where it reduces
@@ -231,22 +230,6 @@ class Backend(Protocol):
 
     def drive_velocities(self, velocities: Floats, env_ids: Sequence[int]) -> None:
         """Set every joint's target of velocity, likewise (rad/s, m/s); 0 until it is set."""
-        ...
-
-    def advance(
-        self, targets: Floats, velocities: Floats | None, env_ids: Sequence[int], substeps: int
-    ) -> Readout:
-        """Do what `drive`, `drive_velocities`, `step` and `read` do, all at once.
-
-        A backend whose worlds are apart does it world after world: what is read right after a step
-        is read from the processor's caches.
-
-        Args:
-            targets: Every joint's drive target, (N, dof).
-            velocities: Every joint's target of velocity, likewise; None leaves them.
-            env_ids: Which worlds are driven and advanced; all are read.
-            substeps: Steps of physics.
-        """
         ...
 
     def step(self, env_ids: Sequence[int], substeps: int) -> None:

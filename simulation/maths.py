@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import lru_cache, wraps
 from math import isfinite
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import numpy as np
 import torch
@@ -130,19 +130,22 @@ def copy(x: Array) -> Any:
 
 def tanh(x: Array) -> Any:
     """Return torch's hyperbolic tangents."""
-    return x.tanh() if isinstance(x, Tensor) else torch.from_numpy(x).tanh().numpy()
+    if isinstance(x, Tensor):
+        return x.tanh()
+    if not x.flags.c_contiguous:
+        return torch.from_numpy(x).tanh().numpy()
+    tangents = x.copy()  # where torch writes, NumPy need not take its tensor back
+    torch.from_numpy(tangents).tanh_()
+    return tangents
 
 
 def closeness(x: Array, steepness: float) -> Any:
     """Return ``1 - tanh(steepness · x)``, the way to reward that a distance is small."""
     if isinstance(x, Tensor) or x.dtype != np.float32:
         return 1.0 - tanh(x * steepness)
-    lent = _lend(x.shape)
-    np.multiply(x, number(steepness), lent.array)
-    lent.tensor.tanh_()
-    close = _ONE - lent.array
-    _give_back(lent)
-    return close
+    tangents = x * number(steepness)
+    torch.from_numpy(tangents).tanh_()
+    return number(1.0) - tangents
 
 
 def sqrt(x: Array | Tensor) -> Any:
@@ -215,7 +218,7 @@ def full(x: Array, count: int, value: float) -> Any:
 
 
 @lru_cache(maxsize=4096)
-def number(value: float) -> Floats:
+def number(value: float) -> Any:
     """Return a number as a float32 array of shape (), which cannot be changed.
 
     It does what a plain float does, and NumPy takes half the time for it.
@@ -228,38 +231,6 @@ def number(value: float) -> Floats:
 def rounded(value: float) -> float:
     """Return the float32 nearest to a number."""
     return float(np.float32(value))
-
-
-class _Lent(NamedTuple):
-    """An array and a tensor of the same memory."""
-
-    array: Floats
-    tensor: Tensor
-
-
-_spare: dict[tuple[int, ...], list[_Lent]] = {}
-_SMALL = 4096  # numbers; more are not kept
-_ONE: Floats = np.array(1, np.float32)
-
-
-def _lend(shape: tuple[int, ...]) -> _Lent:
-    """Return memory that torch writes and NumPy reads, which nobody else has until it is back.
-
-    To wrap an array for torch and its tensor for NumPy costs more than to add a few numbers.
-    """
-    spare = _spare.get(shape)
-    if spare:
-        try:
-            return spare.pop()
-        except IndexError:  # another thread was faster
-            pass
-    array = np.empty(shape, np.float32)
-    return _Lent(array, torch.from_numpy(array))
-
-
-def _give_back(lent: _Lent) -> None:
-    if lent.array.size <= _SMALL:
-        _spare.setdefault(lent.array.shape, []).append(lent)
 
 
 @lru_cache(maxsize=4096)

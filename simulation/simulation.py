@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from layouts import Layout
 from robots import RobotDescriptor, SimulationError
 from robots.descriptor import IDENTITY, Quaternion
-from simulation.backend import Backend, Overlap, Part, PointSolver, PoseSolver, Readout, Rows
+from simulation.backend import Backend, Overlap, Part, PointSolver, PoseSolver, Rows
 from simulation.cameras import AnyCamera, View
 from simulation.control.modes import ModeController
 from simulation.controller import JointPositionController
@@ -76,7 +76,6 @@ class Simulation:
         self._backend = backend()
         self._moment = Moment(self._backend)
         self._latest: State | None = None  # of this moment, if control modes look at it
-        self._read: Readout | None = None  # with the last step, until it is asked for
         self._placements = Placements()
         self._controller = JointPositionController(layout)
         self.drive_targets: Floats = np.zeros((num_envs, self._controller.dof), np.float32)
@@ -114,8 +113,7 @@ class Simulation:
             joint_positions: Joint positions before the step, shape (N, dof) (rad, m).
             env_ids: Which worlds; all if None. The others stand still.
         """
-        targets, velocities, moving = self._targets(action, joint_positions, env_ids)
-        self._read = self._backend.advance(targets, velocities, moving, self.substeps)
+        self._backend.step(self._drive(action, joint_positions, env_ids), self.substeps)
 
     def rest(self, state: State, env_ids: Sequence[int]) -> None:
         """Drive all joints of worlds to where they are, until a step drives them elsewhere.
@@ -144,10 +142,7 @@ class Simulation:
             action: Shape (N, A), finite.
             clock: Tells the time (s).
         """
-        targets, velocities, moving = self._targets(action, self.read().joint_positions, None)
-        self._backend.drive(targets, moving)
-        if velocities is not None:
-            self._backend.drive_velocities(velocities, moving)
+        moving = self._drive(action, self.read().joint_positions, None)
         start = clock()
         self._backend.step(moving, self.substeps)
         return clock() - start
@@ -210,8 +205,7 @@ class Simulation:
         """Return what all worlds look like now."""
         if self._placements:
             self._change()
-        readout, self._read = self._read, None
-        state = State(readout or self._backend.read(), self.index, self._moment)
+        state = State(self._backend.read(), self.index, self._moment)
         if self.modes is not None:
             self._latest = state
         return state
@@ -288,33 +282,41 @@ class Simulation:
 
     # -- inside ------------------------------------------------------------------------------
 
-    def _targets(
+    def _drive(
         self, action: Floats, joint_positions: Floats, env_ids: Iterable[int] | None
-    ) -> tuple[Floats, Floats | None, Sequence[int]]:
-        """Return what joints are driven to, positions and velocities, and in which worlds."""
-        moving = self._everywhere if env_ids is None else list(env_ids)
-        velocities = None
-        if self.modes is None:
-            self._change()
-            targets = self._controller.targets(action, joint_positions)
+    ) -> Sequence[int]:
+        """Set the drive targets of worlds, and return which."""
+        if self.modes is not None:
+            return self._drive_modes(self.modes, action, env_ids)
+        self._change()
+        targets = self._controller.targets(action, joint_positions)
+        if env_ids is None:
+            moving, self.drive_targets = self._everywhere, targets
         else:
-            targets, velocities = self._command(self.modes, action, moving)
+            moving = list(env_ids)
+            self.drive_targets[moving] = targets[moving]
+        self._backend.drive(targets, moving)
+        return moving
+
+    def _drive_modes(
+        self, modes: ModeController, action: Floats, env_ids: Iterable[int] | None
+    ) -> Sequence[int]:
+        state = self._latest
+        if state is None or self._placements:
+            state = self.read()
+        moving = self._everywhere if env_ids is None else list(env_ids)
+        if self._fresh:
+            self.hold(state)
+        self._change()
+        targets, velocities = modes.command(action, state, moving)
         if env_ids is None:
             self.drive_targets = targets
         else:
             self.drive_targets[moving] = targets[moving]
-        return targets, velocities, moving
-
-    def _command(
-        self, modes: ModeController, action: Floats, moving: Sequence[int]
-    ) -> tuple[Floats, Floats | None]:
-        state = self._latest
-        if state is None or self._placements:
-            state = self.read()
-        if self._fresh:
-            self.hold(state)
-        self._change()
-        return modes.command(action, state, moving)
+        self._backend.drive(targets, moving)
+        if velocities is not None:
+            self._backend.drive_velocities(velocities, moving)
+        return moving
 
     def _change(self) -> None:
         """Place what is to be placed, and let states that were read be past."""
@@ -324,7 +326,7 @@ class Simulation:
             self._placements.robots.clear()
         self._moment.past = True
         self._moment = Moment(self._backend)
-        self._latest = self._read = None
+        self._latest = None
 
     def _describe(self, index: int, build: Callable[[World, int], None]) -> World:
         world = World(

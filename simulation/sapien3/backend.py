@@ -24,11 +24,12 @@ from simulation.sapien3.extents import extents_of
 from simulation.sapien3.inverse_kinematics import InverseKinematics
 from simulation.sapien3.point_reach import PointReach
 from simulation.sapien3.pose_follower import JOINTS_OF_A_POSE, NearestFollower, PoseFollower
-from simulation.sapien3.reading import BodyVelocities, PoseReader
 from simulation.sapien3.varied import vary
 from simulation.sapien3.world import BuiltWorld, build_world
 from simulation.variation import Variation
 from simulation.world import Placements, World
+
+_STILL = np.zeros(3, np.float32)
 
 
 class SapienBackend:
@@ -50,6 +51,8 @@ class SapienBackend:
         self.worlds = [
             built.get(i) or self.worlds[i] for i in range(max(len(self.worlds), len(built)))
         ]
+        robots = [robot for world in self.worlds for robot in world.robots.values()]
+        self._articulations: list[Any] = [robot.articulation for robot in robots]
         self._setters: list[list[Callable[[float], None]]] = [
             [set_target for robot in world.robots.values() for set_target in robot.setters]
             for world in self.worlds
@@ -62,30 +65,28 @@ class SapienBackend:
             ]
             for world in self.worlds
         ]
+        self._packers = [world.scene.pack_poses for world in self.worlds]
         self._steps = [world.stepper() for world in self.worlds]
         if self._arms is not None:
             self.watch_arms()
-        self._reader = PoseReader(self.worlds)
+        self._places = _pose_places(len(self.worlds), len(self.worlds[0].scene.entities))
+        self._order = _declared_order(self.worlds[0])
         self._forces: dict[tuple[Pair, ...], PairForces] = {}
-        self._velocities: dict[tuple[Velocity, ...], BodyVelocities] = {}
-        self._lookouts: list[PairForces | BodyVelocities] = []
+        self._movers: dict[tuple[Velocity, ...], list[tuple[Any, str]]] = {}
         return _inventory(self.worlds[0])
 
     def clear(self, env_ids: Sequence[int]) -> None:
         """Begin a reset; see `Backend`."""
-        self._expire()
         for i in env_ids:
             self.worlds[i].clear()
 
     def vary(self, variations: Mapping[int, Variation]) -> None:
         """Let worlds differ from what was built; see `Backend`."""
-        self._expire()
         for i, variation in variations.items():
             vary(self.worlds[i], variation)
 
     def place(self, placements: Placements) -> None:
         """Stand robots and move bodies; see `Backend`."""
-        self._expire()
         for name, rows in placements.robots.items():
             for i, qpos in rows.items():
                 self.worlds[i].robots[name].reset(qpos)
@@ -108,49 +109,27 @@ class SapienBackend:
 
     def step(self, env_ids: Sequence[int], substeps: int) -> None:
         """Advance worlds; see `Backend`."""
-        self._expire()
         for i in env_ids:
             step = self._steps[i]
             for _ in range(substeps):
                 step()
 
-    def advance(
-        self, targets: Floats, velocities: Floats | None, env_ids: Sequence[int], substeps: int
-    ) -> Readout:
-        """Drive, advance and read world after world; see `Backend`."""
-        goals = targets.tolist()
-        speeds = None if velocities is None else velocities.tolist()
-        looks = [self._reader.look]
-        for lookout in self._lookouts:
-            if lookout.follows():
-                looks.append(lookout.look)
-        for i in range(len(self.worlds)):
-            if i in env_ids:
-                for set_target, goal in zip(self._setters[i], goals[i], strict=True):
-                    set_target(goal)
-                if speeds is not None:
-                    for set_speed, speed in zip(self._velocity_setters[i], speeds[i], strict=True):
-                        set_speed(speed)
-                step = self._steps[i]
-                for _ in range(substeps):
-                    step()
-            for look in looks:
-                look(i)
-        return self._reader.readout()
-
     def read(self) -> Readout:
         """Return poses and joints; see `Backend`."""
-        for i in range(len(self.worlds)):
-            self._reader.look(i)
-        return self._reader.readout()
+        packed = np.frombuffer(b"".join([pack() for pack in self._packers]), np.float32)
+        qpos = self._rows([robot.qpos for robot in self._articulations])
+        qvel = self._rows([robot.qvel for robot in self._articulations])
+        if self._order is not None:
+            qpos, qvel = qpos.take(self._order, 1), qvel.take(self._order, 1)
+        return Readout(packed[self._places], qpos, qvel)
 
     def velocities(self, wanted: tuple[Velocity, ...]) -> Floats:
         """Return velocities of bodies; see `Backend`."""
-        found = self._velocities.get(wanted)
-        if found is None:
-            found = self._velocities[wanted] = BodyVelocities(self.worlds, wanted)
-            self._lookouts.append(found)
-        return found.read()
+        movers = self._movers.get(wanted)
+        if movers is None:
+            movers = self._movers[wanted] = self._find_movers(wanted)
+        rows = [_STILL if body is None else getattr(body, kind) for body, kind in movers]
+        return np.concatenate(rows).reshape(len(wanted), -1, 3)
 
     def root_velocities(self) -> Floats:
         """Return velocities of the robots' roots; see `Backend`."""
@@ -163,12 +142,10 @@ class SapienBackend:
         forces = self._forces.get(pairs)
         if forces is None:
             forces = self._forces[pairs] = PairForces(self.worlds, pairs)
-            self._lookouts.append(forces)
         return forces.read()
 
     def write(self, env_ids: Sequence[int], bodies: Rows, robots: Rows) -> None:
         """Put worlds into a state; see `Backend`."""
-        self._expire()
         for row, i in enumerate(env_ids):
             world = self.worlds[i]
             for name, values in bodies.items():
@@ -236,10 +213,18 @@ class SapienBackend:
         """Return what a body collides with; see `Backend`."""
         return described_shapes(self.worlds[env].bodies[body].component)
 
-    def _expire(self) -> None:
-        """Let what was read with the last step be past."""
-        for lookout in self._lookouts:
-            lookout.expire()
+    def _rows(self, joints: list[Floats]) -> Floats:
+        """Return joints of all robots of all worlds as one row for each world."""
+        if len(joints) == 1:
+            return joints[0][None]
+        return np.concatenate(joints).reshape(len(self.worlds), -1)
+
+    def _find_movers(self, wanted: tuple[Velocity, ...]) -> list[tuple[Any, str]]:
+        return [
+            (body.component if body.declared.kind == "dynamic" else None, f"{kind}_velocity")
+            for name, kind in wanted
+            for body in (world.bodies[name] for world in self.worlds)
+        ]
 
 
 def _inventory(world: BuiltWorld) -> Built:
@@ -255,6 +240,23 @@ def _inventory(world: BuiltWorld) -> Built:
     }
     bodies = {name: place[body.entity] for name, body in world.bodies.items()}
     return Built(len(place), bodies, robots)
+
+
+def _pose_places(worlds: int, frames: int) -> NDArray[np.intp]:
+    """Return where each number of the pose table, (F, N, 7), stands in what SAPIEN packs.
+
+    It packs one world after the other, and the quaternion before the position.
+    """
+    packed = np.arange(worlds * frames * 7).reshape(worlds, frames, 7).swapaxes(0, 1)
+    return np.ascontiguousarray(packed[:, :, [4, 5, 6, 0, 1, 2, 3]])
+
+
+def _declared_order(world: BuiltWorld) -> NDArray[np.intp] | None:
+    """Return where each joint of the descriptors stands in SAPIEN's; None if in its own place."""
+    order: list[int] = []
+    for robot in world.robots.values():
+        order += [len(order) + i for i in robot.active_index]
+    return None if order == sorted(order) else np.array(order)
 
 
 def worlds_below(simulation: Any) -> list[BuiltWorld]:

@@ -9,14 +9,13 @@ import numpy as np
 
 from simulation.backend import Overlap, Pair, Part
 from simulation.maths import Floats
-from simulation.sapien3.reading import Lookout
 from simulation.sapien3.robot import SimulatedRobot
 from simulation.sapien3.world import BuiltWorld
 
 _Table = dict[tuple[int, int], tuple[int, int]]
 
 
-class PairForces(Lookout[Floats | None]):
+class PairForces:
     """Reads the contact forces of the same pairs, step after step.
 
     PhysX refreshes contacts only in a step: after a teleport they are still those of the last one.
@@ -24,24 +23,18 @@ class PairForces(Lookout[Floats | None]):
 
     def __init__(self, worlds: Sequence[BuiltWorld], pairs: Sequence[Pair]) -> None:
         """Look the pairs up in every world."""
-        super().__init__(len(worlds))
         self._contacts = [world.system.get_contacts for world in worlds]
         self._tables = [_table(world, pairs) for world in worlds]
-        self._impulses: list[dict[int, Any]] = [{}] * len(worlds)
         self._shape = len(pairs), len(worlds), 3
         self._timestep = np.array(worlds[0].physics.timestep, np.float32)
 
-    def look(self, env: int) -> None:
-        """Read one world."""
-        self._impulses[env] = _impulses(self._contacts[env](), self._tables[env])
-
-    def gathered(self) -> Floats | None:
+    def read(self) -> Floats | None:
         """Return the forces, (P, N, 3) (N, world frame), or None if no pair touches."""
-        if not any(self._impulses):
-            return None
-        forces = np.zeros(self._shape, np.float32)
-        for env, impulses in enumerate(self._impulses):
-            for pair, impulse in impulses.items():
+        forces: Floats | None = None
+        for env, contacts in enumerate(self._contacts):
+            for pair, impulse in _impulses(contacts(), self._tables[env]).items():
+                if forces is None:
+                    forces = np.zeros(self._shape, np.float32)
                 forces[pair, env] = impulse.astype(np.float32) / self._timestep
         return forces
 

@@ -123,7 +123,7 @@ def test_a_task_needs_the_verbs_alone_and_as_many_calls_for_many_worlds_as_for_o
     reset, step, *_ = one
     assert reset["clear"] == 1
     assert reset["place"] == 1
-    assert step["advance"] == 1
+    assert step["drive"] == step["step"] == 1
 
 
 def backwards(robot: RobotDescriptor) -> RobotDescriptor:
@@ -165,38 +165,3 @@ def taped(env: tasks.MultiRobotTask) -> list[np.ndarray]:
     tape = env.begin_tape()
     env.write_tape(tape)
     return [rows for group in tape.read().values() for rows in group.values()]
-
-
-def test_a_step_does_what_driving_stepping_and_reading_do():
-    whole, parts = (tasks.make("StackCube-v1", num_envs=3) for _ in range(2))
-    for action in np.random.default_rng(0).uniform(-1, 1, (12, *whole.action_space.shape)):
-        action = action.astype(np.float32)
-        whole.simulation.step(action, whole.simulation.read().joint_positions)
-        parts.simulation.timed_step(action)
-        for one, other in zip(*(looked_at(env.simulation) for env in (whole, parts)), strict=True):
-            np.testing.assert_array_equal(one, other)
-
-
-def looked_at(simulation: Simulation) -> list[np.ndarray]:
-    state = simulation.read()
-    return [
-        state.all_poses,
-        state.joint_positions,
-        state.joint_velocities,
-        state.velocities(("cubeA", "cubeB")),
-        state.contact_force("arm", "panda_leftfinger", "cubeA"),
-    ]
-
-
-def test_what_was_read_with_a_step_is_not_what_is_there_after_a_change():
-    env = tasks.make("StackCube-v1", num_envs=2)
-    action = np.zeros(env.action_space.shape, np.float32)
-    for _ in range(3):  # from the second on, velocities are read with the step
-        env.step(action)
-        env.simulation.read().velocities(("cubeA",))
-    state = env.get_state_dict()
-    state["actors"]["cubeA"][:, 7:13] = torch.arange(1.0, 7.0)
-    env.set_state_dict(state)
-    linear, angular = env.simulation.read().velocities(("cubeA",))[0]
-    np.testing.assert_array_equal(linear, [[1, 2, 3]] * 2)
-    np.testing.assert_array_equal(angular, [[4, 5, 6]] * 2)

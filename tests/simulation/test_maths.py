@@ -1,0 +1,44 @@
+"""Shortcuts of `simulation.maths` give the bits of what they stand for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from simulation.maths import added, arctan2, closeness, tanh
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("shape", [(1,), (3, 1), (3, 5), (2, 40)])
+def test_closeness_is_one_less_the_hyperbolic_tangent(shape, dtype):
+    x = np.random.default_rng(0).uniform(0, 2, shape).astype(dtype)
+    exact = 1.0 - torch.from_numpy(x * 5.0).tanh().numpy()
+    close = closeness(x, 5.0)
+    assert close.dtype == dtype
+    assert close.tobytes() == exact.tobytes()
+    assert torch.equal(closeness(torch.from_numpy(x), 5.0), torch.from_numpy(exact))
+
+
+def test_tangents_leave_what_they_are_of_as_it_is():
+    x = np.random.default_rng(0).uniform(-2, 2, (3, 4)).astype(np.float32)
+    before = x.copy()
+    for rows in (x, x[:, ::2]):
+        assert np.array_equal(tanh(rows), torch.from_numpy(rows).tanh().numpy())
+        closeness(rows, 5.0)
+    np.testing.assert_array_equal(x, before)
+
+
+@pytest.mark.parametrize("count", [1, 2, 9])
+def test_four_are_added_one_after_the_other(count):
+    x = np.random.default_rng(0).normal(size=(count, 4, 4)).astype(np.float32)
+    one_by_one = x[:, 0] + x[:, 1] + x[:, 2] + x[:, 3]
+    np.testing.assert_array_equal(added(x), one_by_one)
+    np.testing.assert_array_equal(added(torch.from_numpy(x)).numpy(), one_by_one)
+    assert not np.array_equal(x[:, 3] + x[:, 2] + x[:, 1] + x[:, 0], one_by_one)
+
+
+def test_arc_tangents_are_those_of_single_numbers():
+    y, x = np.random.default_rng(0).normal(size=(2, 40)).astype(np.float32)
+    single = [torch.atan2(*pair) for pair in zip(*map(torch.from_numpy, (y, x)), strict=True)]
+    np.testing.assert_array_equal(arctan2(y, x), torch.stack(single).numpy())
