@@ -55,15 +55,19 @@ class Sharing:
         if ids.min() < 0 or ids.max() >= self._num_envs:
             wrong = ids[(ids < 0) | (ids >= self._num_envs)].tolist()
             raise TaskError(f"env_ids {wrong} must lie from 0 to {self._num_envs - 1}")
-        if len(set(ids.tolist())) < len(ids):
+        if np.count_nonzero(self._among(ids)) < len(ids):
             raise TaskError(f"env_ids names environments more than once: {ids.tolist()}")
         return ids.astype(np.intp, copy=False)
 
     def by_part(self, env_ids: NDArray[np.intp]) -> Iterator[tuple[int, Sequence[int]]]:
         """Yield the parts that environments are in, by number, and which of them are in each."""
-        chosen = np.zeros(self._num_envs, bool)
-        chosen[env_ids] = True
+        chosen = self._among(env_ids)
         for number, ids in enumerate(self._parts):
-            own = np.flatnonzero(chosen[ids.start : ids.stop])
+            own = chosen[ids.start : ids.stop].nonzero()[0]
             if len(own):
                 yield number, (own + ids.start).tolist()
+
+    def _among(self, env_ids: NDArray[np.intp]) -> NDArray[np.bool_]:
+        chosen = np.zeros(self._num_envs, bool)
+        chosen[env_ids] = True
+        return chosen

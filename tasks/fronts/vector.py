@@ -135,6 +135,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         self._reader = ActionReader(layout, num_envs)
         self._seeds = [cls.first_seed + i for i in range(num_envs)]
         self._first = FirstSeeds(num_envs)
+        self._names: dict[str, list[tuple[str, str]]] = {}
         self._everywhere = np.ones(num_envs, bool)
         self.batch_size = _checked_batch_size(batch_size, num_envs)
         self._sharing = Sharing(num_envs, workers, self.batch_size)
@@ -418,15 +419,26 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         """
         info: dict[str, Any] = {}
         everywhere = mask.all()
-        for name, array in self._crew.arrays.items():
-            first, _, key = name.partition("/")
-            if first == prefix:
-                for called in (key, SUCCESS) if key == "success" else (key,):
-                    info[called] = array[ids].copy()
-                    if not everywhere:
-                        info[called][~mask] = 0
-                    info[f"_{called}"] = mask.copy()
+        for key, array in self._told(prefix):
+            info[key] = array[ids].copy()
+            if not everywhere:
+                info[key][~mask] = 0
+            info[f"_{key}"] = mask.copy()
         return info
+
+    def _told(self, prefix: str) -> list[tuple[str, NDArray[Any]]]:
+        """Return the arrays whose names begin with a prefix, and what info calls them."""
+        if prefix not in self._names:
+            found = [
+                (called, name)
+                for name in self._crew.arrays
+                for first, _, key in [name.partition("/")]
+                if first == prefix
+                for called in ((key, SUCCESS) if key == "success" else (key,))
+            ]
+            self._names[prefix] = found
+        arrays = self._crew.arrays
+        return [(called, arrays[name]) for called, name in self._names[prefix]]
 
     def _final(self, ended: _Flags, ids: _Rows) -> dict[str, Any]:
         observations = np.full(len(ended), None, object)

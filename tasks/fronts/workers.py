@@ -58,6 +58,8 @@ class Workers:
         self._shares, self._timeout = shares, timeout
         self._places = [(i, k) for i, share in enumerate(shares) for k in range(len(share))]
         self._crew: dict[int, Holder] = {}
+        self._poller = select.poll()
+        self._senders: dict[int, int] = {}  # file descriptor → whose it is
         self._shapes: Shapes = {}
         self._descriptor = -1
         self._owner = os.getpid()
@@ -86,6 +88,9 @@ class Workers:
                 for i in numbers:
                     self._end(i)  # Ctrl-C may have come before that
                     self._crew[i] = Holder(self._shares[i], self._timeout)
+                    for descriptor in self._crew[i].descriptors:
+                        self._senders[descriptor] = i
+                        self._poller.register(descriptor, select.POLLIN)
                 begun = {i: self._crew[i].begun for i in numbers}
                 shapes = self._answers(begun, START_SECONDS)
                 if self._descriptor < 0:
@@ -203,21 +208,21 @@ class Workers:
         failures: list[Failure] = []
         self._torn = True
         while not over():
-            waiting = {i: worker for i, worker in self._crew.items() if worker.open}
+            waiting = [i for i, worker in self._crew.items() if worker.open]
             if not waiting:
                 break
             left = None if deadline is None else max(0.0, deadline - time.monotonic()) * 1000
-            ready = _ready(waiting, left)
+            ready = {self._senders[descriptor] for descriptor, _ in self._poller.poll(left)}
             for i in ready:
                 try:
-                    waiting[i].hear()
+                    self._crew[i].hear()
                 except Gone as gone:
                     failures.append(self._lose(i, gone.reason, gone.traceback))
             if not ready:
-                failures.extend(
+                failures += [
                     self._lose(i, f"did not answer within {timeout:g} s and was ended")
                     for i in waiting
-                )
+                ]
         self._torn = False
         if failures:
             raise WorkersFailed(sorted(failures, key=lambda failure: failure.worker))
@@ -231,15 +236,9 @@ class Workers:
         return failure
 
     def _end(self, number: int) -> None:
+        for descriptor in [d for d, i in self._senders.items() if i == number]:
+            self._poller.unregister(descriptor)
+            del self._senders[descriptor]
         if number in self._crew:
             self._crew[number].end(0.0)
             del self._crew[number]
-
-
-def _ready(workers: Mapping[int, Holder], milliseconds: float | None) -> set[int]:
-    """Wait until some workers have something to tell, and return which."""
-    senders = {descriptor: i for i, one in workers.items() for descriptor in one.descriptors}
-    poller = select.poll()
-    for descriptor in senders:
-        poller.register(descriptor, select.POLLIN)
-    return {senders[descriptor] for descriptor, _ in poller.poll(milliseconds)}

@@ -19,22 +19,27 @@ _DESCRIPTOR = struct.Struct("i")
 class Channel:
     """One end of a connection between two processes; can be an argument of a `WorkerProcess`."""
 
-    def __init__(self, end: socket.socket) -> None:
-        """Take an end of a socket pair, as `pair` makes it."""
-        self._end = end
+    def __init__(self, end: socket.socket, *, takes_descriptors: bool = True) -> None:
+        """Take an end of a socket pair, as `pair` makes it.
+
+        Args:
+            end: The end.
+            takes_descriptors: Whether file descriptors may come with messages.
+        """
+        self._end, self._takes_descriptors = end, takes_descriptors
         self._number, self._pieces = -1, list[bytes]()
         self.descriptors: list[int] = []
         """What came with messages; whoever takes one out closes it."""
 
     @classmethod
     def pair(cls) -> tuple[Channel, Channel]:
-        """Return both ends of a new connection.
+        """Return both ends of a new connection; file descriptors can be sent to the second one.
 
         Raises:
             OSError: If file descriptors run out.
         """
         one, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        return cls(one), cls(other)
+        return cls(one, takes_descriptors=False), cls(other)
 
     def fileno(self) -> int:
         """Return its file descriptor, for those who poll."""
@@ -89,13 +94,9 @@ class Channel:
         self._end.close()
 
     def _read(self, flags: int) -> tuple[int, bytes] | None:
-        space = socket.CMSG_SPACE(_DESCRIPTOR.size)
-        packet, ancillary, _, _ = self._end.recvmsg(_HEAD.size + _PIECE, space, flags)
+        packet = self._packet(flags)
         if not packet:
             raise EOFError("the other end is closed")
-        for level, kind, data in ancillary:
-            if (level, kind) == (socket.SOL_SOCKET, socket.SCM_RIGHTS):
-                self.descriptors.extend(value for (value,) in _DESCRIPTOR.iter_unpack(data))
         number, i, count = _HEAD.unpack_from(packet)
         if i == 0:
             self._number, self._pieces = number, []
@@ -103,3 +104,13 @@ class Channel:
             return None
         self._pieces.append(packet[_HEAD.size :])
         return (number, b"".join(self._pieces)) if i == count - 1 else None
+
+    def _packet(self, flags: int) -> bytes:
+        if not self._takes_descriptors:
+            return self._end.recv(_HEAD.size + _PIECE, flags)
+        space = socket.CMSG_SPACE(_DESCRIPTOR.size)
+        packet, ancillary, _, _ = self._end.recvmsg(_HEAD.size + _PIECE, space, flags)
+        for level, kind, data in ancillary:
+            if (level, kind) == (socket.SOL_SOCKET, socket.SCM_RIGHTS):
+                self.descriptors.extend(value for (value,) in _DESCRIPTOR.iter_unpack(data))
+        return packet
