@@ -8,12 +8,14 @@ from typing import Any
 
 import sapien
 import torch
+from numpy.typing import NDArray
 
 from robots import SimulationError
 from robots.descriptor import Vector3
 from simulation.cameras import AnyCamera, RobotCamera, View, camera_name
 from simulation.looks import AS_DECLARED, LIGHTS, Looks
 from simulation.rotations import quaternion
+from simulation.sapien3.backdrop import COLOR, PLACE, Backdrop, Bodies
 from simulation.sapien3.device import expect_render_device
 from simulation.sapien3.dressing import (
     Wardrobe,
@@ -31,13 +33,8 @@ LAMPS = (((1.0, 1.0, -1.0), (1.0, 1.0, 1.0)), ((0.0, 0.0, -1.0), (1.0, 1.0, 1.0)
 
 # mani_skill 3.0.1, render/shaders.py, "minimal": what each image holds
 _SHADERS = "minimal"
-_FORMATS = {"Color": "r8g8b8a8unorm", "PositionSegmentation": "r16g16b16a16sint"}
-_IMAGES = {
-    "rgb": "Color",
-    "depth": "PositionSegmentation",
-    "segmentation": "PositionSegmentation",
-    "position": "PositionSegmentation",
-}
+_FORMATS = {COLOR: "r8g8b8a8unorm", PLACE: "r16g16b16a16sint"}
+_IMAGES = {"rgb": COLOR, "depth": PLACE, "segmentation": PLACE, "position": PLACE}
 
 
 def look(
@@ -70,6 +67,8 @@ class Studio:
         ]
         self._cameras: dict[tuple[Any, ...], Any] = {}
         self._markers = _markers(world)
+        self._bodies = Bodies(world)
+        self._backdrops: dict[Any, Backdrop] = {}
         self._looks = AS_DECLARED  # that it has
         self._wardrobe: Wardrobe | None = None
 
@@ -83,9 +82,46 @@ class Studio:
             marker.visibility = float(markers)
         placed = [self._placed(name, camera) for name, camera in cameras.items()]
         self._scene.update_render()
-        for camera in placed:
+        riding = any(isinstance(camera, RobotCamera) for camera in cameras.values())
+        if markers or riding or not self._bodies.solid:
+            return self._whole(placed, textures)
+        return self._layered(placed, textures)
+
+    def _whole(self, cameras: Sequence[Any], textures: Sequence[str]) -> list[View]:
+        """Take pictures of everything at once."""
+        self._bodies.show_all()
+        for camera in cameras:
             camera.take_picture()
-        return [_view(camera, textures) for camera in placed]
+        names = {_IMAGES[texture] for texture in textures}
+        return [
+            _view(camera, textures, {name: camera.get_picture(name) for name in names})
+            for camera in cameras
+        ]
+
+    def _layered(self, cameras: Sequence[Any], textures: Sequence[str]) -> list[View]:
+        """Take pictures of what moves, and lay those of what stands still behind them."""
+        backdrops = self._backdrops_of(cameras)
+        self._bodies.show_moving([backdrop.planes for backdrop in backdrops])
+        for camera in cameras:
+            camera.take_picture()
+        names = {_IMAGES[texture] for texture in textures}
+        views: list[View] = []
+        for camera, backdrop in zip(cameras, backdrops, strict=True):
+            images = backdrop.behind(camera, names)
+            if images is None:
+                return self._whole(cameras, textures)
+            views.append(_view(camera, textures, images))
+        return views
+
+    def _backdrops_of(self, cameras: Sequence[Any]) -> list[Backdrop]:
+        poses = self._bodies.still_poses()
+        for camera in cameras:
+            backdrop = self._backdrops.get(camera)
+            if backdrop is None or not backdrop.fits(camera, poses):
+                self._bodies.show_still()
+                camera.take_picture()
+                self._backdrops[camera] = Backdrop(camera, poses)
+        return [self._backdrops[camera] for camera in cameras]
 
     def _placed(self, name: str, camera: AnyCamera) -> Any:
         lens = camera.mount if isinstance(camera, RobotCamera) else camera
@@ -109,6 +145,7 @@ class Studio:
     def _dress(self, looks: Looks) -> None:
         """Let everything look as it is to from now on."""
         self._looks = looks
+        self._bodies.show_all()
         if looks.patterns or looks.paints:
             if self._wardrobe is None:
                 self._wardrobe = Wardrobe(self._world)
@@ -121,6 +158,7 @@ class Studio:
                 lamp.entity.set_pose(lamp_pose(direction, glow))
         if glow := looks.lights.get(everywhere):
             self._scene.set_ambient_light(light_color(SKY, glow))
+        self._bodies, self._backdrops = Bodies(self._world), {}
 
     def _add_camera(
         self, name: str, width: int, height: int, fov: float, near: float, far: float
@@ -140,9 +178,8 @@ def _markers(world: BuiltWorld) -> list[Any]:
     ]
 
 
-def _view(camera: Any, textures: Sequence[str]) -> View:
-    found = {image: camera.get_picture(image) for image in {_IMAGES[t] for t in textures}}
-    pixels = {texture: found[_IMAGES[texture]] for texture in textures}
+def _view(camera: Any, textures: Sequence[str], images: Mapping[str, NDArray[Any]]) -> View:
+    pixels = {texture: images[_IMAGES[texture]] for texture in textures}
     channels = {
         "rgb": lambda x: x[..., :3],
         "depth": lambda x: -x[..., 2:3],
