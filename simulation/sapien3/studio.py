@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import sapien
@@ -36,6 +36,9 @@ _SHADERS = "minimal"
 _FORMATS = {COLOR: "r8g8b8a8unorm", PLACE: "r16g16b16a16sint"}
 _IMAGES = {"rgb": COLOR, "depth": PLACE, "segmentation": PLACE, "position": PLACE}
 
+Drawn = Callable[[], list[View]]
+"""Waits until pictures are drawn, and returns what each camera sees."""
+
 
 def look(
     world: BuiltWorld,
@@ -43,8 +46,8 @@ def look(
     textures: Sequence[str],
     *,
     markers: bool,
-) -> list[View]:
-    """Return what cameras see in a world now; see `simulation.backend.Backend.look`."""
+) -> Drawn:
+    """Begin to draw what cameras see in a world now; see `simulation.backend.Backend.look`."""
     expect_render_device()
     if world.studio is None:
         world.studio = Studio(world)
@@ -74,8 +77,11 @@ class Studio:
 
     def look(
         self, cameras: Mapping[str, AnyCamera], textures: Sequence[str], *, markers: bool
-    ) -> list[View]:
-        """Take pictures with all cameras at the same moment."""
+    ) -> Drawn:
+        """Begin to take pictures with all cameras, of the same moment.
+
+        The driver draws in threads of its own, also while other worlds' pictures are begun.
+        """
         if self._world.looks is not self._looks:
             self._dress(self._world.looks)
         for marker in self._markers:
@@ -87,30 +93,32 @@ class Studio:
             return self._whole(placed, textures)
         return self._layered(placed, textures)
 
-    def _whole(self, cameras: Sequence[Any], textures: Sequence[str]) -> list[View]:
-        """Take pictures of everything at once."""
+    def _whole(self, cameras: Sequence[Any], textures: Sequence[str]) -> Drawn:
+        """Begin to take pictures of everything at once."""
         self._bodies.show_all()
         for camera in cameras:
             camera.take_picture()
         names = {_IMAGES[texture] for texture in textures}
-        return [
+        return lambda: [
             _view(camera, textures, {name: camera.get_picture(name) for name in names})
             for camera in cameras
         ]
 
-    def _layered(self, cameras: Sequence[Any], textures: Sequence[str]) -> list[View]:
-        """Take pictures of what moves, and lay those of what stands still behind them."""
+    def _layered(self, cameras: Sequence[Any], textures: Sequence[str]) -> Drawn:
+        """Begin to take pictures of what moves; those of what stands still come behind them."""
         backdrops = self._backdrops_of(cameras)
         self._bodies.show_moving([backdrop.planes for backdrop in backdrops])
         for camera in cameras:
             camera.take_picture()
         names = {_IMAGES[texture] for texture in textures}
-        views: list[View] = []
-        for camera, backdrop in zip(cameras, backdrops, strict=True):
-            images = backdrop.behind(camera, names)
-            if images is None:
-                return self._whole(cameras, textures)
-            views.append(_view(camera, textures, images))
+
+        def views() -> list[View]:
+            images = [b.behind(c, names) for b, c in zip(backdrops, cameras, strict=True)]
+            if None in images:
+                return self._whole(cameras, textures)()
+            pairs = zip(cameras, images, strict=True)
+            return [_view(camera, textures, found or {}) for camera, found in pairs]
+
         return views
 
     def _backdrops_of(self, cameras: Sequence[Any]) -> list[Backdrop]:
