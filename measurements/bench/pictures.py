@@ -55,9 +55,7 @@ def pictures(settings: Settings, beside: Variant | None = None) -> Measurement:
         if beside is not None:
             other = beside.make(task_id)
             stack.callback(other.close)
-            # As many pictures as the vector, but for rounding: each takes as long.
-            steps = max(STEPS, STEPS * count // other.num_envs)
-            variants[beside.name, task_id] = TimedVector(other, clock, min(steps, 16)).rate
+            variants[beside.name, task_id] = TimedVector(other, clock, DRAWN).rate
         floor = stack.enter_context(DrawingProcesses(task_id, clock))
         variants[DRAWING, task_id] = floor.rate
         samples = settings.interleave(variants, rounds=min(settings.rounds, ROUNDS))
@@ -109,16 +107,10 @@ class DrawingProcesses:
 def _draw(connection: Connection, task_id: str, clock: Clock) -> None:
     """Draw as many pictures as is asked for, and answer with the seconds that it took."""
     import tasks
-    from simulation.sapien3.backend import worlds_below
 
     processes.end_with_parent()
     env = tasks.make(task_id, obs_mode=OBS_MODE)
     env.reset(0)
-    (world,) = worlds_below(env.simulation)
-    system: Any = world.scene.render_system
-    markers = {body.entity for body in world.bodies.values() if body.declared.marker}
-    for body in system.render_bodies:
-        body.visibility = float(body.entity not in markers)
     connection.send(0.0)
     while True:
         try:
@@ -127,10 +119,8 @@ def _draw(connection: Connection, task_id: str, clock: Clock) -> None:
             return
         start = clock.now()
         for _ in range(count):
-            world.scene.update_render()
-            for camera in system.cameras:
-                camera.take_picture()
-                camera.get_picture("Color")
+            # With its markers a world is drawn at once, nothing left out.
+            env.simulation.look(0, env.observer.cameras, (OBS_MODE,), markers=True)
         connection.send(clock.now() - start)
 
 

@@ -30,12 +30,14 @@ def drawn(renderer) -> None:
         pytest.skip(problem)
 
 
-def built(*colors, kinds=("static", "dynamic")) -> Simulation:
-    """A Panda and boxes in the same place, one in the other."""
+def built(*colors, kinds=("static", "dynamic"), apart: float = 0.2) -> Simulation:
+    """A Panda and boxes in a row along y, ``apart`` m from one to the next."""
+
+    x, _, z = PLACE
 
     def build(world: World, _: int) -> None:
         for i, (color, kind) in enumerate(zip(colors, kinds, strict=True)):
-            world.add(f"box{i}", Box(HALF, color=color), kind=kind, position=PLACE)
+            world.add(f"box{i}", Box(HALF, color=color), kind=kind, position=(x, i * apart, z))
 
     simulation = Simulation(single({"arm": "panda"}), build, 1, visuals=True)
     for name, placement in simulation.layout.items():
@@ -113,7 +115,7 @@ def test_what_no_camera_sees_is_not_drawn():
 def test_what_stands_still_is_drawn_again_where_it_was_moved():
     simulation = built(RED, GREEN)
     before = pictures(simulation, layered=True)
-    worlds_below(simulation)[0].set_pose("box0", [0.0, 0.2, 0.1, 1.0, 0.0, 0.0, 0.0])
+    worlds_below(simulation)[0].set_pose("box0", [0.0, -0.2, 0.1, 1.0, 0.0, 0.0, 0.0])
     after = pictures(simulation, layered=True)
     assert not np.array_equal(before[0], after[0])
     expect_same(simulation)
@@ -121,7 +123,7 @@ def test_what_stands_still_is_drawn_again_where_it_was_moved():
 
 def test_of_two_surfaces_in_one_place_the_order_decides(monkeypatch: pytest.MonkeyPatch):
     for kinds in (("static", "kinematic"), ("kinematic", "static")):
-        simulation = built(RED, GREEN, kinds=kinds)
+        simulation = built(RED, GREEN, kinds=kinds, apart=0.0)
         at_once = whole_pictures(monkeypatch)
         simulation.look(0, CAMERAS, ("rgb",), markers=False)
         assert at_once, "nothing noticed that both are equally far away"
