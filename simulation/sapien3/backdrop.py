@@ -67,12 +67,11 @@ class Bodies:
         Args:
             views: What `planes` returned of each camera.
         """
-        boxes = np.array([body.get_global_aabb_fast() for body in self._moving]).reshape(-1, 2, 3)
-        seen = np.zeros(len(boxes), bool)
-        for view in views:
-            seen |= _may_be_inside(boxes, view)
-        unseen = {body for body, s in zip(self._moving, seen.tolist(), strict=True) if not s}
-        self._hide(unseen.union(self._still))
+        self._hide(_unseen(self._moving, views).union(self._still))
+
+    def show_seen(self, view: Planes) -> None:
+        """Let all be drawn that a camera may see; see `show_moving`."""
+        self._hide(_unseen([*self._still, *self._moving], [view]))
 
     def _hide(self, hidden: set[Any]) -> None:
         for body in hidden ^ self._hidden:
@@ -143,11 +142,15 @@ def planes(camera: Any) -> Planes:
     return found @ camera.get_extrinsic_matrix().astype(np.float64)
 
 
-def _may_be_inside(boxes: NDArray[Any], view: Planes) -> NDArray[np.bool_]:
-    """Tell of boxes, lowest and highest corner (B, 2, 3) (m), which no plane shuts out."""
+def _unseen(bodies: Sequence[Any], views: Sequence[Planes]) -> set[Any]:
+    """Return the bodies that are for each camera outside of one of its planes."""
+    boxes = np.array([body.get_global_aabb_fast() for body in bodies]).reshape(-1, 2, 3)
     middle, half = (boxes[:, 1] + boxes[:, 0]) / 2, (boxes[:, 1] - boxes[:, 0]) / 2
-    ahead = middle @ view[:, :3].T + view[:, 3] + half @ np.abs(view[:, :3]).T
-    return (ahead > -_SLACK).all(1)
+    seen = np.zeros(len(boxes), bool)
+    for view in views:
+        ahead = middle @ view[:, :3].T + view[:, 3] + half @ np.abs(view[:, :3]).T
+        seen |= (ahead > -_SLACK).all(1)
+    return {body for body, s in zip(bodies, seen.tolist(), strict=True) if not s}
 
 
 def _place_of(camera: Any) -> bytes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import sapien
@@ -15,7 +15,7 @@ from robots.descriptor import Vector3
 from simulation.cameras import AnyCamera, RobotCamera, View, camera_name
 from simulation.looks import AS_DECLARED, LIGHTS, Looks
 from simulation.rotations import quaternion
-from simulation.sapien3.backdrop import COLOR, PLACE, Backdrop, Bodies
+from simulation.sapien3.backdrop import COLOR, PLACE, Backdrop, Bodies, planes
 from simulation.sapien3.device import expect_render_device
 from simulation.sapien3.dressing import (
     Wardrobe,
@@ -88,10 +88,10 @@ class Studio:
             marker.visibility = float(markers)
         placed = [self._placed(name, camera) for name, camera in cameras.items()]
         self._scene.update_render()
-        riding = any(isinstance(camera, RobotCamera) for camera in cameras.values())
-        if markers or riding or not self._bodies.solid:
+        if markers or not self._bodies.solid:
             return self._whole(placed, textures)
-        return self._layered(placed, textures)
+        riding = [isinstance(camera, RobotCamera) for camera in cameras.values()]
+        return self._layered(placed, riding, textures)
 
     def _whole(self, cameras: Sequence[Any], textures: Sequence[str]) -> Drawn:
         """Begin to take pictures of everything at once."""
@@ -99,29 +99,39 @@ class Studio:
         for camera in cameras:
             camera.take_picture()
         names = {_IMAGES[texture] for texture in textures}
-        return lambda: [
-            _view(camera, textures, {name: camera.get_picture(name) for name in names})
-            for camera in cameras
-        ]
+        return lambda: [_view(camera, textures, _pictures(camera, names)) for camera in cameras]
 
-    def _layered(self, cameras: Sequence[Any], textures: Sequence[str]) -> Drawn:
-        """Begin to take pictures of what moves; those of what stands still come behind them."""
-        backdrops = self._backdrops_of(cameras)
-        self._bodies.show_moving([backdrop.planes for backdrop in backdrops])
-        for camera in cameras:
+    def _layered(
+        self, cameras: Sequence[Any], riding: Sequence[bool], textures: Sequence[str]
+    ) -> Drawn:
+        """Begin to take pictures of what each camera may see.
+
+        Those of cameras that stand still show only what moves; what does not comes behind it.
+        """
+        standing = [camera for camera, rides in zip(cameras, riding, strict=True) if not rides]
+        backdrops = self._backdrops_of(standing)
+        self._bodies.show_moving([backdrop.planes for backdrop in backdrops.values()])
+        for camera in standing:
             camera.take_picture()
+        for camera in cameras:
+            if camera not in backdrops:
+                self._bodies.show_seen(planes(camera))
+                camera.take_picture()
         names = {_IMAGES[texture] for texture in textures}
 
         def views() -> list[View]:
-            images = [b.behind(c, names) for b, c in zip(backdrops, cameras, strict=True)]
-            if None in images:
-                return self._whole(cameras, textures)()
-            pairs = zip(cameras, images, strict=True)
-            return [_view(camera, textures, found or {}) for camera, found in pairs]
+            found: list[View] = []
+            for camera in cameras:
+                backdrop = backdrops.get(camera)
+                images = backdrop.behind(camera, names) if backdrop else _pictures(camera, names)
+                if images is None:
+                    return self._whole(cameras, textures)()
+                found.append(_view(camera, textures, images))
+            return found
 
         return views
 
-    def _backdrops_of(self, cameras: Sequence[Any]) -> list[Backdrop]:
+    def _backdrops_of(self, cameras: Sequence[Any]) -> dict[Any, Backdrop]:
         poses = self._bodies.still_poses()
         for camera in cameras:
             backdrop = self._backdrops.get(camera)
@@ -129,7 +139,7 @@ class Studio:
                 self._bodies.show_still()
                 camera.take_picture()
                 self._backdrops[camera] = Backdrop(camera, poses)
-        return [self._backdrops[camera] for camera in cameras]
+        return {camera: self._backdrops[camera] for camera in cameras}
 
     def _placed(self, name: str, camera: AnyCamera) -> Any:
         lens = camera.mount if isinstance(camera, RobotCamera) else camera
@@ -184,6 +194,10 @@ def _markers(world: BuiltWorld) -> list[Any]:
         for body in world.bodies.values()
         if body.declared.marker
     ]
+
+
+def _pictures(camera: Any, names: Iterable[str]) -> dict[str, NDArray[Any]]:
+    return {name: camera.get_picture(name) for name in names}
 
 
 def _view(camera: Any, textures: Sequence[str], images: Mapping[str, NDArray[Any]]) -> View:

@@ -8,7 +8,7 @@ import pytest
 import tasks
 from layouts import single
 from simulation import Box, Camera, Simulation, World
-from simulation.cameras import TEXTURES, RobotCamera
+from simulation.cameras import TEXTURES
 from simulation.rendering.pictures import vulkan_problem
 from simulation.sapien3.backend import worlds_below
 from simulation.sapien3.studio import Studio
@@ -91,13 +91,26 @@ def test_a_picture_of_parts_is_that_of_the_whole(task_id: str):
 @pytest.mark.parametrize("task_id", tasks.list_tasks())
 def test_it_is_with_the_cameras_of_every_task(task_id: str):
     with closing(tasks.make(task_id, obs_mode="rgb")) as env:
-        cameras = {n: c for n, c in env.observer.cameras.items() if not isinstance(c, RobotCamera)}
+        cameras = env.observer.cameras
         for seed in range(2):
             env.reset(seed=seed)
             env.step(np.ones((1, *env.single_action_space.shape), np.float32))
             both = [pictures(env.simulation, layered=x, cameras=cameras) for x in (True, False)]
             for laid, whole in zip(*both, strict=True):
                 np.testing.assert_array_equal(laid, whole)
+
+
+def test_a_hand_s_camera_draws_only_what_is_before_it():
+    hand = {"arm": "panda_wristcam"}
+    with closing(tasks.make("PickCube-v1", robots=hand, obs_mode="rgb")) as env:
+        env.reset(seed=0)
+        for cameras in (env.observer.cameras, {"hand": env.observer.cameras["hand_camera"]}):
+            both = [pictures(env.simulation, layered=x, cameras=cameras) for x in (False, True)]
+            for laid, whole in zip(*both, strict=True):
+                np.testing.assert_array_equal(laid, whole)
+            hidden = {body.entity.name for body in studio_of(env.simulation)._bodies._hidden}
+            assert {"panda_link0", "panda_link1"} <= hidden
+            assert not hidden & {"table-workspace", "cube", "panda_leftfinger"}
 
 
 def test_what_no_camera_sees_is_not_drawn():
