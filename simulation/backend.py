@@ -30,7 +30,7 @@ such simulations keep them, and none of the verbs is called once per world.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, Protocol
 
@@ -264,14 +264,19 @@ class Backend(Protocol):
 
     def look(
         self, env: int, cameras: Mapping[str, AnyCamera], textures: Sequence[str], *, markers: bool
-    ) -> list[View]:
-        """Return what each camera sees in one world now, all at the same moment.
+    ) -> Callable[[], list[View]]:
+        """Begin to draw what each camera sees in one world now, all at the same moment.
+
+        Until it is returned, nothing may move in that world; others may be looked at.
 
         Args:
             env: Which world.
             cameras: Camera by name.
             textures: What to tell of each pixel, some of `simulation.cameras.TEXTURES`.
             markers: Whether bodies that are there for people only are seen.
+
+        Returns:
+            What waits until it is drawn, and returns it.
 
         Raises:
             SimulationError: If this process is a fork of one that drew.

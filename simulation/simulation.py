@@ -218,6 +218,12 @@ class Simulation:
         self, env: int, cameras: Mapping[str, AnyCamera], textures: Sequence[str], *, markers: bool
     ) -> list[View]:
         """Return what cameras see in a world now; see `simulation.backend.Backend.look`."""
+        return self.begin_look(env, cameras, textures, markers=markers)()
+
+    def begin_look(
+        self, env: int, cameras: Mapping[str, AnyCamera], textures: Sequence[str], *, markers: bool
+    ) -> Callable[[], list[View]]:
+        """Begin to draw what cameras see now; see `simulation.backend.Backend.look`."""
         if self._placements:
             self._change()
         return self._backend.look(env, cameras, textures, markers=markers)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import torch
 
-from measurements.bench import episodes, looks, processes, steps, varying, vectors
+from measurements.bench import episodes, looks, pictures, processes, steps, varying, vectors
 from measurements.bench.measurement import BenchmarkError, Measurement
 from measurements.bench.report import Report, machine
 from measurements.bench.settings import Benchmark, Settings
@@ -21,6 +21,7 @@ BENCHMARKS: Mapping[str, Benchmark] = {
     "vector": Benchmark("vectors of many environments on two cores", vectors.vectors),
     "varying": Benchmark("resets and steps of worlds that vary", varying.varying),
     "looks": Benchmark("resets and first pictures of worlds that look different", looks.looks),
+    "pictures": Benchmark("rate of environments that observe pictures", pictures.pictures),
     "environments": Benchmark("a step by number of environments", steps.environments),
     "workers": Benchmark("rate by number of worker processes", processes.workers),
     "robots": Benchmark("a step by number of robots, of one kind and mixed", steps.robots),

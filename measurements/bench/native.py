@@ -18,6 +18,7 @@ from measurements.bench.catalogue import BENCHMARKS
 from measurements.bench.command import add_arguments, run_benchmarks, settings_of
 from measurements.bench.episodes import timed_resets
 from measurements.bench.measurement import BenchmarkError, Measurement, by_series
+from measurements.bench.pictures import OBS_MODE, Variant, pictures
 from measurements.bench.report import Report, save
 from measurements.bench.settings import Benchmark, Settings
 from measurements.bench.steps import PHYSICS, Played
@@ -38,6 +39,10 @@ def benchmarks(task_ids: Sequence[str]) -> dict[str, Benchmark]:
         "step": Benchmark("a step of one environment", partial(step, task_ids)),
         "reset": Benchmark("a reset of one environment", partial(reset, task_ids)),
         "vector": Benchmark("vectors on two cores", partial(vectors, native=_native_vector)),
+        "pictures": Benchmark(
+            BENCHMARKS["pictures"].answers,
+            partial(pictures, beside=Variant(NATIVE, _native_pictures)),
+        ),
     }
     return {**beside, **{name: one for name, one in BENCHMARKS.items() if name not in beside}}
 
@@ -122,9 +127,17 @@ def _native_vector(task_id: str) -> Generator[AsyncVectorEnv | None]:
     if task_id not in list_clones() or len(get_task_class(task_id).layout) > 1:
         yield None
         return
-    make = [partial(make_native_front, task_id)] * PROCESSES
-    with closing(AsyncVectorEnv(make, context="spawn")) as env:
+    with closing(_native_front(task_id, "state")) as env:
         yield env
+
+
+def _native_pictures(task_id: str) -> AsyncVectorEnv:
+    return _native_front(task_id, OBS_MODE)
+
+
+def _native_front(task_id: str, obs_mode: str) -> AsyncVectorEnv:
+    make = [partial(make_native_front, task_id, obs_mode)] * PROCESSES
+    return AsyncVectorEnv(make, context="spawn")
 
 
 def main(argv: Sequence[str] | None = None) -> int:

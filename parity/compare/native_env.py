@@ -72,13 +72,13 @@ def make_native(
             ) from error
 
 
-def make_native_front(task_id: str) -> gymnasium.Env[Any, Any]:
+def make_native_front(task_id: str, obs_mode: str = "state") -> gymnasium.Env[Any, Any]:
     """Make the native environment of a task with NumPy observations, alone in its process."""
     import torch
 
     torch.set_num_threads(1)
     logging.disable(logging.WARNING)
-    native = make_native(task_id)
+    native = make_native(task_id, obs_mode=obs_mode)
     with quiet():
         from mani_skill.utils.wrappers.gymnasium import CPUGymWrapper
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,8 +89,19 @@ class Observers:
         Raises:
             SimulationError: If this process is a fork of one that drew.
         """
-        views = self._simulation.look(env, self._cameras, self._textures, markers=False)
-        return dict(zip(self._cameras, views, strict=True))
+        return self.begin(env)()
+
+    def begin(self, env: int) -> Callable[[], dict[str, View]]:
+        """Begin to draw one world, which may not move before the pictures are returned.
+
+        Returns:
+            What waits for them, and returns what `look` does.
+
+        Raises:
+            SimulationError: If this process is a fork of one that drew.
+        """
+        finish = self._simulation.begin_look(env, self._cameras, self._textures, markers=False)
+        return lambda: dict(zip(self._cameras, finish(), strict=True))
 
 
 def _expect_visuals(simulation: Simulation) -> None:

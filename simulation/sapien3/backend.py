@@ -159,8 +159,8 @@ class SapienBackend:
 
     def look(
         self, env: int, cameras: Mapping[str, AnyCamera], textures: Sequence[str], *, markers: bool
-    ) -> list[View]:
-        """Return what cameras see; see `Backend`."""
+    ) -> Callable[[], list[View]]:
+        """Begin to draw what cameras see; see `Backend`."""
         from simulation.sapien3.studio import look  # what draws is loaded by the first picture
 
         return look(self.worlds[env], cameras, textures, markers=markers)

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import sapien
 import torch
+from numpy.typing import NDArray
 
 from robots import SimulationError
 from robots.descriptor import Vector3
 from simulation.cameras import AnyCamera, RobotCamera, View, camera_name
 from simulation.looks import AS_DECLARED, LIGHTS, Looks
 from simulation.rotations import quaternion
+from simulation.sapien3.backdrop import COLOR, PLACE, Backdrop, Bodies, planes
 from simulation.sapien3.device import expect_render_device
 from simulation.sapien3.dressing import (
     Wardrobe,
@@ -31,13 +33,11 @@ LAMPS = (((1.0, 1.0, -1.0), (1.0, 1.0, 1.0)), ((0.0, 0.0, -1.0), (1.0, 1.0, 1.0)
 
 # mani_skill 3.0.1, render/shaders.py, "minimal": what each image holds
 _SHADERS = "minimal"
-_FORMATS = {"Color": "r8g8b8a8unorm", "PositionSegmentation": "r16g16b16a16sint"}
-_IMAGES = {
-    "rgb": "Color",
-    "depth": "PositionSegmentation",
-    "segmentation": "PositionSegmentation",
-    "position": "PositionSegmentation",
-}
+_FORMATS = {COLOR: "r8g8b8a8unorm", PLACE: "r16g16b16a16sint"}
+_IMAGES = {"rgb": COLOR, "depth": PLACE, "segmentation": PLACE, "position": PLACE}
+
+Drawn = Callable[[], list[View]]
+"""Waits until pictures are drawn, and returns what each camera sees."""
 
 
 def look(
@@ -46,8 +46,8 @@ def look(
     textures: Sequence[str],
     *,
     markers: bool,
-) -> list[View]:
-    """Return what cameras see in a world now; see `simulation.backend.Backend.look`."""
+) -> Drawn:
+    """Begin to draw what cameras see in a world now; see `simulation.backend.Backend.look`."""
     expect_render_device()
     if world.studio is None:
         world.studio = Studio(world)
@@ -70,22 +70,76 @@ class Studio:
         ]
         self._cameras: dict[tuple[Any, ...], Any] = {}
         self._markers = _markers(world)
+        self._bodies = Bodies(world)
+        self._backdrops: dict[Any, Backdrop] = {}
         self._looks = AS_DECLARED  # that it has
         self._wardrobe: Wardrobe | None = None
 
     def look(
         self, cameras: Mapping[str, AnyCamera], textures: Sequence[str], *, markers: bool
-    ) -> list[View]:
-        """Take pictures with all cameras at the same moment."""
+    ) -> Drawn:
+        """Begin to take pictures with all cameras, of the same moment.
+
+        The driver draws in threads of its own, also while other worlds' pictures are begun.
+        """
         if self._world.looks is not self._looks:
             self._dress(self._world.looks)
         for marker in self._markers:
             marker.visibility = float(markers)
         placed = [self._placed(name, camera) for name, camera in cameras.items()]
         self._scene.update_render()
-        for camera in placed:
+        if markers or not self._bodies.solid:
+            return self._whole(placed, textures)
+        riding = [isinstance(camera, RobotCamera) for camera in cameras.values()]
+        return self._layered(placed, riding, textures)
+
+    def _whole(self, cameras: Sequence[Any], textures: Sequence[str]) -> Drawn:
+        """Begin to take pictures of everything at once."""
+        self._bodies.show_all()
+        for camera in cameras:
             camera.take_picture()
-        return [_view(camera, textures) for camera in placed]
+        names = {_IMAGES[texture] for texture in textures}
+        return lambda: [_view(camera, textures, _pictures(camera, names)) for camera in cameras]
+
+    def _layered(
+        self, cameras: Sequence[Any], riding: Sequence[bool], textures: Sequence[str]
+    ) -> Drawn:
+        """Begin to take pictures of what each camera may see.
+
+        Those of cameras that stand still show only what moves; what does not comes behind it.
+        """
+        standing = [camera for camera, rides in zip(cameras, riding, strict=True) if not rides]
+        backdrops = self._backdrops_of(standing)
+        self._bodies.show_moving([backdrop.planes for backdrop in backdrops.values()])
+        for camera in standing:
+            camera.take_picture()
+        for camera in cameras:
+            if camera not in backdrops:
+                self._bodies.show_seen(planes(camera))
+                camera.take_picture()
+        names = {_IMAGES[texture] for texture in textures}
+
+        def views() -> list[View]:
+            found: list[View] = []
+            for camera in cameras:
+                backdrop = backdrops.get(camera)
+                images = backdrop.behind(camera, names) if backdrop else _pictures(camera, names)
+                if images is None:
+                    return self._whole(cameras, textures)()
+                found.append(_view(camera, textures, images))
+            return found
+
+        return views
+
+    def _backdrops_of(self, cameras: Sequence[Any]) -> dict[Any, Backdrop]:
+        poses = self._bodies.still_poses()
+        for camera in cameras:
+            backdrop = self._backdrops.get(camera)
+            if backdrop is None or not backdrop.fits(camera, poses):
+                self._bodies.show_still()
+                camera.take_picture()
+                self._backdrops[camera] = Backdrop(camera, poses)
+        return {camera: self._backdrops[camera] for camera in cameras}
 
     def _placed(self, name: str, camera: AnyCamera) -> Any:
         lens = camera.mount if isinstance(camera, RobotCamera) else camera
@@ -109,6 +163,7 @@ class Studio:
     def _dress(self, looks: Looks) -> None:
         """Let everything look as it is to from now on."""
         self._looks = looks
+        self._bodies.show_all()
         if looks.patterns or looks.paints:
             if self._wardrobe is None:
                 self._wardrobe = Wardrobe(self._world)
@@ -121,6 +176,7 @@ class Studio:
                 lamp.entity.set_pose(lamp_pose(direction, glow))
         if glow := looks.lights.get(everywhere):
             self._scene.set_ambient_light(light_color(SKY, glow))
+        self._bodies, self._backdrops = Bodies(self._world), {}
 
     def _add_camera(
         self, name: str, width: int, height: int, fov: float, near: float, far: float
@@ -140,9 +196,12 @@ def _markers(world: BuiltWorld) -> list[Any]:
     ]
 
 
-def _view(camera: Any, textures: Sequence[str]) -> View:
-    found = {image: camera.get_picture(image) for image in {_IMAGES[t] for t in textures}}
-    pixels = {texture: found[_IMAGES[texture]] for texture in textures}
+def _pictures(camera: Any, names: Iterable[str]) -> dict[str, NDArray[Any]]:
+    return {name: camera.get_picture(name) for name in names}
+
+
+def _view(camera: Any, textures: Sequence[str], images: Mapping[str, NDArray[Any]]) -> View:
+    pixels = {texture: images[_IMAGES[texture]] for texture in textures}
     channels = {
         "rgb": lambda x: x[..., :3],
         "depth": lambda x: -x[..., 2:3],

@@ -339,8 +339,9 @@ class _CameraRig:
         self.stale = set(range(simulation.num_envs))
 
     def look(self) -> dict[str, Any]:
-        for env in sorted(self.stale):
-            self._rows[env] = self._observers.look(env)
+        begun = {env: self._observers.begin(env) for env in sorted(self.stale)}
+        for env, finish in begun.items():
+            self._rows[env] = finish()
         self.stale.clear()
         names = list(self._rows[0])
         matrices = ("extrinsic_cv", "cam2world_gl", "intrinsic_cv")

@@ -111,9 +111,9 @@ def test_state_beside_images_is_the_state():
 @drawing
 def test_only_what_changed_is_drawn_again(monkeypatch: pytest.MonkeyPatch):
     drawn: list[int] = []
-    look = Observers.look
+    begin = Observers.begin
     monkeypatch.setattr(
-        Observers, "look", lambda self, env: (drawn.append(env), look(self, env))[1]
+        Observers, "begin", lambda self, env: (drawn.append(env), begin(self, env))[1]
     )
     with closing(tasks.make(TASK, 3, obs_mode="rgb", cameras=SMALL)) as env:
         first, _ = env.reset(seed=0)
