@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 DESCRIPTION = "measure what steps, resets, workers and recordings cost, beside the physics alone"
 EPILOG = (
-    "Benchmarks: step, reset, vector, varying, looks, environments, workers, robots, contacts,"
-    " memory, start, recording, validation. One after the other, they take about two minutes."
+    "Benchmarks: step, reset, vector, varying, looks, pictures, environments, workers, robots,"
+    " contacts, memory, start, recording, validation. One after the other, they take some minutes."
 )
 
 
