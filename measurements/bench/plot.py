@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLUMNS = 2  # panels side by side
-TITLE = 62  # characters of a line
+TITLE = 54  # characters of a line
 DOTS_PER_INCH = 120
 PANEL_WIDTH, PANEL_HEIGHT, BAR_HEIGHT, FOOT = 6.5, 3.6, 0.2, 0.7  # inches
 
