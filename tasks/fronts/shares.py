@@ -14,9 +14,9 @@ from robots import TaskError
 class Sharing:
     """How the environments of a vector are shared among its workers.
 
-    Every worker holds some consecutive ones. Where `recv` returns fewer than all, these are
-    divided into parts of which one from each worker makes a batch: a worker that has finished one
-    goes on with the next while the first one's results are looked at.
+    Every worker holds some consecutive ones, in parts no larger than what `recv` returns. A worker
+    with several parts goes on with the next one while the results of the last are looked at. Parts
+    are as large as that allows: what a step costs beside its physics, most of it once per part.
 
     Attributes:
         shares: For each worker, the environments of each of its parts.
@@ -31,10 +31,9 @@ class Sharing:
             batch_size: How many environments are received at once.
         """
         count = max(num_workers, 1)
-        size = max(1, batch_size // count) if batch_size < num_envs else num_envs
         bounds = [(i * num_envs) // count for i in range(count + 1)]
         self.shares = [
-            [range(i, min(i + size, stop)) for i in range(start, stop, size)]
+            [range(i, min(i + batch_size, stop)) for i in range(start, stop, batch_size)]
             for start, stop in zip(bounds, bounds[1:], strict=False)
         ]
         self._num_envs = num_envs

@@ -101,8 +101,8 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             task_id: The task's id or another of its names.
             num_envs: Number of environments.
             num_workers: Number of processes; None takes one per core, 0 this process.
-            batch_size: How many environments `recv` returns; all if None. With half of them or
-                fewer, workers go on with others while a policy looks at these.
+            batch_size: How many environments `recv` returns; all if None. A worker that holds
+                more goes on with others while a policy looks at these.
             autoreset_mode: What happens after an episode's last step. With ``NEXT_STEP`` the next
                 step begins a new one, without reading the action; with ``SAME_STEP`` the same
                 step does, and ``info`` keeps ``final_obs`` and ``final_info``; with ``DISABLED``
