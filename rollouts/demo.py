@@ -25,7 +25,7 @@ from tasks.episode import PlayedEpisode, play
 from tasks.registry import make_scenario
 
 ENOUGH = 0.9  # share of episodes that must succeed
-FILMED_EPISODES, FILMING_SECONDS = 4, 60.0
+FILMED_EPISODES, FILMING_SECONDS = 2, 60.0
 
 
 @dataclass(frozen=True)
