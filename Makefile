@@ -4,7 +4,8 @@ PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python
 
-# Installed code is compiled when it is first imported, of the demo's a fifth; this keeps what was.
+# The demo's packages are compiled when they are first imported, most of them never; with this,
+# Python keeps what it compiled.
 export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: help demo test test-all faults check docs bench parity clean

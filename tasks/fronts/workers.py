@@ -123,8 +123,7 @@ class Workers:
         for number, own in arguments.items():
             worker, place = self._places[number]
             asked[number] = self._crew[worker].ask(place, method, own)
-        self._wait(lambda: all(one.done for one in asked.values()), self._timeout)
-        return {number: one.answer for number, one in asked.items()}
+        return self._answers(asked, self._timeout)
 
     def send(self, number: int, env_ids: Sequence[int]) -> None:
         """Let a part step some of its environments, and do not wait for it.
@@ -194,7 +193,7 @@ class Workers:
             asked = [worker.ask(None, SETTLE, ()) for worker in open_]
             self._wait(lambda: all(one.done for one in asked), self._timeout)
 
-    def _answers(self, asked: Mapping[int, Asked], timeout: float) -> dict[int, Any]:
+    def _answers(self, asked: Mapping[int, Asked], timeout: float | None) -> dict[int, Any]:
         self._wait(lambda: all(one.done for one in asked.values()), timeout)
         return {i: one.answer for i, one in asked.items()}
 
