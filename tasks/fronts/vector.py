@@ -18,21 +18,20 @@ from numpy.typing import NDArray
 from robots import SimulationError, TaskError, unknown_name_message
 from robots.common.bounds import checked_whole
 from tasks.engine.actions import ActionReader
-from tasks.engine.arguments import RECONFIGURE, SUCCESS, checked_options, checked_seeds
+from tasks.engine.arguments import RECONFIGURE, checked_options, checked_seeds
 from tasks.engine.observation import space_of
 from tasks.engine.remade import Remade
-from tasks.fronts.batch import FINAL, INFO, OBSERVATION, Beginning, Part
+from tasks.fronts.batch import Beginning, Part
 from tasks.fronts.gymnasium import RENDER_MODES
 from tasks.fronts.in_process import InProcess
 from tasks.fronts.lost import Failure, WorkerError, WorkersFailed
+from tasks.fronts.results import Results
 from tasks.fronts.shares import Sharing
 from tasks.fronts.workers import Workers
 from tasks.language.randomness import FirstSeeds
 from tasks.registry import get_task_class, make_scenario
 
 _Flags = NDArray[np.bool_]
-_Rows = slice | NDArray[np.intp]
-_ALL = slice(None)
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
 
@@ -135,7 +134,6 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         self._reader = ActionReader(layout, num_envs)
         self._seeds = [cls.first_seed + i for i in range(num_envs)]
         self._first = FirstSeeds(num_envs)
-        self._names: dict[str, list[tuple[str, str]]] = {}
         self._everywhere = np.ones(num_envs, bool)
         self.batch_size = _checked_batch_size(batch_size, num_envs)
         self._sharing = Sharing(num_envs, workers, self.batch_size)
@@ -150,10 +148,11 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         except WorkersFailed as failed:
             raise self._error(failed.failures, None) from failed.where
         self._close = weakref.finalize(self, self._crew.close)
+        self._results = Results(self._crew, num_envs)
         low, high = np.array(layout.action_bounds, np.float32).T
         self.single_action_space = Box(low, high, dtype=np.float32)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self.single_observation_space = space_of(self._observation(_ALL), batched=True)
+        self.single_observation_space = space_of(self._results.observation(), batched=True)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
 
     @_alone
@@ -210,8 +209,8 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         self._expect_workers()
         self._expect_idle(self._crew.steps.away)
         self._crew.arrays["action"][:] = self._reader.read(actions)
-        self._call("step", {i: () for i in range(len(self._crew.parts))}, self._results)
-        return self._results()
+        self._call("step", {i: () for i in range(len(self._crew.parts))}, self._results.step)
+        return self._results.step()
 
     @_alone
     def send(self, actions: Any, env_ids: Sequence[int] | NDArray[np.integer[Any]]) -> None:
@@ -261,7 +260,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             ids = np.array(self._crew.take(self.batch_size))
         except WorkersFailed as failed:
             raise self._error(failed.failures, None) from failed.where
-        obs, reward, terminated, truncated, info = self._results(ids)
+        obs, reward, terminated, truncated, info = self._results.step(ids)
         return obs, reward, terminated, truncated, {**info, "env_id": ids}
 
     @_alone
@@ -378,79 +377,8 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             if seed is not None:
                 self._seeds[i] = seed
 
-    # -- results -----------------------------------------------------------------------------
-
     def _begun(self, mask: _Flags) -> tuple[Any, dict[str, Any]]:
-        return self._observation(_ALL), self._info(INFO, mask, _ALL)
-
-    def _results(
-        self, ids: _Rows = _ALL
-    ) -> tuple[Any, NDArray[np.float32], _Flags, _Flags, dict[str, Any]]:
-        """Return what is on the board of some environments, as copies."""
-        arrays = self._crew.arrays
-        info = self._info(INFO, self._everywhere[ids], ids)
-        restarted = arrays.get("restarted")
-        if restarted is not None and restarted[ids].any():
-            info.update(self._final(restarted[ids].copy(), ids))
-        flags = (arrays[name][ids].copy() for name in ("reward", "terminated", "truncated"))
-        return self._observation(ids), *flags, info
-
-    def _observation(self, ids: _Rows, prefix: str = "") -> Any:
-        arrays = self._crew.arrays
-        if prefix + OBSERVATION in arrays:
-            return arrays[prefix + OBSERVATION][ids].copy()
-        tree: dict[str, Any] = {}
-        for name, array in arrays.items():
-            first, *way = name.split("/")
-            if first == prefix + OBSERVATION:
-                branch = tree
-                for key in way[:-1]:
-                    branch = branch.setdefault(key, {})
-                branch[way[-1]] = array[ids].copy()
-        return tree or np.empty((len(self._everywhere[ids]), 0), np.float32)
-
-    def _info(self, prefix: str, mask: _Flags, ids: _Rows) -> dict[str, Any]:
-        """Return what is known of some environments, as Gymnasium's own vectors tell it.
-
-        Args:
-            prefix: What the names of the arrays begin with.
-            mask: Of which of these environments it is told.
-            ids: The environments.
-        """
-        info: dict[str, Any] = {}
-        everywhere = mask.all()
-        for key, array in self._told(prefix):
-            info[key] = array[ids].copy()
-            if not everywhere:
-                info[key][~mask] = 0
-            info[f"_{key}"] = mask.copy()
-        return info
-
-    def _told(self, prefix: str) -> list[tuple[str, NDArray[Any]]]:
-        """Return the arrays whose names begin with a prefix, and what info calls them."""
-        if prefix not in self._names:
-            found = [
-                (called, name)
-                for name in self._crew.arrays
-                for first, _, key in [name.partition("/")]
-                if first == prefix
-                for called in ((key, SUCCESS) if key == "success" else (key,))
-            ]
-            self._names[prefix] = found
-        arrays = self._crew.arrays
-        return [(called, arrays[name]) for called, name in self._names[prefix]]
-
-    def _final(self, ended: _Flags, ids: _Rows) -> dict[str, Any]:
-        observations = np.full(len(ended), None, object)
-        batch = self._observation(ids, FINAL)
-        for i in np.flatnonzero(ended).tolist():
-            observations[i] = _row(batch, i)
-        return {
-            "final_obs": observations,
-            "_final_obs": ended,
-            "final_info": self._info(FINAL + INFO, ended, ids),
-            "_final_info": ended.copy(),
-        }
+        return self._results.observation(), self._results.info(mask)
 
     # -- checks ------------------------------------------------------------------------------
 
@@ -493,9 +421,3 @@ def _checked_batch_size(batch_size: int | None, num_envs: int) -> int:
     if batch_size is None:
         return num_envs
     return checked_whole("batch_size", batch_size, 1, num_envs, TaskError)
-
-
-def _row(batch: Any, env: int) -> Any:
-    if isinstance(batch, Mapping):
-        return {key: _row(part, env) for key, part in batch.items()}
-    return batch[env]
