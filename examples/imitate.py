@@ -22,13 +22,14 @@ from dataclasses import asdict, dataclass
 from functools import cache
 from math import cos, pi
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from torch import Tensor, nn
+from typing_extensions import Self
 
 import tasks
 from kinematics.rotations import rotation_of
@@ -48,7 +49,6 @@ FILE = "runs/imitate/TwoRobotPickCube-v1/policy.pt"  # or what IMITATE_POLICY sa
 EXAMINED_SEED = 500_000  # of the first episode that is played while it learns
 TEST_SEED = 1_000_000  # of the first test episode; recorded ones begin with 0
 TOGETHER = 25  # episodes played at once
-EXAMINATIONS = 20  # while it learns; after each, what it has learned is kept
 
 Floats = NDArray[np.float32]
 
@@ -78,7 +78,7 @@ class Recipe:
     seed: int = 0
     shake: float = 0.15
     chunk: int = 8
-    played: int = 6
+    played: int = 4
     width: int = 256
     blocks: int = 3
     batch: int = 256
@@ -138,12 +138,12 @@ class Senses:
 class Observer:
     """Plays recorded episodes again, and notes what is observed before every action."""
 
-    def __init__(self, recipe: Recipe) -> None:
+    def __init__(self, recipe: Recipe, senses: Senses) -> None:
         """Make the task as it was recorded."""
         shaken = shaking(recipe)
         how: dict[str, Any] = {"obs_mode": OBSERVED, "reward_mode": "none"}
         self.env = tasks.make(recipe.task, randomization=shaken, **how)
-        self._senses, self._arms = Senses(recipe.task), list(_arms(self.env.layout))
+        self._senses, self._arms = senses, list(_arms(self.env.layout))
 
     def __call__(self, episode: Trajectory) -> tuple[Floats, Floats]:
         """Return observations (T, D), and actions (T, A) as positions of joints."""
@@ -165,7 +165,7 @@ class Observer:
         return wanted
 
 
-def observe(recipe: Recipe, recording: Path) -> tuple[Tensor, Tensor]:
+def observe(recipe: Recipe, recording: Path, senses: Senses) -> tuple[Tensor, Tensor]:
     """Return what was observed, (N, D), and the actions that follow, (N, chunk · A).
 
     Episodes that the expert did not solve are left out.
@@ -174,7 +174,7 @@ def observe(recipe: Recipe, recording: Path) -> tuple[Tensor, Tensor]:
         TaskError: If the recording has too few episodes.
         TrajectoryError: If it cannot be read, or is of another world.
     """
-    observer, samples = Observer(recipe), list[tuple[Floats, Floats]]()
+    observer, samples = Observer(recipe, senses), list[tuple[Floats, Floats]]()
     with closing(observer.env), open_trajectories(recording) as file:
         file.expect(observer.env.task_id, observer.env.layout.action_dim)
         file.expect_world(observer.env)
@@ -186,11 +186,11 @@ def observe(recipe: Recipe, recording: Path) -> tuple[Tensor, Tensor]:
                     samples.append(observer(episode))
                 line.update(number + 1, "observing")
     seen = np.concatenate([observations for observations, _ in samples])
-    chunks = np.concatenate([_chunks(actions, recipe.chunk) for _, actions in samples])
+    chunks = np.concatenate([chunks_of(actions, recipe.chunk) for _, actions in samples])
     return torch.from_numpy(seen), torch.from_numpy(chunks)
 
 
-def _chunks(actions: Floats, size: int) -> Floats:
+def chunks_of(actions: Floats, size: int) -> Floats:
     """Return the actions from each step on, (T, size · A); the last one is held."""
     steps = np.arange(len(actions))[:, None] + np.arange(size)
     return actions[steps.clip(max=len(actions) - 1)].reshape(len(actions), -1)
@@ -222,11 +222,15 @@ class ChunkNetwork(nn.Module):
     unit: Tensor
     switches: Tensor
 
-    def __init__(self, inputs: int, outputs: int, width: int, blocks: int) -> None:
-        """Make it, for observations of ``inputs`` numbers and chunks of ``outputs``."""
+    def __init__(self, inputs: int, outputs: int, width: int, blocks: int, more: int = 0) -> None:
+        """Make it, for observations of ``inputs`` numbers and chunks of ``outputs``.
+
+        The network gets ``more`` numbers that the linear fit does not.
+        """
         super().__init__()
+        self.sizes: tuple[int, ...] = inputs, outputs, width, blocks
         middle = (Block(width) for _ in range(blocks))
-        first, last = nn.Linear(inputs, width), nn.Linear(width, outputs)
+        first, last = nn.Linear(inputs + more, width), nn.Linear(width, outputs)
         self.network = nn.Sequential(first, *middle, nn.LayerNorm(width), last)
         self.linear = nn.Linear(inputs, outputs).requires_grad_(False)
         for name, size in (("mean", inputs), ("scale", inputs), ("unit", outputs)):
@@ -234,7 +238,7 @@ class ChunkNetwork(nn.Module):
         self.register_buffer("switches", torch.zeros(outputs, dtype=torch.bool))
 
     @torch.no_grad()
-    def fit(self, observations: Tensor, chunks: Tensor) -> None:
+    def fit(self, observations: Any, chunks: Tensor) -> None:
         """Fit the linear part by least squares, and measure the units."""
         self.mean.copy_(observations.mean(0))
         self.scale.copy_(observations.std(0).clamp(min=1e-2))
@@ -250,12 +254,12 @@ class ChunkNetwork(nn.Module):
         """Return observations in units of their standard deviation."""
         return ((observations - self.mean) / self.scale).clamp(-6.0, 6.0)
 
-    def forward(self, observations: Tensor) -> Tensor:
+    def forward(self, observations: Any) -> Tensor:
         """Predict chunks, (N, outputs)."""
         seen = self.normalised(observations)
         return self.linear(seen) + self.unit * self.network(seen)
 
-    def choose(self, observations: Tensor) -> Tensor:
+    def choose(self, observations: Any) -> Tensor:
         """Predict chunks whose grippers are opened or closed, as the expert's are.
 
         Half closed they would look as if they were closing, and be closed.
@@ -272,34 +276,53 @@ class ClonedPolicy:
         file: Where it was loaded from, or None.
     """
 
-    def __init__(self, recipe: Recipe, network: ChunkNetwork, file: str | None = None) -> None:
+    recipes: ClassVar[type[Recipe]] = Recipe
+    networks: ClassVar[type[ChunkNetwork]] = ChunkNetwork
+    examinations: ClassVar[int] = 20  # while it learns; after each, what it has learned is kept
+
+    def __init__(self, recipe: Any, network: ChunkNetwork, file: str | None = None) -> None:
         """Play with a network."""
         self.recipe, self.file = recipe, file
         self._senses, self._network, self._left = Senses(recipe.task), network, list[Tensor]()
 
     @classmethod
-    def load(cls, file: str | Path) -> ClonedPolicy:
+    def load(cls, file: str | Path) -> Self:
         """Load what `Training.save` wrote."""
         saved: dict[str, Any] = torch.load(file, weights_only=True)
-        recipe, weights = Recipe(**saved["recipe"]), saved["network"]
-        outputs, inputs = weights["linear.weight"].shape
-        network = ChunkNetwork(inputs, outputs, recipe.width, recipe.blocks)
-        network.load_state_dict(weights)
-        return cls(recipe, network, str(file))
+        network = cls.networks(*saved["sizes"])
+        network.load_state_dict(saved["network"])
+        return cls(cls.recipes(**saved["recipe"]), network, str(file))
+
+    @classmethod
+    def training(cls, recipe: Any, recording: Path, workers: int | None, out: Path) -> Training:
+        """Return what learns from a recording."""
+        observations, chunks = observe(recipe, recording, Senses(recipe.task))
+        torch.manual_seed(recipe.seed)  # of the first weights
+        sizes = observations.shape[1], chunks.shape[1], recipe.width, recipe.blocks
+        return Training(recipe, ChunkNetwork(*sizes), observations, chunks)
+
+    @property
+    def making(self) -> dict[str, Any]:
+        """How the task is made that it plays: arguments of `tasks.make`."""
+        return {"control_mode": MODE, "obs_mode": OBSERVED}
+
+    def sense(self, observation: Mapping[str, Any]) -> Any:
+        """Return what the network gets of an observation."""
+        return self._senses(observation)
 
     @torch.no_grad()
     def __call__(self, observation: Mapping[str, Any]) -> Tensor:
         """Return the next action, (A,), after an observation of one environment."""
         if not self._left:
-            chunk = self._network.choose(self._senses(observation)).reshape(self.recipe.chunk, -1)
+            chunk = self._network.choose(self.sense(observation)).reshape(self.recipe.chunk, -1)
             self._left = [*chunk[: self.recipe.played]]
         return self._left.pop(0)
 
     def examine(self, first: int, count: int, on_event: Callable[[Any], None]) -> Evaluation:
         """Play the episodes of some seeds."""
         task, seeds = self.recipe.task, range(first, first + count)
-        how: dict[str, Any] = {"control_mode": MODE, "obs_mode": OBSERVED, "workers": 0}
-        return evaluate(self, task, seeds, num_envs=TOGETHER, on_event=on_event, **how)
+        how: dict[str, Any] = {"workers": 0, "num_envs": TOGETHER, **self.making}
+        return evaluate(self, task, seeds, on_event=on_event, **how)
 
 
 class Training:
@@ -312,17 +335,20 @@ class Training:
             of what the linear fit leaves, share of episodes that succeeded.
     """
 
-    def __init__(self, recipe: Recipe, observations: Tensor, chunks: Tensor) -> None:
-        """Make a network that has learned nothing but the linear fit."""
-        self.steps, self.curve = 0, list[tuple[int, float, float]]()
+    def __init__(
+        self, recipe: Recipe, network: ChunkNetwork, observations: Any, chunks: Tensor
+    ) -> None:
+        """Begin with a network's first weights and the linear fit.
+
+        What was observed gives a batch of it for a tensor of indices, as tensors do.
+        """
+        self.network, self.steps, self.curve = network, 0, list[tuple[int, float, float]]()
         self._recipe, self._observations, self._chunks = recipe, observations, chunks
         self._random = torch.Generator().manual_seed(recipe.seed)
         self._errors = list[float]()
-        torch.manual_seed(recipe.seed)  # of the first weights
-        sizes = observations.shape[1], chunks.shape[1], recipe.width, recipe.blocks
-        self.network = ChunkNetwork(*sizes)
-        self.network.fit(observations, chunks)
-        self._optimizer = torch.optim.AdamW(self.network.network.parameters())
+        network.fit(observations, chunks)
+        learned = [weights for weights in network.parameters() if weights.requires_grad]
+        self._optimizer = torch.optim.AdamW(learned)
 
     def step(self) -> None:
         """Learn from a batch."""
@@ -349,6 +375,7 @@ class Training:
         """Write all that it takes to go on, whole or not at all."""
         state = {
             "recipe": asdict(self._recipe),
+            "sizes": self.network.sizes,
             "network": self.network.state_dict(),
             "optimizer": self._optimizer.state_dict(),
             "random": self._random.get_state(),
@@ -375,9 +402,9 @@ class Training:
         self.curve = state["curve"]
 
 
-def learn(training: Training, recipe: Recipe, examined: int, file: Path) -> ClonedPolicy:
-    """Learn all steps; examine the network and keep everything now and then."""
-    policy, every = ClonedPolicy(recipe, training.network), -(-recipe.steps // EXAMINATIONS)
+def learn(training: Training, policy: ClonedPolicy, examined: int, file: Path) -> None:
+    """Learn all steps; examine the policy and keep everything now and then."""
+    recipe, every = policy.recipe, -(-policy.recipe.steps // policy.examinations)
     with LiveLine(recipe.steps, "batches") as line:
         while training.steps < recipe.steps:
             training.step()
@@ -386,7 +413,6 @@ def learn(training: Training, recipe: Recipe, examined: int, file: Path) -> Clon
                 found = policy.examine(EXAMINED_SEED, examined, lambda _: None)
                 line.say(training.note(found.success_rate))
                 training.save(file)
-    return ClonedPolicy.load(file)
 
 
 def draw(curve: Sequence[tuple[int, float, float]], title: str, path: Path) -> None:
@@ -403,17 +429,21 @@ def draw(curve: Sequence[tuple[int, float, float]], title: str, path: Path) -> N
     figure.savefig(path)
 
 
-def imitate(recipe: Recipe, options: argparse.Namespace, out: Path) -> Evaluation:
+def imitate(
+    recipe: Recipe, options: argparse.Namespace, out: Path, policies: type[ClonedPolicy]
+) -> Evaluation:
     """Record, learn, and play the test seeds; leave weights, curve and numbers in a folder."""
     torch.set_num_threads(1)  # several would add up in other orders
     warnings.filterwarnings("ignore", "robot .* is thrown about")  # beginners hit the table
     out.mkdir(parents=True, exist_ok=True)
     if options.recording is None:
         demonstrate(recipe, out / "recording", options.workers)
-    training = Training(recipe, *observe(recipe, options.recording or out / "recording"))
-    if (out / "policy.pt").exists():
-        training.load(out / "policy.pt")
-    policy = learn(training, recipe, options.examined, out / "policy.pt")
+    recording, file = options.recording or out / "recording", out / "policy.pt"
+    training = policies.training(recipe, recording, options.workers, out)
+    if file.exists():
+        training.load(file)
+    learn(training, policies(recipe, training.network), options.examined, file)
+    policy = policies.load(file)
     with LiveLine(options.tests, "episodes") as line:
         result = policy.examine(TEST_SEED, options.tests, lambda _: line.advance(1, "examining"))
     numbers = {
@@ -431,31 +461,40 @@ def imitate(recipe: Recipe, options: argparse.Namespace, out: Path) -> Evaluatio
     return result
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(
+    arguments: Sequence[str] | None = None,
+    policies: type[ClonedPolicy] = ClonedPolicy,
+    task: str = "TwoRobotPickCube-v1",
+    name: str = "imitate",
+) -> int:
     """Run the example.
 
     Args:
         arguments: Words of the command line; by default those of this process.
+        policies: What learns.
+        task: The task's id, unless the command line says it.
+        name: Of the example.
 
     Returns:
         0 if 85 of 100 test episodes succeed, else 1.
     """
+    usual = policies.recipes(task)
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     add = parser.add_argument
-    add("task", nargs="?", default="TwoRobotPickCube-v1", help="task id (default %(default)s)")
-    add("--episodes", type=int, default=Recipe.episodes, help="to learn from (%(default)s)")
-    add("--steps", type=int, default=Recipe.steps, help="batches to learn from (%(default)s)")
-    add("--seed", type=int, default=Recipe.seed, help="of weights and batches (%(default)s)")
+    add("task", nargs="?", default=task, help="task id (default %(default)s)")
+    add("--episodes", type=int, default=usual.episodes, help="to learn from (%(default)s)")
+    add("--steps", type=int, default=usual.steps, help="batches to learn from (%(default)s)")
+    add("--seed", type=int, default=usual.seed, help="of weights and batches (%(default)s)")
     add("--examined", type=int, default=25, help="episodes now and then (%(default)s)")
     add("--tests", type=int, default=100, help="test episodes (%(default)s)")
     add("--workers", type=int, help="processes that record (default: one per core)")
     add("--recording", type=Path, help="folder of a recording that is there already")
-    add("--out", type=Path, help="folder (default: runs/imitate/TASK)")
+    add("--out", type=Path, help=f"folder (default: runs/{name}/TASK)")
     options = parser.parse_args(arguments)
-    recipe = Recipe(options.task, options.episodes, options.steps, options.seed)
-    out = options.out or Path("runs/imitate") / options.task.rpartition(":")[2]
+    recipe = policies.recipes(options.task, options.episodes, options.steps, options.seed)
+    out = options.out or Path("runs") / name / options.task.rpartition(":")[2]
     try:
-        result = imitate(recipe, options, out)
+        result = imitate(recipe, options, out, policies)
     except RobotLayoutsError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

@@ -22,7 +22,7 @@ from rollouts.reading.summary import MAX_JSON, MAX_SEED
 FORMAT = "robot-layouts certificate 1"
 FILE = "certificate.json"
 PACKAGES = ("robot-layouts", "sapien", "numpy", "torch")
-SHOWN = 100  # episodes that differ, or could not be played, that are listed
+SHOWN = 100  # episodes that differ, could not be played, or in which arms touch, that are listed
 
 _COUNT = whole(0, 2**53)
 _CERTIFICATE = fields(
@@ -37,7 +37,9 @@ _CERTIFICATE = fields(
         **dict.fromkeys(("equal", "steps", "successes"), _COUNT),
         "differing": items(OBJECT),
         "not_played": items(OBJECT),
-        "arm_contacts": fields({"episodes": _COUNT, "steps": _COUNT, "pairs": OBJECT}),
+        "arm_contacts": fields(
+            {"episodes": _COUNT, "steps": _COUNT, "pairs": OBJECT}, {"touching": items(OBJECT)}
+        ),
     }
 )
 
@@ -60,6 +62,7 @@ class Certificate:
         contact_episodes: Episodes in which arms touched each other.
         contact_steps: Control steps in which they did.
         pairs: The same by pair of links.
+        touching: Seed, success and number of such steps of these episodes, likewise.
     """
 
     task_id: str
@@ -75,6 +78,7 @@ class Certificate:
     contact_episodes: int = 0
     contact_steps: int = 0
     pairs: Counter[str] = field(default_factory=Counter[str])
+    touching: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
 
     @property
     def complete(self) -> bool:
@@ -95,9 +99,12 @@ class Certificate:
             self.equal += 1
         else:
             _keep(self.differing, {"seed": seed, **vars(replay.difference)})
-        self.contact_episodes += bool(replay.touching)
-        self.contact_steps += replay.touching_steps
-        self.pairs.update(replay.touching)
+        if replay.touching:
+            self.contact_episodes += 1
+            self.contact_steps += replay.touching_steps
+            self.pairs.update(replay.touching)
+            told = {"success": replay.success, "steps": replay.touching_steps}
+            _keep(self.touching, {"seed": seed, **told})
 
     def note_failure(self, seed: int, reason: str) -> None:
         """Count an episode that could not be played."""
@@ -124,6 +131,7 @@ class Certificate:
                 "episodes": self.contact_episodes,
                 "steps": self.contact_steps,
                 "pairs": dict(sorted(self.pairs.items())),
+                "touching": self.touching,
             },
         }
 
@@ -167,7 +175,7 @@ def sentences(certificate: Certificate) -> Sequence[str]:
         f"{c.equal} of {c.episodes} episodes equal to the last bit, {c.steps} steps, {c.successes}"
         " successes",
         f"arms touched in {c.contact_episodes} episodes"
-        + (f", {c.contact_steps} steps: {', '.join(c.pairs)}" if c.pairs else ""),
+        + (f", {c.contact_steps} steps: {', '.join(c.pairs)}{_seeds(c)}" if c.pairs else ""),
     ]
     if c.differing:
         first = c.differing[0]
@@ -180,6 +188,15 @@ def sentences(certificate: Certificate) -> Sequence[str]:
     if not c.complete:
         lines.append(f"not complete: {len(c.checked)} of {c.episodes} were played")
     return lines
+
+
+def _seeds(certificate: Certificate) -> str:
+    """Return in which episodes arms touched, the first three, in words."""
+    named = [
+        f"{one['seed']}{'' if one['success'] else ' (no success)'}" for one in certificate.touching
+    ][:3]
+    more = "" if certificate.contact_episodes <= len(named) else " and others"
+    return f"; seeds {', '.join(named)}{more}" if named else ""
 
 
 def _keep(listed: list[dict[str, Any]], entry: dict[str, Any]) -> None:
@@ -205,4 +222,5 @@ def _from_json(found: Mapping[str, Any]) -> Certificate:
         contacts["episodes"],
         contacts["steps"],
         Counter(contacts["pairs"]),
+        contacts.get("touching", []),
     )

@@ -101,7 +101,7 @@ def test_a_killed_run_goes_on_to_the_same_weights(example, learned, recording, t
 
 def observed(example, recording):
     """An episode as it was recorded, and what the network learns from it."""
-    observer = example.Observer(example.Recipe(TASK))
+    observer = example.Observer(example.Recipe(TASK), example.Senses(TASK))
     with TrajectoryFile(recording / "trajectory.h5") as file:
         episode = file[0]
     seen, positions = observer(episode)
@@ -131,7 +131,7 @@ def test_arms_are_shaken_and_grippers_are_not(example):
 
 def test_chunks_hold_the_last_action(example):
     actions = np.arange(6, dtype=np.float32).reshape(3, 2)
-    chunks = example._chunks(actions, 2)
+    chunks = example.chunks_of(actions, 2)
     assert chunks.tolist() == [[0, 1, 2, 3], [2, 3, 4, 5], [4, 5, 4, 5]]
 
 

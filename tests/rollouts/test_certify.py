@@ -11,7 +11,7 @@ import tasks
 from layouts import face_to_face
 from robots import RecordingError
 from rollouts.__main__ import main
-from rollouts.dataset.certificate import Certificate
+from rollouts.dataset.certificate import Certificate, sentences
 from rollouts.dataset.certify import certify
 from rollouts.dataset.comparison import difference
 from rollouts.playing.in_process import InProcessExecutor
@@ -54,7 +54,7 @@ def test_other_processes_certify_the_same_as_this_one(copy, tmp_path, capsys):
     assert about["holds"]
     assert about["checked"] == [[0, COUNT - 1]]
     assert about["steps"] == 3 * COUNT
-    assert about["arm_contacts"] == {"episodes": 0, "steps": 0, "pairs": {}}
+    assert about["arm_contacts"] == {"episodes": 0, "steps": 0, "pairs": {}, "touching": []}
     assert [file["file"] for file in about["files"]][:3] == [
         *("trajectory.h5", "trajectory.json", "trajectory_0001.h5")
     ]
@@ -164,5 +164,7 @@ def test_arms_that_touch_are_counted(tmp_path):
     assert found.holds
     assert found.contact_episodes == 1
     assert found.contact_steps == 3
+    assert found.touching == [{"seed": 0, "success": False, "steps": 3}]
+    assert sentences(found)[1].endswith("; seeds 0 (no success)")
     assert all("left." in pair and "right." in pair for pair in found.pairs)
     assert Certificate.read(path.with_suffix(".certificate.json")) == found

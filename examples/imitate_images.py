@@ -1,0 +1,212 @@
+"""A network learns a task of one arm or two from what cameras see: behaviour cloning in chunks.
+
+    pip install 'robot-layouts[preview,export]'
+    python examples/imitate_images.py TwoRobotLiftBar-v1
+
+It learns as the network of `imitate.py` does, but is not told where objects are: it gets small
+pictures of all cameras, and what real robots sense of themselves. The pictures are drawn from the
+recording, in processes, which takes a Vulkan driver. The same command goes on where it was stopped
+or killed, and equal commands make equal networks, to the last bit.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, ClassVar, cast
+
+import h5py
+import numpy as np
+import torch
+from imitate import MODE, ChunkNetwork, ClonedPolicy, Recipe, Senses, Training, main, observe
+from torch import Tensor, nn
+
+import tasks
+from rollouts.export.dataset import Export, export
+from rollouts.playing.executor import choose_executor
+from rollouts.progress import LiveLine
+from tasks.engine.cameras import by_place, cameras_of
+from tasks.engine.columns import ROBOMIMIC, picture_column
+
+OBSERVED = "rgb"
+FILE = "runs/imitate_images/TwoRobotLiftBar-v1/policy.pt"  # or what IMITATE_IMAGES_POLICY says
+SEEN = 64  # numbers that are made of the pictures of a moment
+
+
+@dataclass(frozen=True)
+class PictureRecipe(Recipe):
+    """What decides the weights.
+
+    Attributes:
+        size: Width and height of a picture (pixels).
+    """
+
+    episodes: int = 300
+    steps: int = 4_000
+    batch: int = 64
+    size: int = 96
+
+    @property
+    def making(self) -> dict[str, Any]:
+        """How the task is made: arguments of `tasks.make`."""
+        return {"obs_mode": OBSERVED, "camera_size": (self.size, self.size)}
+
+
+@dataclass(frozen=True)
+class Sights:
+    """What is observed at N moments.
+
+    Attributes:
+        numbers: Of the robots, (N, D).
+        pictures: Of C cameras, (N, 3 · C, H, W), uint8.
+    """
+
+    numbers: Tensor
+    pictures: Tensor
+
+    def __getitem__(self, moments: Tensor) -> Sights:
+        """Return some of them."""
+        return Sights(self.numbers[moments], self.pictures[moments])
+
+
+class RobotSenses(Senses):
+    """What a network gets beside pictures: numbers that `OBSERVED` has, too."""
+
+    def __init__(self, recipe: PictureRecipe) -> None:
+        """Ask the task what it tells beside pictures, and how its cameras are called."""
+        super().__init__(recipe.task)
+        env = tasks.make(recipe.task, **recipe.making)
+        with closing(env):
+            spaces = cast(Mapping[str, Any], env.observation_space)
+            self._extra = [*spaces["extra"]]
+            cameras = by_place(cameras_of(env.layout, env.cameras))
+        self.columns = [picture_column(ROBOMIMIC, camera, "rgb") for camera in cameras]
+
+    def __call__(self, observation: Mapping[str, Any]) -> Tensor:
+        """Return the numbers, (N, D), of what ``obs_mode="state_dict"`` or `OBSERVED` observes."""
+        told = {name: observation["extra"][name] for name in self._extra}
+        return super().__call__({"agent": observation["agent"], "extra": told})
+
+
+def draw_pictures(recording: Path, recipe: PictureRecipe, out: Path, workers: int | None) -> Path:
+    """Draw what cameras see before every action, as a robomimic dataset; return its file."""
+    file = out / "image.hdf5"
+    if not file.exists():
+        size, executor = (recipe.size, recipe.size), choose_executor(workers)
+        wanted = Export(recording, "robomimic", out, cameras="all", size=size, only_successes=True)
+        with LiveLine(recipe.episodes, "episodes") as line:
+            export(wanted, lambda done, _: line.update(int(done), "drawing"), executor=executor)
+    return file
+
+
+def load_pictures(file: Path, columns: list[str]) -> Tensor:
+    """Return the pictures of all episodes, one after the other, (N, 3 · C, H, W)."""
+    with h5py.File(file) as dataset:
+        demos = cast(Mapping[str, Any], dataset["data"])
+        episodes = [demos[f"demo_{i}"]["obs"] for i in range(len(demos))]
+        pictures = [np.concatenate([seen[name] for name in columns], 3) for seen in episodes]
+    return torch.from_numpy(np.concatenate(pictures)).permute(0, 3, 1, 2).contiguous()
+
+
+class Eye(nn.Module):
+    """Makes few numbers of a picture: each layer but the last sees it half as large."""
+
+    def __init__(self, channels: int, size: int) -> None:
+        """Make it, for square pictures of some channels."""
+        super().__init__()
+        self.layers = nn.Sequential(
+            nn.Conv2d(channels, 16, 5, stride=2, padding=2),
+            nn.GELU(),
+            nn.Conv2d(16, 32, 3, stride=2, padding=1),
+            nn.GELU(),
+            nn.Conv2d(32, 32, 3, stride=2, padding=1),
+            nn.GELU(),
+            nn.Conv2d(32, 8, 1),
+            nn.GELU(),
+            nn.Flatten(),
+            nn.Linear(8 * (-(-size // 8)) ** 2, SEEN),
+        )
+
+    def forward(self, pictures: Tensor) -> Tensor:
+        """Map (N, channels, size, size), uint8, to (N, SEEN)."""
+        return self.layers(pictures.float() / 127.5 - 1)
+
+
+class SeeingNetwork(ChunkNetwork):
+    """Predicts the next actions from pictures, too."""
+
+    def __init__(self, inputs: int, outputs: int, width: int, blocks: int, *picture: int) -> None:
+        """Make it, for pictures of so many channels and such a size."""
+        super().__init__(inputs, outputs, width, blocks, more=SEEN)
+        self.sizes = (*self.sizes, *picture)
+        self.eye = Eye(*picture)
+
+    def fit(self, observations: Sights, chunks: Tensor) -> None:
+        """Fit the linear part to the numbers."""
+        super().fit(observations.numbers, chunks)
+
+    def forward(self, observations: Sights) -> Tensor:
+        """Predict chunks, (N, outputs)."""
+        numbers = self.normalised(observations.numbers)
+        seen = torch.cat([numbers, self.eye(observations.pictures)], 1)
+        return self.linear(numbers) + self.unit * self.network(seen)
+
+
+class SeeingPolicy(ClonedPolicy):
+    """Plays what a network predicts that sees."""
+
+    recipes, networks = PictureRecipe, SeeingNetwork
+    examinations: ClassVar[int] = 5
+
+    def __init__(self, recipe: Any, network: ChunkNetwork, file: str | None = None) -> None:
+        """Play with a network."""
+        super().__init__(recipe, network, file)
+        self._senses = RobotSenses(recipe)
+
+    @classmethod
+    def training(cls, recipe: Any, recording: Path, workers: int | None, out: Path) -> Training:
+        """Return what learns from a recording."""
+        senses = RobotSenses(recipe)
+        numbers, chunks = observe(recipe, recording, senses)
+        file = draw_pictures(recording, recipe, out / "pictures", workers)
+        sights = Sights(numbers, load_pictures(file, senses.columns))
+        torch.manual_seed(recipe.seed)  # of the first weights
+        sizes = numbers.shape[1], chunks.shape[1], recipe.width, recipe.blocks
+        network = SeeingNetwork(*sizes, *sights.pictures.shape[1:3])
+        return Training(recipe, network, sights, chunks)
+
+    @property
+    def making(self) -> dict[str, Any]:
+        """How the task is made that it plays."""
+        return {"control_mode": MODE, **self.recipe.making}
+
+    def sense(self, observation: Mapping[str, Any]) -> Sights:
+        """Return what the network gets of an observation."""
+        seen = [camera["rgb"] for camera in observation["sensor_data"].values()]
+        return Sights(self._senses(observation), torch.cat(seen, 3).permute(0, 3, 1, 2))
+
+
+@cache
+def _learned() -> SeeingPolicy:
+    return SeeingPolicy.load(os.environ.get("IMITATE_IMAGES_POLICY", FILE))
+
+
+def __getattr__(name: str) -> Any:
+    """Return what was learned, as `policy`, so that commands and receipts can name it."""
+    if name == "policy":
+        return _learned()
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the example; see `imitate.main`."""
+    return main(arguments, SeeingPolicy, "TwoRobotLiftBar-v1", "imitate_images")
+
+
+if __name__ == "__main__":  # the workers are processes of their own
+    sys.exit(run())
