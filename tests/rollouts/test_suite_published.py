@@ -7,10 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from experts import find_expert
 from rollouts.receipts import Receipt
+from rollouts.receipts.sources import describe_expert, describe_task
 from rollouts.suite.files import load_suite
 from rollouts.suite.folder import expect_untouched, read_run
 from rollouts.suite.page import read_runs, render_markdown
+from tasks import get_task_class
 
 DOCS = Path(__file__).parents[2] / "docs"
 FOLDER = DOCS / "receipts" / "standard"
@@ -28,6 +31,14 @@ def test_all_of_the_suite_was_played_portably():
     assert len(RECEIPTS) == 21
     for receipt in run.receipts.values():
         assert receipt.environment["processor"]["portable"] is True
+
+
+@pytest.mark.parametrize("path", RECEIPTS, ids=lambda path: path.stem)
+def test_it_was_played_by_the_code_that_is_here(path):
+    receipt = Receipt.read(path)
+    task = get_task_class(receipt.task["id"])
+    assert receipt.task == describe_task(task)
+    assert receipt.policy == describe_expert(find_expert(task.task_id))
 
 
 @pytest.mark.long
