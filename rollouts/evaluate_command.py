@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     workers.add_arguments(parser)
     add("--seed", type=zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
     add("--receipt", type=Path, metavar="JSON", help="write a receipt, which `verify` plays again")
-    workers.add_obs_mode(parser)
+    workers.add_observed(parser)
     workers.add_control_mode(parser)
     add_cell_options(parser)
 
@@ -62,6 +62,7 @@ def run(options: argparse.Namespace) -> int:
                 receipt=options.receipt,
                 on_event=_Status(line).show,
                 obs_mode=options.obs_mode,
+                camera_size=options.camera_size,
                 control_mode=options.control_mode,
                 **chosen_cell(options),
             )

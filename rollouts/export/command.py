@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rollouts.playing.command_options import add_arguments as add_executor_arguments
-from rollouts.playing.command_options import chosen_executor, stop_signals
+from rollouts.playing.command_options import chosen_executor, picture_size, stop_signals
 
 if TYPE_CHECKING:
     from rollouts.export.dataset import Exported
@@ -38,7 +38,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--images", action="store_true", help="png images, which lose nothing, in place of videos")
     add("--depth", action="store_true", help="what the cameras tell of depth, too (mm, 16 bits)")
-    add("--size", type=_size, metavar="WxH", help="pixels of their pictures (each camera's own)")
+    add(
+        "--size",
+        type=picture_size,
+        metavar="WxH",
+        help="pixels of their pictures (each camera's own)",
+    )
     add("--instruction", metavar="TEXT", help="what is to be done (what the task says)")
     add("--only-successes", action="store_true", help="leave out episodes that end in failure")
     add("--task", help="the recording's task; MODULE:ID for one of your own")
@@ -87,14 +92,6 @@ def _artists(options: argparse.Namespace) -> Executor | None:
     if options.ray is None and not options.workers:
         return None
     return chosen_executor(options)
-
-
-def _size(text: str) -> tuple[int, int]:
-    width, _, height = text.partition("x")
-    try:
-        return int(width), int(height)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no size; it is WxH, as 128x96") from None
 
 
 def _summary(done: Exported) -> str:

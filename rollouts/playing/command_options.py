@@ -132,14 +132,22 @@ def _at_least(least: int, text: str) -> int:
     return number
 
 
-def add_obs_mode(parser: argparse.ArgumentParser) -> None:
-    """Add the option that says what policies observe."""
-    parser.add_argument(
-        "--obs-mode",
-        default="state",
-        metavar="MODE",
-        help="what they observe: state, state_dict, rgb and others (%(default)s)",
-    )
+def add_observed(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say what policies observe."""
+    add = parser.add_argument
+    words = "what they observe: state, state_dict, rgb and others (%(default)s)"
+    add("--obs-mode", default="state", metavar="MODE", help=words)
+    words = "pixels of the pictures that they observe (each camera's own)"
+    add("--camera-size", type=picture_size, metavar="WxH", help=words)
+
+
+def picture_size(text: str) -> tuple[int, int]:
+    """Read the width and height of pictures for argparse."""
+    width, _, height = text.partition("x")
+    try:
+        return int(width), int(height)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no size; it is WxH, as 128x96") from None
 
 
 def add_control_mode(

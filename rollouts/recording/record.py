@@ -173,6 +173,7 @@ def record(
     takeover: Policy | str | None = None,
     corrector: Policy | str | None = None,
     obs_mode: str = "state",
+    camera_size: tuple[int, int] | None = None,
     num_envs: int = 1,
     randomization: Randomization | None = None,
     file_size: float = FILE_SIZE,
@@ -206,6 +207,8 @@ def record(
         corrector: Asked at every step what it would do: maps the observation to an action, which
             is recorded beside the one that is carried out. Or ``"module:name"``.
         obs_mode: What they observe; see `tasks.make`. Observations are not recorded.
+        camera_size: Width and height of the pictures that they observe (pixels), if not each
+            camera's own.
         num_envs: How many episodes each process plays at once, in environments of one task. What
             is recorded is the same, and so it is with a policy whose attribute ``batched`` is True
             if each row of its actions follows from that row of the observations alone; see
@@ -229,6 +232,7 @@ def record(
     checked_whole("num_envs", num_envs, 1, None, TaskError)
     cast, actors = Actors.cast(cls, policy, takeover, corrector)
     cell: dict[str, Any] = {"layout": layout, "robots": robots, "bystanders": bystanders}
+    cell["camera_size"] = camera_size
     if randomization is not None:
         cell["randomization"] = randomization
     scenario = make_scenario(cls, control_mode=control_mode, obs_mode=obs_mode, **cell)

@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="MODULE:NAME",
         help="says at every step what it would do, which is recorded beside what is done",
     )
-    workers.add_obs_mode(parser)
+    workers.add_observed(parser)
     add(
         "--num-envs",
         type=one_or_more,
@@ -89,6 +89,7 @@ def run(options: argparse.Namespace) -> int:
                 takeover=options.takeover,
                 corrector=options.corrector,
                 obs_mode=options.obs_mode,
+                camera_size=options.camera_size,
                 num_envs=options.num_envs,
                 file_size=options.file_size,
                 **chosen_cell(options),
