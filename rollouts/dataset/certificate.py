@@ -12,6 +12,7 @@ from typing import Any
 
 from robots import RecordingError, UnreadableFileError
 from robots.common.files import read_json
+from robots.common.pages import plural
 from robots.common.writing import write_whole
 from rollouts.dataset.comparison import Replay
 from rollouts.playing.environment import versions as installed
@@ -174,8 +175,8 @@ def sentences(certificate: Certificate) -> Sequence[str]:
     lines = [
         f"{c.equal} of {c.episodes} episodes equal to the last bit, {c.steps} steps, {c.successes}"
         " successes",
-        f"arms touched in {c.contact_episodes} episodes"
-        + (f", {c.contact_steps} steps: {', '.join(c.pairs)}{_seeds(c)}" if c.pairs else ""),
+        f"arms touched in {plural(c.contact_episodes, 'episode')}"
+        + (f", {plural(c.contact_steps, 'step')}: {', '.join(c.pairs)}{_seeds(c)}" * bool(c.pairs)),
     ]
     if c.differing:
         first = c.differing[0]
