@@ -24,12 +24,15 @@ import h5py
 import numpy as np
 import torch
 from imitate import MODE, ChunkNetwork, ClonedPolicy, Recipe, Senses, Training, main, observe
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
 import tasks
+from robots import TaskError
 from rollouts.export.dataset import Export, export
 from rollouts.playing.executor import choose_executor
 from rollouts.progress import LiveLine
+from rollouts.reading.recording import open_trajectories
 from tasks.engine.cameras import by_place, cameras_of
 from tasks.engine.columns import ROBOMIMIC, picture_column
 
@@ -104,17 +107,32 @@ def draw_pictures(recording: Path, recipe: PictureRecipe, out: Path, workers: in
     return file
 
 
-def load_pictures(file: Path, columns: list[str]) -> Tensor:
-    """Return the pictures of all episodes, one after the other, (N, 3 · C, H, W)."""
-    with h5py.File(file) as dataset:
+def load_pictures(file: Path, recording: Path, recipe: PictureRecipe, columns: list[str]) -> Tensor:
+    """Return the pictures of what is learned from, one after the other, (N, 3 · C, H, W).
+
+    Raises:
+        TaskError: If they are of other episodes than the recording's, or of another size.
+    """
+    pictures = list[NDArray[np.uint8]]()
+    with h5py.File(file) as dataset, open_trajectories(recording) as episodes:
         demos = cast(Mapping[str, Any], dataset["data"])
-        episodes = [demos[f"demo_{i}"]["obs"] for i in range(len(demos))]
-        pictures = [np.concatenate([seen[name] for name in columns], 3) for seen in episodes]
+        for number in range(recipe.episodes):
+            if (episode := episodes[number]).solved:
+                demo = demos.get(f"demo_{len(pictures)}")
+                if demo is None or not np.array_equal(demo["actions"], episode.actions):
+                    raise TaskError(_stale(file, f"other episodes than {recording}"))
+                pictures.append(np.concatenate([demo["obs"][name] for name in columns], 3))
+                if pictures[-1].shape[1:3] != (recipe.size, recipe.size):
+                    raise TaskError(_stale(file, f"pictures that are not {recipe.size} wide"))
     return torch.from_numpy(np.concatenate(pictures)).permute(0, 3, 1, 2).contiguous()
 
 
+def _stale(file: Path, what: str) -> str:
+    return f"{file} has {what}; remove it, or choose another folder with --out"
+
+
 class Eye(nn.Module):
-    """Makes few numbers of a picture: each layer but the last sees it half as large."""
+    """Makes few numbers of a picture, which three layers halve in width and height each."""
 
     def __init__(self, channels: int, size: int) -> None:
         """Make it, for square pictures of some channels."""
@@ -174,7 +192,7 @@ class SeeingPolicy(ClonedPolicy):
         senses = RobotSenses(recipe)
         numbers, chunks = observe(recipe, recording, senses)
         file = draw_pictures(recording, recipe, out / "pictures", workers)
-        sights = Sights(numbers, load_pictures(file, senses.columns))
+        sights = Sights(numbers, load_pictures(file, recording, recipe, senses.columns))
         torch.manual_seed(recipe.seed)  # of the first weights
         sizes = numbers.shape[1], chunks.shape[1], recipe.width, recipe.blocks
         network = SeeingNetwork(*sizes, *sights.pictures.shape[1:3])

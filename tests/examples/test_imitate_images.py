@@ -3,14 +3,18 @@
 import json
 import pickle
 from contextlib import closing
+from dataclasses import replace
+from shutil import copytree
 
+import h5py
 import pytest
 import torch
 
 pytest.importorskip("matplotlib")
 
 import tasks
-from rollouts import evaluate
+from robots import TaskError
+from rollouts import evaluate, record
 from rollouts.reading.recording import open_trajectories
 from tests.examples.learning import examples, finish, start
 
@@ -73,6 +77,34 @@ def test_what_it_learned_from_is_what_it_gets_when_it_plays(example, learned):
             first += len(episode.actions)
     assert first == len(sights.pictures) == len(sights.numbers)
     assert seen.pictures.shape == (1, 3, 96, 96)
+
+
+def test_pictures_of_another_recording_are_refused(example, learned, tmp_path, capsys):
+    copytree(learned / "pictures", tmp_path / "pictures")
+    from imitate import shaking
+
+    shaken = shaking(example.PictureRecipe(TASK))
+    record(TASK, range(5, 7), tmp_path / "recording", workers=0, randomization=shaken)
+    other = ["--recording", str(tmp_path / "recording"), "--workers", "0"]
+    assert example.run([*WORDS, *other, "--out", str(tmp_path)]) == 1
+    assert "image.hdf5 has other episodes than" in capsys.readouterr().err
+    assert not (tmp_path / "policy.pt").exists()
+
+
+def test_more_pictures_than_wanted_serve_but_not_fewer_or_smaller(example, learned, tmp_path):
+    file = copytree(learned / "pictures", tmp_path / "pictures") / "image.hdf5"
+    recipe, recording = example.PictureRecipe(TASK, episodes=2), learned / "recording"
+    columns = example.RobotSenses(recipe).columns
+    one = example.load_pictures(file, recording, replace(recipe, episodes=1), columns)
+    both = example.load_pictures(file, recording, recipe, columns)
+    assert torch.equal(one, both[: len(one)])
+    assert len(one) < len(both)
+    with pytest.raises(TaskError, match="not 64 wide; remove it, or choose another folder"):
+        example.load_pictures(file, recording, replace(recipe, size=64), columns)
+    with h5py.File(file, "a") as dataset:
+        del dataset["data/demo_1"]
+    with pytest.raises(TaskError, match="other episodes"):
+        example.load_pictures(file, recording, recipe, columns)
 
 
 def test_it_is_not_told_where_objects_are(example, learned):

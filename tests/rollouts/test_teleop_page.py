@@ -185,11 +185,11 @@ def test_nothing_but_gizmos_keys_and_buttons_is_taken(cell):
         command = guest.wait_for("RegisterCommandMessage", label="Move +z")["uuid"]
         press(guest, "Take left")
         before = session.targets["left"].copy()
+        right = shifted(session, "right", (0.0, 0.0, 0.01))
         for message in wrong_messages(session, command):
             guest.send(message)
         press(guest, "Take right")
         press(guest, "Move +z")
-        right = session.targets["right"] + [0, 0, 0.01, 0, 0, 0, 0]
         wait_until(lambda: at(session, "right", right) or not at(session, "left", before))
         assert at(session, "left", before)
 
