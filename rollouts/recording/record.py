@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -40,6 +40,7 @@ from tasks.registry import make_scenario
 from tasks.varying.randomization import Randomization
 
 FILE = "trajectory.h5"
+LOST_IN_A_ROW = 10  # episodes that workers died of, and none that was played, until all ends
 
 
 Recorded = tuple[Score, bytes]
@@ -143,7 +144,8 @@ class Summary:
         already: How many of those asked for were there before.
         damaged: Episodes that were there before and are damaged, in words.
         played: Episodes played this time, by seed.
-        failed: Why an episode could not be played, by seed.
+        failed: Why an episode could not be played, by seed: it raised an error, or its workers
+            died, each time that it was tried.
         deaths: Workers that died, in words.
         workers: Who played, in words.
     """
@@ -190,7 +192,8 @@ def record(
         workers: How many processes; None: one for each core that this process may use; 0: none,
             but this one.
         episode_timeout: Seconds that an episode may take in a worker until that is ended and the
-            episode played again, three times in all; None if it may take for ever.
+            episode played again, three times in all; None if it may take for ever. An episode that
+            ends its worker each time is left out, and tried again by the next recording.
         control_mode: Control mode of the recorded actions, or those by arm; see `tasks.Scenario`.
         layout: Where robots stand, if not where the task's own do; see `tasks.make`.
         robots: Other robots for some places; see `tasks.make`.
@@ -223,8 +226,8 @@ def record(
             no sense, or a seed is there twice.
         RecordingError: If the folder cannot be written or holds a recording of something else, or
             a policy's file cannot be read; the finished episodes are kept.
-        WorkerError: If workers cannot be started, die again and again, or end before all is
-            played; they are kept, too.
+        WorkerError: If workers cannot be started, die of ten episodes in a row, or end before all
+            is played; they are kept, too.
         KeyboardInterrupt: If interrupted; they are kept, too.
     """
     executor = choose_executor(workers, executor, episode_timeout)
@@ -252,10 +255,9 @@ def record(
         job = EpisodeJob(cls, at_once, cast, actors, recorder.writer, together)
         try:
             with closing(play_all(executor, job, list(together))) as events:
-                for event in events:
-                    for single in _one_by_one(event, together):
-                        _note(summary, single, recorder)
-                        on_event(summary, single)
+                for event in _of_episodes(events, together):
+                    _note(summary, event, recorder)
+                    on_event(summary, event)
         finally:  # an interrupt may come between writing and counting
             summary.recorded = len(recorder)
     return summary
@@ -266,6 +268,19 @@ def where_died(event: Event) -> str:
     return f"{event.died} " + (
         "before it could play anything" if event.seed is None else f"at seed {event.seed}"
     )
+
+
+def _of_episodes(events: Iterable[Event], together: Mapping[int, Sequence[int]]) -> Iterator[Event]:
+    """Yield an event for each episode, as long as not one after the other ends its workers."""
+    lost = 0
+    for event in events:
+        yield from _one_by_one(event, together)
+        if event.result is not None:
+            lost = 0
+        elif isinstance(event.error, WorkersDied):
+            lost += 1
+            if lost == LOST_IN_A_ROW:
+                raise event.error
 
 
 def _one_by_one(event: Event, together: Mapping[int, Sequence[int]]) -> list[Event]:
@@ -281,8 +296,6 @@ def _one_by_one(event: Event, together: Mapping[int, Sequence[int]]) -> list[Eve
 
 
 def _note(summary: Summary, event: Event, recorder: Recorder) -> None:
-    if isinstance(event.error, WorkersDied):
-        raise event.error
     if event.died is not None:
         summary.deaths.append(where_died(event))
     elif event.error is not None and event.seed is not None:

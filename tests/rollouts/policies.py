@@ -1,6 +1,8 @@
 """Policies for tests; worker processes import this module."""
 
+import os
 import random
+import signal
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -62,6 +64,19 @@ def fails_at_times(obs):
     if random.random() < 0.004:
         raise ValueError("not this one")
     return still(obs)
+
+
+def dies_at_times(obs):
+    """Takes its process along where `fails_at_times` fails."""
+    try:
+        return fails_at_times(obs)
+    except ValueError:
+        dies(obs)
+
+
+def dies(obs):
+    """Takes its process along."""
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def too_few(count, obs):

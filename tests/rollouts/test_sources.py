@@ -213,6 +213,27 @@ def test_one_that_fails_does_not_cost_the_others(tmp_path):
     assert same_files(tmp_path / FILE, tmp_path / "more" / FILE)
 
 
+def test_one_that_ends_its_workers_does_not_cost_the_others(tmp_path):
+    rare, died = policies.fails_at_times, policies.dies_at_times
+    failed = record(TASK, range(6), tmp_path / "rare", workers=0, policy=rare).failed
+    summary = record(TASK, range(6), tmp_path, workers=2, policy=died)
+    assert summary.failed.keys() == failed.keys()
+    assert len(summary.deaths) == 3 * len(failed)
+    for seed, error in summary.failed.items():
+        assert f"the episode of seed {seed} ended 3 worker processes; the last" in str(error)
+    with TrajectoryFile(tmp_path / FILE) as file:
+        assert file.seeds == tuple(seed for seed in range(6) if seed not in failed)
+    again = record(TASK, range(6), tmp_path, workers=2, policy=died)  # it is tried again
+    assert again.failed.keys() == failed.keys()
+    assert again.already == 6 - len(failed)
+
+
+def test_a_policy_that_ends_all_workers_ends_the_recording(tmp_path, monkeypatch):
+    monkeypatch.setattr("rollouts.recording.record.LOST_IN_A_ROW", 2)
+    with pytest.raises(WorkerError, match="seed 1 ended 3 worker processes; .* SIGKILL"):
+        record(TASK, range(100), tmp_path, workers=1, policy=policies.dies)
+
+
 class Hand:
     """A person, whom nobody copies."""
 
