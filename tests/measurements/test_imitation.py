@@ -9,6 +9,8 @@ pytest.importorskip("matplotlib")
 
 from measurements.imitation import main, markdown
 from rollouts.receipts import Receipt
+from rollouts.receipts.sources import checksum, describe_task
+from tasks import get_task_class
 
 DOCS = Path(__file__).parents[2] / "docs"
 RECORD = DOCS / "imitation.json"
@@ -42,6 +44,14 @@ def test_receipts_say_what_the_record_says(path):
     assert [episode.seed for episode in receipt.episodes if not episode.success] == run["failed"]
     assert receipt.policy["files"]
     assert receipt.policy["weights"]
+
+
+@pytest.mark.parametrize("path", RECEIPTS, ids=lambda path: path.stem)
+def test_receipts_are_of_the_code_that_is_here(path):
+    receipt = Receipt.read(path)
+    example = receipt.policy["name"].partition(":")[0]
+    assert receipt.policy["sha256"] == checksum(DOCS.parent / "examples" / f"{example}.py")
+    assert receipt.task == describe_task(get_task_class(receipt.task["id"]))
 
 
 def test_every_run_has_a_receipt():
