@@ -84,10 +84,8 @@ class _Status:
 
     def show(self, event: Event) -> None:
         """Tell what has come of the episodes so far."""
-        if event.seed is None and event.note is not None:
-            self._line.say(event.note)
-        if event.died is not None:
-            self._line.say(f"{event.died}; another takes its place")
+        if event.news is not None:
+            self._line.say(event.news)
         if event.result is not None:
             self._played += 1
             self._solved += event.result.success

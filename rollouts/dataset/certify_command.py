@@ -87,10 +87,8 @@ class _Status:
         self._line.total = certificate.episodes
         if event is None and certificate.checked:
             self._line.say(f"{len(certificate.checked)} episodes were played before")
-        if event is not None and event.note is not None:
-            self._line.say(event.note)
-        if event is not None and event.died is not None:
-            self._line.say(f"{event.died}; another takes its place")
+        if event is not None and event.news is not None:
+            self._line.say(event.news)
         if event is not None and event.error is not None:
             self._line.say(f"seed {event.seed} cannot be played: {event.error}")
         done = len(certificate.checked)

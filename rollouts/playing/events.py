@@ -40,3 +40,17 @@ class Event:
     machine_lost: bool = False
     note: Any = None
     worker: str = ""
+
+    @property
+    def death(self) -> str:
+        """How its worker died, and what that was doing, in words."""
+        if self.seed is None:
+            return f"{self.died} before it could play anything"
+        return f"{self.died} at seed {self.seed}"
+
+    @property
+    def news(self) -> str | None:
+        """What is to be told of workers, in words; None if nothing."""
+        if self.died is not None:
+            return f"{self.death}; another takes its place"
+        return None if self.seed is not None else self.note

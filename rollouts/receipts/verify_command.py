@@ -93,10 +93,8 @@ class _Status:
 
     def show(self, event: Event) -> None:
         """Tell how many of the episodes so far are the same."""
-        if event.seed is None and event.note is not None:
-            self._line.say(event.note)
-        if event.died is not None:
-            self._line.say(f"{event.died}; another takes its place")
+        if event.news is not None:
+            self._line.say(event.news)
         if event.seed is not None and event.result is not None:
             self._played += 1
             self._equal += event.result.trace.states == self._states[event.seed]

@@ -263,13 +263,6 @@ def record(
     return summary
 
 
-def where_died(event: Event) -> str:
-    """Return how a worker died and what it was doing, in words."""
-    return f"{event.died} " + (
-        "before it could play anything" if event.seed is None else f"at seed {event.seed}"
-    )
-
-
 def _of_episodes(events: Iterable[Event], together: Mapping[int, Sequence[int]]) -> Iterator[Event]:
     """Yield an event for each episode, as long as not one after the other ends its workers."""
     lost = 0
@@ -297,7 +290,7 @@ def _one_by_one(event: Event, together: Mapping[int, Sequence[int]]) -> list[Eve
 
 def _note(summary: Summary, event: Event, recorder: Recorder) -> None:
     if event.died is not None:
-        summary.deaths.append(where_died(event))
+        summary.deaths.append(event.death)
     elif event.error is not None and event.seed is not None:
         summary.failed[event.seed] = event.error
         recorder.give_up(event.seed)

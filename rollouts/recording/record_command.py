@@ -126,10 +126,8 @@ class _Status:
         if event is None and summary.already:
             total = self._line.total
             self._line.say(f"{summary.already} of {total} episodes were recorded before")
-        if event is not None and event.note is not None:
-            self._line.say(event.note)
-        if event is not None and event.died is not None:
-            self._line.say(f"{summary.deaths[-1]}; another takes its place")
+        if event is not None and event.news is not None:
+            self._line.say(event.news)
         if event is not None and event.error is not None:
             self._line.say(f"seed {event.seed} is not recorded: {event.error}")
         solved = sum(played.success for played in summary.played.values())

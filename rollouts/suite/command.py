@@ -213,10 +213,8 @@ class _Status:
             self._before += len(case.seeds)
             self._line.say(f"{case.name} was played before")
             return
-        if event.seed is None and event.note is not None:
-            self._line.say(event.note)
-        if event.died is not None:
-            self._line.say(f"{event.died}; another takes its place")
+        if event.news is not None:
+            self._line.say(event.news)
         if event.result is not None:
             self._played += 1
             self._solved += event.result.success
