@@ -19,6 +19,7 @@ from robots.descriptor import IDENTITY
 
 _STILL = np.eye(4)
 _UNIT_TOLERANCE = 1e-6  # rounding of a quaternion written with seven digits
+_TURN_TOLERANCE = 1e-5  # of what is made of such a one: squares and products of its numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -324,7 +325,7 @@ def _checked_pose(what: str, pose: NDArray[Any]) -> None:
     if pose.shape != (4, 4) or not np.isfinite(pose).all():
         raise LayoutError(f"{what} is {shown(pose.tolist())}; it takes 4 x 4 finite numbers")
     turn = pose[:3, :3]
-    if (pose[3] != _STILL[3]).any() or np.abs(turn @ turn.T - np.eye(3)).max() > _UNIT_TOLERANCE:
+    if (pose[3] != _STILL[3]).any() or np.abs(turn @ turn.T - np.eye(3)).max() > _TURN_TOLERANCE:
         raise LayoutError(
             f"{what} is {shown(pose.tolist())}; it takes a rotation matrix and a position, above"
             " the row 0, 0, 0, 1"

@@ -107,3 +107,13 @@ def test_a_body_that_is_moved_keeps_what_is_known_of_its_shapes():
     elsewhere = crate.moved(pose_matrix((1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)))
     assert elsewhere.hulls is crate.hulls
     assert elsewhere.poses(None, 1)[0][0, 3] == 1.0
+
+
+def test_poses_of_single_precision_are_taken():
+    """SAPIEN's quaternions of bodies that tumble are 1 to a few units of their last place."""
+    crate = box("crate", (0.1, 0.2, 0.3))
+    turn = quaternion_about((0.6, 0.0, 0.8), 2.9)
+    for wrong in (1 - 4e-7, 1 + 4e-7):
+        crate.moved(pose_matrix((0.1, 0.2, 0.3), np.float32(turn * wrong)))
+    with pytest.raises(LayoutError, match="takes a rotation matrix"):
+        crate.moved(pose_matrix((0.1, 0.2, 0.3), turn * (1 + 1e-5)))
