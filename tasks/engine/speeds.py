@@ -2,7 +2,8 @@
 
 A joint ten times as fast as its limit was not driven there: links that are inside each other were
 driven apart, or something hit it. It is reported once in an episode by a `RuntimeWarning`, as
-something may still come of the episode; beyond a hundred times, physics has diverged.
+something may still come of the episode; beyond a hundred times, physics has diverged. Who learns
+from nothing does so all the time, and is told of each joint a few times only.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from simulation.causes import Causes
 from simulation.maths import Array
 
 WARNS, REFUSES = 10.0, 100.0  # times a joint's largest speed
+MOST = 3  # reports of a joint
 STACK = 5  # calls from a report up to that of `step`
 
 
@@ -41,6 +43,7 @@ class SpeedWatch:
             for joint in group.joints
         ]
         self._reported = np.zeros(simulation.num_envs, bool)
+        self._reports = np.zeros(len(limits), int)  # of each joint
 
     def begin(self, env_ids: Sequence[int]) -> None:
         """Begin episodes, in which nothing was reported yet."""
@@ -80,8 +83,12 @@ class SpeedWatch:
                 )
             if times[env, worst] > WARNS and not self._reported[env]:
                 self._reported[env] = True
-                words = self._words(times, state, env, worst, elapsed)
-                warnings.warn(words, RuntimeWarning, stacklevel=STACK)
+                self._reports[worst] += 1
+                if self._reports[worst] <= MOST:
+                    words = self._words(times, state, env, worst, elapsed)
+                    if self._reports[worst] == MOST:
+                        words += "; this joint is not reported again"
+                    warnings.warn(words, RuntimeWarning, stacklevel=STACK)
 
     def _words(self, times: Array, state: State, env: int, worst: int, elapsed: Array) -> str:
         robot, joint, unit = self._joints[worst]

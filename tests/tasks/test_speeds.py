@@ -51,6 +51,21 @@ def test_ten_times_the_largest_speed_is_reported_once_in_an_episode():
         env.step(STILL)
 
 
+def test_a_joint_is_reported_a_few_times_only():
+    """Who learns from nothing throws arms about in every other episode."""
+    env = make()
+    loose(env)
+    told = []
+    for _ in range(5):
+        env.reset(seed=0)
+        throw(env, 1, 40.0)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            env.step(STILL)
+        told += [str(warning.message) for warning in caught]
+    assert ["is not reported again" in text for text in told] == [False, False, True]
+
+
 def test_what_moves_as_fast_as_it_may_is_not_reported():
     env = make()
     loose(env)
