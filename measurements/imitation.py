@@ -6,8 +6,6 @@ are added to a record; a page and a picture of all learning curves are written b
 
 from __future__ import annotations
 
-import argparse
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
@@ -16,75 +14,43 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from measurements.robots.record import versions_of
-from robots import RecordingError
-from robots.common.commands import exit_code, program, start
-from robots.common.writing import write_whole
-from rollouts.suite.statistics import wilson
+from measurements.learned import Page, Seen, read_json, row, success, versions
+from robots.common.commands import start
 
-RECORD = Path("docs/imitation.json")
 CURVE = "learning_curve.json"  # as the examples call it
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
-Seen = dict[str, Any]
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command.
+    """Run the command; see `measurements.learned.Page.main`."""
+    return PAGE.main(__doc__, arguments)
 
-    Returns:
-        0 if everything was written, 1 if something cannot be read or written.
+
+def read(run: Path) -> tuple[str, Seen]:
+    """Return what a run is called, the task and whether the network sees pictures, and its record.
+
+    Raises:
+        RecordingError: If it cannot be read.
     """
-    parser = argparse.ArgumentParser(prog=program("measurements.imitation"), description=__doc__)
-    add = parser.add_argument
-    add("runs", nargs="*", type=Path, metavar="RUN", help="folder of a run to add")
-    add("--out", type=Path, default=RECORD, metavar="FILE", help="the record (%(default)s)")
-    options = parser.parse_args(arguments)
-    return exit_code(lambda: _run(options))
-
-
-def _run(options: argparse.Namespace) -> int:
-    out: Path = options.out
-    seen: Seen = _read(out) if out.exists() else {"runs": {}}
-    for run in options.runs:
-        found = _read(run / CURVE)
-        seen["runs"][_name(found["recipe"])] = found
-    if options.runs:
-        seen["versions"] = versions_of("numpy", "torch", "sapien")
-    seen["runs"] = dict(sorted(seen["runs"].items()))
-    write_whole(out, json.dumps(seen, indent=1) + "\n")
-    write_whole(out.with_suffix(".md"), "\n".join(markdown(seen)) + "\n")
-    draw(seen, out.with_suffix(".png"))
-    return 0
-
-
-def _name(recipe: Mapping[str, Any]) -> str:
-    """Return what a run is called: the task, and whether the network sees pictures."""
-    return recipe["task"] + (", from pictures" if "size" in recipe else "")
-
-
-def _read(path: Path) -> Seen:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise RecordingError(f"{path} cannot be read: {error}") from error
+    found = read_json(run / CURVE)
+    recipe = found["recipe"]
+    return recipe["task"] + (", from pictures" if "size" in recipe else ""), found
 
 
 def markdown(seen: Mapping[str, Any]) -> Iterator[str]:
     """Yield the lines of the page."""
-    versions = ", ".join(f"{name} {version}" for name, version in seen["versions"].items())
     yield "# Imitation, measured"
     yield ""
     yield "What the networks of `examples/imitate.py` and `examples/imitate_images.py` have learned"
     yield "of the experts' episodes; see [the tutorial](tutorials/imitation.md). *Success* is that"
     yield "of test seeds that they neither learned from nor were examined on, with 95 % confidence"
     yield "(Wilson's score interval). `python -m measurements.imitation RUN …` writes this page."
-    yield f"Learned with {versions}."
+    yield versions(seen)
     yield ""
-    yield _row("task", "episodes", "batches", "test episodes", "success (%)", "failed seeds")
-    yield _row("---", *["---:"] * 4, "---")
+    yield row("task", "episodes", "batches", "test episodes", "success (%)", "failed seeds")
+    yield row("---", *["---:"] * 4, "---")
     for name, run in seen["runs"].items():
-        yield _row(name, *_cells(run))
+        yield row(name, *_cells(run))
     yield ""
     yield "![Success on unseen seeds while they learn](imitation.png)"
     yield ""
@@ -96,16 +62,11 @@ def markdown(seen: Mapping[str, Any]) -> Iterator[str]:
 def _cells(run: Mapping[str, Any]) -> Iterator[str]:
     recipe, (first, last) = run["recipe"], run["test_seeds"]
     episodes = last - first + 1
-    low, high = wilson(episodes - len(run["failed"]), episodes)
     yield f"{recipe['episodes']:,}"
     yield f"{recipe['steps']:,} of {recipe['batch']}"
     yield str(episodes)
-    yield f"{100 * run['success']:.0f} ({100 * low:.1f} to {100 * high:.1f})"
+    yield success(run["failed"], episodes)
     yield ", ".join(map(str, run["failed"])) or "none"
-
-
-def _row(*cells: str) -> str:
-    return f"| {' | '.join(cells)} |"
 
 
 def draw(seen: Mapping[str, Any], path: Path) -> None:
@@ -123,6 +84,15 @@ def draw(seen: Mapping[str, Any], path: Path) -> None:
     axes.legend(loc="lower right")
     figure.savefig(path)
 
+
+PAGE = Page(
+    name="measurements.imitation",
+    record=Path("docs/imitation.json"),
+    packages=("numpy", "torch", "sapien"),
+    read=read,
+    markdown=markdown,
+    draw=draw,
+)
 
 if __name__ == "__main__":
     start(main)

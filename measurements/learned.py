@@ -1,0 +1,92 @@
+"""Pages of what examples have learned: a record of runs, a page and a picture made of it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from measurements.robots.record import versions_of
+from robots import RecordingError
+from robots.common.commands import exit_code, program
+from robots.common.writing import write_whole
+from rollouts.suite.statistics import wilson
+
+Seen = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Page:
+    """How runs become a page.
+
+    Attributes:
+        name: Of the module that is run.
+        record: Where it is kept which runs there are; the page and the picture are beside it.
+        packages: Whose versions are kept with it.
+        read: Returns what a run is called, and what is kept of its folder.
+        markdown: Yields the lines of the page of a record.
+        draw: Saves the picture of a record.
+    """
+
+    name: str
+    record: Path
+    packages: tuple[str, ...]
+    read: Callable[[Path], tuple[str, Seen]]
+    markdown: Callable[[Mapping[str, Any]], Iterator[str]]
+    draw: Callable[[Mapping[str, Any], Path], None]
+
+    def main(self, description: str | None, arguments: Sequence[str] | None = None) -> int:
+        """Run the command.
+
+        Returns:
+            0 if everything was written, 1 if something cannot be read or written.
+        """
+        parser = argparse.ArgumentParser(prog=program(self.name), description=description)
+        add = parser.add_argument
+        add("runs", nargs="*", type=Path, metavar="RUN", help="folder of a run to add")
+        add("--out", type=Path, default=self.record, metavar="FILE", help="record (%(default)s)")
+        options = parser.parse_args(arguments)
+        return exit_code(lambda: self._run(options.runs, options.out))
+
+    def _run(self, runs: Sequence[Path], out: Path) -> int:
+        seen: Seen = read_json(out) if out.exists() else {"runs": {}}
+        seen["runs"].update(map(self.read, runs))
+        if runs:
+            seen["versions"] = versions_of(*self.packages)
+        seen["runs"] = dict(sorted(seen["runs"].items()))
+        write_whole(out, json.dumps(seen, indent=1) + "\n")
+        write_whole(out.with_suffix(".md"), "\n".join(self.markdown(seen)) + "\n")
+        self.draw(seen, out.with_suffix(".png"))
+        return 0
+
+
+def read_json(path: Path) -> Any:
+    """Return what a file says.
+
+    Raises:
+        RecordingError: If it cannot be read.
+    """
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise RecordingError(f"{path} cannot be read: {error}") from error
+
+
+def versions(seen: Mapping[str, Any]) -> str:
+    """Return which versions a record is of, as a sentence."""
+    return f"Learned with {', '.join(f'{name} {v}' for name, v in seen['versions'].items())}."
+
+
+def success(failed: Sequence[int], episodes: int) -> str:
+    """Return a rate of success with its interval (Wilson's), in percent."""
+    low, high = wilson(episodes - len(failed), episodes)
+    rate = 100 * (1 - len(failed) / episodes)
+    return f"{rate:.0f} ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def row(*cells: str) -> str:
+    """Return a row of a table."""
+    return f"| {' | '.join(cells)} |"
