@@ -95,7 +95,7 @@ def draw(seen: Mapping[str, Any], path: Path) -> None:
         )
         axes.plot(*points.T, "o-", color=colour, markersize=3, label=name)
     axes.grid(alpha=0.3)
-    axes.legend(loc="upper left")
+    axes.legend(loc="lower right")
     figure.savefig(path)
 
 
