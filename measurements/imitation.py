@@ -6,24 +6,14 @@ are added to a record; a page and a picture of all learning curves are written b
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import cycle
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from matplotlib.figure import Figure
-
-from measurements.learned import Page, Seen, read_json, row, success, versions
+from measurements.learned import Curve, Page, Seen, read_json, row, success, versions
 from robots.common.commands import start
 
 CURVE = "learning_curve.json"  # as the examples call it
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; see `measurements.learned.Page.main`."""
-    return PAGE.main(__doc__, arguments)
 
 
 def read(run: Path) -> tuple[str, Seen]:
@@ -69,30 +59,21 @@ def _cells(run: Mapping[str, Any]) -> Iterator[str]:
     yield ", ".join(map(str, run["failed"])) or "none"
 
 
-def draw(seen: Mapping[str, Any], path: Path) -> None:
-    """Save the learning curves as a picture: success beside the share of batches."""
-    figure = Figure(figsize=(8, 4.5), dpi=110, layout="constrained")
-    axes = figure.add_subplot(ylim=(-2, 102), xlim=(0, 100))
-    axes.set_xlabel("batches learned from (% of the run)")
-    axes.set_ylabel("success on unseen seeds (%)")
-    for (name, run), colour in zip(seen["runs"].items(), cycle(COLOURS), strict=False):
-        points = np.array([(point["steps"], point["success"]) for point in run["curve"]])
-        share = 100 * points / (run["recipe"]["steps"], 1)
-        label = f"{name}: {100 * run['success']:.0f} at the end"
-        axes.plot(*share.T, "o-", color=colour, markersize=3, label=label)
-    axes.grid(alpha=0.3)
-    axes.legend(loc="lower right")
-    figure.savefig(path)
+def curve(name: str, run: Mapping[str, Any]) -> tuple[str, Curve]:
+    """Return the name in the picture, and the curve, of a run."""
+    label, steps = f"{name}: {100 * run['success']:.0f} at the end", run["recipe"]["steps"]
+    return label, [(100 * p["steps"] / steps, 100 * p["success"]) for p in run["curve"]]
 
 
 PAGE = Page(
     name="measurements.imitation",
+    description=__doc__,
     record=Path("docs/imitation.json"),
-    packages=("numpy", "torch", "sapien"),
     read=read,
     markdown=markdown,
-    draw=draw,
+    curve=curve,
+    unit="batches learned from (% of the run)",
 )
 
 if __name__ == "__main__":
-    start(main)
+    start(PAGE.main)

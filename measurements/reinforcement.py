@@ -7,25 +7,16 @@ picture of all learning curves are written beside it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from matplotlib.figure import Figure
-
-from measurements.learned import Page, Seen, read_json, row, success, versions
+from measurements.learned import Curve, Page, Seen, read_json, row, success, versions
 from robots import RecordingError
 from robots.common.commands import start
 from rollouts.receipts import Receipt
 
 ALGORITHMS = {"stable-baselines3": "PPO", "torchrl": "MAPPO"}  # by what a run's settings name
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; see `measurements.learned.Page.main`."""
-    return PAGE.main(__doc__, arguments)
 
 
 def read(run: Path) -> tuple[str, Seen]:
@@ -45,7 +36,7 @@ def read(run: Path) -> tuple[str, Seen]:
         "with": f"{library} {settings[library]}",
         "steps": settings["steps"],
         "curve": read_json(checkpoints[-1] / "curve.json"),
-        "tested": [episodes[0].seed, episodes[-1].seed],
+        "test_seeds": [episodes[0].seed, episodes[-1].seed],
         "failed": [episode.seed for episode in episodes if not episode.success],
     }
 
@@ -54,11 +45,10 @@ def markdown(seen: Mapping[str, Any]) -> Iterator[str]:
     """Yield the lines of the page."""
     yield "# Reinforcement, measured"
     yield ""
-    yield "What `examples/ppo_two_arms.py` and `examples/mappo_two_arms.py` have learned of dense"
-    yield "rewards; see [the tutorial](tutorials/reinforcement.md). *Success* is that of test"
-    yield "episodes without noise, of seeds that were not learned from, with 95 % confidence"
-    yield "(Wilson's score interval). `python -m measurements.reinforcement RUN …` writes this"
-    yield "page."
+    yield "What the [examples of reinforcement learning](tutorials/reinforcement.md) have learned"
+    yield "of a task's dense reward. *Success* is that of test episodes without noise, of seeds"
+    yield "that were not learned from, with 95 % confidence (Wilson's score interval)."
+    yield "`python -m measurements.reinforcement RUN …` writes this page."
     yield versions(seen)
     yield ""
     yield row("task", "with", "steps", "hours", "test episodes", "success (%)", "failed seeds")
@@ -73,7 +63,7 @@ def markdown(seen: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _cells(run: Mapping[str, Any]) -> Iterator[str]:
-    last, (first_seed, last_seed) = run["curve"][-1], run["tested"]
+    last, (first_seed, last_seed) = run["curve"][-1], run["test_seeds"]
     episodes = last_seed - first_seed + 1
     yield run["with"]
     yield f"{last['steps']:,}" + ("" if last["steps"] >= run["steps"] else f" of {run['steps']:,}")
@@ -83,30 +73,20 @@ def _cells(run: Mapping[str, Any]) -> Iterator[str]:
     yield ", ".join(map(str, run["failed"])) or "none"
 
 
-def draw(seen: Mapping[str, Any], path: Path) -> None:
-    """Save the learning curves as a picture: success beside the steps learned from."""
-    figure = Figure(figsize=(8, 4.5), dpi=110, layout="constrained")
-    axes = figure.add_subplot(ylim=(-2, 102))
-    axes.set_xlabel("steps learned from (millions)")
-    axes.set_ylabel("success on unseen seeds (%)")
-    for (name, run), colour in zip(seen["runs"].items(), COLOURS, strict=False):
-        points = np.array(
-            [(point["steps"] / 1e6, 100 * point["success"]) for point in run["curve"]]
-        )
-        axes.plot(*points.T, "o-", color=colour, markersize=3, label=name)
-    axes.grid(alpha=0.3)
-    axes.legend(loc="lower right")
-    figure.savefig(path)
+def curve(name: str, run: Mapping[str, Any]) -> tuple[str, Curve]:
+    """Return the name in the picture, and the curve, of a run."""
+    return name, [(p["steps"] / 1e6, 100 * p["success"]) for p in run["curve"]]
 
 
 PAGE = Page(
     name="measurements.reinforcement",
+    description=__doc__,
     record=Path("docs/reinforcement.json"),
-    packages=("numpy", "torch", "sapien"),
     read=read,
     markdown=markdown,
-    draw=draw,
+    curve=curve,
+    unit="steps learned from (millions)",
 )
 
 if __name__ == "__main__":
-    start(main)
+    start(PAGE.main)

@@ -193,7 +193,8 @@ def record(
             but this one.
         episode_timeout: Seconds that an episode may take in a worker until that is ended and the
             episode played again, three times in all; None if it may take for ever. An episode that
-            ends its worker each time is left out, and tried again by the next recording.
+            ends its worker each time is left out, with those that are played at once with it, and
+            tried again by the next recording.
         control_mode: Control mode of the recorded actions, or those by arm; see `tasks.Scenario`.
         layout: Where robots stand, if not where the task's own do; see `tasks.make`.
         robots: Other robots for some places; see `tasks.make`.

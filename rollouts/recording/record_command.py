@@ -146,6 +146,6 @@ def _report(summary: Summary, path: Path) -> None:
         if len(summary.workers) > 1:
             print(f"played by {len(summary.workers)} workers")
     for death in summary.deaths:
-        print(f"made good: {death}")
+        print(f"replaced: {death}")
     if summary.failed:
         print(f"not recorded: seeds {', '.join(map(str, sorted(summary.failed)))}")

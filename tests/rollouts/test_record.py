@@ -182,7 +182,7 @@ def test_a_worker_that_is_stopped(tmp_path):
     printed, said = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, said
     assert f"worker process {stopped} did not finish the episode within 10 s and was ended" in said
-    assert f"made good: worker process {stopped} did not" in printed
+    assert f"replaced: worker process {stopped} did not" in printed
     assert same_files(tmp_path / FILE, recorded_directly(tmp_path / "direct" / FILE, range(40)))
     wait_until_nobody_is_left(process)
 
@@ -252,7 +252,7 @@ def test_a_worker_that_is_killed(tmp_path):
     assert process.returncode == 0, said
     assert f"worker process {workers[0]} died by SIGKILL " in said
     assert "; another takes its place" in said
-    assert f"made good: worker process {workers[0]} died" in printed
+    assert f"replaced: worker process {workers[0]} died" in printed
     assert same_files(tmp_path / FILE, recorded_directly(tmp_path / "direct" / FILE, range(60)))
 
 
