@@ -5,9 +5,11 @@ import signal
 import struct
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -87,6 +89,27 @@ class DiesOnce:
         except FileExistsError:
             return Play().play
         os._exit(7)
+
+
+@dataclass(frozen=True)
+class DiesAmidAnEpisode:
+    """Prepares what ``prepare`` does; the first worker to say how far it is dies instead."""
+
+    prepare: Callable[[], Callable[[int], Any]]
+    folder: Path
+
+    def __call__(self):
+        send = local_workers._send_note
+
+        def send_or_die(note):
+            try:
+                (self.folder / "died").touch(exist_ok=False)
+            except FileExistsError:
+                return send(note)
+            os.kill(os.getpid(), signal.SIGKILL)
+
+        local_workers._send_note = send_or_die
+        return self.prepare()
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,8 @@
 
 import io
 import json
-import os
-import signal
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
@@ -32,6 +31,7 @@ from simulation.rendering.pictures import Observers, vulkan_problem
 from tasks import Normal, Randomization, Shift, Uniform, Whole
 from tasks.episode import play
 from tests.rollouts.clusters import running_cluster
+from tests.rollouts.plays import DiesAmidAnEpisode
 from tests.rollouts.recordings import edited, record
 
 TASK, ROBOTS = "TwoRobotPickCube-v1", {"left": "panda_wristcam", "right": "panda_wristcam"}
@@ -361,19 +361,26 @@ def test_videos_have_even_sides(tmp_path):
 
 
 class Watched:
-    """Two processes, of which the first that draws is killed if wanted."""
+    """Two processes, whose ids are kept."""
 
-    def __init__(self, *, kill: bool) -> None:
-        self.kill, self.workers = kill, set[int]()
+    def __init__(self) -> None:
+        self.workers = set[int]()
 
     def run(self, prepare, seeds):
         for event in ProcessExecutor(2).run(prepare, seeds):
             if event.worker.startswith("process "):
-                worker = int(event.worker.split()[1])
-                if self.kill and not self.workers:
-                    os.kill(worker, signal.SIGKILL)
-                self.workers.add(worker)
+                self.workers.add(int(event.worker.split()[1]))
             yield event
+
+
+@dataclass
+class Struck:
+    """Two processes, one of which dies while it draws."""
+
+    folder: Path
+
+    def run(self, prepare, seeds):
+        return ProcessExecutor(2).run(DiesAmidAnEpisode(prepare, self.folder), seeds)
 
 
 @drawn
@@ -383,7 +390,7 @@ class Watched:
 )
 def test_it_does_not_matter_who_draws(recording, tmp_path, options):
     files, told = [], []
-    for executor in (None, ProcessExecutor(1), Watched(kill=True)):
+    for executor in (None, ProcessExecutor(1), Struck(tmp_path)):
         out = tmp_path / f"{len(files)}"
         wanted = Export(recording, out=out, cameras="all", size=SIZE, **options)
         export(wanted, executor=executor, tell=told.append)
@@ -401,7 +408,7 @@ def test_whatever_ends_drawing_in_workers_leaves_nothing(recording, tmp_path):
     def interrupt(done, total):
         raise KeyboardInterrupt
 
-    executor = Watched(kill=False)
+    executor = Watched()
     wanted = Export(recording, "robomimic", tmp_path / "out", cameras="all", size=SIZE)
     with pytest.raises(KeyboardInterrupt):
         export(wanted, interrupt, executor=executor)
