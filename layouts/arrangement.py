@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import TypeVar
 
@@ -35,7 +37,8 @@ class Arrangement(Mapping[str, Placement]):
     same robots under the same names in the same order.
     """
 
-    __slots__ = ("_frames", "_placements")
+    _frames: dict[str, Frame]
+    _placements: dict[str, Placement]
 
     def __init__(
         self, placements: Mapping[str, Placement], frames: Mapping[str, Frame] | None = None
@@ -149,6 +152,10 @@ class Arrangement(Mapping[str, Placement]):
         A limb is called ``robot.limb``, and what its robot drives besides ``robot.body``. Its
         placement holds its own part of the descriptor, and stands where the limb begins.
         """
+        return dict(self._parts)
+
+    @cached_property
+    def _parts(self) -> dict[str, Placement]:
         parts: dict[str, Placement] = {}
         for name, placement in self.items():
             own = placement.parts
@@ -159,14 +166,18 @@ class Arrangement(Mapping[str, Placement]):
     @property
     def arms(self) -> dict[str, Placement]:
         """The `parts` that have a tool centre point: robots, or their limbs if they have some."""
-        return {n: part for n, part in self.parts.items() if n.rpartition(".")[2] != BODY}
+        return {n: part for n, part in self._parts.items() if n.rpartition(".")[2] != BODY}
 
     @property
     def short_names(self) -> dict[str, str]:
         """The limbs that go by their own name: those that no other robot or limb is called like."""
+        return dict(self._short_names)
+
+    @cached_property
+    def _short_names(self) -> dict[str, str]:
         limbs = [(part.partition(".")[2], part) for part in self.arms if part not in self]
-        names = [*self, *(limb for limb, _ in limbs)]
-        return {limb: part for limb, part in limbs if names.count(limb) == 1}
+        called = Counter([*self, *(limb for limb, _ in limbs)])
+        return {limb: part for limb, part in limbs if called[limb] == 1}
 
     @property
     def arms_by_group(self) -> dict[tuple[str, str], str]:
@@ -189,11 +200,8 @@ class Arrangement(Mapping[str, Placement]):
         Raises:
             UnknownNameError: If there is none of that name.
         """
-        known = {**self.parts, **self}
-        full = self.short_names.get(name, name)
-        if full not in known:
-            raise UnknownNameError("robot of this layout", name, [*known, *self.short_names])
-        return known[full]
+        full = self.arm_name(name)
+        return self[full] if full in self else self._parts[full]
 
     def arm_name(self, name: str) -> str:
         """Return the full name of a robot or a limb.
@@ -201,8 +209,11 @@ class Arrangement(Mapping[str, Placement]):
         Raises:
             UnknownNameError: If there is none of that name.
         """
-        self.arm(name)
-        return self.short_names.get(name, name)
+        full = self._short_names.get(name, name)
+        if full not in self._parts and full not in self:
+            known = {**self._parts, **self, **self._short_names}
+            raise UnknownNameError("robot of this layout", name, known)
+        return full
 
     def owner(self, name: str) -> str:
         """Return the robot that an arm belongs to: itself, unless it is a limb.

@@ -22,8 +22,6 @@ class Layout(Arrangement):
     same robots under the same names in the same order.
     """
 
-    __slots__ = ()
-
     def __str__(self) -> str:
         """Show a table: name, robot, action numbers, base pose, keyframe and reach of each."""
         return describe(self)

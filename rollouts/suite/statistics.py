@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import comb, sqrt
+from math import sqrt
 from statistics import NormalDist
 
 LEVEL = 0.95  # of all intervals
@@ -40,7 +40,10 @@ def mcnemar(gained: int, lost: int) -> float:
         lost: Seeds that the other solves and the one does not.
     """
     flips = gained + lost
-    tail = sum(comb(flips, k) for k in range(min(gained, lost) + 1))
+    ways = tail = 1
+    for heads in range(1, min(gained, lost) + 1):
+        ways = ways * (flips - heads + 1) // heads
+        tail += ways
     return min(1.0, 2 * tail / 2**flips)
 
 

@@ -156,7 +156,7 @@ class TestWhatIsTimed:
         assert not multiprocessing.active_children()
 
 
-SLOW = ("memory", "start")  # they start processes again and again
+SLOW = ("memory", "pictures", "start")  # they start processes again and again, or four that draw
 
 
 @pytest.mark.parametrize(

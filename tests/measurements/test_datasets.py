@@ -16,6 +16,7 @@ def test_the_five_axes_are_axes():
     assert len(Randomization.from_json(large.FIVE).declared) == 5
 
 
+@pytest.mark.long
 def test_memory_of_copies(tmp_path, capsys):
     record = tmp_path / "record.json"
     words = ["memory", "--episodes=40", "--file-size=0.3", f"--record={record}"]

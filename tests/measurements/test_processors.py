@@ -40,6 +40,7 @@ def test_nothing_portable_differs():
     assert all(seen["episodes"] >= 10 for seen in compared)
 
 
+@pytest.mark.long
 def test_what_depends_on_the_processor_is_seen():
     one = play_under(settings()[PLAIN], FEW)
     other = play_under(settings()["MKL, any"], FEW)

@@ -19,6 +19,8 @@ from rollouts.teleop.session import Phase, Session
 from tests.layouts.guests import WEBSOCKET, Guest, ask
 from tests.pages import wait_until
 
+pytestmark = pytest.mark.xdist_group("teleop_page")  # they share one session
+
 LEFT, RIGHT = "/(gizmos)/left", "/(gizmos)/right"
 
 
