@@ -19,7 +19,7 @@ START_SECONDS = 600.0  # to load torch and SAPIEN from a busy disk, fetch robot 
 QUIET_SECONDS = 30.0  # without a message until a note lists who plays what; twice as long each time
 
 _LOOK_SECONDS = 1.0  # between looks at the clock
-_LEAP_SECONDS = 5.0  # that count at most from one look to the next
+_LEAP_SECONDS = 2.0  # that count at most from one look to the next
 _SHOWN = 4  # workers that a text names
 
 

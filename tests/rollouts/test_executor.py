@@ -239,7 +239,7 @@ def test_the_time_in_which_this_process_is_stopped_makes_nobody_late():
         from tests.rollouts.plays import Play
 
         if __name__ == "__main__":
-            for event in ProcessExecutor(1, episode_timeout=6).run(Play(lasts=2.0), range(3)):
+            for event in ProcessExecutor(1, episode_timeout=9).run(Play(lasts=1.0), range(3)):
                 print(event.died or event.seed, flush=True)
     """
     words = [sys.executable, "-c", textwrap.dedent(program)]
@@ -248,7 +248,7 @@ def test_the_time_in_which_this_process_is_stopped_makes_nobody_late():
     (worker,) = workers_of(process.pid)
     for pid in (process.pid, worker):
         os.kill(pid, signal.SIGSTOP)
-    time.sleep(8)
+    time.sleep(10)
     for pid in (process.pid, worker):
         os.kill(pid, signal.SIGCONT)
     rest, _ = process.communicate(timeout=60)
