@@ -11,6 +11,7 @@ from layouts import Layout
 from robots import LocalMjcf, LocalUrdf, RobotDescriptor, RobotRegistry, UnreadableFileError
 from robots.common.files import read_regular
 from robots.mjcf.locator import is_mjcf
+from robots.urdf.cleaning.cleaning import is_template
 from robots.urdf.summary import MAX_URDF_BYTES
 from rollouts.reading import json_fields
 from rollouts.reading.json_fields import TEXT, by_name, maybe
@@ -44,7 +45,7 @@ def guess_again(place: str, recorded: Mapping[str, str], name: str) -> RobotDesc
     """Return the robot of a recording, guessed from the same file.
 
     The file is parsed only if it has the recorded checksum, so that a recording of somebody else
-    makes nothing of other files.
+    makes nothing of other files. A xacro template is not expanded: it is a program.
 
     Args:
         place: Its place.
@@ -52,20 +53,25 @@ def guess_again(place: str, recorded: Mapping[str, str], name: str) -> RobotDesc
         name: Its name.
 
     Raises:
-        TrajectoryError: If the file, or what is guessed from it, is another one.
+        TrajectoryError: If the file, or what is guessed from it, is another one, or a template.
     """
     path = Path(recorded["urdf"])
     helps = f"name the robot, with --robots {place}=… or robots={{{place!r}: …}}"
     try:
-        same = _checksum(path) == recorded["sha256"]
+        contents = read_regular(path, MAX_URDF_BYTES)
     except UnreadableFileError as error:
         raise TrajectoryError(
             f"the robot of {place!r} was guessed from {path}, which cannot be read"
             f" ({error.strerror}); {helps}"
         ) from error
-    if not same:
+    if hashlib.sha256(contents).hexdigest() != recorded["sha256"]:
         raise TrajectoryError(
             f"the robot of {place!r} was guessed from {path}, which has changed since; {helps}"
+        )
+    if not is_mjcf(path) and is_template(contents, str(path)):
+        raise TrajectoryError(
+            f"the robot of {place!r} was guessed from {path}, a xacro template, which is a"
+            f" program and does not run because a file names it; {helps}"
         )
     robot = RobotDescriptor.from_urdf(path, name, quiet=True)
     if descriptor_digest(robot) != recorded["descriptor"]:

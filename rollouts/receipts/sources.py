@@ -5,9 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from hashlib import sha256
-from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from typing import Any
 
@@ -76,16 +74,6 @@ def describe_policy(policy: Any, name: str | None = None) -> dict[str, Any]:
     }
 
 
-def is_the_same_code(module: str, recorded: str | None) -> bool:
-    """Return whether importing a module would run the very code of a receipt; it is not imported.
-
-    Args:
-        module: Its name.
-        recorded: SHA-256 of its file.
-    """
-    return recorded is not None and _checksum_unseen(module) == recorded
-
-
 def checksum(path: str | os.PathLike[str]) -> str:
     """Return the SHA-256 of a file, in hex.
 
@@ -119,35 +107,10 @@ def _named(name: str, checksums: Mapping[str, str | None]) -> dict[str, Any]:
 
 def _module_checksum(name: str) -> str | None:
     """Return the SHA-256 of a module that is imported; None of one without a file of its own."""
-    return _file_checksum(getattr(sys.modules.get(name), "__file__", None))
-
-
-def _checksum_unseen(name: str) -> str | None:
-    if name in sys.modules:
-        return _module_checksum(name)
-    spec = _spec(name)
-    return _file_checksum(spec.origin if spec is not None else None)
-
-
-def _spec(name: str) -> ModuleSpec | None:
-    """Return where a module is, without importing the packages that it is in."""
-    path: list[str] | None = None
-    spec: ModuleSpec | None = None
-    whole = ""
-    for part in name.split("."):
-        whole = f"{whole}.{part}".removeprefix(".")
-        spec = PathFinder.find_spec(whole, path)
-        if spec is None:
-            return None
-        with suppress(KeyError):  # a folder without __init__.py inside another one
-            path = list(spec.submodule_search_locations or ())
-    return spec
-
-
-def _file_checksum(file: str | None) -> str | None:
+    file = getattr(sys.modules.get(name), "__file__", None)
     try:
         return None if file is None else checksum(file)
-    except UnreadableFileError:  # inside an archive, or the word "built-in"
+    except UnreadableFileError:  # inside an archive
         return None
 
 

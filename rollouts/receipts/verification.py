@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
-from typing import Any
+from shlex import quote
 
 from layouts.placement import RobotLike
-from robots import RobotLayoutsError, UnknownNameError
+from robots import RobotLayoutsError
 from robots.common.bounds import checked_whole
-from rollouts.playing.casting import Cast, cast_of
+from rollouts.playing.casting import cast_of
 from rollouts.playing.evaluation_job import EvaluationJob, scores_of
 from rollouts.playing.executor import Event, Executor, choose_executor
 from rollouts.playing.together import grouped
@@ -19,7 +19,7 @@ from rollouts.receipts.comparison import Change, Difference, changes, episode_di
 from rollouts.receipts.evaluated import describe_job, receipt_of
 from rollouts.receipts.making import make_again
 from rollouts.receipts.receipt import Receipt, ReceiptError
-from rollouts.receipts.sources import EXPERT, is_the_same_code
+from rollouts.receipts.sources import EXPERT
 from tasks import MultiRobotTask, get_task_class
 from tasks.episode import Policy
 from tasks.registry import TASKS, make_scenario
@@ -82,8 +82,9 @@ def verify(
 ) -> Verification:
     """Play the episodes of a receipt again, and compare everything.
 
-    A receipt does not choose which code runs: a policy's or a task's module that no package lists
-    is imported only if its file has the receipt's SHA-256. Otherwise it has to be named.
+    A receipt does not choose which code runs: experts play, and tasks that this library or an
+    installed package lists. Any other policy or task has to be named, and its module is compared
+    with the receipt's afterwards.
 
     Args:
         receipt: A receipt, or its file.
@@ -91,8 +92,9 @@ def verify(
         on_event: Called with each event of the executor, to show progress.
         workers: How many processes play; None: one for each core that this process may use; 0:
             none, but this one.
-        policy: The policy, where the receipt cannot name it: as `rollouts.evaluate` takes it.
-        task: The task, ``module:Id``, if it is in a module that no package lists.
+        policy: The policy, unless it is an expert: as `rollouts.evaluate` takes it.
+        task: The task, ``module:Id``, if no installed package lists it and its module has not been
+            imported yet.
         robots: Which robots these were, by place, where the receipt cannot say it.
         num_envs: How many episodes each process plays at once. Those of a batched policy are
             played as many at once as when the receipt was written.
@@ -107,7 +109,9 @@ def verify(
     recorded = receipt if isinstance(receipt, Receipt) else Receipt.read(receipt)
     checked_whole("num_envs", num_envs, 1, None, ReceiptError)
     cls = _task(recorded, task)
-    cast, name = _cast(recorded, cls, policy)
+    if policy is None:
+        _expect_policy(recorded)
+    cast, name = cast_of(EXPERT if policy is None else policy, cls)
     guessed = recorded.environment.get("guessed", {})
     making = make_again(recorded.making, guessed, cls, robots or {})
     seeds = [episode.seed for episode in recorded.episodes]
@@ -128,44 +132,29 @@ def verify(
 def _task(receipt: Receipt, name: str | None) -> type[MultiRobotTask]:
     """Return the class of a receipt's task."""
     recorded, module = receipt.task["id"], receipt.task["class"].partition(":")[0]
-    if name is not None:
-        cls = get_task_class(name)
-        if cls.task_id != recorded:
-            raise ReceiptError(f"the receipt is of {recorded}, not of {cls.task_id}")
-        return cls
-    if recorded not in TASKS and not is_the_same_code(module, receipt.task["sha256"]):
-        raise ReceiptError(_unlike("task", recorded, module) + f"--task {module}:{recorded}")
-    try:
-        return get_task_class(recorded if recorded in TASKS else f"{module}:{recorded}")
-    except UnknownNameError as error:
-        raise ReceiptError(f"the receipt's task cannot be made here: {error}") from error
+    if name is None and recorded not in TASKS:
+        raise ReceiptError(
+            f"the receipt is of the task {recorded}, which nothing installed lists, and a receipt"
+            f" does not choose which code runs; to play what is here, type:"
+            f" --task {quote(f'{module}:{recorded}')}"
+        )
+    cls = get_task_class(name or recorded)
+    if name is not None and cls.task_id != recorded:
+        raise ReceiptError(f"the receipt is of {recorded}, not of {cls.task_id}")
+    return cls
 
 
-def _cast(
-    receipt: Receipt, cls: type[MultiRobotTask], policy: Policy | str | None
-) -> tuple[Cast, str | None]:
-    """Return who plays, and by which name that was imported."""
-    if policy is None and receipt.policy["kind"] != EXPERT:
-        policy = _recorded_policy(receipt)
-    return cast_of(EXPERT if policy is None else policy, cls)
-
-
-def _recorded_policy(receipt: Receipt) -> str:
-    """Return the name of a receipt's policy, if it may be imported by that."""
-    name, module = receipt.policy["name"], receipt.policy["name"].partition(":")[0]
+def _expect_policy(receipt: Receipt) -> None:
+    """Refuse a receipt of another player than an expert."""
+    kind, name = receipt.policy["kind"], receipt.policy["name"]
+    if kind == EXPERT:
+        return
     if receipt.policy.get("importable") is not True:
         raise ReceiptError(
             f"the receipt's policy {name} was no variable of a module, and cannot be imported"
             " again; pass it to rollouts.receipts.verify as policy=…"
         )
-    if not is_the_same_code(module, receipt.policy["sha256"]):
-        raise ReceiptError(_unlike("policy", name, module) + f"--policy {name}")
-    return name
-
-
-def _unlike(what: str, name: Any, module: str) -> str:
-    return (
-        f"the source of the {what} {name} is not that of the receipt: the module {module!r} cannot"
-        " be found here or has changed since, and a receipt does not choose which code runs; to"
-        " play what is here, name it: "
+    raise ReceiptError(
+        f"the receipt is of the policy {name}, and a receipt does not choose which code runs; to"
+        f" play what is here, type: --policy {quote(name)}"
     )

@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = EPILOG
     add = parser.add_argument
     add("receipt", type=Path, metavar="RECEIPT", help="what `evaluate --receipt` wrote")
-    add("--policy", metavar="MODULE:NAME", help="the policy, where the receipt does not suffice")
+    add("--policy", metavar="MODULE:NAME", help="the policy, unless it is an expert")
     add("--task", metavar="MODULE:ID", help="the task, if no installed package lists it")
     add(
         "--robots",

@@ -7,6 +7,8 @@ from rollouts import evaluate
 from rollouts.receipts import Verification, verify
 from tests.rollouts.policies import LEANS, TASK
 
+NAMED = "tests.rollouts.policies:LEANS"
+
 
 def written(
     tmp_path, name="receipt.json", policy=LEANS, seeds=range(3), task=TASK, **details

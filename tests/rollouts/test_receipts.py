@@ -16,7 +16,7 @@ from rollouts import Evaluation, evaluate
 from rollouts.receipts import Receipt, ReceiptError
 from tasks.episode import REBUILT
 from tests.rollouts.policies import LEANS, TASK, Leans, Wanders
-from tests.rollouts.receipt_files import again, written
+from tests.rollouts.receipt_files import NAMED, again, written
 
 ROOT = Path(__file__).parents[2]
 
@@ -106,7 +106,7 @@ def test_scores_with_and_without_a_receipt_are_the_same(tmp_path):
 
 
 def test_what_is_equal(receipt):
-    found = again(receipt, num_envs=2)
+    found = again(receipt, policy=NAMED, num_envs=2)
     assert found.equal
     assert found.differences == found.changed == ()
     assert str(

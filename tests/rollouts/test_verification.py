@@ -18,7 +18,7 @@ from rollouts.receipts import EpisodeReceipt, Receipt, ReceiptError
 from rollouts.receipts.comparison import first_step
 from tasks.registry import TASKS
 from tests.rollouts.policies import still
-from tests.rollouts.receipt_files import again, edit, written
+from tests.rollouts.receipt_files import NAMED, again, edit, written
 
 # It acts alike but at one step; weights.npy is beside it.
 POLICY = """
@@ -80,15 +80,7 @@ def test_a_changed_action_is_named_by_seed_and_step(modules, tmp_path, capsys):
     modules("my_policy", POLICY)
     path = written(tmp_path, policy="my_policy:policy", seeds=[5, 6])
     modules("my_policy", POLICY.replace("0.5 if", "0.6 if"))
-    words = ["verify", str(path), "--workers=0"]
-    assert main(words) == 1
-    assert capsys.readouterr().err == (
-        "error: the source of the policy my_policy:policy is not that of the receipt: the module"
-        " 'my_policy' cannot be found here or has changed since, and a receipt does not choose"
-        " which code runs; to play what is here, name it: --policy my_policy:policy\n"
-    )
-    assert "my_policy" not in sys.modules
-    assert main([*words, "--policy=my_policy:policy"]) == 1
+    assert main(["verify", str(path), "--workers=0", "--policy=my_policy:policy"]) == 1
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "PushT-v1, my_policy:policy: 0 of 2 episodes equal to the last bit"
     assert lines[1].startswith("seed 5: states differ from step 8 on; return ")
@@ -98,11 +90,15 @@ def test_a_changed_action_is_named_by_seed_and_step(modules, tmp_path, capsys):
     assert lines[5:] == ["not equal: this is not what the receipt says"]
 
 
-def test_a_policy_of_the_very_same_code_is_imported(modules, tmp_path, capsys):
+def test_a_policy_that_is_named_is_compared(modules, tmp_path, capsys):
     modules("my_policy", POLICY)
     path = written(tmp_path, policy="my_policy:policy")
     sys.modules.pop("my_policy")
-    assert main(["verify", str(path), "--workers=0"]) == 0
+    words = ["verify", str(path), "--workers=0"]
+    assert main(words) == 1
+    assert capsys.readouterr().err.endswith("type: --policy my_policy:policy\n")
+    assert "my_policy" not in sys.modules
+    assert main([*words, "--policy=my_policy:policy"]) == 0
     assert capsys.readouterr().out.endswith("\nequal: this is what the receipt says\n")
 
 
@@ -114,7 +110,7 @@ def test_a_changed_weight_of_a_policy_is_named(modules, tmp_path):
     data[-2] ^= 1  # of the last action number
     weights.write_bytes(data)
     modules("my_policy", POLICY)
-    found = again(path)
+    found = again(path, policy="my_policy:policy")
     assert not found.equal
     assert [difference.step for difference in found.differences] == [1, 1, 1]
     (change,) = found.changed
@@ -163,12 +159,12 @@ def arm(tmp_path) -> Path:
 def test_a_changed_byte_of_a_robot_file_is_named(tmp_path, arm):
     """Of a mesh that touches nothing: no state differs, and it is caught all the same."""
     path = written(tmp_path, robots=RobotDescriptor.from_urdf(arm, quiet=True), seeds=[0])
-    assert again(path).equal
+    assert again(path, policy=NAMED).equal
     mesh = arm.parent / "franka_description/meshes/collision/link2.stl"
     data = bytearray(mesh.read_bytes())
     data[100] ^= 1
     mesh.write_bytes(data)
-    found = again(path)
+    found = again(path, policy=NAMED)
     assert not found.equal
     (change,) = found.changed
     robot = Receipt.read(path).making["layout"]["arm"]["robot"]
@@ -186,8 +182,8 @@ def test_a_changed_urdf_is_named_with_the_states_that_it_changes(tmp_path, arm):
     assert 'mass value="3' in text
     arm.write_text(text.replace('mass value="3', 'mass value="4', 1))
     with pytest.raises(ReceiptError, match=rf"{arm}, which has changed since; name the robot"):
-        again(path)
-    found = again(path, robots={"arm": robot})
+        again(path, policy=NAMED)
+    found = again(path, policy=NAMED, robots={"arm": robot})
     assert [change.name for change in found.changed] == [
         f"file {arm.name} of the robot arm (panda_stick)"
     ]
@@ -197,19 +193,18 @@ def test_a_changed_urdf_is_named_with_the_states_that_it_changes(tmp_path, arm):
 def test_the_source_of_a_task_is_named(modules, tmp_path, capsys):
     modules("my_task", OWN_TASK)
     path = tmp_path / "receipt.json"
-    words = ["--task=my_task:ShortPush-v1", "--policy=tests.rollouts.policies:LEANS"]
+    task, policy = "--task=my_task:ShortPush-v1", f"--policy={NAMED}"
+    words = ["evaluate", task, policy, "--episodes=1", "--workers=0", f"--receipt={path}"]
     try:
-        assert main(["evaluate", *words, "--episodes=1", "--workers=0", f"--receipt={path}"]) == 0
+        assert main(words) == 0
         assert capsys.readouterr().out.endswith(f"{path}: receipt {Receipt.read(path).hash}\n")
         _forget("ShortPush-v1")
-        sys.modules.pop("my_task")
-        assert main(["verify", str(path), "--workers=0"]) == 0
-        _forget("ShortPush-v1")
         modules("my_task", f"{OWN_TASK}\n# nothing that matters\n")
-        capsys.readouterr()
-        assert main(["verify", str(path), "--workers=0"]) == 1
-        assert capsys.readouterr().err.endswith("name it: --task my_task:ShortPush-v1\n")
-        assert main(["verify", str(path), "--workers=0", words[0]]) == 1
+        words = ["verify", str(path), "--workers=0", policy]
+        assert main(words) == 1
+        assert capsys.readouterr().err.endswith("type: --task my_task:ShortPush-v1\n")
+        assert "my_task" not in sys.modules
+        assert main([*words, task]) == 1
         said = capsys.readouterr().out
         assert "1 of 1 episodes equal to the last bit" in said
         assert "\n  task ShortPush-v1, source of the module my_task: " in said
@@ -232,7 +227,7 @@ def _forget(task_id):
 )
 def test_versions_and_processors_are_named_and_do_not_count(copy, part, name, value, about, capsys):
     edit(copy, lambda found: found["environment"][part].update({name: value}))
-    assert main(["verify", str(copy), "--workers=0"]) == 0
+    assert main(["verify", str(copy), "--workers=0", f"--policy={NAMED}"]) == 0
     printed = capsys.readouterr().out
     assert f"\nnot as in the receipt:\n  {about}" in printed
     assert len(printed.splitlines()) == 4
@@ -262,7 +257,7 @@ def test_versions_and_processors_are_named_and_do_not_count(copy, part, name, va
     ],
 )
 def test_a_receipt_changed_by_hand_is_not_equal(copy, change, difference, name):
-    found = again(edit(copy, change))
+    found = again(edit(copy, change), policy=NAMED)
     assert not found.equal
     assert found.changed[0].about == "receipt"
     assert "changed after it was written" in str(found)
