@@ -39,12 +39,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_show(parser: argparse.ArgumentParser) -> None:
+    _add_suite(parser)
+    _add_task(parser)
+
+
+def _add_suite(parser: argparse.ArgumentParser) -> None:
     about = "a suite's file (.yaml), or a suite of this library: standard"
     parser.add_argument("suite", metavar="SUITE", help=about)
 
 
+def _add_task(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--task",
+        nargs="+",
+        default=(),
+        metavar="MODULE:ID",
+        help="tasks of the suite that no installed package lists, whose modules are imported",
+    )
+
+
 def _add_run(parser: argparse.ArgumentParser) -> None:
-    _add_show(parser)
+    _add_suite(parser)
     add = parser.add_argument
     add("--out", type=Path, required=True, metavar="DIR", help=_FOLDER)
     _add_policy(parser, "as the suite says, else the experts")
@@ -57,11 +72,13 @@ def _add_report(parser: argparse.ArgumentParser) -> None:
     add("folders", nargs="+", type=Path, metavar="DIR", help=f"{_FOLDER}; several are compared")
     page = "the HTML file (report.html in the first folder)"
     add("--out", type=Path, metavar="PAGE", help=page)
+    _add_task(parser)
 
 
 def _add_verify(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="DIR", help=_FOLDER)
-    _add_policy(parser, "as the receipts say, if that can be imported as it was")
+    _add_policy(parser, "the experts")
+    _add_task(parser)
     workers.add_arguments(parser)
 
 
@@ -93,6 +110,7 @@ def run(options: argparse.Namespace) -> int:
 def _show(options: argparse.Namespace) -> int:
     from rollouts.suite.files import load_suite
 
+    _import_tasks(options)
     suite = load_suite(options.suite)
     print(printable(str(suite)))
     print(f"SHA-256: {suite.hash}")
@@ -106,7 +124,7 @@ def _run(options: argparse.Namespace) -> int:
     from rollouts.suite.run import run_suite
     from rollouts.suite.tables import summary
 
-    suite = load_suite(options.suite)
+    suite = load_suite(options.suite, import_tasks=True)
     cases = chosen_cases(suite, options.only)
     with LiveLine(sum(len(case.seeds) for case in cases), "episodes") as line:
         found = run_suite(
@@ -126,6 +144,7 @@ def _report(options: argparse.Namespace) -> int:
     from robots.common.writing import write_whole
     from rollouts.suite.page import read_runs, render_markdown, render_page
 
+    _import_tasks(options)
     runs = read_runs(options.folders)
     page: Path = options.out or options.folders[0] / "report.html"
     write_whole(page, render_page(runs))
@@ -139,6 +158,7 @@ def _verify(options: argparse.Namespace) -> int:
     from rollouts.suite.folder import read_run
     from rollouts.suite.verifying import verify_run
 
+    _import_tasks(options)
     run = read_run(options.folder)
     episodes = sum(len(receipt.episodes) for receipt in run.receipts.values())
     with LiveLine(episodes, "episodes") as line:
@@ -155,6 +175,14 @@ def _verify(options: argparse.Namespace) -> int:
     words = f"{missing} case{' was' if missing == 1 else 's were'} not played"
     print(f"{equal} of {len(found)} receipts verified; {words}")
     return 0 if equal == len(found) and found else 1
+
+
+def _import_tasks(options: argparse.Namespace) -> None:
+    """Import the modules of tasks that were named on the command line."""
+    from tasks import get_task_class
+
+    for name in options.task:
+        get_task_class(name)
 
 
 def _policies(words: list[str] | None) -> dict[str, str] | None:

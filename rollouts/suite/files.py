@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import yaml
@@ -14,7 +16,7 @@ from robots.common.bounds import shown
 from robots.common.writing import write_whole
 from rollouts.suite.included import OWN, read_layout, read_randomization, written_layout
 from rollouts.suite.suite import Case, Suite, checked_name
-from tasks import get_task_class
+from tasks import MultiRobotTask, get_task_class
 from tasks.varying.files import read_data
 
 SHIPPED = {"standard": Path(__file__).with_name("standard.yaml")}
@@ -26,22 +28,26 @@ TOP = ("name", *SHARED, "policies", "tasks")
 ENTRY = ("task", "name", *SHARED, "layout", "layouts")
 
 
-def load_suite(path: str | PathLike[str]) -> Suite:
+def load_suite(path: str | PathLike[str], *, import_tasks: bool = False) -> Suite:
     """Return a suite.
 
     Args:
         path: A YAML file, or the name of a suite that comes with the library: ``"standard"``.
+        import_tasks: Whether to import the modules of the tasks that it names as ``module:Id``.
+            Otherwise these have to be imported already, so that a file of somebody else runs no
+            code.
 
     Raises:
         UnknownNameError: If it is neither.
-        TaskError: If the file cannot be read or describes no suite; the message names it.
+        TaskError: If the file cannot be read, describes no suite, or names a task whose module has
+            not been imported; the message names the file.
     """
     file = SHIPPED.get(str(path), Path(path))
     if file.suffix.lower() not in (".yaml", ".yml"):
         raise UnknownNameError("suite", str(path), SHIPPED, "Or give a file ending in .yaml.")
     data = read_data(file, "suite")
     try:
-        return _suite(data, file.parent)
+        return _suite(data, file.parent, import_tasks)
     except RobotLayoutsError as error:
         raise TaskError(f"{file}: {error}") from error
 
@@ -62,7 +68,7 @@ def save_suite(suite: Suite, path: str | PathLike[str]) -> None:
     write_whole(path, f"# suite {suite.id}\n{text}")
 
 
-def _suite(data: Any, folder: Path) -> Suite:
+def _suite(data: Any, folder: Path, import_tasks: bool) -> Suite:
     top = _mapping(data, "a suite", TOP)
     name = checked_name("a suite", top.get("name"))
     entries = top.get("tasks")
@@ -72,23 +78,36 @@ def _suite(data: Any, folder: Path) -> Suite:
     cases = [
         case
         for number, entry in enumerate(entries, 1)
-        for case in _cases(entry, shared, folder, number)
+        for case in _cases(entry, shared, folder, number, import_tasks)
     ]
-    return Suite(name, tuple(cases), _policies(top.get("policies", {})))
+    return Suite(name, tuple(cases), _policies(top.get("policies", {}), import_tasks))
 
 
-def _policies(given: Any) -> dict[str, str]:
+def _policies(given: Any, import_tasks: bool) -> dict[str, str]:
     """Return who plays, as written; tasks are looked up when it is played."""
     found = _mapping(given, "policies")
     for task, policy in found.items():
         if not isinstance(policy, str):
             raise TaskError(f"the policy of {task} is {shown(policy)}; it must be MODULE:NAME")
         if task != OTHERS:
-            get_task_class(task)
+            _task_class(task, import_tasks)
     return dict(found)
 
 
-def _cases(entry: Any, shared: Mapping[str, Any], folder: Path, number: int) -> Sequence[Case]:
+def _task_class(name: str, import_tasks: bool) -> type[MultiRobotTask]:
+    """Return the class of a task that a suite names; see `load_suite`."""
+    module = name.rpartition(":")[0]
+    if module and module not in sys.modules and not import_tasks:
+        raise TaskError(
+            f"nothing installed lists {name}, and a file does not choose which code runs; if you"
+            f" trust its module, type: --task {quote(name)} (in Python, import it first)"
+        )
+    return get_task_class(name)
+
+
+def _cases(
+    entry: Any, shared: Mapping[str, Any], folder: Path, number: int, import_tasks: bool
+) -> Sequence[Case]:
     """Return the cases of an entry: one for each of its layouts."""
     try:
         own = {"task": entry} if isinstance(entry, str) else _mapping(entry, "an entry", ENTRY)
@@ -96,7 +115,8 @@ def _cases(entry: Any, shared: Mapping[str, Any], folder: Path, number: int) -> 
         for key in ("task", "seeds"):
             if key not in about:
                 raise TaskError(f"{key!r} is missing; it needs a task, and seeds unless all share")
-        name = str(about.get("name") or get_task_class(str(about["task"])).task_id)
+        cls = _task_class(str(about["task"]), import_tasks)
+        name = str(about.get("name") or cls.task_id)
         return [_case(about, *place, folder) for place in _places(about, name)]
     except RobotLayoutsError as error:
         raise TaskError(f"task {number}{_named(entry)}: {error}") from error

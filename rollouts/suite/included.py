@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from inspect import signature
 from pathlib import Path
 from typing import Any
@@ -12,7 +14,7 @@ import yaml
 
 from layouts import Layout
 from layouts.presets import PRESETS
-from robots import LayoutError, TaskError, UnknownNameError
+from robots import LayoutError, RobotRegistry, TaskError, UnknownNameError
 from robots.common.bounds import shown
 from tasks.varying.randomization import Randomization
 
@@ -27,16 +29,17 @@ def read_layout(value: Any, folder: Path) -> Layout | None:
 
     Args:
         value: ``"own"``, a file, a preset's name with its arguments, or a layout written out.
-        folder: What a file's name is relative to.
+        folder: What a file's name is relative to, and below which files are read.
 
     Raises:
         LayoutError: If it describes none.
+        TaskError: If it is a file somewhere else.
         UnknownNameError: If a name in it is unknown.
     """
     if value == OWN:
         return None
     if isinstance(value, str):
-        return Layout.load(folder / value)
+        return Layout.load(_below(folder, value))
     if isinstance(value, Mapping) and "preset" in value:
         return _preset(value)
     if isinstance(value, Mapping) and "robots" in value:
@@ -65,10 +68,25 @@ def read_randomization(value: Any, folder: Path) -> Randomization | None:
     if value is None:
         return None
     if isinstance(value, str):
-        return Randomization.load(folder / value)
+        return Randomization.load(_below(folder, value))
     if not isinstance(value, Mapping):
         raise TaskError(f"randomization is {shown(value)}; it takes a file, or axes by name")
     return Randomization.from_json(value)
+
+
+def _below(folder: Path, name: str) -> Path:
+    """Return the path of a file below a folder; a suite of somebody else reads no other.
+
+    Raises:
+        TaskError: If it is not below it, links followed.
+    """
+    with suppress(ValueError):  # a name that no file has
+        if Path(os.path.realpath(folder / name)).is_relative_to(os.path.realpath(folder)):
+            return folder / name
+    raise TaskError(
+        f"{shown(name)} is no file below the suite's folder, and a suite includes no others; copy"
+        " it there"
+    )
 
 
 class _Loader(yaml.SafeLoader):
@@ -90,6 +108,9 @@ def _written_out(value: Mapping[str, Any]) -> Layout:
 
 def _preset(value: Mapping[str, Any]) -> Layout:
     options = {key: _whole(given) for key, given in value.items() if key not in ("preset",)}
+    robots = options.get("robots")
+    if isinstance(robots, Mapping):  # by name alone: a suite brings no files of robots
+        options["robots"] = {name: RobotRegistry.load(robot) for name, robot in robots.items()}
     place = PRESETS[str(value["preset"])]
     takes = signature(place).parameters
     for name in options:
