@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from robots import TaskError
 from robots.common.writing import writing_errors
 from rollouts.receipts.receipt import Receipt, ReceiptError
+from rollouts.recording.disk import claim
 from rollouts.suite.belonging import expect_of_case
 from rollouts.suite.files import load_suite, save_suite
 from rollouts.suite.suite import Case, Suite
@@ -39,6 +42,25 @@ class SuiteRun:
 def receipt_path(folder: Path, case: Case) -> Path:
     """Return where the receipt of a case is, once it was played."""
     return folder / RECEIPTS / f"{case.name}.json"
+
+
+@contextmanager
+def sole_run(folder: Path) -> Generator[None]:
+    """Let no other run play into a folder meanwhile; it is made if need be.
+
+    Raises:
+        TaskError: If another one does.
+        UnwritableFileError: If it cannot be made.
+    """
+    with writing_errors(folder):
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        right = claim(folder)
+    if right is None:
+        raise TaskError(f"another run is playing into {folder}; wait for its end")
+    try:
+        yield
+    finally:
+        os.close(right)
 
 
 def begin_run(folder: Path, suite: Suite) -> SuiteRun:

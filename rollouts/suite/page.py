@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import Path
@@ -14,6 +15,8 @@ from rollouts.suite.results import Result
 from rollouts.suite.tables import ALL, INTERVALS, LETTERS, PAIRED, Table
 
 STYLE = ("rollouts.suite", "suite.css")
+
+_MARKUP = re.compile(r"[\\`*_\[\]!|~]|(?<=:)/|(?<=www)\.", re.IGNORECASE)
 
 _WIDTH, _ROW = 160, 12  # of a chart of intervals
 
@@ -135,6 +138,10 @@ def _markdown(shown: Table, text: int) -> Iterator[str]:
 
 
 def _row(cells: Sequence[str]) -> str:
-    """Return a row, in which no cell can be markup."""
-    plain = (escape(cell, quote=False).replace("|", "\\|").replace("\n", " ") for cell in cells)
-    return f"| {' | '.join(plain)} |"
+    """Return a row, in which no cell is markup, nor a link to those who find links in texts."""
+    plain = (escape(" ".join(cell.split()), quote=False) for cell in cells)
+    return f"| {' | '.join(_MARKUP.sub(_entity, cell) for cell in plain)} |"
+
+
+def _entity(found: re.Match[str]) -> str:
+    return f"&#{ord(found[0])};"

@@ -14,7 +14,7 @@ from rollouts.playing.executor import Event, Executor, choose_executor
 from rollouts.receipts.receipt import Receipt
 from rollouts.receipts.sources import describe_expert, describe_policy
 from rollouts.sources.policies import EXPERT
-from rollouts.suite.folder import SuiteRun, begin_run, read_run, receipt_path
+from rollouts.suite.folder import SuiteRun, begin_run, read_run, receipt_path, sole_run
 from rollouts.suite.policies import Player, chosen_cases, chosen_policies
 from rollouts.suite.suite import Case, Suite, naming
 from tasks.episode import Policy
@@ -52,24 +52,25 @@ def run_suite(
 
     Raises:
         UnknownNameError: If a case or a task is unknown.
-        TaskError: If nobody plays a task, or the folder holds the run of another suite, or
-            receipts of another policy; nothing was played then.
+        TaskError: If nobody plays a task, or the folder holds the run of another suite, receipts
+            of another policy, or a run that is playing; nothing was played then.
         ReceiptError: If a receipt in the folder is damaged, or was changed.
         WorkerError: If a policy raised something; finished receipts are kept.
     """
     executor, out = choose_executor(workers, executor), Path(out)
     cases = chosen_cases(suite, only)
     players = chosen_policies(suite, cases, policy)
-    run = begin_run(out, suite)
-    for case in cases:
-        if case.name in run.receipts:
-            _expect_same(run.receipts[case.name], players[case.name], receipt_path(out, case))
-    for case in cases:
-        if case.name in run.receipts:
-            on_event(case, None)
-        else:
-            _play(case, players[case.name], receipt_path(out, case), executor, on_event)
-    return read_run(out)
+    with sole_run(out):
+        run = begin_run(out, suite)
+        for case in cases:
+            if case.name in run.receipts:
+                _expect_same(run.receipts[case.name], players[case.name], receipt_path(out, case))
+        for case in cases:
+            if case.name in run.receipts:
+                on_event(case, None)
+            else:
+                _play(case, players[case.name], receipt_path(out, case), executor, on_event)
+        return read_run(out)
 
 
 def _play(

@@ -113,11 +113,9 @@ class Suite:
         checked_name("a suite", self.name)
         if not self.cases:
             raise TaskError(f"the suite {self.name} is empty; it needs one task or more")
-        # On some disks names that differ in capitals alone are the same file.
-        counts = Counter(case.name.lower() for case in self.cases)
-        twice = next((case.name for case in self.cases if counts[case.name.lower()] > 1), None)
-        if twice is not None:
-            raise TaskError(f"two cases are called {twice}; give one of them another 'name'")
+        name, count = Counter(case.name for case in self.cases).most_common(1)[0]
+        if count > 1:
+            raise TaskError(f"two cases are called {name}; give one of them another 'name'")
 
     @property
     def hash(self) -> str:

@@ -93,6 +93,11 @@ def test_the_hash_is_of_what_is_played(whole):
     assert len(hashes - {suite.hash}) == len(changed)
 
 
+def test_names_may_differ_by_capitals_alone(tmp_path):
+    text = f"{SHARED} [{{task: PickCube-v1, name: a}}, {{task: PickCube-v1, name: A}}]"
+    assert [case.name for case in load_suite(written(tmp_path, text)).cases] == ["a", "A"]
+
+
 def test_the_hash_is_of_the_content_of_layouts(whole):
     before = load_suite(whole)
     file = whole.parent / "cells" / "near.yaml"
@@ -160,6 +165,7 @@ def test_what_are_no_seeds(value, complaint):
         (f"{SHARED} [PickCub-v1]", r"task 1 \(PickCub-v1\): unknown task 'PickCub-v1'. Did you"),
         (f"{SHARED} [{{seeds: 2}}]", "task 1: 'task' is missing"),
         (f"{SHARED} [PickCube-v1, pick_cube]", "two cases are called PickCube-v1; give one of t"),
+        (f"{SHARED} [{{task: PickCube-v1, name: a}}, {{task: PushT-v1, name: a}}]", "called a;"),
         (f"{SHARED} [{{task: PickCube-v1, layot: own}}]", "Did you mean 'layout'?"),
         (f"{SHARED} [{{task: PickCube-v1, seeds: [0-2, 1]}}]", "seed 1 is there twice"),
         (f"control_mode: pd_join_pos\n{SHARED} [PickCube-v1]", "'pd_join_pos' is not offered"),

@@ -2,8 +2,10 @@
 
 import re
 from dataclasses import replace
+from html import unescape
 
 import pytest
+from markdown_it import MarkdownIt
 
 from layouts import single
 from robots import TaskError
@@ -114,6 +116,29 @@ def test_the_page(folders, tmp_path, capsys):
     assert "| Push | 100.0 (83.9 to 100.0) | 40.0 (21.9 to 61.3) | 20 |" in markdown
     rows = [line for line in markdown.splitlines() if line.startswith("| Push ")]
     assert len(rows) == 4  # successes, comparison, lengths, receipts
+
+
+STRANGE = (
+    "[a](javascript:alert(1)) ![b](http://x.y/z.png) <http://x.y> [c]: www.x.y\n\nhttps://x.y"
+    " | `d` **e** _f_ ~~g~~ \\[h](http://x.y)"
+)
+
+
+def test_no_text_of_a_receipt_is_markup(folders):
+    """Whoever publishes a report of somebody else's run publishes no links of theirs."""
+    path = receipt_path(folders[0], SUITE.cases[0])
+    good = Receipt.read(path)
+    policy = {**good.policy, "name": STRANGE}
+    failed = replace(good.episodes[3], reason=STRANGE)
+    processor = {"versions": {"python": STRANGE}, "processor": {"name": STRANGE}}
+    replace(
+        good, policy=policy, episodes=(*good.episodes[:3], failed), environment=processor
+    ).write(path)
+    text = render_markdown(read_runs(folders))
+    html = MarkdownIt("commonmark").enable(["table", "strikethrough"]).render(text)
+    assert unescape(html).count(STRANGE.replace("\n", " ").replace("  ", " ")) == 4
+    assert not re.search(r"<(a|img|em|strong|s)\b|<code>d", html)
+    assert not re.search(r"://|www\.", text)  # which some renderers make links of
 
 
 def test_where_the_report_is(folders):

@@ -98,6 +98,21 @@ def test_an_error_of_a_policy_keeps_what_is_finished(tmp_path):
     assert read_run(tmp_path).missing == ("PushCube-v1",)
 
 
+def test_two_runs_into_one_folder(tmp_path):
+    """The second would leave receipts of another policy beside those of the first."""
+    refused = []
+
+    def meanwhile(case, event):
+        with pytest.raises(TaskError, match=f"another run is playing into {tmp_path}"):
+            run_suite(SUITE, tmp_path, LEANS, workers=0)
+        refused.append(case.name)
+
+    run = run_suite(SUITE, tmp_path, STILL, workers=0, on_event=meanwhile)
+    assert refused == ["First", "First", "Later"]
+    assert {receipt.policy["name"] for receipt in run.receipts.values()} == {STILL}
+    assert run_suite(SUITE, tmp_path, STILL, workers=0).receipts == run.receipts
+
+
 def test_some_cases_alone(tmp_path):
     run = run_suite(SUITE, tmp_path, STILL, only=["Later"], workers=0)
     assert list(run.receipts) == ["Later"]
