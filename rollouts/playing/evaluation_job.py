@@ -41,6 +41,7 @@ class EvaluationJob:
         cast: Who plays.
         together: Seeds that are played at once, by the first of them.
         traced: Whether each score is to be a `TracedScore`.
+        most_steps: Seed → steps after which its episode ends, if it has not ended before.
     """
 
     task: type[MultiRobotTask]
@@ -48,6 +49,7 @@ class EvaluationJob:
     cast: Cast
     together: Mapping[int, tuple[int, ...]] = field(default_factory=dict[int, tuple[int, ...]])
     traced: bool = False
+    most_steps: Mapping[int, int] = field(default_factory=dict[int, int])
 
     @property
     def modules(self) -> tuple[str, ...]:
@@ -64,14 +66,16 @@ class _Play:
     """Plays episodes in the worlds of one task, which are built anew for each."""
 
     def __init__(self, job: EvaluationJob) -> None:
-        self._together, self._env, self._traced = job.together, job.task(job.scenario), job.traced
+        self._job, self._env = job, job.task(job.scenario)
         self._casting = Casting(job.cast, self._env)
 
     def __call__(self, seed: int) -> dict[int, Score]:
         """Play the episodes of a seed and of those that are played together with it."""
-        players = [self._casting(seed) for seed in self._together[seed]]
+        players = [self._casting(seed) for seed in self._job.together[seed]]
+        for player in players:
+            player.most = min(player.most, self._job.most_steps.get(player.seed, player.most))
         with torch.no_grad():
-            if not self._traced:
+            if not self._job.traced:
                 play_together(self._env, players)
                 return {player.seed: player.score for player in players}
             played = states_together(self._env, players)

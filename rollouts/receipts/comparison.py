@@ -55,7 +55,7 @@ class Change:
 
     Attributes:
         about: ``"version"``, ``"processor"``, ``"file"`` (of a robot), ``"policy"``, ``"task"``,
-            ``"making"`` or ``"receipt"``.
+            ``"making"``, ``"variable"`` (of the environment) or ``"receipt"``.
         name: Which.
         recorded: What the receipt says; None if nothing.
         here: What it is here; None if there is none.
@@ -132,6 +132,8 @@ def _of_making(path: Path, recorded: Receipt, here: Receipt) -> Named:
 
 
 def _of_environment(path: Path, recorded: Receipt, here: Receipt) -> Named:
+    if path[0] == "variables":
+        return "variable", "environment variables that the policy reads"
     if path[0] == "versions":
         return "version", f"version of {path[1]}"
     return ("processor", f"processor, {path[1]}") if path[0] == "processor" else None

@@ -11,7 +11,12 @@ from rollouts.playing.together import is_batched
 from rollouts.reading.guessed_robots import describe_guessed
 from rollouts.receipts.making import describe_making
 from rollouts.receipts.receipt import EpisodeReceipt, Receipt
-from rollouts.receipts.sources import describe_expert, describe_policy, describe_task
+from rollouts.receipts.sources import (
+    describe_expert,
+    describe_policy,
+    describe_task,
+    variables_read,
+)
 from tasks.episode import Score
 
 
@@ -45,12 +50,15 @@ def receipt_of(
         scores: Seed → how it went, each a `TracedScore`.
     """
     traced = {seed: score for seed, score in scores.items() if isinstance(score, TracedScore)}
-    guessed = describe_guessed(job.scenario.layout)
+    more = {
+        "guessed": describe_guessed(job.scenario.layout),
+        "variables": variables_read(job.cast.policy, described["policy"]["name"]),
+    }
     return Receipt(
         **described,
         environment={
             **_environment(score.environment for score in traced.values()),
-            **({"guessed": guessed} if guessed else {}),
+            **{name: value for name, value in more.items() if value},
         },
         episodes=tuple(_episode(seed, score) for seed, score in traced.items()),
     )

@@ -48,7 +48,7 @@ ID = Kind("a task's id, without a module", lambda value: NAME.fits(value) and ":
 TASK = fields({"id": ID, "class": NAME, "sha256": maybe(DIGEST)})
 POLICY = fields({"kind": NAME, "name": NAME, "sha256": maybe(DIGEST)}, {"files": OBJECT})
 MAKING = fields({"layout": OBJECT})
-ENVIRONMENT = fields({"versions": OBJECT, "processor": OBJECT})
+ENVIRONMENT = fields({"versions": OBJECT, "processor": OBJECT}, {"variables": TEXT})
 EPISODE = fields(
     {
         "seed": whole(0, MAX_SEED),
@@ -135,7 +135,8 @@ class Receipt:
             more; see `rollouts.receipts.making.describe_making`.
         environment: ``versions`` and ``processor`` of where it was played; see
             `rollouts.playing.environment`. ``others``, if workers differed; ``guessed``, where the
-            files of robots were that no registry knows.
+            files of robots were that no registry knows; ``variables``, names of environment
+            variables that the policy's source reads and that were set.
         episodes: One for each seed, in the order in which these were given.
         claimed: The hash that a file says it has; empty if it comes from no file.
     """

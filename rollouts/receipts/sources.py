@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -22,6 +24,7 @@ from tasks import MultiRobotTask
 EXPERT, POLICY = "expert", "policy"
 _MAIN = "__main__"  # a script or a notebook, which nobody can import
 _CHUNK = 2**20  # bytes read at a time
+_VARIABLE = re.compile(r"""\b(?:environ(?:\.get\(|\[)|getenv\()\s*["'](\w+)["']""")
 
 
 def describe_task(cls: type[MultiRobotTask]) -> dict[str, Any]:
@@ -72,6 +75,23 @@ def describe_policy(policy: Any, name: str | None = None) -> dict[str, Any]:
         **_named("files", _files(policy)),
         **_named("weights", _weights(policy)),
     }
+
+
+def variables_read(policy: Any, name: str) -> str:
+    """Return the environment variables that are set and that the source of a policy reads by name.
+
+    Their values are left out: they may be secret.
+
+    Args:
+        policy: What gives actions.
+        name: Where it was imported from, ``module:name``.
+    """
+    found = set[str]()
+    for module in {name.partition(":")[0], definition(policy).__module__}:
+        if file := getattr(sys.modules.get(module), "__file__", None):
+            with suppress(OSError):
+                found.update(_VARIABLE.findall(Path(file).read_text(errors="replace")))
+    return " ".join(sorted(found & {*os.environ}))
 
 
 def checksum(path: str | os.PathLike[str]) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import os
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
@@ -84,7 +86,7 @@ def verify(
 
     A receipt does not choose which code runs: experts play, and tasks that this library or an
     installed package lists. Any other policy or task has to be named, and its module is compared
-    with the receipt's afterwards.
+    with the receipt's afterwards. No episode is played further than one step beyond the receipt's.
 
     Args:
         receipt: A receipt, or its file.
@@ -107,26 +109,43 @@ def verify(
         WorkerError: If the policy raised something, or workers die of it again and again.
     """
     recorded = receipt if isinstance(receipt, Receipt) else Receipt.read(receipt)
-    checked_whole("num_envs", num_envs, 1, None, ReceiptError)
-    cls = _task(recorded, task)
-    if policy is None:
-        _expect_policy(recorded)
-    cast, name = cast_of(EXPERT if policy is None else policy, cls)
-    guessed = recorded.environment.get("guessed", {})
-    making = make_again(recorded.making, guessed, cls, robots or {})
-    seeds = [episode.seed for episode in recorded.episodes]
-    at_once = recorded.making.get("num_envs", min(num_envs, len(seeds)))
-    scenario = make_scenario(cls, at_once, **making)
+    with _naming_variables(recorded):
+        checked_whole("num_envs", num_envs, 1, None, ReceiptError)
+        cls = _task(recorded, task)
+        if policy is None:
+            _expect_policy(recorded)
+        cast, name = cast_of(EXPERT if policy is None else policy, cls)
+        guessed = recorded.environment.get("guessed", {})
+        making = make_again(recorded.making, guessed, cls, robots or {})
+        seeds = [episode.seed for episode in recorded.episodes]
+        at_once = recorded.making.get("num_envs", min(num_envs, len(seeds)))
+        scenario = make_scenario(cls, at_once, **making)
+        try:
+            scenario.check(cls.reward_modes)
+        except RobotLayoutsError as error:
+            raise ReceiptError(f"the receipt's task cannot be made here: {error}") from error
+        most_steps = {episode.seed: episode.steps + 1 for episode in recorded.episodes}
+        job = EvaluationJob(cls, scenario, cast, grouped(seeds, at_once), True, most_steps)
+        described = describe_job(job, name)
+        scores = scores_of(choose_executor(workers, executor), job, on_event)
+        return Verification(
+            recorded, receipt_of(described, job, {seed: scores[seed] for seed in seeds})
+        )
+
+
+@contextmanager
+def _naming_variables(receipt: Receipt) -> Generator[None]:
+    """Let every error of this library name the policy's variables that are not set here."""
     try:
-        scenario.check(cls.reward_modes)
+        yield
     except RobotLayoutsError as error:
-        raise ReceiptError(f"the receipt's task cannot be made here: {error}") from error
-    job = EvaluationJob(cls, scenario, cast, grouped(seeds, at_once), traced=True)
-    described = describe_job(job, name)
-    scores = scores_of(choose_executor(workers, executor), job, on_event)
-    return Verification(
-        recorded, receipt_of(described, job, {seed: scores[seed] for seed in seeds})
-    )
+        names = receipt.environment.get("variables", "").split()
+        if unset := [name for name in names if name not in os.environ]:
+            hint = (
+                "environment variables that were set when the receipt was written, and are not here"
+            )
+            error.args = (f"{error}; {hint}: {', '.join(unset)}", *error.args[1:])
+        raise
 
 
 def _task(receipt: Receipt, name: str | None) -> type[MultiRobotTask]:

@@ -7,6 +7,7 @@ from typing import Any
 
 from robots import TaskError, closest_match
 from robots.common.catalogue import reason
+from robots.common.rooms import ROOMS
 
 EXPERT = "expert"
 
@@ -29,17 +30,22 @@ def find_policy(name: str, what: str = "policy") -> Any:
         raise TaskError(f"{what} is {name!r}; it must be MODULE:NAME, something callable{word}")
     try:
         found: Any = import_module(module)
+        for part in attribute.split("."):
+            if not hasattr(found, part):
+                raise TaskError(_lacks(found, module, part))
+            found = getattr(found, part)
     except (Exception, SystemExit) as error:  # whatever the user's own code does
         raise TaskError(f"no {what} {name!r}: {reason(error)}") from error
-    for part in attribute.split("."):
-        if not hasattr(found, part):
-            match = closest_match(part, dir(found))
-            hint = f". Did you mean {match!r}?" if match else ""
-            raise TaskError(
-                f"no {what} {name!r}: module {module!r} has no attribute {attribute!r}{hint}"
-            )
-        found = getattr(found, part)
     return check_policy(found, what)
+
+
+def _lacks(found: Any, module: str, attribute: str) -> str:
+    """Say that a module has no such attribute, and why that may be."""
+    words = f"module {module!r} has no attribute {attribute!r}"
+    if (package := module.partition(".")[0]) in ROOMS:
+        return f"{words}; {package!r} is a package of this library: rename a module of yours"
+    match = closest_match(attribute, dir(found))
+    return f"{words}. Did you mean {match!r}?" if match else words
 
 
 def check_policy(policy: Any, what: str = "policy") -> Any:

@@ -287,6 +287,7 @@ def test_what_is_no_action(tmp_path, given, words):
         ({"policy": 5}, "policy is 5; it must be callable, obs → action, or the word 'expert'"),
         ({"policy": Wanders}, r"policy is the class Wanders; give an instance of it, .* Wanders()"),
         ({"policy": "tests.rollouts.policies:stil"}, "has no attribute 'stil'. Did you mean 'stil"),
+        ({"policy": "tasks:policy"}, "no attribute 'policy'; 'tasks' is a package of this library"),
         ({"policy": "no.such:thing"}, "no policy 'no.such:thing': ModuleNotFoundError: No module"),
         ({"policy": "tests.rollouts.policies:TASK"}, "policy is 'PushT-v1'; it must be callable"),
         ({"policy": still, "takeover": "expert"}, "takeover is 'expert'; it must be MODULE:NAME"),

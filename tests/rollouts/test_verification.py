@@ -17,7 +17,7 @@ from rollouts.__main__ import main
 from rollouts.receipts import EpisodeReceipt, Receipt, ReceiptError
 from rollouts.receipts.comparison import first_step
 from tasks.registry import TASKS
-from tests.rollouts.policies import still
+from tests.rollouts.policies import LEANS, still
 from tests.rollouts.receipt_files import NAMED, again, edit, written
 
 # It acts alike but at one step; weights.npy is beside it.
@@ -115,6 +115,34 @@ def test_a_changed_weight_of_a_policy_is_named(modules, tmp_path):
     assert [difference.step for difference in found.differences] == [1, 1, 1]
     (change,) = found.changed
     assert (change.about, change.name) == ("policy", "policy my_policy:policy, file weights.npy")
+
+
+def test_a_variable_that_the_policy_needs_is_named(modules, tmp_path, monkeypatch, capsys):
+    found_late = "def __getattr__(name):\n    return {'policy': Policy()}[name]"
+    text = POLICY.replace("policy = Policy()", f"import os\n{found_late}")
+    modules(
+        "my_policy", text.replace("np.load(WEIGHTS)", 'np.load(os.environ.get("MINE", "none"))')
+    )
+    monkeypatch.setenv("MINE", str(tmp_path / "weights.npy"))
+    path = written(tmp_path, policy="my_policy:policy")
+    assert Receipt.read(path).environment["variables"] == "MINE"
+    words = ["verify", str(path), "--workers=0", "--policy=my_policy:policy"]
+    assert main(words) == 0
+    monkeypatch.delenv("MINE")
+    capsys.readouterr()
+    hint = "; environment variables that were set when the receipt was written, and are not"
+    hint += " here: MINE\n"
+    assert main(words[:-1]) == 1
+    assert capsys.readouterr().err.endswith(f"type: --policy my_policy:policy{hint}")
+    assert main(words) == 1
+    assert capsys.readouterr().err == (
+        "error: no policy 'my_policy:policy': FileNotFoundError: [Errno 2] No such file or"
+        f" directory: 'none'{hint}"
+    )
+    assert main([*words[:-1], f"--policy={NAMED}"]) == 1
+    assert "variables that the policy reads: MINE in the receipt, nothing here" in (
+        capsys.readouterr().out
+    )
 
 
 class Network(torch.nn.Linear):
@@ -263,6 +291,23 @@ def test_a_receipt_changed_by_hand_is_not_equal(copy, change, difference, name):
     assert "changed after it was written" in str(found)
     assert [str(d)[:30] for d in found.differences] == ([difference] if difference else [])
     assert any(c.name.startswith(name) for c in found.changed[0 if difference else 1 :])
+
+
+def test_an_episode_is_played_one_step_further_than_the_receipts_at_most(copy):
+    """However long it may be here, as a receipt of somebody else may say."""
+    played = []
+
+    def policy(obs):
+        played.append(obs)
+        return LEANS(obs)
+
+    edit(copy, lambda found: found["making"].update(max_episode_steps=2**31 - 1))
+    assert not again(copy, policy=policy).equal
+    assert len(played) == 3 * (10 + 1)
+    played.clear()
+    edit(copy, lambda found: found["making"].update(max_episode_steps=10))
+    assert again(copy, policy=policy).differences == ()
+    assert len(played) == 3 * 10
 
 
 def test_the_first_step_is_named_where_lengths_differ():
