@@ -7,7 +7,7 @@ from typing import Any
 
 from layouts import Layout, Placement
 from layouts.placement import RobotLike
-from robots import LayoutError, RobotLayoutsError, RobotRegistry
+from robots import LayoutError, RobotLayoutsError, RobotRegistry, UnknownNameError
 from rollouts.reading.guessed_robots import guess_again
 from rollouts.reading.trajectory import TrajectoryError
 
@@ -31,8 +31,12 @@ def layout_again(
         source: The file, for errors.
 
     Raises:
+        UnknownNameError: If a robot is given for a place that there is not.
         TrajectoryError: If a robot cannot be had here, or it is no layout.
     """
+    for place in robots:
+        if place not in described:
+            raise UnknownNameError("place", place, described)
     if len(described) > MOST_ROBOTS:
         raise TrajectoryError(
             f"{source} has a layout of {len(described)} robots; {MOST_ROBOTS} are the most that"

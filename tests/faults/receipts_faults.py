@@ -1,0 +1,400 @@
+"""Receipts that are damaged, lie, or would have somebody else's code run."""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import shlex
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from hashlib import sha256
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from tests.faults.fault import GOES_ON, Fault, run_command
+
+AREA = "receipts"
+TASK, POLICY, SEEDS, STEPS = "PushT-v1", "tests.rollouts.policies:LEANS", (0, 1), 3
+HEX = "ab" * 32
+
+Place = tuple[str | int, ...]
+_ARM: Place = ("making", "layout", "arm")
+_EPISODE: Place = ("episodes", 0)
+
+
+def faults() -> Iterator[Fault]:
+    """Go through this area's faults."""
+    for place, value in _FIELDS.items():
+        what = f"{'.'.join(map(str, place))} is {value!r:.40}"
+        yield Fault(AREA, what, functools.partial(_verify, edit=_set(place, value)))
+    for kind, (place, values) in _KINDS.items():
+        for value in values:
+            what = f"{kind}: {value!r:.40}"
+            yield Fault(AREA, what, functools.partial(_verify, edit=_set(place, value)))
+    for place in _NEEDED:
+        what = f"no {'.'.join(map(str, place))}"
+        yield Fault(AREA, what, functools.partial(_verify, edit=_remove(place)))
+    for what, edit in _NONSENSE.items():
+        yield Fault(AREA, what, functools.partial(_verify, edit=edit))
+    for what, make in _FILES.items():
+        yield Fault(AREA, f"the file is {what}", functools.partial(_read, make=make))
+    for what, edit in _LIES.items():
+        yield Fault(AREA, f"it lies: {what}", functools.partial(_differs, edit=edit), GOES_ON)
+    for name in _GADGETS:
+        yield Fault(AREA, f"its policy is {name}", functools.partial(_runs_nothing, policy=name))
+    for module in ("antigravity", "strange", "os"):
+        run = functools.partial(_runs_nothing, task=module)
+        yield Fault(AREA, f"its task is in {module}", run)
+    for what, edit in _STRANGE_ROBOTS.items():
+        yield Fault(AREA, what, functools.partial(_runs_nothing, edit=edit))
+    for what, run in _ARGUMENTS.items():
+        yield Fault(AREA, what, run)
+
+
+# -- a receipt, and what is done with it ----------------------------------------------------------
+
+
+@functools.cache
+def contents() -> str:
+    """Return the text of a small receipt, as it was written."""
+    from rollouts import evaluate
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "receipt.json"
+        evaluate(POLICY, TASK, SEEDS, workers=0, receipt=path, max_episode_steps=STEPS)
+        return path.read_text()
+
+
+def edited(folder: Path, edit: Callable[[Any], object]) -> Path:
+    """Write the receipt, changed and with the hash of what it has become, to a folder."""
+    from rollouts.receipts import Receipt, ReceiptError
+
+    path, about = folder / "receipt.json", json.loads(contents())
+    edit(about)
+    path.write_text(json.dumps(about))
+    try:
+        Receipt.read(path).write(path)
+    except (ReceiptError, KeyError):  # as somebody left it, then
+        path.write_text(json.dumps(about))
+    return path
+
+
+def _verify(folder: Path, edit: Callable[[Any], object]) -> Any:
+    from rollouts.receipts import verify
+
+    return verify(edited(folder, edit), workers=0, policy=POLICY)
+
+
+def _differs(folder: Path, edit: Callable[[Any], object]) -> str:
+    found = _verify(folder, edit)
+    assert not found.equal
+    first = [*found.differences, *found.changed][0]
+    return f"not equal: {first}"
+
+
+def _read(folder: Path, make: Callable[[Path], object]) -> None:
+    from rollouts.receipts import verify
+
+    make(folder / "receipt.json")
+    verify(folder / "receipt.json", workers=0, policy=POLICY)
+
+
+def _runs_nothing(
+    folder: Path, policy: str = "", task: str = "", edit: Callable[[Any], object] = lambda _: None
+) -> None:
+    """Verify by the command, in a folder of a stranger's; whatever of theirs runs leaves a file."""
+    mark, bait = folder / "ran", folder / "bait"
+    bait.mkdir()
+    for program in ("agent", "browser"):
+        (bait / program).write_text(f"#!/bin/sh\ntouch {shlex.quote(str(mark))}\n")
+        (bait / program).chmod(0o700)
+    code = f"import pathlib\npathlib.Path({str(mark)!r}).touch()\n"
+    (folder / "strange").mkdir()
+    (folder / "strange" / "__init__.py").write_text(code)
+    (folder / "strange" / "inside.py").write_text(code)
+    (folder / "arm.urdf").write_text(TEMPLATE)
+
+    def change(found: Any) -> None:
+        edit(found)
+        if policy:
+            own = {"sha256": _hash(folder, policy.partition(":")[0]), "importable": True}
+            found["policy"] = {"kind": "policy", "name": policy, **own}
+            found["making"]["obs_mode"] = "state_dict"
+        if task:
+            own = {"class": f"{task}:Task", "sha256": _hash(folder, task)}
+            found["task"].update(id="Strange-v1", **own)
+
+    edited(folder, change)
+    before = sorted(folder.rglob("*"))
+    words = ["verify", "receipt.json", "--workers=0", *([] if policy else ["--policy", POLICY])]
+    environment = {
+        **os.environ,
+        "PATH": f"{bait}:{os.environ['PATH']}",
+        "BROWSER": str(bait / "browser"),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+    try:
+        run_command("rollouts", *words, cwd=folder, env=environment)
+    finally:
+        assert sorted(folder.rglob("*")) == before, "something of it ran"
+
+
+def _hash(folder: Path, module: str) -> str:
+    """Return the SHA-256 of a module's file, as whoever writes a receipt knows it."""
+    path = folder / module.replace(".", "/")
+    own = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    with suppress(ImportError, OSError):
+        spec = None if own.exists() else find_spec(module)
+        return sha256(
+            own.read_bytes() if spec is None else Path(spec.origin).read_bytes()
+        ).hexdigest()
+    return HEX
+
+
+# -- what is wrong with it ------------------------------------------------------------------------
+
+
+def _set(place: Place, value: Any) -> Callable[[Any], None]:
+    def edit(found: Any) -> None:
+        for key in place[:-1]:
+            found = found[key]
+        found[place[-1]] = value
+
+    return edit
+
+
+def _remove(place: Place) -> Callable[[Any], None]:
+    def edit(found: Any) -> None:
+        for key in place[:-1]:
+            found = found[key]
+        del found[place[-1]]
+
+    return edit
+
+
+def _both(*edits: Callable[[Any], object]) -> Callable[[Any], None]:
+    def edit(found: Any) -> None:
+        for one in edits:
+            one(found)
+
+    return edit
+
+
+# Every field, with one value of another kind.
+_FIELDS: dict[Place, Any] = {
+    ("format",): "robot-layouts receipt 2",
+    ("hash",): "ab",
+    ("task",): [],
+    ("task", "id"): ["PushT-v1"],
+    ("task", "class"): 3,
+    ("task", "sha256"): "x" * 64,
+    ("policy",): "expert",
+    ("policy", "kind"): "",
+    ("policy", "name"): None,
+    ("policy", "sha256"): 7,
+    ("policy", "files"): ["policy.pt"],
+    ("making",): None,
+    ("making", "layout"): [],
+    _ARM: "panda_stick",
+    (*_ARM, "robot"): 1,
+    (*_ARM, "position"): [0, 0],
+    (*_ARM, "quaternion"): [0, 0, 0],
+    (*_ARM, "keyframe"): 5,
+    (*_ARM, "qpos_noise"): "much",
+    (*_ARM, "control_mode"): [],
+    ("making", "obs_mode"): None,
+    ("making", "reward_mode"): None,
+    ("making", "control_mode"): 3,
+    ("making", "control_frequency"): "20",
+    ("making", "max_episode_steps"): 0,
+    ("making", "physics"): [],
+    ("making", "randomization"): "mass",
+    ("making", "cameras"): {},
+    ("making", "camera_size"): [64],
+    ("making", "bystanders"): 1,
+    ("making", "simulator"): None,
+    ("making", "num_envs"): 1.5,
+    ("environment",): [],
+    ("environment", "versions"): "3.11",
+    ("environment", "processor"): None,
+    ("environment", "variables"): ["HOME"],
+    ("environment", "guessed"): [1],
+    ("episodes",): {},
+    _EPISODE: None,
+    (*_EPISODE, "seed"): "0",
+    (*_EPISODE, "success"): 1,
+    (*_EPISODE, "steps"): True,
+    (*_EPISODE, "total"): "1.0",
+    (*_EPISODE, "states"): None,
+    (*_EPISODE, "trace"): 5,
+    (*_EPISODE, "reason"): None,
+}
+
+# Every kind of value, in one field that has it, with what is nearly one.
+_KINDS: dict[str, tuple[Place, tuple[Any, ...]]] = {
+    "a SHA-256": ((*_EPISODE, "states"), ("", HEX.upper(), HEX[:-1], f"{HEX}0", f" {HEX[1:]}")),
+    "a seed": ((*_EPISODE, "seed"), (-1, 2**32, 0.0, float("inf"))),
+    "a number": ((*_EPISODE, "total"), (float("nan"), float("inf"), [1.0])),
+    "a name": (("policy", "name"), ("", "x" * 201, 5, ["a:b"])),
+    "a trace": ((*_EPISODE, "trace"), ("", "AAAA", "äöüß", "A A A A A A=")),
+    "a list of episodes": (("episodes",), ([], [[]], [{}], ["seed"])),
+}
+
+_NEEDED: tuple[Place, ...] = (
+    ("format",),
+    ("hash",),
+    ("task", "class"),
+    ("policy", "name"),
+    ("making", "layout"),
+    ("making", "simulator"),
+    ("environment", "versions"),
+    (*_EPISODE, "states"),
+)
+
+_NONSENSE: dict[str, Callable[[Any], object]] = {
+    "a seed twice": _set(("episodes", 1, "seed"), 0),
+    "a trace of more steps than it has": _set((*_EPISODE, "steps"), STEPS - 1),
+    "more steps than any episode has": _set((*_EPISODE, "steps"), 2**31),
+    "another task with its places": _both(
+        _set(("task", "id"), "TwoRobotPickCube-v1"), _set(("making", "reward_mode"), "dense")
+    ),
+    "a task's id with a module": _set(("task", "id"), "os:PushT-v1"),
+    "a policy that was no variable": _both(
+        _set(("policy", "importable"), False), _set(("policy", "name"), "")
+    ),
+    "an unknown robot": _set((*_ARM, "robot"), "pandy"),
+    "a robot's name that is a path": _set((*_ARM, "robot"), "/etc/passwd"),
+    "a robot far away": _set((*_ARM, "position"), [1e300, 0, 0]),
+    "a robot turned by nothing": _set((*_ARM, "quaternion"), [0, 0, 0, 0]),
+    "a robot at an unknown keyframe": _set((*_ARM, "keyframe"), "standing on its head"),
+    "endless joint noise": _set((*_ARM, "qpos_noise"), 1e9),
+    "a place too many": lambda found: found["making"]["layout"].update(
+        left=found["making"]["layout"]["arm"]
+    ),
+    "a thousand places": lambda found: found["making"]["layout"].update(
+        {f"arm{i}": found["making"]["layout"]["arm"] for i in range(1000)}
+    ),
+    "no place": _set(("making", "layout"), {}),
+    "an unknown control mode": _set(("making", "control_mode"), "pd_ee_dance"),
+    "an unknown observation": _set(("making", "obs_mode"), "smell"),
+    "an unknown reward": _set(("making", "reward_mode"), "praise"),
+    "an unknown simulator": _set(("making", "simulator"), "os:system"),
+    "a million steps a second": _set(("making", "control_frequency"), 1e6),
+    "steps of no time": _set(("making", "control_frequency"), 0),
+    "more environments than fit": _set(("making", "num_envs"), 10**6),
+    "physics of another library": _set(("making", "physics"), {"substeps": 4}),
+    "physics without friction": _set(("making", "physics"), {"timestep": 0.01}),
+    "an unknown axis of randomization": _set(("making", "randomization"), {"mas": 1}),
+    "a mass below nothing": _set(("making", "randomization"), {"mass": {"Tee": -1.0}}),
+    "a camera without a name": _set(("making", "cameras"), [{"eye": [0, 0, 1]}]),
+    "pictures of a terapixel": _both(
+        _set(("making", "camera_size"), [10**6, 10**6]), _set(("making", "obs_mode"), "rgb")
+    ),
+}
+
+
+def _text(change: Callable[[str], str]) -> Callable[[Path], object]:
+    return lambda path: path.write_text(change(contents()))
+
+
+def _sparse(path: Path) -> None:
+    path.touch()
+    os.truncate(path, 5 << 30)
+
+
+_FILES: dict[str, Callable[[Path], object]] = {
+    "missing": lambda path: None,
+    "a folder": Path.mkdir,
+    "a FIFO": os.mkfifo,
+    "/dev/zero": lambda path: path.symlink_to("/dev/zero"),
+    "a link to itself": lambda path: path.symlink_to(path),
+    "5 GB of nothing": _sparse,
+    "empty": Path.touch,
+    "half": _text(lambda text: text[: len(text) // 2]),
+    "without its last brace": _text(lambda text: text.rstrip("}\n")),
+    "two receipts": _text(lambda text: text * 2),
+    "a receipt with a key twice": _text(lambda text: text.replace("{", '{"hash": "",', 1)),
+    "a receipt inside a list": _text(lambda text: f"[{text}]"),
+    "100,000 brackets": lambda path: path.write_text("[" * 100_000),
+    "a number of a million digits": _text(
+        lambda text: text.replace(": 0,", f": {'9' * 10**6},", 1)
+    ),
+    "UTF-16": lambda path: path.write_bytes(contents().encode("utf-16")),
+    "not UTF-8": lambda path: path.write_bytes(contents().encode().replace(b"PushT", b"\xff", 1)),
+    "YAML": lambda path: path.write_text("format: robot-layouts receipt 1\n"),
+    "a pickle": lambda path: path.write_bytes(b"\x80\x04cos\nsystem\n"),
+}
+
+_LIES: dict[str, Callable[[Any], object]] = {
+    "one success more": _set((*_EPISODE, "success"), True),
+    "a higher return": _set((*_EPISODE, "total"), 1e300),
+    "other states": _set((*_EPISODE, "states"), HEX),
+    "a trace of other states": _set((*_EPISODE, "trace"), "AAAAAAAAAAA="),
+    "another seed": _set((*_EPISODE, "seed"), 4_000_000_000),
+    "a reason": _set((*_EPISODE, "reason"), "\x1b[2J bad luck"),
+    "episodes without an end": _set(("making", "max_episode_steps"), 2**31 - 1),
+    "another source of the policy": _set(("policy", "sha256"), HEX),
+    "another name of the policy": _set(("policy", "name"), "mine:policy"),
+    "a checkpoint that is not there": _set(("policy", "files"), {"policy.pt": HEX}),
+    "another source of the task": _set(("task", "sha256"), HEX),
+    "another class of the task": _set(("task", "class"), "mine:Task"),
+    "another file of the robot": _set((*_ARM, "files"), {"arm.urdf": HEX}),
+    "the robot elsewhere": _set((*_ARM, "position"), [0.0, 0.0, 0.01]),
+    "another gravity": _set(("making", "randomization"), {"gravity": 1.0}),
+    "fewer steps a second": _set(("making", "control_frequency"), 10.0),
+}
+
+_GADGETS = (
+    "http.server:test",
+    "venv:main",
+    "subprocess:call",
+    "antigravity:fly",
+    "strange:policy",
+    "strange.inside:policy",
+    "tests.rollouts.policies:dies",
+    "os:system; touch ran",
+    "../strange:policy",
+)
+
+
+TEMPLATE = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="arm">
+<xacro:include filename="/etc/passwd"/></robot>"""
+
+
+def _guessed(name: str) -> Callable[[Any], None]:
+    """Return what says that the robot was guessed from a file, whose hash is right."""
+
+    def edit(found: Any) -> None:
+        text = TEMPLATE.encode() if name == "arm.urdf" else Path(name).read_bytes()
+        about = {"urdf": name, "sha256": sha256(text).hexdigest(), "descriptor": HEX}
+        found["environment"]["guessed"] = {"arm": about}
+
+    return edit
+
+
+_STRANGE_ROBOTS: dict[str, Callable[[Any], object]] = {
+    "its robot is in a module": _set((*_ARM, "robot"), "strange:ROBOT"),
+    "its robot is a program": _set((*_ARM, "robot"), "./bait/agent"),
+    "its robot was guessed from /etc/passwd": _guessed("/etc/passwd"),
+    "its robot was guessed from a xacro template": _guessed("arm.urdf"),
+}
+
+
+def _verified(folder: Path, **arguments: Any) -> None:
+    from rollouts.receipts import verify
+
+    verify(edited(folder, lambda _: None), **{"workers": 0, **arguments})
+
+
+_ARGUMENTS: dict[str, Callable[[Path], None]] = {
+    "nobody is named to play": lambda folder: _verified(folder),
+    "a policy that is none": lambda folder: _verified(folder, policy=5),
+    "a policy that is not there": lambda folder: _verified(folder, policy="no.such:policy"),
+    "another task": lambda folder: _verified(folder, policy=POLICY, task="PushCube-v1"),
+    "a robot of no place": lambda folder: _verified(folder, policy=POLICY, robots={"a": "pandy"}),
+    "no environments": lambda folder: _verified(folder, policy=POLICY, num_envs=0),
+    "fewer than no workers": lambda folder: _verified(folder, policy=POLICY, workers=-1),
+}
