@@ -195,3 +195,8 @@ def test_no_template_is_expanded_because_a_receipt_names_it(copy, called):
     edit(copy, lambda found: found["environment"].update(guessed=guessed))
     with pytest.raises(ReceiptError, match="arm.urdf, a xacro template, .*--robots arm="):
         again(copy, policy=NAMED)
+
+
+def test_a_robot_for_a_place_that_there_is_not(receipt):
+    with pytest.raises(ReceiptError, match="unknown place 'arms'. Did you mean 'arm'"):
+        again(receipt, policy=NAMED, robots={"arms": "panda_stick"})
