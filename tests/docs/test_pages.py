@@ -10,7 +10,7 @@ DOCS = ROOT / "docs"
 PAGES = sorted(page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md"))
 GENERATED = "gallery/"  # its pages all show the same commands, once for each task and robot
 PLAYED = [page for page in PAGES if not page.startswith(GENERATED) and blocks(DOCS / page)]
-QUICK = {"concepts/robots.md", "questions.md"}  # the others take longer than five seconds
+QUICK = {"concepts/robots.md"}  # the others take longer than five seconds
 
 
 @pytest.mark.parametrize(
