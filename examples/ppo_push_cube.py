@@ -21,12 +21,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from matplotlib.figure import Figure
 from stable_baselines3 import PPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.utils import LinearSchedule
-from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
+from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 import tasks
 from robots import RobotLayoutsError
@@ -135,8 +136,9 @@ def learn(options: argparse.Namespace) -> list[Examination]:
 
     def make(num_envs: int) -> VecNormalize:
         env = tasks.sb3_vec_env(TASK, num_envs, options.workers, ignore_terminations=True)
-        return VecNormalize(VecMonitor(env), norm_reward=False, clip_obs=5.0)
+        return VecNormalize(env, norm_reward=False, clip_obs=5.0)
 
+    torch.set_num_threads(options.threads)
     line = LiveLine(options.steps)
     with closing(make(options.envs)) as env, closing(make(options.tests)) as tests, line:
         tests.training, tests.obs_rms = False, env.obs_rms
@@ -182,6 +184,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add("--envs", type=int, default=64, help="environments to learn in (default %(default)s)")
     add("--tests", type=int, default=50, help="test episodes (default %(default)s)")
     add("--workers", type=int, help="processes (default: one per core)")
+    add("--threads", type=int, default=1, help="threads that learn (default %(default)s)")
     add("--seed", type=int, default=0, help="of the policy and of the episodes (default 0)")
     add("--out", type=Path, default=Path("runs/ppo_push_cube"), help="folder (default %(default)s)")
     options = parser.parse_args(arguments)

@@ -83,3 +83,8 @@ __all__ = [
     "turn",
     "yaw_of",
 ]
+
+
+def __dir__() -> list[str]:
+    """List what is public: `help` and completion go by this."""
+    return __all__

@@ -56,12 +56,13 @@ def squared(direction: float, yaw: float) -> float:
 def gripper_facing(direction: float, tilt: float) -> Floats:
     """Return the orientation of a gripper that reaches down and forward, (4,).
 
-    The gripper's own z axis is its approach, its y axis the way its fingers open, which stays
-    level.
+    Its fingers open level, at a right angle to ``direction``: fingers that are to close along a
+    heading take that heading plus or minus π/2. The gripper's own z axis is its approach, its y
+    axis the way its fingers open.
 
     Args:
-        direction: Heading in which it leans.
-        tilt: Angle between its approach and straight down; π/2 reaches forward level.
+        direction: Heading in which it leans, from +x (rad).
+        tilt: Angle between its approach and straight down (rad); π/2 reaches forward level.
     """
     down = turn("x", pi)
     return multiply(multiply(turn("z", direction), down), turn("y", tilt))

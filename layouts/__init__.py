@@ -31,3 +31,8 @@ __all__ = [
     "wall",
     "yaw_quaternion",
 ]
+
+
+def __dir__() -> list[str]:
+    """List what is public: `help` and completion go by this."""
+    return __all__

@@ -21,3 +21,8 @@ __all__ = [
     "TcpGoal",
     "plan",
 ]
+
+
+def __dir__() -> list[str]:
+    """List what is public: `help` and completion go by this."""
+    return __all__

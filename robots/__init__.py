@@ -65,3 +65,8 @@ __all__ = [
     "is_portable",
     "unknown_name_message",
 ]
+
+
+def __dir__() -> list[str]:
+    """List what is public: `help` and completion go by this."""
+    return __all__

@@ -14,7 +14,7 @@ _REGISTERED = """
 RobotRegistry.register({constant})  # from here on, it goes by its name: {name!r}
 """
 
-_TEST = '''"""Looks whether {name} stands and moves as it is to; run it with pytest, here."""
+_TEST = '''"""Tests whether {name} stands and moves as it should; run it with pytest, here."""
 
 from layouts import single
 from robots import RobotRegistry

@@ -35,3 +35,8 @@ __all__ = [
     "add_table",
     "build_scene",
 ]
+
+
+def __dir__() -> list[str]:
+    """List what is public: `help` and completion go by this."""
+    return __all__

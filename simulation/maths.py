@@ -1,8 +1,8 @@
 """The functions that tasks compute with, on whatever arrays a state gives: NumPy's or torch's.
 
-What NumPy's and torch's arrays both have as an operator or a method (``+``, ``<=``, ``&``, slices,
-``x.any(1)``, ``x.sum(0)``, ``abs(x)``) needs no function. Plain floats stay what they are: they
-take the arrays' float32.
+They are called as in NumPy and mean the same. What both kinds of arrays have as an operator
+(``+``, ``<=``, ``&``, ``@``, slices) needs no function. Plain floats stay what they are: they take
+the arrays' float32.
 
 Sums, products, quotients and comparisons round alike everywhere, so NumPy does them at a fifth of
 what a torch call costs. Roots, norms and transcendental functions do not: native takes torch's, so
@@ -33,9 +33,9 @@ def by_torch(function: Callable[..., Tensor]) -> Callable[..., Any]:
     """Let a function of tensors take NumPy's arrays as well, and return what it was given."""
 
     @wraps(function)
-    def call(*arguments: Any) -> Any:
+    def call(*arguments: Any, **options: Any) -> Any:
         given = [torch.from_numpy(a) if isinstance(a, np.ndarray) else a for a in arguments]
-        result = function(*given)
+        result = function(*given, **options)
         return result if isinstance(arguments[0], Tensor) else result.numpy()
 
     return call
@@ -51,6 +51,16 @@ def all_finite(values: Array) -> bool:
     if values.size == 1:
         return isfinite(values.item())
     return isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())
+
+
+def all(x: Array, axis: int | None = None) -> Any:
+    """Return whether all flags along an axis are set, or all there are."""
+    return x.all() if axis is None else x.all(axis)
+
+
+def any(x: Array, axis: int | None = None) -> Any:
+    """Return whether one of the flags along an axis is set, or one of all."""
+    return x.any() if axis is None else x.any(axis)
 
 
 def where(condition: Array, one: Array | float, other: Array | float) -> Any:
@@ -78,6 +88,43 @@ def minimum(x: Array, bound: Array | float) -> Any:
 def clip(x: Array, low: float, high: float) -> Any:
     """Return numbers, those beyond a bound moved to it."""
     return torch.clamp(x, low, high) if isinstance(x, Tensor) else np.clip(x, low, high)
+
+
+def abs(x: Array) -> Any:
+    """Return numbers without their sign."""
+    return x.__abs__()
+
+
+def max(x: Array, axis: int | None = None) -> Any:
+    """Return the largest number along an axis, or of all."""
+    return x.amax(() if axis is None else axis) if isinstance(x, Tensor) else x.max(axis)
+
+
+def min(x: Array, axis: int | None = None) -> Any:
+    """Return the smallest number along an axis, or of all."""
+    return x.amin(() if axis is None else axis) if isinstance(x, Tensor) else x.min(axis)
+
+
+def argmax(x: Array, axis: int | None = None) -> Any:
+    """Return where the largest number along an axis is, the first if there are several."""
+    return x.argmax(axis)
+
+
+def argmin(x: Array, axis: int | None = None) -> Any:
+    """Return where the smallest number along an axis is, the first if there are several."""
+    return x.argmin(axis)
+
+
+@by_torch
+def sum(x: Any, axis: int | None = None) -> Any:
+    """Return torch's sums along an axis, or of all numbers."""
+    return x.sum() if axis is None else x.sum(axis)
+
+
+@by_torch
+def mean(x: Any, axis: int | None = None) -> Any:
+    """Return torch's means of floats along an axis, or of all."""
+    return x.mean() if axis is None else x.mean(axis)
 
 
 def stack(arrays: Sequence[Array], axis: int = 0) -> Any:
@@ -148,6 +195,18 @@ def closeness(x: Array, steepness: float) -> Any:
     return number(1.0) - tangents
 
 
+@by_torch
+def exp(x: Any) -> Any:
+    """Return torch's exponentials."""
+    return x.exp()
+
+
+@by_torch
+def log(x: Any) -> Any:
+    """Return torch's natural logarithms."""
+    return x.log()
+
+
 def sqrt(x: Array | Tensor) -> Any:
     """Return torch's square roots; in a portable process, those rounded as IEEE 754 says.
 
@@ -190,6 +249,12 @@ def norm(x: Array) -> Any:
     if isinstance(x, Tensor):
         return torch.linalg.vector_norm(x, dim=-1)
     return torch.linalg.vector_norm(torch.from_numpy(x), dim=-1).numpy()
+
+
+@by_torch
+def cross(x: Any, y: Any) -> Any:
+    """Return torch's cross products of vectors, (..., 3)."""
+    return torch.linalg.cross(x, y)
 
 
 def like(x: Array, values: Any) -> Any:

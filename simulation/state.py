@@ -320,8 +320,8 @@ class State:
         fingers = self._index.fingers[robot]
         if fingers is None:
             warn(
-                f"{robot!r} has no fingers, so that is_grasping({robot!r}, {body!r}) is false for"
-                " ever; a task that needs them says so in `needs`",
+                f"{robot!r} has no fingers, so that is_grasping({robot!r}, {body!r}) is never true;"
+                " a task that needs them says so in `needs`",
                 RuntimeWarning,
                 stacklevel=3,
             )

@@ -43,7 +43,7 @@ def _print(trial: Trial, console: Console) -> None:
         console.print(f"  {line}")
     console.print(_numbers(trial))
     if not trial.problems:
-        console.print("  It stands and moves as it is to.")
+        console.print("  It stands and moves as it should.")
     for problem in trial.problems:
         console.print(f"  WRONG: {problem}")
     console.print()

@@ -12,7 +12,7 @@ Making an environment of it for other programs (each loads its package when it i
     sb3_vec_env: Stable-Baselines3.
     lerobot_vec_env: LeRobot's evaluation.
 
-Writing a task (`tasks.vocabulary` lists every name; functions of arrays are in `tasks.maths`):
+Writing a task (functions of arrays are in `tasks.maths`):
     MultiRobotTask: What a task's class subclasses.
     register_task: Gives it its names.
     Needs: What a place needs of the robot that stands there.
@@ -30,45 +30,106 @@ expect_own("robots", "layouts", "simulation")
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from robots.common.module_names import missing_name
 from tasks.fronts import lerobot_vec_env, parallel_env, register, sb3_vec_env
-from tasks.registry import on_registration
+from tasks.registry import get_task_class, list_clones, list_tasks, make, on_registration
 
 if TYPE_CHECKING:
-    from tasks.registry import get_task_class, list_clones, list_tasks, make
     from tasks.vocabulary import *  # noqa: F403
-    from tasks.vocabulary import EpisodeRandom, MultiRobotTask, Scenario, register_task
 
-_REGISTRY = ("get_task_class", "list_clones", "list_tasks", "make", "register_task")
-
-__all__ = [  # what only tasks' files need is in `tasks.vocabulary`
+__all__ = [  # those of `tasks.vocabulary` as well, which is loaded when one of them is asked for
+    "BLUE",
+    "DARK_BLUE",
+    "DARK_RED",
+    "FACE_UP",
+    "GREEN",
+    "POLISHED",
+    "RED",
+    "TARGET_HEIGHT",
+    "WHITE",
+    "Area",
+    "Ball",
+    "Box",
+    "Camera",
+    "CameraShift",
+    "Capsule",
+    "Choice",
+    "Color",
+    "Compound",
+    "Cube",
+    "Cuboid",
+    "Cylinder",
+    "Distractors",
     "EpisodeRandom",
+    "Finish",
+    "Fixed",
+    "Friction",
+    "Goal",
+    "Info",
+    "Light",
+    "LogUniform",
+    "Mesh",
     "MultiRobotTask",
+    "Needs",
+    "Normal",
+    "Peg",
+    "PhysicsSettings",
+    "Plane",
+    "Quaternion",
+    "Randomization",
     "Scenario",
+    "Shape",
+    "Shift",
+    "Sphere",
+    "State",
+    "Surface",
+    "Table",
+    "Target",
+    "Texture",
+    "Uniform",
+    "Vector3",
+    "Whole",
+    "WideTable",
+    "World",
+    "add_goal",
+    "add_table",
+    "add_target",
+    "add_wide_table",
+    "angle_between",
+    "closeness",
+    "compose",
+    "diagonal",
+    "distance_to_top",
     "get_task_class",
+    "inverse",
+    "is_at_rest",
     "lerobot_vec_env",
+    "letting_go",
+    "lies_on",
+    "linear",
     "list_clones",
     "list_tasks",
     "make",
+    "once_per_state",
     "parallel_env",
     "register_task",
     "sb3_vec_env",
+    "stillness",
+    "transform",
 ]
 
 
 def __getattr__(name: str) -> Any:
     """Load what is asked for, once."""
-    if name.startswith("_"):
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    home = import_module("tasks.registry" if name in _REGISTRY else "tasks.vocabulary")
-    if name not in (*_REGISTRY, *getattr(home, "__all__", ())):
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(home, name)
+    if name not in __all__:
+        raise missing_name(__name__, name, __all__)
+    value = globals()[name] = getattr(import_module("tasks.vocabulary"), name)
     return value
 
 
 def __dir__() -> list[str]:
-    """List what is loaded only when it is asked for, too: `help` and completion go by this."""
-    return sorted({*globals(), *__all__})
+    """List what is public, loaded or not: `help` and completion go by this."""
+    return __all__
 
 
 on_registration(register)

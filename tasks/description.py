@@ -61,12 +61,12 @@ class Docstring:
 
     Attributes:
         summary: Its first paragraph.
-        randomisation: What is drawn at a reset; empty if it does not say.
+        randomization: What is drawn at a reset; empty if it does not say.
         success: When it is done, without the word "Success:"; empty if it does not say.
     """
 
     summary: str
-    randomisation: str
+    randomization: str
     success: str
 
 
@@ -199,7 +199,7 @@ def describe(env: MultiRobotTask) -> Iterator[RenderableType]:
     yield f"{cls.task_id}: {text.summary}\n"
     rows = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
     for name, value in (
-        ("randomisation", text.randomisation),
+        ("randomization", text.randomization),
         ("success", text.success),
         ("episode", f"{env.max_episode_steps} steps, {env.scenario.control_frequency:g} per s"),
         ("reward modes", ", ".join([f"{cls.reward_modes[0]} (default)", *cls.reward_modes[1:]])),

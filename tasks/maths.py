@@ -1,12 +1,20 @@
 """Functions of the arrays that a state gives, NumPy's or torch's; see `simulation.maths`."""
 
+from typing import TYPE_CHECKING, NoReturn
+
+from robots.common.module_names import missing_name
 from simulation.maths import (
     Array,
     Flags,
     Floats,
+    abs,
+    all,
     all_finite,
+    any,
     arccos,
     arctan2,
+    argmax,
+    argmin,
     by_torch,
     clip,
     columns,
@@ -14,16 +22,23 @@ from simulation.maths import (
     copy,
     cos,
     counted,
+    cross,
+    exp,
     floats,
     full,
     like,
+    log,
+    max,
     maximum,
+    mean,
+    min,
     minimum,
     norm,
     rounded,
     sin,
     sqrt,
     stack,
+    sum,
     tanh,
     where,
     zeros,
@@ -33,9 +48,14 @@ __all__ = [
     "Array",
     "Flags",
     "Floats",
+    "abs",
+    "all",
     "all_finite",
+    "any",
     "arccos",
     "arctan2",
+    "argmax",
+    "argmin",
     "by_torch",
     "clip",
     "columns",
@@ -43,17 +63,35 @@ __all__ = [
     "copy",
     "cos",
     "counted",
+    "cross",
+    "exp",
     "floats",
     "full",
     "like",
+    "log",
+    "max",
     "maximum",
+    "mean",
+    "min",
     "minimum",
     "norm",
     "rounded",
     "sin",
     "sqrt",
     "stack",
+    "sum",
     "tanh",
     "where",
     "zeros",
 ]
+
+if not TYPE_CHECKING:  # type checkers know what there is, and would believe in any name
+
+    def __getattr__(name: str) -> NoReturn:
+        """Say what there is."""
+        raise missing_name(__name__, name, __all__)
+
+
+def __dir__() -> list[str]:
+    """List what is public: completion goes by this."""
+    return __all__

@@ -9,6 +9,7 @@ import argparse
 import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from math import cos, pi, sin
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,7 +26,10 @@ from robots.urdf.summary import read_urdf
 from robots.urdf.tcp import find_tcp
 from robots.urdf.tree import kinematic_tree
 
-SPREAD = 0.06  # of a robot's reach: how far a goal may be from the middle, to each side
+RADIUS = 0.03  # of a goal (m)
+# Shares of a robot's reach: how far a goal may be from its middle to each side, and how far that
+# middle is from where the TCP begins, besides the radius: no goal holds it from the start.
+SPREAD, ASIDE = 0.05, 0.1
 
 _TASK = '''"""{title}: every arm brings its tool centre point to a ball in the air."""
 
@@ -35,7 +39,7 @@ from experts.rehearsal import first_success
 {imports}
 from tasks.maths import norm
 
-RADIUS = 0.03  # of a goal (m)
+RADIUS = {radius}  # of a goal (m)
 
 
 @register_task("{task_id}")
@@ -73,7 +77,10 @@ class {title}(MultiRobotTask):
 def reach(task, seed):
     """The expert: actions (T, A) that solve the episode of a seed, found in a world of its own."""
     places = task.layout.places
-    script = {{place: [reaching(task, place, "goal", goal_of(place))] for place in places}}
+    # Grippers stay as they are: jaws that swing would move the TCP.
+    script = {{
+        place: [reaching(task, place, "goal", goal_of(place), gripper=0.0)] for place in places
+    }}
     return first_success(task, seed, lambda scene: [script])
 
 
@@ -185,6 +192,7 @@ def task_source(task_id: str, robots: Mapping[str, str]) -> str:
     ]
     return _TASK.format(
         title=task_id.rpartition("-")[0],
+        radius=RADIUS,
         task_id=task_id,
         imports="\n".join(imports),
         layout=f"{preset.name}({{{named}}}{preset.options})",
@@ -200,7 +208,7 @@ def _goal(place: str, layout: Layout) -> str:
 
 
 def _area(layout: Layout, place: str) -> tuple[list[float], list[float]]:
-    """Return the corners of where an arm's goal may be (m, world): about its TCP at the start."""
+    """Return the corners of where an arm's goal may be (m, world): left of its TCP at the start."""
     arm, placement = layout.arm(place).robot, layout[layout.owner(place)]
     robot = placement.robot
     urdf = robot.urdf.locate()
@@ -210,9 +218,11 @@ def _area(layout: Layout, place: str) -> tuple[list[float], list[float]]:
     qpos = np.zeros((1, len(tree.coordinates)))
     qpos[0, : robot.dof] = placement.start_qpos
     tcp = find_tcp(arm, tree).places(tree.forward(qpos))[0]
-    middle = placement.base_position + rotate(np.array(placement.base_quaternion), tcp)
-    spread = SPREAD * arm.reach
-    middle = middle + [0.0, 0.0, spread]
+    ahead = rotate(np.array(placement.base_quaternion), tcp)
+    left = np.arctan2(ahead[1], ahead[0]) + pi / 2  # where any arm gets by turning
+    aside, spread = RADIUS + ASIDE * arm.reach, SPREAD * arm.reach
+    middle = placement.base_position + ahead
+    middle = middle + [aside * cos(left), aside * sin(left), spread]
     return (middle - spread).round(3).tolist(), (middle + spread).round(3).tolist()
 
 

@@ -18,7 +18,7 @@ from layouts.viewer.text import as_html
 from robots.common.commands import LOOPBACK
 from robots.common.writing import write_whole
 
-NO_SLIDERS = "A saved page has no sliders; the one that view serves without --html has them."
+NO_SLIDERS = "A saved page has no sliders for joints; without --html, view serves one that has."
 NOTE_STYLE = (  # above the bar that plays a motion
     "position: fixed; left: 0.75rem; bottom: 4.5rem; z-index: 1000; max-width: 24rem;"
     " padding: 0.5rem 0.75rem; border-radius: 0.25rem; background: #fffd; color: #222;"
@@ -29,8 +29,8 @@ NOTE_STYLE = (  # above the bar that plays a motion
 def save_html(cell: Cell, path: str | os.PathLike[str]) -> Path:
     """Save a page as one file that needs no server and fetches nothing.
 
-    It has no sliders, and says so: robots stand as they start, or play the motion. What is shown
-    can be chosen in its scene tree.
+    It has no sliders for joints, and says so: robots stand as they start, or play the motion. What
+    is shown can be chosen in its scene tree.
 
     Args:
         cell: What to show.

@@ -1,1 +1,1 @@
-"""What data sets cost: recording, opening, certifying; and a large one, made from end to end."""
+"""What datasets cost: recording, opening, certifying; and a large one, made from end to end."""

@@ -32,7 +32,7 @@ class Cost:
 
 @dataclass(frozen=True)
 class Costs:
-    """What a data set of a task took.
+    """What a dataset of a task took.
 
     Attributes:
         task: The task's id.

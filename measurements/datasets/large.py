@@ -1,4 +1,4 @@
-"""A large data set from end to end: other layouts, worlds that vary, certified and reported."""
+"""A large dataset from end to end: other layouts, worlds that vary, certified and reported."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ def task_page(cls: type[MultiRobotTask], sources: Sources) -> Iterator[str]:
     yield from facts(_facts(cls, measured, sources))
     yield ""
     yield from section("Success", _lines(sentence(text.success)))
-    yield from section("What differs from episode to episode", _lines(sentence(text.randomisation)))
+    yield from section("What differs from episode to episode", _lines(sentence(text.randomization)))
     yield from section("Run it", _python(cls), _console(cls))
     yield from section("Who stands where", _places(cls.layout), _others(cls))
     yield from section("Action", *_action(cls.layout))

@@ -18,7 +18,7 @@ from rollouts.teleop.session import Session
 from rollouts.teleop.stopwatch import HTML_ID, QUICK
 
 ARROW = 0.85 * GIZMO_SIZE  # where to press, from the middle of a gizmo (m)
-PLACE = re.compile(r"to \((\S+), (\S+), (\S+)\) m, (\d+) mm to go")
+PLACE = re.compile(r"target \((\S+), (\S+), (\S+)\) m, (\d+) mm away")
 CLOCK = re.compile(r"Real time\.|Time runs at .* no step is left out\.")
 _MEASURED = "(id) => [document.getElementById(id).innerText, window.dragsSeen]"
 _THIRTY_FRAMES = (

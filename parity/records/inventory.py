@@ -28,7 +28,7 @@ TABLE_WIDTH = 180  # columns that a table may take; a narrower terminal wraps it
 NO_REASON = "not cloned yet"
 
 # What native's registry does not tell: read in mani_skill 3.0.1, envs/.
-_SCENES = "needs a data set of indoor scenes"
+_SCENES = "needs a dataset of indoor scenes"
 _NO_ROBOT = "no descriptor here of its robot: "
 _SPECIAL_REASONS = {
     "DrawSVG-v1": "needs the packages svgpathtools and svgwrite",

@@ -1,1 +1,1 @@
-"""Data sets as a whole: certified by replays, and reported on one page."""
+"""Datasets as a whole: certified by replays, and reported on one page."""

@@ -1,4 +1,4 @@
-"""The report of a data set: one HTML page that needs nothing else."""
+"""The report of a dataset: one HTML page that needs nothing else."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def _header(report: Report) -> str:
     mode = contents.control_mode
     words = mode if isinstance(mode, str) else ", ".join(f"{a} {m}" for a, m in mode.items())
     note = f"{contents.task_id}, {words}"
-    return heading("robot-layouts, a data set", report.title, note, tiles)
+    return heading("robot-layouts, a dataset", report.title, note, tiles)
 
 
 def _lengths(contents: Contents) -> str:

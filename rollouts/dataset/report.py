@@ -1,4 +1,4 @@
-"""Gathers what the report of a data set shows."""
+"""Gathers what the report of a dataset shows."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def make_report(
     clips: int = 4,
     progress: Progress = lambda done, total, what: None,
 ) -> Report:
-    """Return what is known of a data set.
+    """Return what is known of a dataset.
 
     Args:
         path: The recording: an h5 file, a folder or a manifest.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from robots.assets.progress import size
 from robots.common.commands import printable
 from rollouts.playing.command_options import zero_or_more
 from tasks.cell_options import add_cell_options, chosen_cell
@@ -71,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
         )
     page = render(report)
     write_whole(options.out, page, RecordingError)
-    print(printable(f"{options.out}: {len(page.encode()) / 1e6:.1f} MB"))
+    print(printable(f"{options.out}: {size(len(page.encode()))}"))
     for remark in report.remarks:
         print(printable(remark))
     return 0

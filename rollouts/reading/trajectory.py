@@ -346,7 +346,7 @@ def expect_file(path: Path, suffixes: Sequence[str]) -> None:
         siblings = (p.name for p in path.parent.glob("*") if p.suffix in suffixes)
         match = closest_match(path.name, siblings)
         hint = f"; did you mean {path.parent / match}?" if match else ""
-        raise TrajectoryError(f"there is no file {path}{hint}")
+        raise TrajectoryError(f"there is no file or folder {path}{hint}")
     if path.suffix not in suffixes:
         raise TrajectoryError(
             f"{path} is of an unknown kind {path.suffix!r}; known are {', '.join(suffixes)}"

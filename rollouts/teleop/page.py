@@ -257,11 +257,11 @@ class TeleopPage:
         self._run.label = "Stop (P)" if session.phase is Phase.RUNNING else "Start (P)"
         for arm, text in self._arm_texts.items():
             away = np.linalg.norm(session.steering.tcp(arm)[:3] - session.targets[arm][:3])
-            gripper = f", {'closed' if session.closed[arm] else 'open'}"
+            gripper = f", gripper {'closed' if session.closed[arm] else 'open'}"
             own = gripper if arm in session.steering.with_gripper else ""
             place = ", ".join(f"{x:.3f}" for x in session.targets[arm][:3])
             holder = self._seats.holder(arm)
-            _write(text, f"{holder}{own}\nto ({place}) m, {away * 1000:.0f} mm to go")
+            _write(text, f"{holder}{own}\ntarget ({place}) m, {away * 1000:.0f} mm away")
 
     # -- the panel ---------------------------------------------------------------------------
 

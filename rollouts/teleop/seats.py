@@ -55,7 +55,7 @@ class Seats:
     def holder(self, arm: str) -> str:
         """Return who steers an arm, in words."""
         holder = self._holders[arm]
-        return "nobody steers it" if holder is None else f"steered by {_name(holder)}"
+        return "not steered" if holder is None else f"steered by {_name(holder)}"
 
 
 def _name(client: int) -> str:

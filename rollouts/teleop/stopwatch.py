@@ -15,7 +15,7 @@ from layouts.viewer.text import STYLE, node
 HTML_ID = "from-drag-to-picture"
 QUICK = "Quick picture"  # a box on the panel
 MOST = 200  # drags that count
-NOTHING_YET = "From drag to picture: nothing dragged yet"
+NOTHING_YET = "Time from drag to picture: not measured yet"
 GIZMOS, STEERED = "(gizmos)", "(steered)"
 
 _SCRIPT = """
@@ -29,7 +29,7 @@ if (!window.dragsSeen) {
     const at = (share) => ranked[Math.floor(share * (ranked.length - 1))].toFixed(0);
     const place = document.getElementById("HTML_ID");
     if (place) place.textContent =
-      `From drag to picture: ${at(0.5)} ms (median), ${at(0.95)} ms (95 %), of ${seen.length}`;
+      `Time from drag to picture: ${at(0.5)} ms (median), ${at(0.95)} ms (95 %), of ${seen.length}`;
   };
   document.addEventListener("change", (event) => {  // else the box would keep all keys to itself
     if (event.target.type === "checkbox") event.target.blur();

@@ -192,6 +192,15 @@ class MultiRobotTask(Declaration, Varied, Remade):
             raise SimulationError(f"this {type(self).__name__} is closed; make a new one")
         return self._simulation
 
+    @property
+    def state(self) -> State:
+        """What all worlds look like now, as `evaluate` is given it; read anew after each step.
+
+        Raises:
+            SimulationError: If the task was closed.
+        """
+        return self.simulation.read()
+
     def close(self) -> None:
         """Let the worlds go; closing twice is allowed."""
         self._simulation = None

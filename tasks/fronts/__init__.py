@@ -81,7 +81,8 @@ def sb3_vec_env(
     """Make a Stable-Baselines3 ``VecEnv`` of a task, with the environments of its vector.
 
     Policies learn from a flat state, ``"MlpPolicy"``, or from named parts of one and from images,
-    ``"MultiInputPolicy"`` with ``obs_mode="state_dict"`` or ``"rgb"``.
+    ``"MultiInputPolicy"`` with ``obs_mode="state_dict"`` or ``"rgb"``. Workers have one thread
+    each; those of this process stay torch's (``torch.set_num_threads``).
 
     Args:
         task_id: The task's id or another of its names.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Mapping
 from typing import Any, NoReturn
 
@@ -30,10 +31,10 @@ class SB3Task(Remade, VecEnv):
 
     An environment whose episode ends begins the next one in the same step. What its last step
     returned is in its info: ``terminal_observation``, ``TimeLimit.truncated`` (its time was up, and
-    it had not terminated), and ``is_success``, of which Stable-Baselines3 makes success rates.
+    it had not terminated), ``is_success``, of which Stable-Baselines3 makes success rates, and
+    ``episode``, of which it makes ``ep_rew_mean`` and ``ep_len_mean``, as after ``VecMonitor``.
     Nested spaces are unknown to Stable-Baselines3, so parts of an observation are named by their
-    path, ``extra/tcp_pose`` or ``sensor_data/base_camera/rgb``. ``VecMonitor`` adds the returns and
-    lengths of episodes.
+    path, ``extra/tcp_pose`` or ``sensor_data/base_camera/rgb``.
 
     Attributes:
         vector: The Gymnasium vector behind it; ``vector.restart`` replaces workers that are gone.
@@ -64,6 +65,8 @@ class SB3Task(Remade, VecEnv):
         super().__init__(num_envs, observation, self.vector.single_action_space)
         self.metadata = self.vector.metadata
         self._actions: Any = None
+        self._returns = np.zeros(num_envs, np.float32)
+        self._made = time.time()
 
     def reset(self) -> VecEnvObs:
         """Begin new episodes, with what `seed` and `set_options` gave for this once.
@@ -86,6 +89,7 @@ class SB3Task(Remade, VecEnv):
                 rows = _rows(info, self.num_envs)
                 for i in np.flatnonzero(mask).tolist():
                     self.reset_infos[i] = rows[i]
+        self._returns[:] = 0.0
         self._reset_seeds()
         self._reset_options()
         return _flat(obs)
@@ -111,6 +115,7 @@ class SB3Task(Remade, VecEnv):
             WorkerError: If workers die, hang or fail.
         """
         obs, reward, terminated, truncated, info = self.vector.step(self._actions)
+        self._returns += reward
         done = terminated | truncated
         infos = _rows(info, self.num_envs)
         if done.any():
@@ -118,6 +123,12 @@ class SB3Task(Remade, VecEnv):
             for i in np.flatnonzero(done).tolist():
                 self.reset_infos[i], infos[i] = infos[i], final[i]
                 infos[i]["terminal_observation"] = _flat(info["final_obs"][i])
+                infos[i]["episode"] = {
+                    "r": float(self._returns[i]),
+                    "l": infos[i]["elapsed_steps"],
+                    "t": round(time.time() - self._made, 6),
+                }
+            self._returns[done] = 0.0
         for own, late in zip(infos, (truncated & ~terminated).tolist(), strict=True):
             own["TimeLimit.truncated"] = late
         return _flat(obs), reward, done, infos

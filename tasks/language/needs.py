@@ -18,8 +18,8 @@ class Needs:
     """What a robot must have to take a place; a robot that lacks it is refused at `tasks.make`.
 
     Attributes:
-        fingers: Whether it must have two links that grasp; without, `State.is_grasping` is false
-            for ever.
+        fingers: Whether it must have two links that grasp; without them, `State.is_grasping` is
+            never true.
         opening: How wide its gripper must open (m). That of jaws that swing is not known, and is
             not held against them.
         reach: How far its TCP must reach from its base axis (m).

@@ -1,4 +1,4 @@
-"""What data sets cost is measured on real ones, and a large one goes on where it was stopped."""
+"""What datasets cost is measured on real ones, and a large one goes on where it was stopped."""
 
 import json
 

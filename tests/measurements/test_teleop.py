@@ -22,7 +22,7 @@ def test_what_the_page_measures_is_what_is_said(tmp_path, capsys):
     seen = json.loads(out.read_text())
     assert len(seen["times"]) >= 14
     assert all(0 < time < 60_000 for time in seen["times"])
-    said = re.match(r"From .*: (\d+) ms \(median\), (\d+) ms \(95 %\), of (\d+)", seen["page"])
+    said = re.match(r"Time from .*: (\d+) ms \(median\), (\d+) ms \(95 %\), of (\d+)", seen["page"])
     assert said
     median, most, count = map(int, said.groups())
     assert count == len(seen["times"])

@@ -95,6 +95,16 @@ class TestNew:
         assert "test_two_arm_reach.py is there already, and is not overwritten" in said
         assert not (tmp_path / "two_arm_reach.py").exists()
 
+    def test_no_goal_of_a_task_is_reached_from_the_start(self, tmp_path, monkeypatch):
+        from tasks import make
+
+        monkeypatch.syspath_prepend(tmp_path)
+        words = ["new", "task", "FarReach", "--out", str(tmp_path), "--robots"]
+        assert main([*words, "left=panda", "right=so100"]) == 0
+        env = make("far_reach:FarReach-v1", num_envs=8)
+        for place in env.layout.places:
+            assert env.state.tcp_distance(place, f"goal_{place}").min() > 0.03
+
     @pytest.mark.long
     @pytest.mark.parametrize(
         "robots",

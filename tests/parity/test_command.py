@@ -163,7 +163,7 @@ def expect_equal_document(document: dict) -> None:
             ["--task", "PickCube-v1", "--reward-mode", "sparce"],
             "PickCube-v1 has no reward mode 'sparce'. Did you mean 'sparse'?",
         ),
-        (["--task", "PickCube-v1", "--actions", "nofile.h5"], "there is no file nofile.h5"),
+        (["--task", "PickCube-v1", "--actions", "no.h5"], "there is no file or folder no.h5"),
         (["--task", "PickCube-v1", "--demos", "nowhere"], "there is no folder nowhere"),
         (["--task", "PickCube-v1", "--json", "nowhere/a.json"], "there is no folder"),
         (["--all", "--actions", "a.npz"], "give one --task"),

@@ -198,7 +198,7 @@ def test_disagreement_is_told(capsys):
     ("words", "complaint"),
     [
         (["--task", "pik_cube"], "unknown task 'pik_cube'. Did you mean"),
-        (["--task", "pick_cube", "--demo", "nothing.h5"], "there is no file nothing.h5"),
+        (["--task", "pick_cube", "--demo", "nothing.h5"], "there is no file or folder nothing.h5"),
         (["--task", "pick_cube", "--episodes", "0"], "--episodes is 0; it must be 1 or more"),
     ],
 )

@@ -102,7 +102,7 @@ class TestCommand:
         printed = capsys.readouterr().out
         assert "panda: 9 joints, 8 action numbers" in printed
         assert "small: 3 joints, 3 action numbers" in printed
-        assert printed.count("It stands and moves as it is to.") == 2
+        assert printed.count("It stands and moves as it should.") == 2
         assert "arm.panda_joint7" in printed
         assert "0.1 rad per step" in printed
 

@@ -10,8 +10,15 @@ import numpy as np
 import pytest
 import torch
 
+import experts
+import layouts
+import motion
+import robots
+import rollouts
+import simulation
 import tasks
 from robots import ActionError, TaskError, UnknownNameError
+from tasks import maths, vocabulary
 
 TASK = "PickCube-v1"
 
@@ -135,9 +142,25 @@ def test_every_kind_of_float_is_one(env, dtype):
 def test_help_shows_what_there_is():
     text = pydoc.plain(pydoc.render_doc(tasks))
     for name in tasks.__all__:
-        assert name in dir(tasks)
-        assert f"class {name}" in text or f"{name}(" in text, name
+        assert f"{name} = " in text or f"class {name}" in text or f"{name}(" in text, name
     assert "A task by its id" in text
+
+
+ROOMS = (experts, layouts, motion, robots, rollouts, simulation, tasks)
+
+
+@pytest.mark.parametrize("room", ROOMS, ids=lambda room: room.__name__)
+def test_what_is_public_is_listed_and_can_be_imported(room):
+    taken = {}
+    exec(f"from {room.__name__} import *", taken)
+    assert taken.keys() - {"__builtins__"} == {*dir(room)} == {*room.__all__}
+
+
+def test_all_of_the_vocabulary_is_public():
+    assert {*vocabulary.__all__} <= {*tasks.__all__}
+    assert not {*maths.__all__} & {*tasks.__all__}  # `from tasks import *` hides no builtin
+    with pytest.raises(ImportError, match=r"no 'Cubiod'. Did you mean 'Cuboid'\? It has Area, .*"):
+        from tasks import Cubiod  # noqa: F401
 
 
 def test_listing_names_loads_no_torch():

@@ -19,4 +19,4 @@ def test_every_task_says_what_is_drawn_and_when_it_succeeds(task_id: str):
     cls = tasks.get_task_class(task_id)
     assert "Success:" in cls.__dict__["__doc__"]
     said = read_docstring(cls)
-    assert all((said.summary, said.randomisation, said.success))
+    assert all((said.summary, said.randomization, said.success))

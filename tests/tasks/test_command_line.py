@@ -92,7 +92,7 @@ def test_describe_takes_any_name_and_says_the_rest(capsys):
     printed = " ".join(run(capsys, "describe", "ManiSkill.pick_cube_native").split())
     for text in (
         "PickCube-v1: Grasp a cube from the table and hold it still at a goal in the air.",
-        "randomisation Cube and goal are drawn from a square of 0.2 m",
+        "randomization Cube and goal are drawn from a square of 0.2 m",
         "success the cube is within 2.5 cm of the goal and the arm is static.",
         "episode 50 steps, 20 per s",
         "reward modes normalized_dense (default), dense, sparse, none",
@@ -163,7 +163,7 @@ class TestVerdicts:
 def test_a_docstring_has_parts():
     said = read_docstring(Waiting)
     assert said.summary == "Wait for nothing."
-    assert said.randomisation == "A number is drawn.\nNothing else is."
+    assert said.randomization == "A number is drawn.\nNothing else is."
     assert said.success == "at once, within 1 s."
 
 

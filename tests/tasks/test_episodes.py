@@ -174,10 +174,25 @@ def test_velocities_of_an_old_state_are_refused():
         state.linear_velocity("cube")
 
 
+def test_the_state_is_that_of_now():
+    env = tasks.make("PickCube-v1", num_envs=2)
+    for _ in range(2):
+        env.reset(seed=3)
+        obs, _, _, _, info = env.step(actions(env, 1)[0])
+        judged = env.evaluate(env.state)
+        assert {name: info[name].tolist() for name in judged} == {
+            name: flags.tolist() for name, flags in judged.items()
+        }
+        place = obs[:, env.observation_slices["tcp_pose"]].numpy()
+        np.testing.assert_array_equal(env.state.tcp_pose("arm"), place)
+
+
 def test_a_closed_task_says_so():
     env = tasks.make("PickCube-v1")
     env.close()
     env.close()
+    with pytest.raises(SimulationError, match="is closed"):
+        _ = env.state
     with pytest.raises(SimulationError, match="is closed"):
         env.step(torch.zeros(1, 8))
     with pytest.raises(SimulationError, match="is closed"):

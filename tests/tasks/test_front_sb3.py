@@ -56,9 +56,13 @@ def actions():
 def play(env, actions):
     """Everything that an environment says while episodes end at different times."""
     env.seed(SEED)
-    said = [env.reset(), [*env.reset_infos]]
+    infos = env.unwrapped.reset_infos
+    said = [env.reset(), [*infos]]
     for action in actions:
-        said.append((*env.step(action), [*env.reset_infos]))
+        said.append((*env.step(action), [*infos]))
+        for info in said[-1][3]:
+            if "episode" in info:
+                assert info["episode"].pop("t") >= 0.0  # the clock's
     return said
 
 
@@ -69,7 +73,7 @@ def ends(said, env):
 
 def test_it_says_what_their_own_vector_says(actions):
     env = DummyVecEnv([lambda: gymnasium.make(f"RobotLayouts/{TASK}") for _ in range(NUM_ENVS)])
-    theirs, ours = play(env, actions), play(make(), actions)
+    theirs, ours = play(VecMonitor(env), actions), play(make(), actions)
     np.testing.assert_equal(ours, theirs)
     (step, *_) = ends(ours, SOLVED)
     assert step < 49
@@ -122,6 +126,15 @@ def test_success_in_the_last_step_is_no_lack_of_time(actions):
     _, _, done, infos = env.step(actions[0, :1] * 0)
     assert done.all()
     assert (infos[0]["is_success"], infos[0]["TimeLimit.truncated"]) == (True, False)
+
+
+@pytest.mark.parametrize("wrap", [lambda env: env, VecMonitor, VecNormalize])
+def test_a_training_run_knows_returns_and_lengths_of_episodes(wrap):
+    env = wrap(make(max_episode_steps=5))
+    model = PPO("MlpPolicy", env, n_steps=6, batch_size=18, n_epochs=1, device="cpu", seed=0)
+    model.learn(NUM_ENVS * 6)
+    assert [episode["l"] for episode in model.ep_info_buffer] == [5] * NUM_ENVS
+    assert all(0 < episode["r"] < 5 for episode in model.ep_info_buffer)
 
 
 def test_terminations_may_be_ignored(actions):
@@ -199,7 +212,7 @@ def test_a_training_run_does_not_depend_on_workers(spread, tmp_path):
 
 
 def trained(env):
-    model = PPO("MlpPolicy", VecMonitor(env), n_steps=52, batch_size=78, seed=3, device="cpu")
+    model = PPO("MlpPolicy", env, n_steps=52, batch_size=78, seed=3, device="cpu")
     return model.learn(2 * 52 * NUM_ENVS)
 
 
