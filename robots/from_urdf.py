@@ -11,7 +11,6 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import redirect_stdout
-from difflib import get_close_matches
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -153,10 +152,9 @@ def _described(name: str, form: str | None) -> Path:
     }
     known = [key for key, found in has.items() if found]
     if name not in known:
-        near = get_close_matches(name, known, n=8, cutoff=0.4)
-        hint = f"These are the closest of {len(known)}; `robot_descriptions list` has them all."
+        hint = "`robot_descriptions list` has all."
         what = " or ".join(f"{'an' if f == MJCF else 'a'} {f.upper()}" for f in forms)
-        raise UnknownNameError(f"robot of robot_descriptions with {what}", name, near, hint)
+        raise UnknownNameError(f"robot of robot_descriptions with {what}", name, known, hint)
     try:
         with redirect_stdout(sys.stderr):  # clones, or finds its clone, and talks about it
             module: Any = import_module(f"robot_descriptions.{name}")

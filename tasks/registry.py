@@ -82,10 +82,11 @@ TASKS = Catalogue(
         _native_name(target.partition(":")[0].removeprefix(CLONES)): task_id
         for task_id, target in CATALOGUE.items()
         if target.startswith(CLONES)
-    },
+    }
+    | {"pick_cube_native": "PickCube-v1"},  # as RoboVerse has it, too
     ignore_case=True,
-    hint="A task of your own goes by 'module:Id', as in 'mylab.tray:TwoArmTray-v1', and is"
-    " registered there by @register_task('Id').",
+    hint="`robot-layouts tasks list` has all. A task of your own goes by 'module:Id', as in"
+    " 'mylab.tray:TwoArmTray-v1', and is registered there by @register_task('Id').",
 )
 
 

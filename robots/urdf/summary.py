@@ -71,6 +71,16 @@ def read_written(path: Path) -> bytes:
     return contents
 
 
+def is_template_file(path: Path) -> bool:
+    """Tell whether `read_urdf` has to expand a file: a xacro template, with or without arguments.
+
+    Raises:
+        AssetError: If it cannot be read, or is no XML.
+    """
+    file, arguments = template_of(path)
+    return bool(arguments) or is_template(_read(file), str(file))
+
+
 def _read(path: Path) -> bytes:
     try:
         return read_regular(path, MAX_URDF_BYTES)

@@ -61,7 +61,8 @@ def layout_again(
             raise
         except RobotLayoutsError as error:
             raise TrajectoryError(
-                f"{source} has a robot at {place!r} that cannot be had here: {error}"
+                f"{source} has a robot at {place!r} that cannot be had here: {error} Name it, with"
+                f" --robots {place}=… or robots={{{place!r}: …}}."
             ) from error
     try:
         return Layout(placements)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
 
-from robots import TaskError, closest_match
-from robots.common.catalogue import reason
+from robots import TaskError
+from robots.common.importing import imported
 
 EXPERT = "expert"
 
@@ -27,19 +26,7 @@ def find_policy(name: str, what: str = "policy") -> Any:
     if not module or not attribute:
         word = f", or the word {EXPERT!r}" if what == "policy" else ""
         raise TaskError(f"{what} is {name!r}; it must be MODULE:NAME, something callable{word}")
-    try:
-        found: Any = import_module(module)
-    except (Exception, SystemExit) as error:  # whatever the user's own code does
-        raise TaskError(f"no {what} {name!r}: {reason(error)}") from error
-    for part in attribute.split("."):
-        if not hasattr(found, part):
-            match = closest_match(part, dir(found))
-            hint = f". Did you mean {match!r}?" if match else ""
-            raise TaskError(
-                f"no {what} {name!r}: module {module!r} has no attribute {attribute!r}{hint}"
-            )
-        found = getattr(found, part)
-    return check_policy(found, what)
+    return check_policy(imported(name, what, TaskError), what)
 
 
 def check_policy(policy: Any, what: str = "policy") -> Any:

@@ -88,6 +88,11 @@ def expand(template: Path, arguments: Mapping[str, str]) -> bytes:
     return xml
 
 
+def was_expanded(template: Path, arguments: Mapping[str, str]) -> bool:
+    """Tell whether this process has expanded a template with these arguments before."""
+    return (str(template), urlencode(arguments)) in _expanded
+
+
 def _expand(template: Path, arguments: Mapping[str, str]) -> tuple[list[str], bytes]:
     xacro = _package(template)
     printed = io.StringIO()
