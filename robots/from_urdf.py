@@ -133,6 +133,7 @@ def _argument(text: str) -> tuple[str, str]:
 def _find(path_or_name: str | os.PathLike[str], form: str | None) -> Path:
     """Return the path, or what robot_descriptions has of that name."""
     path = absolute(path_or_name, f"the path of the {(form or URDF).upper()}")
+    path = Path(os.path.normpath(path))
     is_name = isinstance(path_or_name, str) and path_or_name.isidentifier()
     if os.path.exists(template_of(path)[0]) or not is_name:
         return path

@@ -89,7 +89,7 @@ def test_a_saved_layout_loads_again_from_wherever_it_lies(folder, where, monkeyp
     layout = Layout(
         {
             "left": Placement("toy_robots:TINY"),
-            "right": Placement("robot.urdf", position=(1, 0, 0)),
+            "right": Placement("cells/../robot.urdf", position=(1, 0, 0)),
             "there": Placement("panda", position=(2, 0, 0)),
         }
     )
