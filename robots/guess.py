@@ -38,9 +38,10 @@ from robots.guessing.semantics import known_anatomy, known_tip
 from robots.guessing.stance import Stance
 from robots.guessing.tool import BETWEEN, EXACT, Tool, find_tool
 from robots.parts import Limb as LimbDescription
+from robots.urdf.cleaning.xacro_files import expand, template_of
 from robots.urdf.model import UrdfModel
 from robots.urdf.reading import read_model
-from robots.urdf.summary import parse_urdf, read_cleaned
+from robots.urdf.summary import is_template_file, parse_urdf, read_cleaned
 
 LinkPairs = tuple[tuple[str, str], ...]
 
@@ -147,7 +148,16 @@ def guess(
     hands_too = (*_about_hands(parts), grasping) if parts.grippers else ()
     drives = parts.drives.reasons()
     known = () if hints.limbs else hints.reasons
-    about = (*known, *parts.anatomy.reasons, *tools, *hands_too, *drives, *_out_of_limits(parts))
+    template = expand(*template_of(path)).reasons() if is_template_file(path) else ()
+    about = (
+        *template,
+        *known,
+        *parts.anatomy.reasons,
+        *tools,
+        *hands_too,
+        *drives,
+        *_out_of_limits(parts),
+    )
     about = (*about, *posture.reasons, measured)
     given = tuple(f"{field}: given, not guessed" for field in overrides)
     return Guess(

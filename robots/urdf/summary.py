@@ -67,7 +67,7 @@ def read_written(path: Path) -> bytes:
     file, arguments = template_of(path)
     contents = _read(file)
     if arguments or is_template(contents, str(file)):
-        contents = expand(file, arguments)
+        contents = expand(file, arguments).xml
     return contents
 
 
