@@ -131,7 +131,7 @@ def _alike(name: str, folder: str) -> list[str]:
 
 
 def _packages(name: str, folder: str) -> Iterator[str]:
-    """Yield the folders whose package.xml has a name: around a folder, in it and its package, beside.
+    """Yield the folders whose package.xml has a name: around a folder, in it and near its package.
 
     The package is the nearest folder around with a package.xml; where there is none, the folder.
     """

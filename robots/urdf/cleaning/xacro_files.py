@@ -157,8 +157,8 @@ class _Lost:
             return ""
         there = "is" if "," not in named else "are"
         return (
-            f"; the package {named} {there} not there: put it beside {template.name} or its package,"
-            " in a folder of that name or with its package.xml"
+            f"; the package {named} {there} not there: put it beside {template.name} or beside its"
+            " package, in a folder of that name or with its package.xml"
         )
 
 
