@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 from robots.assets.locator import LocalUrdf
-from robots.common.errors import AssetError, DescriptorError
+from robots.common.errors import AssetError, DescriptorError, closest_match
 from robots.common.importing import imported
 from robots.common.paths import absolute
 from robots.descriptor import RobotDescriptor
@@ -52,6 +53,7 @@ def named_robot(word: str | os.PathLike[str]) -> RobotDescriptor:
         MissingPackageError: If it is an MJCF, and MuJoCo is not installed.
     """
     if is_path(word):
+        _expect_file(absolute(word, "the path of a robot"))
         return RobotDescriptor.from_urdf(word, quiet=True)
     if isinstance(word, str) and ":" in word:
         return _of_module(word)
@@ -111,6 +113,18 @@ def written_robot(robot: RobotDescriptor, folder: Path) -> str | None:
         return None
     word = Path(os.path.relpath(path, folder.absolute())).as_posix()
     return word if is_path(word) else f"./{word}"
+
+
+def _expect_file(path: Path) -> None:
+    """Refuse the path of a file that is not there, and name the one that it is most like."""
+    from robots.urdf.cleaning.xacro_files import template_of
+
+    file = template_of(path)[0]
+    if not os.path.lexists(file):
+        with suppress(OSError, ValueError):  # the folder is not there, either
+            if match := closest_match(file.name, os.listdir(file.parent)):
+                raise AssetError(f"there is no file {file}. Did you mean {match!r}?")
+        raise AssetError(f"there is no file {file}. A robot goes by {FORMS}.")
 
 
 def _of_module(word: str) -> RobotDescriptor:

@@ -52,8 +52,10 @@ def test_errors_name_the_forms_and_the_closest_match(folder):
         named_robot("toy_robots:tiny")
     with pytest.raises(DescriptorError, match="toy_robots:URDF gave .*; a RobotDescriptor is need"):
         named_robot("toy_robots:URDF")
-    with pytest.raises(AssetError, match=r"cannot read the URDF .*none\.urdf"):
-        named_robot("none.urdf")
+    with pytest.raises(AssetError, match=r"no file .*robt\.urdf. Did you mean 'robot.urdf'"):
+        named_robot("robt.urdf")
+    with pytest.raises(AssetError, match=r"there is no file /none/x\.xml. A robot goes by a name"):
+        named_robot("/none/x.xml")
 
 
 def test_a_file_runs_no_code(folder, capsys):
