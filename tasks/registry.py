@@ -213,8 +213,8 @@ def make(
         task_id: Its id or another of its names.
         num_envs: Number of environments in this process.
         robots: Other robots for some places: a mapping place → robot, or one robot for a task
-            with one place; by name, descriptor, or the path of a URDF to guess it from. One that
-            lacks its place's keyframe starts from its home's.
+            with one place; by name, descriptor, the path of a URDF or MJCF to guess it from, or
+            ``MODULE:NAME``. One that lacks its place's keyframe starts from its home's.
         layout: Another layout with the task's places, in any order; for a task over any number of
             robots, with places of any names. ``bystanders="hold"`` or ``"act"`` lets more robots
             stand there.
