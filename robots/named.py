@@ -11,6 +11,7 @@ from robots.assets.locator import LocalUrdf
 from robots.common.errors import AssetError, DescriptorError, closest_match
 from robots.common.importing import imported
 from robots.common.paths import absolute
+from robots.common.quoting import shown
 from robots.descriptor import RobotDescriptor
 from robots.mjcf.locator import ENDINGS, LocalMjcf, is_mjcf
 from robots.registry import ROBOTS, RobotRegistry, checked_robot
@@ -84,6 +85,7 @@ def robot_in_file(word: str, place: str, folder: Path) -> RobotDescriptor:
     if is_path(word, folder):
         path = absolute(word if word.startswith("~") else folder / word, f"the robot of {place!r}")
         path = Path(os.path.normpath(path))
+        _expect_file(path)
         if not is_mjcf(path) and is_template_file(path) and not was_expanded(*template_of(path)):
             raise _unnamed(word, place, "a xacro template", f"guess {word} from Python")
         return named_robot(path)
@@ -121,10 +123,12 @@ def _expect_file(path: Path) -> None:
 
     file = template_of(path)[0]
     if not os.path.lexists(file):
+        beside: list[str] = []
         with suppress(OSError, ValueError):  # the folder is not there, either
-            if match := closest_match(file.name, os.listdir(file.parent)):
-                raise AssetError(f"there is no file {file}. Did you mean {match!r}?")
-        raise AssetError(f"there is no file {file}. A robot goes by {FORMS}.")
+            beside = os.listdir(file.parent)
+        match = closest_match(file.name, beside)
+        hint = f"Did you mean {match!r}?" if match else f"A robot goes by {FORMS}."
+        raise AssetError(f"there is no file {shown(str(file))}. {hint}")
 
 
 def _of_module(word: str) -> RobotDescriptor:

@@ -52,9 +52,9 @@ def test_errors_name_the_forms_and_the_closest_match(folder):
         named_robot("toy_robots:tiny")
     with pytest.raises(DescriptorError, match="toy_robots:URDF gave .*; a RobotDescriptor is need"):
         named_robot("toy_robots:URDF")
-    with pytest.raises(AssetError, match=r"no file .*robt\.urdf. Did you mean 'robot.urdf'"):
+    with pytest.raises(AssetError, match=r"no file .*robt\.urdf'. Did you mean 'robot.urdf'"):
         named_robot("robt.urdf")
-    with pytest.raises(AssetError, match=r"there is no file /none/x\.xml. A robot goes by a name"):
+    with pytest.raises(AssetError, match=r"there is no file '/none/x\.xml'. A robot goes by a n"):
         named_robot("/none/x.xml")
 
 
