@@ -16,9 +16,10 @@ from layouts.presets import FACING, PRESETS
 from layouts.search_command import add_search_options
 from layouts.validate_command import add_check_options
 from layouts.view_command import add_view_options
-from robots import LayoutError, RobotRegistry, UnknownNameError
+from robots import LayoutError, UnknownNameError
 from robots.common.bounds import shown
 from robots.common.commands import FAILED, exit_code, program, start
+from robots.named import FORMS, named_robot
 
 # What presets take besides the robots.
 OPTIONS = ("spacing", "radius", "facing", "columns", "edges", "table", "inset", "keyframe")
@@ -50,7 +51,7 @@ def add_layout_words(parser: argparse.ArgumentParser) -> None:
         "robots",
         nargs="*",
         metavar="NAME=ROBOT",
-        help=f"for a preset, in action order; robots: {', '.join(RobotRegistry.names())}",
+        help=f"of a preset, in action order; of others, robots for some places; ROBOT: {FORMS}",
     )
     for name, help_text in (
         ("--spacing", "between neighbouring bases (m)"),
@@ -87,11 +88,10 @@ def chosen_layout(options: argparse.Namespace) -> Layout:
         raise UnknownNameError(
             "layout preset", options.what, [*PRESETS, *TASKS], "Or give a file ending in .yaml."
         )
-    if options.robots or given:
-        raise LayoutError(
-            f"{options.what} says it all; it takes no {' '.join([*options.robots, *given])}"
-        )
-    return read(options.what)
+    if given:
+        raise LayoutError(f"{options.what} says where robots stand; it takes no {' '.join(given)}")
+    robots = {name: named_robot(word) for name, word in named_robots(options.robots).items()}
+    return read(options.what).replace_robots(**robots)  # which may be those that it cannot name
 
 
 def build(preset: str, robots: Sequence[str], **options: Any) -> Layout:

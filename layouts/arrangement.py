@@ -302,7 +302,7 @@ class Arrangement(Mapping[str, Placement]):
         """Return the layout with other robots in some places, facing the same way.
 
         Args:
-            robots: Robot (name or descriptor) by place name.
+            robots: Robot by place name, as a `Placement` takes it.
 
         Raises:
             UnknownNameError: If a place, a robot or the place's keyframe does not exist.

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from layouts.arrangement import Arrangement
 from layouts.description import describe
 from robots.common.writing import write_whole
+from robots.named import written_robot
 
 if TYPE_CHECKING:
     from layouts.validation import Report
@@ -32,43 +33,57 @@ class Layout(Arrangement):
 
         return layout_html(self)
 
-    def to_yaml(self) -> str:
-        """Return the layout as YAML text, as it was declared; robots by their registered names.
+    def to_yaml(self, folder: str | PathLike[str] = "") -> str:
+        """Return the layout as YAML text, as it was declared.
 
-        `from_yaml` turns the text into an equal layout.
+        Robots stand there by their registered names; those of ``MODULE:NAME`` by that, and those
+        that were guessed from a URDF or MJCF by its path. `from_yaml` turns the text into an equal
+        layout.
+
+        Args:
+            folder: What paths are relative to; the present folder unless it is given.
 
         Raises:
-            LayoutError: If a robot is not registered, or not as it is here.
+            LayoutError: If a robot goes by none of these, or not as it is here.
         """
         from layouts.yaml_format import to_yaml
 
-        return to_yaml(self)
+        return to_yaml(self, lambda robot: written_robot(robot, Path(folder)))
 
     @classmethod
-    def from_yaml(cls, text: str) -> Layout:
+    def from_yaml(cls, text: str, folder: str | PathLike[str] = "") -> Layout:
         """Return the layout that a YAML text describes.
+
+        No code runs that the text chooses: a robot ``MODULE:NAME`` is taken if the module is
+        imported already, and a xacro template if it was expanded before.
+
+        Args:
+            text: The text.
+            folder: What paths of robots are relative to; the present folder unless it is given.
 
         Raises:
             LayoutError: If it describes none; the message names the line.
         """
         from layouts.yaml_format import from_yaml
 
-        return cls._of(from_yaml(text))
+        return cls._of(from_yaml(text, folder=folder))
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the layout to a YAML file, whole or not at all, and return its path.
 
+        Paths of robots are relative to the file's folder; see `to_yaml`.
+
         Raises:
-            LayoutError: If a robot is not registered, or not as it is here.
+            LayoutError: If a robot goes by nothing that a file can hold, or not as it is here.
             UnwritableFileError: If it cannot be written (also an ``OSError``).
         """
-        text = self.to_yaml()
+        text = self.to_yaml(Path(path).parent)
         write_whole(path, text)
         return Path(path)
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Layout:
-        """Return the layout in a YAML file.
+        """Return the layout in a YAML file; see `from_yaml`.
 
         Raises:
             LayoutError: If the file cannot be read or describes no layout; the message names the

@@ -28,7 +28,8 @@ class Placement:
     What is left out is the robot's own `robots.Home`, so that another robot can take the place.
 
     Attributes:
-        robot: Its descriptor; a registry name is accepted and looked up.
+        robot: Its descriptor; a registry name, the path of a URDF or MJCF, or ``MODULE:NAME`` is
+            accepted and looked up.
         position: Base position (m) in the world or in what it hangs on. None is the robot's home
             in the world, and the origin of what it hangs on.
         quaternion: Base orientation there, wxyz, unit length, or None for home.
@@ -189,12 +190,13 @@ def faced(robot: RobotDescriptor, turn: Quaternion) -> Quaternion:
 
 
 def load_robot(robot: RobotLike) -> RobotDescriptor:
-    """Return a descriptor as it is, look a name up, or guess the robot of a URDF by its path.
+    """Return a descriptor as it is, or the robot of a word; see `robots.named.named_robot`.
 
     Raises:
         LayoutError: If it is none of these.
         UnknownNameError: If no robot has that name.
-        AssetError: If it is the path of no usable URDF.
+        AssetError: If it is the path of no usable URDF or MJCF.
+        DescriptorError: If it is ``MODULE:NAME``, and there is no such robot.
     """
     if isinstance(robot, RobotDescriptor):
         return robot

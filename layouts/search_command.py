@@ -9,7 +9,8 @@ from typing import Any
 from layouts.frames import Frame, ceiling, table
 from layouts.placing import ReachedBy, search
 from layouts.validate_command import add_target_option, read_targets
-from robots import LayoutError, RobotRegistry
+from robots import LayoutError
+from robots.named import FORMS
 
 
 def add_search_options(
@@ -26,7 +27,7 @@ def add_search_options(
         "robots",
         nargs="+",
         metavar="NAME=ROBOT",
-        help=f"in action order; robots: {', '.join(RobotRegistry.names())}",
+        help=f"in action order; ROBOT: {FORMS}",
     )
     add_target_option(parser)
     add(

@@ -13,6 +13,7 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, replace
 from os import PathLike
+from pathlib import Path
 from typing import Any, NoReturn
 
 import yaml
@@ -29,10 +30,12 @@ from robots import (
     UnreadableFileError,
 )
 from robots.common.files import read_text
+from robots.named import FORMS, robot_in_file
 
 VERSION = 1
 MAX_LENGTH = 1 << 20  # bytes of a file, characters of a text; 20,000 robots fit
 MAX_WORD = 200  # characters
+MAX_PATH = 4096  # characters of a robot's path
 UNITS = "# positions in m; quaternion: w, x, y, z; rpy and qpos_noise in rad"
 
 # Keys in the order in which they are written. Left-out keys keep the value of the declaration.
@@ -46,11 +49,15 @@ RESERVED = ("true", "false", "yes", "no", "on", "off", "y", "n", "null")  # YAML
 TAGS = tuple(f"tag:yaml.org,2002:{kind}" for kind in ("str", "seq", "map"))
 
 
-def to_yaml(layout: Arrangement) -> str:
+def to_yaml(layout: Arrangement, word: Callable[[RobotDescriptor], str | None]) -> str:
     """Return a layout as YAML text that `from_yaml` turns into an equal layout.
 
+    Args:
+        layout: The layout.
+        word: Returns what a robot goes by; see `robots.named.written_robot`.
+
     Raises:
-        LayoutError: If a robot is not registered, or not as it is here.
+        LayoutError: If a robot goes by nothing.
     """
     lines = [UNITS, f"version: {VERSION}"]
     if layout.frames:
@@ -59,17 +66,20 @@ def to_yaml(layout: Arrangement) -> str:
             lines += _entry(name, _values(frame, FRAME_KEYS))
     lines.append("robots:")
     for name, placement in layout.items():
-        robot = _registered_name(name, placement.robot)
+        robot = word(placement.robot) or _refuse(name, placement.robot)
         lines += _entry(name, {"robot": robot, **_values(placement, ROBOT_KEYS[1:])})
     return "\n".join(lines) + "\n"
 
 
-def from_yaml(text: str, source: str = "") -> Arrangement:
+def from_yaml(
+    text: str, source: str = "", folder: str | PathLike[str] | None = None
+) -> Arrangement:
     """Return the layout that a YAML text describes.
 
     Args:
         text: The text.
         source: Where it comes from, for errors, such as a file's name.
+        folder: What paths of robots are relative to; None is the present folder.
 
     Raises:
         LayoutError: If it describes none; the message names the line.
@@ -80,7 +90,7 @@ def from_yaml(text: str, source: str = "") -> Arrangement:
         )
     if len(text) > MAX_LENGTH:
         raise LayoutError(f"a layout's YAML has {len(text):,} characters; {MAX_LENGTH:,} is most")
-    return _Reader(source).layout(text)
+    return _Reader(source, Path(folder or "")).layout(text)
 
 
 def read_layout(path: str | PathLike[str]) -> Arrangement:
@@ -89,7 +99,7 @@ def read_layout(path: str | PathLike[str]) -> Arrangement:
         text = read_text(path, MAX_LENGTH)
     except UnreadableFileError as error:
         raise LayoutError(f"cannot read the layout {str(path)!r}: {error.strerror}") from error
-    return from_yaml(text, str(path))
+    return from_yaml(text, str(path), Path(path).parent)
 
 
 class _Loader(yaml.SafeLoader):
@@ -101,8 +111,8 @@ class _Loader(yaml.SafeLoader):
 class _Reader:
     """Reads one text, and names its lines in errors."""
 
-    def __init__(self, source: str) -> None:
-        self.source = source
+    def __init__(self, source: str, folder: Path) -> None:
+        self.source, self.folder = source, folder
 
     def layout(self, text: str) -> Arrangement:
         root = self._compose(text)
@@ -168,11 +178,11 @@ class _Reader:
     def _placement(self, name: str, node: Any) -> Placement:
         entries = self._mapping(node, f"robot {name!r}", ROBOT_KEYS)
         if "robot" not in entries:
-            self._fail(node, f"{name!r} needs 'robot': the name of a registered robot")
+            self._fail(node, f"{name!r} needs 'robot': {FORMS}")
         robot = entries.pop("robot")[1]
-        robot_name = self._word(robot, "robot")
+        word = self._word(robot, "robot", MAX_PATH)
         with self._at(robot):
-            placement = Placement(RobotRegistry.load(robot_name))
+            placement = Placement(robot_in_file(word, name, self.folder))
         return self._filled(placement, entries)
 
     def _filled(self, declared: Any, entries: Mapping[str, tuple[Any, Any]]) -> Any:
@@ -227,20 +237,20 @@ class _Reader:
             self._fail(node, f"{what} has {text}, which is too large; a finite number is needed")
         return float(text)
 
-    def _word(self, node: Any, what: str) -> str:
-        text = self._scalar(node, what)
+    def _word(self, node: Any, what: str, most: int = MAX_WORD) -> str:
+        text = self._scalar(node, what, most)
         if node.style is None and (
             not text or NUMBER.fullmatch(text) or text.lower() in ("null", "~", "true", "false")
         ):
             self._fail(node, f"{what} is {text or 'empty'}; a name is needed (or leave it out)")
         return text
 
-    def _scalar(self, node: Any, what: str) -> str:
+    def _scalar(self, node: Any, what: str, most: int = MAX_WORD) -> str:
         self._expect_no_tag(node)
         if not isinstance(node, yaml.ScalarNode):
             self._fail(node, f"{what} is {_kind(node)}; a single word or number is needed")
-        if len(node.value) > MAX_WORD:
-            self._fail(node, f"{what} has {len(node.value):,} characters; {MAX_WORD} is most")
+        if len(node.value) > most:
+            self._fail(node, f"{what} has {len(node.value):,} characters; {most:,} is most")
         return node.value
 
     def _expect_no_tag(self, node: Any) -> None:
@@ -273,22 +283,20 @@ def _kind(node: Any) -> str:
     return repr(node.value[:MAX_WORD]) if node.value else "empty"
 
 
-def _registered_name(place: str, robot: RobotDescriptor) -> str:
-    """Return a descriptor's name if the registry would give the same descriptor back."""
-    how = "YAML holds robots by their registered names"
-    try:
-        registered = RobotRegistry.load(robot.name)
-    except UnknownNameError:
+def _refuse(place: str, robot: RobotDescriptor) -> NoReturn:
+    """Say what a robot lacks that no word brings back."""
+    how = f"YAML holds robots by {FORMS}"
+    if robot.name not in RobotRegistry.names():
         raise LayoutError(
-            f"the robot {robot.name!r} of {place!r} is not registered; {how}: call"
+            f"the robot {robot.name!r} of {place!r} is not registered, nor what is guessed from"
+            f" its file; {how}: give the layout MODULE:NAME, or call"
             " RobotRegistry.register(descriptor) here and where the text is read"
-        ) from None
-    if registered != robot:
-        raise LayoutError(
-            f"the robot of {place!r} differs from the registered {robot.name!r}; {how}: register it"
-            " under a name of its own, made with dataclasses.replace(descriptor, name=...)"
         )
-    return robot.name
+    raise LayoutError(
+        f"the robot of {place!r} differs from the registered {robot.name!r}; {how}: give the layout"
+        " MODULE:NAME, or register it under a name of its own, made with"
+        " dataclasses.replace(descriptor, name=...)"
+    )
 
 
 def _values(declared: Any, keys: Sequence[str]) -> dict[str, Any]:

@@ -53,7 +53,7 @@ def save_motion(motion: Moving, path: str | PathLike[str]) -> Path:
         "format": FORMAT,
         "version": VERSION,
         "units": UNITS,
-        "layout": motion.layout.to_yaml(),
+        "layout": motion.layout.to_yaml(target.parent),
         "joints": {name: list(p.robot.joints) for name, p in motion.layout.items()},
         "times": motion.times.tolist(),
         "positions": _lists(motion.positions),
@@ -80,16 +80,16 @@ def load_motion(path: str | PathLike[str], make: Callable[..., _T]) -> _T:
         make: Makes a motion of its fields.
     """
     try:
-        return make(**_fields(read_json(path, MAX_BYTES)))
+        return make(**_fields(read_json(path, MAX_BYTES), Path(path).parent))
     except UnreadableFileError as error:
         raise MotionError(str(error)) from error
     except RobotLayoutsError as error:
         raise MotionError(f"{Path(path)}: {error}") from error
 
 
-def _fields(document: Any) -> dict[str, Any]:
+def _fields(document: Any, folder: Path) -> dict[str, Any]:
     _expect_document(document)
-    layout = Layout.from_yaml(_text("layout", document["layout"]))
+    layout = Layout.from_yaml(_text("layout", document["layout"]), folder)
     _expect_joints(layout, _mapping("joints", document["joints"]))
     by_robot = ("positions", "velocities", "largest_velocities", "largest_accelerations")
     table = document["table"]

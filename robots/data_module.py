@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from os import PathLike, fspath
+from pathlib import Path
 from typing import Any
 
 from robots.action_split import ActionSplit, names
@@ -16,23 +17,30 @@ WIDTH = 100
 _HOMES = {
     "LocalMjcf": "robots.mjcf.locator",
     "LocalUrdf": "robots.assets.locator",
+    "Path": "pathlib",
+    "RobotRegistry": "robots",
     "UrdfLocator": "robots.assets.locator",
 }
 
 
-def write_module(robot: RobotDescriptor, reasons: Sequence[str] = ()) -> str:
+def write_module(
+    robot: RobotDescriptor, reasons: Sequence[str] = (), also: Iterable[str] = ()
+) -> str:
     """Return Python source that declares a descriptor; running it gives an equal one.
 
     Args:
-        robot: The descriptor.
+        robot: The descriptor. A relative `Path` in it is one from the module's folder.
         reasons: Remarks to leave above it, one sentence each.
+        also: Further names of this library to import.
     """
-    used: set[str] = set()
+    used = set(also)
     body = _write(robot, used, 0, len(robot.name) + 3)
     imports = "\n".join(
         _import(module, sorted({name for name in used if _home(name) == module}))
-        for module in sorted({_home(name) for name in used})
+        for module in sorted({_home(name) for name in used} - {"pathlib"})
     )
+    if "Path" in used:
+        imports = f"from pathlib import Path\n\n{imports}"
     title = f'"""{robot.name}: {robot.summary}."""'
     remarks = [
         textwrap.fill(reason, WIDTH, initial_indent="# ", subsequent_indent="#   ")
@@ -92,6 +100,9 @@ def _parts(value: Any, used: set[str]) -> tuple[str, list[tuple[str, Any]], str]
         return "(", [("", part) for part in value], ")"
     if isinstance(value, str):
         return _quote(value), [], ""
+    if isinstance(value, Path) and not value.is_absolute():
+        used.add("Path")
+        return f"Path(__file__).parent / {_quote(value.as_posix())}", [], ""
     if isinstance(value, PathLike):
         return _quote(fspath(value)), [], ""
     return repr(value), [], ""

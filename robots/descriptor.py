@@ -200,8 +200,8 @@ class RobotDescriptor:
         """Return the robot with another gripper in the place of its own, if it has one.
 
         Args:
-            gripper: A descriptor, a registered name or a URDF: a gripper, or an arm whose gripper
-                is taken.
+            gripper: A descriptor, a registered name, the path of a URDF or MJCF, or ``MODULE:NAME``
+                of a gripper, or of an arm whose gripper is taken.
             **details: ``link``, ``position``, ``quaternion`` and ``name``; see
                 `robots.grafting.with_gripper`, also for the errors.
         """

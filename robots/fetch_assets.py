@@ -19,6 +19,7 @@ from robots.common.commands import exit_code, print_error, printable, program, s
 from robots.common.errors import RobotLayoutsError
 from robots.common.paths import absolute
 from robots.descriptor import RobotDescriptor
+from robots.named import FORMS, named_robot
 from robots.registry import RobotRegistry
 
 SOURCES = ("local", "hf", *(package.name for package in INDEX_PACKAGES), "wheel")
@@ -42,7 +43,7 @@ def _fetch(options: argparse.Namespace) -> int:
     pictures = not options.physics_only
     failures: list[RobotLayoutsError] = []
     if options.robots:
-        robots = [RobotRegistry.load(name) for name in options.robots]
+        robots = [named_robot(name) for name in options.robots]
     else:
         robots, failures = RobotRegistry.load_all()
     needs = {robot.name: robot_files(robot, pictures=pictures) for robot in robots}
@@ -92,7 +93,7 @@ def describe_file(file: AssetFile, store: AssetStore) -> str:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog=program("robots.fetch_assets"), description=__doc__)
     add = parser.add_argument
-    which = "robots to fetch; if none is named, all, or all that --source has"
+    which = f"robots to fetch; if none is named, all, or all that --source has; ROBOT: {FORMS}"
     add("robots", nargs="*", metavar="ROBOT", help=which)
     add("--check", action="store_true", help="fetch nothing, only list what is missing or wrong")
     add("--offline", action="store_true", help="never use the network")

@@ -11,7 +11,6 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import redirect_stdout
-from difflib import get_close_matches
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -134,6 +133,7 @@ def _argument(text: str) -> tuple[str, str]:
 def _find(path_or_name: str | os.PathLike[str], form: str | None) -> Path:
     """Return the path, or what robot_descriptions has of that name."""
     path = absolute(path_or_name, f"the path of the {(form or URDF).upper()}")
+    path = Path(os.path.normpath(path))
     is_name = isinstance(path_or_name, str) and path_or_name.isidentifier()
     if os.path.exists(template_of(path)[0]) or not is_name:
         return path
@@ -153,10 +153,9 @@ def _described(name: str, form: str | None) -> Path:
     }
     known = [key for key, found in has.items() if found]
     if name not in known:
-        near = get_close_matches(name, known, n=8, cutoff=0.4)
-        hint = f"These are the closest of {len(known)}; `robot_descriptions list` has them all."
+        hint = "`robot_descriptions list` has all."
         what = " or ".join(f"{'an' if f == MJCF else 'a'} {f.upper()}" for f in forms)
-        raise UnknownNameError(f"robot of robot_descriptions with {what}", name, near, hint)
+        raise UnknownNameError(f"robot of robot_descriptions with {what}", name, known, hint)
     try:
         with redirect_stdout(sys.stderr):  # clones, or finds its clone, and talks about it
             module: Any = import_module(f"robot_descriptions.{name}")

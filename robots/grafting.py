@@ -43,7 +43,7 @@ from robots.urdf.tcp import find_tcp
 from robots.urdf.tree import kinematic_tree
 
 RobotLike = RobotDescriptor | str | os.PathLike[str]
-"""A descriptor, the name of a registered robot, or the path of a URDF."""
+"""A descriptor, or what `robots.named.named_robot` takes: a name, a path or ``MODULE:NAME``."""
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,15 @@ from robots.bodies.allowed import joined_pairs, rigid_pairs
 from robots.bodies.hulls import Hull, counted_pairs, read_hulls
 from robots.bodies.overlaps import guess_allowed, overlapping
 from robots.common.errors import DescriptorError
-from robots.descriptor import ActionSplit, Fingers, JointGroup, RobotDescriptor, UrdfSource
+from robots.common.fields import settle
+from robots.descriptor import (
+    ActionSplit,
+    Fingers,
+    JointGroup,
+    RobotDescriptor,
+    UrdfSource,
+    Vector3,
+)
 from robots.guessing import words
 from robots.guessing.anatomy import Anatomy, Limb, find_anatomy
 from robots.guessing.drives import Drives
@@ -30,14 +38,20 @@ from robots.guessing.semantics import known_anatomy, known_tip
 from robots.guessing.stance import Stance
 from robots.guessing.tool import BETWEEN, EXACT, Tool, find_tool
 from robots.parts import Limb as LimbDescription
+from robots.urdf.cleaning.xacro_files import expand, template_of
 from robots.urdf.model import UrdfModel
 from robots.urdf.reading import read_model
-from robots.urdf.summary import parse_urdf, read_cleaned
+from robots.urdf.summary import is_template_file, parse_urdf, read_cleaned
 
 LinkPairs = tuple[tuple[str, str], ...]
 
 LISTED = 6  # pairs of links that a reason names
 BEYOND = 1e-2  # rad, m; how far beyond its limits a joint of a known posture may be
+TCP = {  # what may be given of a tool centre point, in a `Tool`
+    "tcp_link": ("link", str),
+    "tcp_position_links": ("links", tuple[str, ...]),
+    "tcp_offset": ("offset", Vector3),
+}
 HOMES = ("home", "rest", "ready", "neutral", "initial", "init", "start", "default")  # best first
 
 
@@ -103,7 +117,7 @@ def guess(
     """
     path = source.locate()
     cleaned = read_cleaned(path)
-    parts = _look_at(path, cleaned.xml, hints)
+    parts = _look_at(path, cleaned.xml, hints, overrides)
     main = parts.anatomy.limbs[0]
     split = _action_split(parts)
     allowed, overlaps = _may_overlap(parts, path)
@@ -134,7 +148,16 @@ def guess(
     hands_too = (*_about_hands(parts), grasping) if parts.grippers else ()
     drives = parts.drives.reasons()
     known = () if hints.limbs else hints.reasons
-    about = (*known, *parts.anatomy.reasons, *tools, *hands_too, *drives, *_out_of_limits(parts))
+    template = expand(*template_of(path)).reasons() if is_template_file(path) else ()
+    about = (
+        *template,
+        *known,
+        *parts.anatomy.reasons,
+        *tools,
+        *hands_too,
+        *drives,
+        *_out_of_limits(parts),
+    )
     about = (*about, *posture.reasons, measured)
     given = tuple(f"{field}: given, not guessed" for field in overrides)
     return Guess(
@@ -143,7 +166,7 @@ def guess(
     )
 
 
-def _look_at(path: Path, xml: bytes, hints: Hints) -> _Parts:
+def _look_at(path: Path, xml: bytes, hints: Hints, overrides: Mapping[str, Any]) -> _Parts:
     model = read_model(xml, path.as_posix())
     anatomy = known_anatomy(model, find_anatomy(model, path.as_posix()), hints)
     stance = Stance(model)
@@ -163,8 +186,24 @@ def _look_at(path: Path, xml: bytes, hints: Hints) -> _Parts:
         )
         for limb in anatomy.limbs
     }
+    main = anatomy.limbs[0].name
+    tools[main] = _given_tool(tools[main], overrides)
     grippers = {limb.name: find_gripper(limb, tips[limb.name], drives) for limb in hands}
     return _Parts(model, stance, anatomy, hulls, drives, tips, tools, grippers, hints)
+
+
+def _given_tool(guessed: Tool, overrides: Mapping[str, Any]) -> Tool:
+    """Return the tool centre point that is given, in place of all that was guessed of it."""
+    given = {
+        field: settle(overrides[name], hint, name, DescriptorError)
+        for name, (field, hint) in TCP.items()
+        if name in overrides
+    }
+    if not given:
+        return guessed
+    tool = Tool(given.get("link", guessed.link), (), "")
+    at = " and ".join(name for name in TCP if name in overrides)
+    return replace(tool, reason=f"TCP: by {at}, as given, on the link {tool.link}", **given)
 
 
 def _known_tool(model: UrdfModel, limb: Limb, hints: Hints) -> Tool | None:

@@ -23,7 +23,7 @@ from robots.common.commands import exit_code, print_error, program, start
 from robots.descriptor import JointGroup, RobotDescriptor
 from robots.fetch_assets import describe_file
 from robots.mjcf.locator import LocalMjcf
-from robots.named import named_robot
+from robots.named import FORMS, named_robot
 from robots.registry import RobotRegistry
 from robots.urdf.model import ModelJoint
 from robots.urdf.reading import read_model
@@ -42,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         does not exist.
     """
     parser = argparse.ArgumentParser(prog=program("robots.inspect"), description=__doc__)
-    parser.add_argument("robots", nargs="*", metavar="ROBOT", help="robots to report on")
+    parser.add_argument("robots", nargs="*", metavar="ROBOT", help=FORMS)
     parser.add_argument(
         "--try", action="store_true", dest="tries", help="stand, step and move them in physics"
     )

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+from robots.assets.locator import LocalUrdf
 from robots.common.commands import exit_code, notice, program, start
 from robots.common.new_files import write_new
+from robots.data_module import write_module
 from robots.from_urdf import guess_descriptor
+from robots.mjcf.locator import LocalMjcf
 
 _REGISTERED = """
 RobotRegistry.register({constant})  # from here on, it goes by its name: {name!r}
@@ -56,16 +62,22 @@ def _write(options: argparse.Namespace) -> None:
     found = guess_descriptor(options.urdf, options.name)
     name = found.descriptor.name
     module, constant = name.lower(), name.upper()
-    first, _, rest = found.module().partition("\n\nfrom ")
-    source = f"{first}\n\nfrom robots import RobotRegistry\nfrom {rest}"
+    robot = replace(found.descriptor, urdf=_seen_from(options.out, found.descriptor.urdf))
+    source = write_module(robot, found.reasons, also=["RobotRegistry"])
     declared = source + _REGISTERED.format(constant=constant, name=name)
     test = _TEST.format(module=module, constant=constant, name=name)
     for path in write_new(options.out, {f"{module}.py": declared, f"test_{module}.py": test}):
         print(path)
     notice(
         f"The comments in {module}.py say what was guessed: correct it, and delete them. Test it:"
-        f" python -m pytest {options.out / f'test_{module}.py'}"
+        f" python -m pytest {options.out / f'test_{module}.py'}\n"
+        f"In {options.out.absolute()} it goes wherever a robot goes, as {module}:{constant}"
     )
+
+
+def _seen_from(folder: Path, source: Any) -> LocalUrdf | LocalMjcf:
+    """Return where a user's file is, with its path relative to a folder."""
+    return replace(source, path=Path(os.path.relpath(source.path, folder.absolute())))
 
 
 if __name__ == "__main__":

@@ -71,8 +71,12 @@ CATALOGUE = {
 }
 
 
-def _check(given: object, origin: str, name: str | None = None) -> RobotDescriptor:
-    """Return a descriptor that came from elsewhere, if it is one and goes by its name."""
+def checked_robot(given: object, origin: str, name: str | None = None) -> RobotDescriptor:
+    """Return a descriptor that came from elsewhere, if it is one and goes by its name.
+
+    Raises:
+        DescriptorError: If not.
+    """
     if not isinstance(given, RobotDescriptor):
         raise DescriptorError(
             f"{origin} gave {show(given)}, of type {type(given).__name__};"
@@ -87,9 +91,9 @@ ROBOTS = Catalogue(
     "robot",
     CATALOGUE,
     group="robot_layouts.robots",
-    check=_check,
+    check=checked_robot,
     error=DescriptorError,
-    hint="Add your own with RobotRegistry.register(descriptor).",
+    hint="`robot-layouts robots list` has all; RobotRegistry.register(descriptor) adds your own.",
 )
 
 
@@ -131,7 +135,7 @@ class RobotRegistry:
         Raises:
             DescriptorError: If it is no descriptor, or another robot has that name.
         """
-        name = _check(descriptor, "register").name
+        name = checked_robot(descriptor, "register").name
         if name in ROBOTS and ROBOTS[name] != descriptor:
             raise DescriptorError(
                 f"another robot is already called {name!r};"

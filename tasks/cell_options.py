@@ -8,7 +8,7 @@ from typing import Any
 from layouts import Layout
 from robots import RobotDescriptor, TaskError
 from robots.common.commands import notice, program
-from robots.named import is_path, named_robot
+from robots.named import FORMS, is_path, named_robot
 from tasks.language.needs import ACT, HOLD
 from tasks.varying.randomization import Randomization
 
@@ -32,7 +32,7 @@ def add_cell_options(
             "--robots",
             nargs="+",
             metavar="PLACE=ROBOT",
-            help="other robots in some places, by name or URDF: left=ur5e.urdf right=xarm7",
+            help=f"other robots in some places: left=ur5e.urdf right=xarm7; ROBOT: {FORMS}",
         )
     add(
         "--bystanders",
@@ -54,10 +54,10 @@ def chosen_cell(options: argparse.Namespace) -> dict[str, Any]:
         RobotLayoutsError: If a robot or layout cannot be had, or a word makes no sense.
     """
     chosen: dict[str, Any] = {}
+    if options.robots:  # first, as the layout may hold robots of modules that these words name
+        chosen["robots"] = chosen_robots(options.robots)
     if options.layout is not None:
         chosen["layout"] = Layout.load(options.layout)
-    if options.robots:
-        chosen["robots"] = chosen_robots(options.robots)
     if options.bystanders is not None:
         chosen["bystanders"] = options.bystanders
     if getattr(options, "randomization", None) is not None:

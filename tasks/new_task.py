@@ -6,6 +6,7 @@ Writes one file with a task to go on with and its expert, and one with their tes
 from __future__ import annotations
 
 import argparse
+import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -20,7 +21,8 @@ from layouts import Layout, face_to_face, ring, single
 from robots import RobotDescriptor, TaskError
 from robots.common.commands import exit_code, notice, program, start
 from robots.common.new_files import write_new
-from robots.named import is_path, named_robot
+from robots.common.paths import absolute
+from robots.named import FORMS, is_path, named_robot
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from robots.urdf.tcp import find_tcp
@@ -33,7 +35,7 @@ SPREAD, ASIDE = 0.05, 0.1
 
 _TASK = '''"""{title}: every arm brings its tool centre point to a ball in the air."""
 
-from experts import register_expert
+{paths}from experts import register_expert
 from experts.reaching import reaching
 from experts.rehearsal import first_success
 {imports}
@@ -140,7 +142,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         nargs="+",
         required=True,
         metavar="PLACE=ROBOT",
-        help="who stands in its places, by name or URDF: left=panda right=arm.urdf",
+        help=f"who stands in its places: left=panda right=arm.urdf; ROBOT: {FORMS}",
     )
     parser.add_argument(
         "--out", type=Path, default=Path(), metavar="DIR", help="folder of the files (this one)"
@@ -152,7 +154,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _write(options: argparse.Namespace) -> None:
     module, task_id = _names(options.name)
     texts = {
-        f"{module}.py": task_source(task_id, _robots(options.robots)),
+        f"{module}.py": task_source(task_id, _robots(options.robots), options.out),
         f"test_{module}.py": _TEST.format(module=module, task_id=task_id),
     }
     for path in write_new(options.out, texts):
@@ -165,12 +167,13 @@ def _write(options: argparse.Namespace) -> None:
     )
 
 
-def task_source(task_id: str, robots: Mapping[str, str]) -> str:
+def task_source(task_id: str, robots: Mapping[str, str], folder: Path) -> str:
     """Return the file of a task in which robots reach for balls, and its expert.
 
     Args:
         task_id: Its id.
-        robots: Robot by place: names, or paths of URDFs.
+        robots: Robot by place: names, paths of URDFs or MJCFs, or ``MODULE:NAME``.
+        folder: Where it will be; paths are written relative to it.
 
     Raises:
         UnknownNameError: If there is no such robot.
@@ -178,19 +181,19 @@ def task_source(task_id: str, robots: Mapping[str, str]) -> str:
         LayoutError: If a place has no name for one.
     """
     preset = _preset(len(robots))
-    written = {place: _written(robot) for place, robot in robots.items()}
+    written = {place: _written(robot, folder) for place, robot in robots.items()}
     named = ", ".join(f'"{place}": {robot}' for place, robot in written.items())
     loaded = {place: named_robot(robot) for place, robot in robots.items()}
     layout = preset.place(loaded)
     wide = len(robots) > 2
-    paths = any(is_path(robot) for robot in robots.values())
     words = ["Area", "Goal", "MultiRobotTask", *(["WideTable"] if wide else []), "closeness"]
+    paths = any(is_path(robot) for robot in robots.values())
     imports = [
         f"from layouts import {preset.name}",
-        *(["from robots import RobotDescriptor"] if paths else []),
         f"from tasks import {', '.join([*words, 'register_task'])}",
     ]
     return _TASK.format(
+        paths="from pathlib import Path\n\n" if paths else "",
         title=task_id.rpartition("-")[0],
         radius=RADIUS,
         task_id=task_id,
@@ -245,11 +248,12 @@ def _preset(count: int) -> _Preset:
     return _Preset("ring", ', radius="auto", keyframe=None', by_reach)
 
 
-def _written(robot: str) -> str:
-    """Return a robot as it is written in a task's file."""
+def _written(robot: str, folder: Path) -> str:
+    """Return a robot as it is written in a task's file, which will be in a folder."""
     if not is_path(robot):
         return f'"{robot}"'
-    return f'RobotDescriptor.from_urdf("{Path(robot).absolute()}", quiet=True)'
+    path = Path(os.path.relpath(absolute(robot, "the path of a robot"), folder.absolute()))
+    return f'Path(__file__).parent / "{path.as_posix()}"'
 
 
 def _robots(words: Sequence[str]) -> dict[str, str]:

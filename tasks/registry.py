@@ -82,10 +82,11 @@ TASKS = Catalogue(
         _native_name(target.partition(":")[0].removeprefix(CLONES)): task_id
         for task_id, target in CATALOGUE.items()
         if target.startswith(CLONES)
-    },
+    }
+    | {"pick_cube_native": "PickCube-v1"},  # as RoboVerse has it, too
     ignore_case=True,
-    hint="A task of your own goes by 'module:Id', as in 'mylab.tray:TwoArmTray-v1', and is"
-    " registered there by @register_task('Id').",
+    hint="`robot-layouts tasks list` has all. A task of your own goes by 'module:Id', as in"
+    " 'mylab.tray:TwoArmTray-v1', and is registered there by @register_task('Id').",
 )
 
 
@@ -212,8 +213,8 @@ def make(
         task_id: Its id or another of its names.
         num_envs: Number of environments in this process.
         robots: Other robots for some places: a mapping place → robot, or one robot for a task
-            with one place; by name, descriptor, or the path of a URDF to guess it from. One that
-            lacks its place's keyframe starts from its home's.
+            with one place; by name, descriptor, the path of a URDF or MJCF to guess it from, or
+            ``MODULE:NAME``. One that lacks its place's keyframe starts from its home's.
         layout: Another layout with the task's places, in any order; for a task over any number of
             robots, with places of any names. ``bystanders="hold"`` or ``"act"`` lets more robots
             stand there.

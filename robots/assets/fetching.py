@@ -7,7 +7,7 @@ from contextlib import closing
 from pathlib import Path
 
 from robots.assets.hub_source import HubSource
-from robots.assets.manifest import AssetFile, PackageOrigin, load_manifest
+from robots.assets.manifest import AssetFile, load_manifest
 from robots.assets.packages import INDEX_PACKAGES, SourceError
 from robots.assets.progress import listing, say, size
 from robots.assets.sources import AssetSource, InstalledPackage
@@ -94,7 +94,9 @@ def ensure(
             asked = [file for file in wanted if source.holds(file)]
             if not asked:
                 continue
-            failure = _Fetch(source, store, scratch, trust).run(asked)
+            fetch = _Fetch(source, store, scratch, trust)
+            failure = fetch.run(asked)
+            fetch.say_kept()
             missing = store.unusable(asked)
             outcome = f"{len(asked) - len(missing)} of {len(asked)} files"
             say(f"{source.title}: {outcome}" + (f"; {_shorten(failure)}" if failure else ""))
@@ -158,17 +160,17 @@ class _Fetch:
             return
         try:
             if self._store.state(file) is FileState.MISSING:
-                self._say_kept(file.origin)
+                self._kept.add(file.origin.name)
                 self._accept(file, data, trust=False)
         except AssetError as error:  # what was asked for is there
             self._room = False
             say(f"{error} What came along is not kept.")
 
-    def _say_kept(self, origin: PackageOrigin) -> None:
-        if origin.name not in self._kept:
-            self._kept.add(origin.name)
-            say(f"keeping what came along of {origin.name}")
-            say(f"licence {origin.licence}: {origin.licence_note}")
+    def say_kept(self) -> None:
+        """Say in one line what was kept that nobody asked for."""
+        if self._kept:
+            command = f"`{program('robots.fetch_assets')} --check` lists it, with licences"
+            say(f"kept what came along of {len(self._kept)} packages; {command}")
 
 
 def _expect_known_references(file: AssetFile, data: bytes) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from robots.common.quoting import shortened, shown
 
 _LONGEST_NAME = 1000  # characters; nothing that long is a slip of the pen
+_LISTED, _ALIKE = 20, 5  # choices that a message lists; of more than 20, the 5 most alike
 
 
 class RobotLayoutsError(Exception):
@@ -122,22 +123,30 @@ class MissingPackageError(RobotLayoutsError, ImportError):
 
 def closest_match(name: object, choices: Iterable[str]) -> str | None:
     """Return the choice most like ``name`` (ignoring case), or None if nothing is close."""
-    by_lower = {choice.lower(): choice for choice in choices}
-    text = str(name)
-    if len(text) > _LONGEST_NAME:
-        return None
-    found = difflib.get_close_matches(text.lower(), by_lower, n=1, cutoff=0.5)
-    return by_lower[found[0]] if found else None
+    return next(iter(_alike(name, choices, 1, 0.5)), None)
 
 
 def unknown_name_message(kind: str, name: object, choices: Iterable[str], hint: str = "") -> str:
-    """Say that ``name`` is not a ``kind``, the closest match, and all choices."""
+    """Say that ``name`` is not a ``kind``, the closest match, and all choices or those like it."""
     choices = tuple(choices)
     match = closest_match(name, choices)
-    suggestion = f" Did you mean {match!r}?" if match else ""
-    listing = ", ".join(choices) if choices else "none"
-    more = f" {hint}" if hint else ""
-    return f"unknown {kind} {shown(name)}.{suggestion} Choices: {listing}.{more}"
+    suggestion = f"Did you mean {match!r}?" if match else ""
+    listing = f"Choices: {', '.join(choices) or 'none'}."
+    if len(choices) > _LISTED:
+        near = _alike(name, choices, _ALIKE, 0.4)
+        listing = f"The closest of {len(choices)}: {', '.join(near)}." if near else ""
+    parts = (f"unknown {kind} {shown(name)}.", suggestion, listing, hint)
+    return " ".join(part for part in parts if part)
+
+
+def _alike(name: object, choices: Iterable[str], most: int, cutoff: float) -> list[str]:
+    """Return the choices that are like a name (ignoring case), the closest first."""
+    by_lower = {choice.lower(): choice for choice in choices}
+    text = str(name)
+    if len(text) > _LONGEST_NAME:
+        return []
+    found = difflib.get_close_matches(text.lower(), by_lower, n=most, cutoff=cutoff)
+    return [by_lower[choice] for choice in found]
 
 
 def _rebuild_unknown_name(

@@ -128,7 +128,7 @@ def _between(
     still = tuple(link for link in rigid if words.has(link, words.TIP))
     if len(still) > 1:  # of fingers that are fixed
         if off(still) <= BETWEEN:
-            return _mean(limb, still, which, off(still))
+            return _mean(stance, limb, still, which, off(still), middle)
         ends = [link for link in ends if link not in still]
     named = min(((off((link,)), link) for link in ends), default=(np.inf, ""))
     if named[0] <= BETWEEN:
@@ -136,32 +136,45 @@ def _between(
         return Tool(named[1], (), reason)
     frames = _grasping(stance, tips)
     if off(frames) <= near:
-        return _mean(limb, frames, which, off(frames))
+        return _mean(stance, limb, frames, which, off(frames), middle)
     if tips.solid:
         return _beside(stance, limb, which, off((limb.palm,)), middle)
     choices: list[tuple[str, ...]] = [(limb.palm,), *((link,) for link in rigid), frames]
     distance, best = min((off(links), links) for links in choices)
     if best == frames:
-        return _mean(limb, best, which, distance)
+        return _mean(stance, limb, best, which, distance, middle)
     only = ", which is only the palm" if best == (limb.palm,) else ", the nearest to the tips"
-    return Tool(best[0], (), f"{which}: the link {best[0]}{only}{_apart(distance)}")
+    apart = _apart(distance, _seen_from(stance, best[0], middle))
+    return Tool(best[0], (), f"{which}: the link {best[0]}{only}{apart}")
 
 
-def _mean(limb: Limb, links: tuple[str, ...], which: str, distance: float) -> Tool:
+def _mean(
+    stance: Stance,
+    limb: Limb,
+    links: tuple[str, ...],
+    which: str,
+    distance: float,
+    middle: Floats,
+) -> Tool:
     listing = ", ".join(links[:-1]) + f" and {links[-1]}"
     reason = f"{which}: the middle of {listing}, turned as {limb.palm}"
-    return Tool(limb.palm, links, reason + _apart(distance))
+    return Tool(limb.palm, links, reason + _apart(distance, _seen_from(stance, limb.palm, middle)))
 
 
 def _beside(stance: Stance, limb: Limb, which: str, distance: float, middle: Floats) -> Tool:
     """Return the place between the finger tips as seen from the palm."""
-    palm = stance.poses(stance.middle)[0, stance.tree.link(limb.palm)]
-    x, y, z = (round(value, 4) + 0.0 for value in transform(inverse_pose(palm), middle).tolist())
     reason = (
         f"{which}: {distance * 100:.0f} cm from the link {limb.palm}, where the finger tips meet"
         " and no frame lies"
     )
-    return Tool(limb.palm, (), reason, (x, y, z))
+    return Tool(limb.palm, (), reason, _seen_from(stance, limb.palm, middle))
+
+
+def _seen_from(stance: Stance, link: str, place: Floats) -> Vector3:
+    """Return a place in the frame of a link, to a tenth of a millimetre (m)."""
+    frame = stance.poses(stance.middle)[0, stance.tree.link(link)]
+    x, y, z = (round(value, 4) + 0.0 for value in transform(inverse_pose(frame), place).tolist())
+    return (x, y, z)
 
 
 def _grasping(stance: Stance, tips: Fingertips) -> tuple[str, ...]:
@@ -184,7 +197,10 @@ def _frame_at(stance: Stance, tips: Fingertips, end: str) -> str:
     return links[int(np.argmin(np.round(away, 6)))]
 
 
-def _apart(distance: float) -> str:
+def _apart(distance: float, offset: Vector3) -> str:
     if distance <= EXACT:
         return ""
-    return f"; the finger tips meet {distance * 100:.0f} cm away, where no frame lies"
+    return (
+        f"; the finger tips meet {distance * 100:.0f} cm away, where no frame lies:"
+        f" tcp_offset={offset} moves it there"
+    )

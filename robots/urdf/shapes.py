@@ -65,8 +65,7 @@ def expect_shape(element: Element, where: str) -> None:
             no number, not positive or beyond all measure.
     """
     what = f"a {element.tag}"
-    geometry = element.find("geometry")
-    shapes = [] if geometry is None else list(geometry)
+    shapes = element.findall("geometry/*")
     if not shapes:
         raise AssetError(f"{where}: {what} without a shape; choices: {', '.join(SIZES)}")
     if len(shapes) > 1:

@@ -67,8 +67,18 @@ def read_written(path: Path) -> bytes:
     file, arguments = template_of(path)
     contents = _read(file)
     if arguments or is_template(contents, str(file)):
-        contents = expand(file, arguments)
+        contents = expand(file, arguments).xml
     return contents
+
+
+def is_template_file(path: Path) -> bool:
+    """Tell whether `read_urdf` has to expand a file: a xacro template, with or without arguments.
+
+    Raises:
+        AssetError: If it cannot be read, or is no XML.
+    """
+    file, arguments = template_of(path)
+    return bool(arguments) or is_template(_read(file), str(file))
 
 
 def _read(path: Path) -> bytes:

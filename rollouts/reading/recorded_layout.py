@@ -65,7 +65,9 @@ def layout_again(
             raise
         except RobotLayoutsError as error:
             raise TrajectoryError(
-                f"{source} has a robot at {place!r} that cannot be had here: {error}"
+                f"{source} has a robot at {place!r} that cannot be had here:"
+                f" {str(error).rstrip('.')}; name the robot, with --robots {place}=… or"
+                f" robots={{{place!r}: …}}"
             ) from error
     try:
         return Layout(placements)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
 
-from robots import TaskError, closest_match
-from robots.common.catalogue import reason
-from robots.common.rooms import ROOMS
+from robots import TaskError
+from robots.common.importing import imported
 
 EXPERT = "expert"
 
@@ -28,24 +26,7 @@ def find_policy(name: str, what: str = "policy") -> Any:
     if not module or not attribute:
         word = f", or the word {EXPERT!r}" if what == "policy" else ""
         raise TaskError(f"{what} is {name!r}; it must be MODULE:NAME, something callable{word}")
-    try:
-        found: Any = import_module(module)
-        for part in attribute.split("."):
-            if not hasattr(found, part):
-                raise TaskError(_lacks(found, module, part))
-            found = getattr(found, part)
-    except (Exception, SystemExit) as error:  # whatever the user's own code does
-        raise TaskError(f"no {what} {name!r}: {reason(error)}") from error
-    return check_policy(found, what)
-
-
-def _lacks(found: Any, module: str, attribute: str) -> str:
-    """Say that a module has no such attribute, and why that may be."""
-    words = f"module {module!r} has no attribute {attribute!r}"
-    if (package := module.partition(".")[0]) in ROOMS:
-        return f"{words}; {package!r} is a package of this library: rename a module of yours"
-    match = closest_match(attribute, dir(found))
-    return f"{words}. Did you mean {match!r}?" if match else words
+    return check_policy(imported(name, what, TaskError), what)
 
 
 def check_policy(policy: Any, what: str = "policy") -> Any:

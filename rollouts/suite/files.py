@@ -63,7 +63,7 @@ def save_suite(suite: Suite, path: str | PathLike[str]) -> None:
     data: dict[str, Any] = {"name": suite.name}
     if suite.policies:
         data["policies"] = dict(suite.policies)
-    data["tasks"] = [_entry(case) for case in suite.cases]
+    data["tasks"] = [_entry(case, Path(path).parent) for case in suite.cases]
     text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, allow_unicode=True)
     write_whole(path, f"# suite {suite.id}\n{text}")
 
@@ -146,11 +146,11 @@ def _case(about: Mapping[str, Any], name: str, layout: Any, folder: Path) -> Cas
     )
 
 
-def _entry(case: Case) -> dict[str, Any]:
+def _entry(case: Case, folder: Path) -> dict[str, Any]:
     """Return a case as an entry that includes everything."""
     about = {key: value for key, value in case.to_json().items() if value is not None}
     if case.layout is not None:
-        about["layout"] = written_layout(case.layout)
+        about["layout"] = written_layout(case.layout, folder)
     return about
 
 

@@ -14,8 +14,9 @@ import yaml
 
 from layouts import Layout
 from layouts.presets import PRESETS
-from robots import LayoutError, RobotRegistry, TaskError, UnknownNameError
+from robots import LayoutError, TaskError, UnknownNameError
 from robots.common.bounds import shown
+from robots.named import robot_in_file
 from tasks.varying.randomization import Randomization
 
 OWN = "own"  # the task's own layout
@@ -41,19 +42,19 @@ def read_layout(value: Any, folder: Path) -> Layout | None:
     if isinstance(value, str):
         return Layout.load(_below(folder, value))
     if isinstance(value, Mapping) and "preset" in value:
-        return _preset(value)
+        return _preset(value, folder)
     if isinstance(value, Mapping) and "robots" in value:
-        return _written_out(value)
+        return _written_out(value, folder)
     raise LayoutError(f"a layout is {shown(value)}; it takes {_HOW}")
 
 
-def written_layout(layout: Layout) -> dict[str, Any]:
-    """Return a layout written out, as `read_layout` reads it.
+def written_layout(layout: Layout, folder: Path) -> dict[str, Any]:
+    """Return a layout written out, as `read_layout` reads it from a file in a folder.
 
     Raises:
-        LayoutError: If a robot is not registered, or not as it is here.
+        LayoutError: See `layouts.Layout.to_yaml`.
     """
-    data = yaml.load(layout.to_yaml(), _Loader)
+    data = yaml.load(layout.to_yaml(folder), _Loader)
     del data["version"]
     return data
 
@@ -98,19 +99,21 @@ class _Loader(yaml.SafeLoader):
     }
 
 
-def _written_out(value: Mapping[str, Any]) -> Layout:
+def _written_out(value: Mapping[str, Any], folder: Path) -> Layout:
     text = yaml.safe_dump({**value, "version": 1}, sort_keys=False)
     try:
-        return Layout.from_yaml(text)
+        return Layout.from_yaml(text, folder)
     except LayoutError as error:
         raise LayoutError(_LINE.sub("", str(error))) from error
 
 
-def _preset(value: Mapping[str, Any]) -> Layout:
+def _preset(value: Mapping[str, Any], folder: Path) -> Layout:
     options = {key: _whole(given) for key, given in value.items() if key not in ("preset",)}
-    robots = options.get("robots")
-    if isinstance(robots, Mapping):  # by name alone: a suite brings no files of robots
-        options["robots"] = {name: RobotRegistry.load(robot) for name, robot in robots.items()}
+    if isinstance(robots := options.get("robots"), Mapping):
+        options["robots"] = {
+            place: robot_in_file(robot, place, folder) if isinstance(robot, str) else robot
+            for place, robot in robots.items()
+        }
     place = PRESETS[str(value["preset"])]
     takes = signature(place).parameters
     for name in options:

@@ -12,8 +12,12 @@ from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 from layouts import Layout
-from robots import RobotLayoutsError, TaskError
+from layouts.yaml_format import to_yaml
+from robots import RobotDescriptor, RobotLayoutsError, TaskError
 from robots.common.bounds import shown
+from robots.fingerprint import asset_fingerprint
+from robots.registry import ROBOTS
+from rollouts.reading.guessed_robots import descriptor_digest
 from rollouts.suite.seeds import read_seeds, write_seeds
 from tasks.registry import full_name, get_task_class, make_scenario
 from tasks.varying.randomization import Randomization
@@ -82,7 +86,7 @@ class Case:
             "name": self.name,
             "task": self.task,
             "seeds": write_seeds(self.seeds),
-            "layout": None if self.layout is None else self.layout.to_yaml(),
+            "layout": None if self.layout is None else to_yaml(self.layout, _content),
             "control_mode": dict(modes) if isinstance(modes, Mapping) else modes,
             "obs_mode": self.obs_mode,
             "randomization": None if varied is None else varied.to_json(),
@@ -171,3 +175,10 @@ def _line(case: Case) -> str:
     about += [] if case.obs_mode == "state" else [f"observes {case.obs_mode}"]
     about += [] if case.randomization is None else ["randomized"]
     return f"{case.name}: {'; '.join(about)}"
+
+
+def _content(robot: RobotDescriptor) -> str:
+    """Return what a robot is, in a word: its name if it is listed, or else what it is made of."""
+    if robot.name in ROBOTS and ROBOTS[robot.name] == robot:
+        return robot.name
+    return f"{robot.name} {descriptor_digest(robot)} {asset_fingerprint(robot.urdf)}"

@@ -336,8 +336,10 @@ class TestBounds:
             Layout.from_yaml("#" * 2_000_000)
 
     def test_words_are_bounded(self):
-        with pytest.raises(LayoutError, match="line 2: robot has 1,000 characters; 200 is most"):
-            Layout.from_yaml(f"version: 1\nrobots: {{a: {{robot: {'x' * 1000}}}}}")
+        with pytest.raises(LayoutError, match="line 2: keyframe has 1,000 characters; 200 is most"):
+            Layout.from_yaml(f"version: 1\nrobots: {{a: {{robot: panda, keyframe: {'x' * 1000}}}}}")
+        with pytest.raises(LayoutError, match="line 2: robot has 5,000 characters; 4,096 is most"):
+            Layout.from_yaml(f"version: 1\nrobots: {{a: {{robot: {'x' * 5000}}}}}")
 
     @pytest.mark.parametrize("text", ['"\\UFFFFFFFF"', f"%YAML 1.{'9' * 5000}\n---\na: 1"])
     def test_numbers_that_yaml_cannot_read_are_refused(self, text):

@@ -177,6 +177,14 @@ REPAIRS: dict[str, tuple[str, tuple[str, ...]]] = {
         with_tip(shape('<mesh filename="box.stl" scale="1 2 3 1"/>')),
         ("link 'tip': a collision has a mesh with scale='1 2 3 1', taken as '1 2 3'",),
     ),
+    "two shapes in one geometry": (
+        with_tip(INERTIAL + shape(f'{BOX}<sphere radius="0.1"/>')),
+        ("link 'tip': a collision of 2 shapes, taken as 2 collisions",),
+    ),
+    "two geometries in one visual": (
+        with_tip(INERTIAL + SHAPE + shape(f"{BOX}</geometry><geometry>{BOX}", "visual")),
+        ("link 'tip': a visual of 2 shapes, taken as 2 visuals",),
+    ),
     "a material within a shape": (
         with_tip(shape(BOX + '<material name="red"/>', "visual")),
         ("link 'tip': a visual has a <material> beside its shape, left out",),
@@ -329,6 +337,10 @@ REFUSED = {
     "a mass below 0": (
         with_tip(inertial('<mass value="-1"/>', tensor("0.1 0.1 0.1")) + SHAPE),
         "link 'tip' moves, but has mass -1 kg",
+    ),
+    "a second shape of an unknown kind": (
+        with_tip(shape(f"{BOX}</geometry><geometry><cone/><cone/>")),
+        "a collision with 3 shapes (box, cone, cone)",
     ),
     "a box below 0": (with_tip(shape('<box size="1 1 -1"/>')), "without a volume: a box"),
     "a mesh that is nowhere": (

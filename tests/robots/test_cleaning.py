@@ -7,16 +7,19 @@ import pytest
 from robots import AssetError, RobotRegistry
 from robots.from_urdf import guess_descriptor
 from robots.inspect import main as inspect_main
-from robots.registry import CATALOGUE
+from robots.registry import CATALOGUE, ROBOTS
 from robots.urdf.cleaning.cleaning import clean
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_cleaned
 from tests.catalogue import is_optional
 from tests.robots.damaged_robots import (
+    BOX,
     FINE,
+    INERTIAL,
     LIMIT,
     REFUSED,
     REPAIRS,
+    with_tip,
     with_wrist,
     write_damaged,
 )
@@ -74,6 +77,16 @@ def test_a_box_turns_as_heavily_as_its_mass_and_size_say(tmp_path):
         assert written == pytest.approx(moment, rel=1e-6)
 
 
+def test_two_shapes_in_one_collision_are_both_there_where_it_is(tmp_path):
+    ball = '<sphere radius="0.1"/>'
+    several = f'<collision><origin xyz="1 2 3"/><geometry>{BOX}{ball}</geometry></collision>'
+    text = with_tip(INERTIAL + several)
+    model = read_model(read_cleaned(write_damaged(tmp_path, text)).xml, "toy.urdf")
+    kinds = [found.kind for found in model.collisions["tip"]]
+    places = [found.origin[:3, 3].tolist() for found in model.collisions["tip"]]
+    assert (kinds, places) == (["box", "sphere"], [[1, 2, 3], [1, 2, 3]])
+
+
 def test_a_mesh_that_changes_is_looked_at_again(tmp_path):
     urdf = write_damaged(tmp_path, REPAIRS["a flat mesh"][0])
     assert read_cleaned(urdf).repairs
@@ -84,7 +97,7 @@ def test_a_mesh_that_changes_is_looked_at_again(tmp_path):
 def test_a_repair_shows_in_the_report_on_a_robot(tmp_path, capsys, monkeypatch):
     urdf = write_damaged(tmp_path, REPAIRS["no inertia"][0])
     descriptor = guess_descriptor(urdf, "cleaned_toy").descriptor
-    monkeypatch.setattr(RobotRegistry, "load", lambda name: descriptor)
+    monkeypatch.setattr(ROBOTS, "registered", {"cleaned_toy": descriptor})
     assert inspect_main(["cleaned_toy"]) == 0
     assert f"Repaired in the URDF\n  {REPAIRS['no inertia'][1][0]}" in capsys.readouterr().out
 

@@ -27,6 +27,7 @@ from robots.data_module import write_module
 from robots.from_urdf import Guess, guess_descriptor, main
 from robots.registry import CATALOGUE
 from robots.registry import ROBOTS as CATALOGUED
+from tests.robots.urdf_parts import Parts
 
 CHECKOUT = Path(__file__).parents[2]
 # What is guessed of these is right. One that the guess gets wrong is left out, and says why here.
@@ -139,6 +140,47 @@ class TestWhatIsSaid:
         assert "reach: given, not guessed" in guess.reasons
         with pytest.raises(DescriptorError, match=r"no fields \['reech'\]; it has name, urdf"):
             guess_descriptor(urdf_of("panda"), reech=0.855)
+
+    @pytest.mark.parametrize(
+        ("given", "link", "links", "offset"),
+        [
+            ({"tcp_offset": (0, 0, 0.095)}, "arm_link6", (), (0, 0, 0.095)),
+            ({"tcp_link": "arm_link5"}, "arm_link5", (), (0, 0, 0)),
+            ({"tcp_position_links": ("left", "right")}, "arm_link6", ("left", "right"), (0, 0, 0)),
+            (
+                {"tcp_offset": (0.01, 0, 0), "tcp_position_links": ("left", "right")},
+                "arm_link6",
+                ("left", "right"),
+                (0.01, 0, 0),
+            ),
+        ],
+    )
+    def test_what_is_given_of_the_tcp_replaces_the_guess_of_it(
+        self, tmp_path, given, link, links, offset
+    ):
+        parts = Parts()
+        palm = parts.arm(parts.link("base"), "arm", "0 0 0.1")
+        for side, sign in (("left", 1), ("right", -1)):
+            parts.link(side, 0.05, "0.04 0.01 0.02", "0.02 0 0")
+            axis, at = f"0 {sign} 0", f"0.05 {0.006 * sign} 0"
+            parts.joint(side, palm, side, at, axis=axis, limits=(0, 0.04), kind="prismatic")
+        path = parts.write(tmp_path)
+        guessed = guess_descriptor(path)
+        assert guessed.descriptor.tcp_position_links == ("left", "right")
+        made = guess_descriptor(path, **given)
+        robot = made.descriptor
+        assert (robot.tcp_link, robot.tcp_position_links, robot.tcp_offset) == (link, links, offset)
+        assert robot.reach != guessed.descriptor.reach or links
+        assert not any("the middle of" in reason for reason in made.reasons)
+
+    def test_a_tcp_that_makes_no_sense_is_refused(self, tmp_path):
+        parts = Parts()
+        parts.arm(parts.link("base"), "arm", "0 0 0.1")
+        path = parts.write(tmp_path)
+        with pytest.raises(DescriptorError, match="tcp_offset is 'up'; "):
+            guess_descriptor(path, tcp_offset="up")
+        with pytest.raises(UnknownNameError, match="'arm_link7'. Did you mean 'arm_link"):
+            guess_descriptor(path, tcp_link="arm_link7")
 
     def test_two_arms_have_groups_of_their_own(self):
         dual = guess_descriptor(urdf_of("panda").with_name("mobile_panda_dual_arm.urdf")).descriptor

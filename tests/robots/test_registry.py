@@ -31,11 +31,13 @@ def test_an_unknown_name_is_a_key_error_with_the_closest_match_and_the_choices()
     assert isinstance(error.value, UnknownNameError)
     assert str(error.value) == (
         "unknown robot 'Panda_Stik'. Did you mean 'panda_stick'?"
-        f" Choices: {', '.join(CATALOGUE)}."
-        " Add your own with RobotRegistry.register(descriptor)."
+        f" The closest of {len(CATALOGUE)}: panda_stick, panda_wristcam, panda_pinch, panda,"
+        " mobile_panda."
+        " `robot-layouts robots list` has all; RobotRegistry.register(descriptor) adds your own."
     )
-    with pytest.raises(UnknownNameError, match="^unknown robot 'xyz'. Choices: ability_hand_left,"):
-        RobotRegistry.load("xyz")
+    assert error.value.choices == tuple(CATALOGUE)
+    with pytest.raises(UnknownNameError, match="^unknown robot 'qqq'. `robot-layouts robots list`"):
+        RobotRegistry.load("qqq")
 
 
 def test_the_closest_match_ignores_case_and_keeps_its_own():

@@ -12,7 +12,7 @@ import trimesh
 
 from robots import AssetError, LocalUrdf, RobotDescriptor
 from robots.fingerprint import asset_fingerprint
-from robots.from_urdf import main
+from robots.from_urdf import guess_descriptor, main
 from robots.urdf.cleaning.xacro_files import template_of, with_arguments
 from robots.urdf.summary import read_cleaned
 
@@ -86,8 +86,52 @@ def test_what_cannot_be_expanded_is_an_error(template):
     with pytest.raises(AssetError, match=r"xacro cannot expand .*arm\.urdf\.xacro: .*nothing"):
         read_cleaned(template)
     template.write_text(ARM.replace("find toy_package", "find lost_package"))
-    with pytest.raises(AssetError, match=r"xacro cannot expand .*arm\.urdf\.xacro: "):
+    with pytest.raises(
+        AssetError, match=r"xacro cannot expand .*arm\.urdf\.xacro: .*part"
+    ) as caught:
         read_cleaned(template)
+    assert "'lost_package' is not there: put it beside" in str(caught.value)
+    assert "ament" not in str(caught.value)
+
+
+@pytest.mark.parametrize("place", ["toy_folder/urdf", "toy_folder", ""])
+def test_a_package_is_found_beside_the_file_and_above_it(template, place):
+    pytest.importorskip("xacro")
+    other = template.parents[2] / place / "lost_package_of_another_folder"
+    other.mkdir(parents=True)
+    (other / "package.xml").write_text("<package><name>lost_package</name></package>")
+    template.with_name("parts.xacro").rename(other / "parts.xacro")
+    template.write_text(ARM.replace("toy_package)/urdf", "lost_package)"))
+    assert RobotDescriptor.from_urdf(template, quiet=True).dof == 2
+
+
+def test_an_include_that_is_not_needed_may_be_of_a_package_that_is_not_there(template):
+    pytest.importorskip("xacro")
+    colours = '<xacro:include filename="$(find lost_package)/colours.xacro"/>'
+    template.write_text(ARM.replace("<link", f"{colours}<link", 1))
+    guess = guess_descriptor(template)
+    assert guess.descriptor.dof == 2
+    assert any("lost_package" in reason and "colours.xacro" in reason for reason in guess.reasons)
+    package = template.parents[1] / "lost_package"
+    package.mkdir()
+    (package / "colours.xacro").write_text('<robot><material name="red"/></robot>')
+    assert b"red" in read_cleaned(template).xml
+
+
+def test_a_mesh_of_a_package_that_is_not_there_names_it(template):
+    pytest.importorskip("xacro")
+    parts = template.with_name("parts.xacro")
+    parts.write_text(PARTS.replace("find toy_package", "find lost_package"))
+    with pytest.raises(AssetError, match="'lost_package' is not there: put it beside"):
+        read_cleaned(template)
+
+
+def test_the_guess_lists_the_arguments(template):
+    pytest.importorskip("xacro")
+    reasons = guess_descriptor(template, xacro={"prefix": "left_"}).reasons
+    assert (
+        "xacro: arguments prefix='left_', limit='1'; xacro={…} or --xacro KEY=VALUE" in reasons[0]
+    )
 
 
 def test_the_command_takes_arguments(template, capsys):

@@ -97,7 +97,7 @@ def test_describe_takes_any_name_and_says_the_rest(capsys):
         "episode 50 steps, 20 per s",
         "reward modes normalized_dense (default), dense, sparse, none",
         "source mani_skill 3.0.1, envs/tasks/tabletop/pick_cube.py",
-        "other names maniskill.pick_cube_native",
+        "other names maniskill.pick_cube_native, pick_cube_native",
         "Layout: 1 robot, 8 action numbers",
         "0 arm arm.panda_joint1 -0.1 +0.1 rad per step",
         "7 arm gripper -0.01 0.04 m",

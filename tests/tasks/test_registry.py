@@ -64,6 +64,7 @@ def test_a_scenario_is_fresh_at_every_access():
 
 def test_the_metasim_road():
     cls = tasks.get_task_class("maniskill.pick_cube_native")
+    assert tasks.get_task_class("pick_cube_native") is cls
     scenario = copy.deepcopy(cls.scenario)
     scenario.num_envs = 1
     scenario.headless = True

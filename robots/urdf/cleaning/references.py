@@ -131,13 +131,17 @@ def _alike(name: str, folder: str) -> list[str]:
 
 
 def _packages(name: str, folder: str) -> Iterator[str]:
-    """Yield the folders around a folder, and beside its package, whose package.xml has a name."""
+    """Yield the folders whose package.xml has a name: around a folder, in it and near its package.
+
+    The package is the nearest folder around with a package.xml; where there is none, the folder.
+    """
     around = list(_around(folder))
     packages = [parent for parent in around if os.path.isfile(f"{parent}/package.xml")]
-    yield from (package for package in packages if _package_name(package) == name)
-    for beside in _neighbours(posixpath.dirname(packages[0])) if packages else ():
-        if _package_name(beside) == name:
-            yield beside
+    own = packages[0] if packages else folder
+    beside = [
+        near for place in (folder, own, posixpath.dirname(own)) for near in _neighbours(place)
+    ]
+    yield from (place for place in (*packages, *beside) if _package_name(place) == name)
 
 
 def _around(folder: str) -> Iterator[str]:

@@ -1,10 +1,11 @@
-"""Leaves out the shapes of a URDF that have no extent: nothing can touch or see them."""
+"""Gives each shape of a URDF an element of its own, and leaves out those without extent."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from xml.etree.ElementTree import Element
+from copy import deepcopy
+from xml.etree.ElementTree import Element, SubElement
 
 from robots.common.errors import AssetError, MissingPackageError
 from robots.urdf.mesh_files import has_body
@@ -16,7 +17,7 @@ KINDS = ("visual", "collision")
 
 
 def repair_shapes(root: Element, urdf: str) -> Iterator[str]:
-    """Leave out shapes without extent and yield what was left out.
+    """Take shapes apart, leave out those without extent, and yield what was done.
 
     Args:
         root: The ``<robot>``.
@@ -25,11 +26,30 @@ def repair_shapes(root: Element, urdf: str) -> Iterator[str]:
     for link in root.iterfind("link"):
         name = link.get("name")
         for kind in KINDS:
+            yield from _take_apart(link, kind)
             for element in link.findall(kind):
                 yield from _repair_geometry(element, f"link {name!r}: a {kind}")
                 if reason := _why_nothing(element, kind, f"{urdf}, link {name!r}", urdf):
                     link.remove(element)
                     yield f"link {name!r}: a {kind} {reason}, left out"
+
+
+def _take_apart(link: Element, kind: str) -> Iterator[str]:
+    """Make elements of one shape each of one that has several."""
+    for element in link.findall(kind):
+        shapes = element.findall("geometry/*")
+        if len(shapes) < 2 or any(shape.tag not in SIZES for shape in shapes):
+            continue
+        place = list(link).index(element)
+        link.remove(element)
+        for old in element.findall("geometry"):
+            element.remove(old)
+        for number, shape in enumerate(shapes):
+            own = deepcopy(element)
+            SubElement(own, "geometry").append(shape)
+            link.insert(place + number, own)
+        many = len(shapes)
+        yield f"link {link.get('name')!r}: a {kind} of {many} shapes, taken as {many} {kind}s"
 
 
 def _repair_geometry(element: Element, what: str) -> Iterator[str]:

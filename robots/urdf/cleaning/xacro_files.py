@@ -9,14 +9,15 @@ from __future__ import annotations
 import io
 import os
 import re
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from threading import Lock
 from typing import Any
 from urllib.parse import parse_qsl, urlencode
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, fromstring
 
 from robots.common.errors import AssetError, MissingPackageError
 from robots.urdf.cleaning.references import find_package
@@ -27,7 +28,7 @@ DEFINITIONS = ("property", "arg", "macro")  # which do nothing where nothing use
 _EXPRESSION = re.compile(r"\$\{|\$\((?!find\b)")  # finding packages is left to the readers
 
 _turn = Lock()  # the package keeps what it is doing in its module
-_expanded: dict[tuple[str, str], tuple[dict[str, int], bytes]] = {}
+_expanded: dict[tuple[str, str], Expansion] = {}
 
 
 def with_arguments(path: Path, arguments: Mapping[str, object]) -> Path:
@@ -68,8 +69,35 @@ def drop_leftovers(root: Element, urdf: str) -> Iterator[str]:
         yield f"left over from xacro, left out: {names} × {len(left)}"
 
 
-def expand(template: Path, arguments: Mapping[str, str]) -> bytes:
-    """Return the URDF that a template makes; it is expanded again if a file of it changes.
+@dataclass(frozen=True)
+class Expansion:
+    """What a template made.
+
+    Attributes:
+        xml: The URDF.
+        arguments: Its ``<xacro:arg>`` and their values, by name.
+        left_out: Includes of packages that are not there, which it did without.
+        files: Times of change of the files that it was made of; none if some were not there.
+    """
+
+    xml: bytes
+    arguments: Mapping[str, str]
+    left_out: tuple[str, ...]
+    files: Mapping[str, int]
+
+    def reasons(self) -> Iterator[str]:
+        """Say in words what can be chosen, and what is missing."""
+        if self.arguments:
+            listing = ", ".join(f"{name}={value!r}" for name, value in self.arguments.items())
+            yield f"xacro: arguments {listing}; xacro={{…}} or --xacro KEY=VALUE chooses others"
+        for file in self.left_out:
+            yield f"xacro: did without {file}, as that package is not there"
+
+
+def expand(template: Path, arguments: Mapping[str, str]) -> Expansion:
+    """Return what a template makes; it is expanded again if a file of it changes.
+
+    An include of a package that is not there is left out, if the template can do without.
 
     Args:
         template: The template.
@@ -81,24 +109,57 @@ def expand(template: Path, arguments: Mapping[str, str]) -> bytes:
     """
     key = (str(template), urlencode(arguments))
     with _turn:
-        files, xml = _expanded.get(key, ({}, b""))
-        if not files or files != _times(files):
-            included, xml = _expand(template, arguments)
-            _expanded[key] = (_times([str(template), *included]), xml)
-    return xml
+        made = _expanded.get(key)
+        if made is None or not made.files or made.files != _times(made.files):
+            made = _expanded[key] = _expand(template, arguments)
+    return made
 
 
-def _expand(template: Path, arguments: Mapping[str, str]) -> tuple[list[str], bytes]:
+def was_expanded(template: Path, arguments: Mapping[str, str]) -> bool:
+    """Tell whether this process has expanded a template with these arguments before."""
+    return (str(template), urlencode(arguments)) in _expanded
+
+
+def _expand(template: Path, arguments: Mapping[str, str]) -> Expansion:
     xacro = _package(template)
     printed = io.StringIO()
+    lost = _Lost()
+    values = dict(arguments)  # xacro adds those that have a value of their own
     try:
-        with redirect_stderr(printed), redirect_stdout(printed), _finding(xacro, template):
+        with redirect_stderr(printed), redirect_stdout(printed), _finding(xacro, template, lost):
             xacro.all_includes.clear()
-            document: Any = xacro.process_file(str(template), mappings=dict(arguments))
-            return list(xacro.all_includes), document.toxml(encoding="utf-8")
+            document: Any = xacro.process_file(str(template), mappings=values)
+            xml = document.toxml(encoding="utf-8")
+            files = () if lost.packages else (str(template), *xacro.all_includes)
     except (Exception, SystemExit) as error:  # whatever a template's expressions raise
         message = " ".join(f"{error or type(error).__name__} {printed.getvalue()}".split())
-        raise AssetError(f"xacro cannot expand {template}: {message[:300]}") from error
+        advice = lost.advice(lost.packages, template)
+        raise AssetError(f"xacro cannot expand {template}: {message[:300]}{advice}") from error
+    meshes = [mesh.get("filename", "") for mesh in fromstring(xml).iterfind(".//collision//mesh")]
+    needed = [name for name in lost.packages if any(f"$(find {name})" in file for file in meshes)]
+    if needed:
+        raise AssetError(f"{template} refers to meshes elsewhere{lost.advice(needed, template)}")
+    return Expansion(xml, values, tuple(lost.includes), _times(files))
+
+
+@dataclass
+class _Lost:
+    """What a template refers to in packages that are not there: these, and files to include."""
+
+    packages: dict[str, None] = field(default_factory=dict[str, None])
+    includes: list[str] = field(default_factory=list[str])
+
+    @staticmethod
+    def advice(packages: Iterable[str], template: Path) -> str:
+        """Return what to do about packages, as the end of a message."""
+        named = ", ".join(map(repr, packages))
+        if not named:
+            return ""
+        there = "is" if "," not in named else "are"
+        return (
+            f"; the package {named} {there} not there: put it beside {template.name} or beside its"
+            " package, in a folder of that name or with its package.xml"
+        )
 
 
 def _package(template: Path) -> Any:
@@ -115,19 +176,35 @@ def _package(template: Path) -> Any:
 
 
 @contextmanager
-def _finding(xacro: Any, template: Path) -> Generator[None]:
-    """Have ``$(find PACKAGE)`` look around the template, before ROS if that is installed."""
+def _finding(xacro: Any, template: Path, lost: _Lost) -> Generator[None]:
+    """Have ``$(find PACKAGE)`` look around the template, before ROS if that is installed.
+
+    Of a package that is neither there nor in ROS it stays as it is, and is noted.
+    """
     substitution = xacro.substitution_args
-    installed = substitution._eval_find
+    installed, included = substitution._eval_find, xacro.get_include_files
 
     def find(package: str) -> str:
-        return find_package(package, template.parent.as_posix()) or installed(package)
+        if found := find_package(package, template.parent.as_posix()):
+            return found
+        try:
+            return installed(package)
+        except Exception:  # ROS's own, or Python's where ROS is not
+            lost.packages[package] = None
+            return f"$(find {package})"
 
-    substitution._eval_find = find
+    def files(spec: str, symbols: Any) -> Iterator[str]:
+        for file in included(spec, symbols):
+            if "$(find " in file:
+                lost.includes.append(file[file.index("$(find ") :])
+            else:
+                yield file
+
+    substitution._eval_find, xacro.get_include_files = find, files
     try:
         yield
     finally:
-        substitution._eval_find = installed
+        substitution._eval_find, xacro.get_include_files = installed, included
 
 
 def _times(files: Any) -> dict[str, int]:
