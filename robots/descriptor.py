@@ -79,6 +79,8 @@ class RobotDescriptor:
         allowed_collisions: Pairs of links that may overlap, besides those that a joint joins and
             those that are rigid with each other; checks and physics let them. None takes what
             ManiSkill's loader takes: of the SRDF beside the URDF the pairs of reason ``Default``.
+        no_floor_contact: Links that floors let through, such as the wheels of a base that joints
+            move along the floor and turn: in contact, they would hold it in its place.
         limbs: The arms of a robot that has several, by name, such as ``left`` and ``right``;
             ``tcp_link``, ``fingers`` and ``reach`` are then those of the first one. A robot without
             limbs is one arm.
@@ -99,6 +101,7 @@ class RobotDescriptor:
     cameras: tuple[CameraMount, ...] = ()
     home: Home = field(default_factory=Home)
     allowed_collisions: tuple[tuple[str, str], ...] | None = None
+    no_floor_contact: tuple[str, ...] = ()
     tcp_offset: Vector3 = (0.0, 0.0, 0.0)
     limbs: Mapping[str, Limb] = field(default_factory=dict[str, Limb])
     control_modes: Mapping[str, Mapping[str, JointGroup]] = field(
@@ -115,6 +118,7 @@ class RobotDescriptor:
         )
         expect(self.reach > 0, f"{self.name}: reach is {self.reach} m; it must be positive")
         expect_different(f"{self.name}: tcp_position_links", self.tcp_position_links)
+        expect_different(f"{self.name}: no_floor_contact", self.no_floor_contact)
         expect_different(f"{self.name}: cameras", [camera.name for camera in self.cameras])
         pairs = self.allowed_collisions or ()
         for i, pair in enumerate(pairs):

@@ -49,6 +49,7 @@ FETCH = replace(
         "tabletop": (0, -pi / 4, 0, pi / 4, 0, pi / 3, 0, *OPEN, 0, 0, 0.386, 0, 0, 0),
     },
     home=Home(position=(-1.05, 0.0, -0.9196429), keyframe="tabletop"),  # on the floor
+    no_floor_contact=("l_wheel_link", "r_wheel_link"),
     control_modes=dict.fromkeys(CONTROL_MODES, BODY),
     reach=1.13,  # of the TCP, from the URDF
     source="mani_skill 3.0.1, agents/robots/fetch/fetch.py and scene_builder/table",
