@@ -22,6 +22,7 @@ from robots.parts import (
     GripperMaterial,
     Home,
     Limb,
+    NativeAgent,
     Quaternion,
     Vector3,
     expect,
@@ -39,6 +40,7 @@ __all__ = [
     "Home",
     "JointGroup",
     "Limb",
+    "NativeAgent",
     "Quaternion",
     "RobotDescriptor",
     "UrdfSource",
@@ -81,6 +83,7 @@ class RobotDescriptor:
             ManiSkill's loader takes: of the SRDF beside the URDF the pairs of reason ``Default``.
         no_floor_contact: Links that floors let through, such as the wheels of a base that joints
             move along the floor and turn: in contact, they would hold it in its place.
+        native_agent: What ManiSkill's agent of it reads otherwise than its other agents.
         limbs: The arms of a robot that has several, by name, such as ``left`` and ``right``;
             ``tcp_link``, ``fingers`` and ``reach`` are then those of the first one. A robot without
             limbs is one arm.
@@ -103,6 +106,7 @@ class RobotDescriptor:
     allowed_collisions: tuple[tuple[str, str], ...] | None = None
     no_floor_contact: tuple[str, ...] = ()
     tcp_offset: Vector3 = (0.0, 0.0, 0.0)
+    native_agent: NativeAgent = NativeAgent()
     limbs: Mapping[str, Limb] = field(default_factory=dict[str, Limb])
     control_modes: Mapping[str, Mapping[str, JointGroup]] = field(
         default_factory=dict[str, Mapping[str, JointGroup]]
@@ -241,6 +245,12 @@ class RobotDescriptor:
             if not is_gripper(name) and not group.held
         ]
         return tuple(joint for group in driven for joint in group.joints)
+
+    @property
+    def gripper_joints(self) -> tuple[str, ...]:
+        """Joints of every group that is a gripper, by its name."""
+        groups = self.action_split.groups.items()
+        return tuple(joint for name, group in groups if is_gripper(name) for joint in group.joints)
 
     @property
     def dof(self) -> int:
