@@ -11,11 +11,12 @@ import pytest
 from layouts import single
 from robots import ActionSplit, JointGroup, LocalUrdf, RobotDescriptor, RobotRegistry
 from robots.common.errors import UnknownNameError
+from robots.from_urdf import guess_descriptor
 from simulation import Simulation
 from simulation.floor import adds_floor, drives_on_floor
 from simulation.overlaps import stand
 from simulation.trial import try_robot
-from tests.faults.toy_robots import link
+from tests.faults.toy_robots import joint, link
 
 DRIVES = ("fetch", "fetch_driving", "mobile_panda")
 OTHERS = ("floating_panda_gripper", "panda", "so100")  # in the air; on a base that stands
@@ -75,14 +76,14 @@ def cart(tmp_path) -> RobotDescriptor:
     wheel = link("wheel", '<box size="0.1 0.1 0.21"/>')
     text = f"""<robot name="cart"><link name="root"/><link name="x"/><link name="y"/>
     {link("body", '<box size="0.4 0.4 0.1"/>')}{wheel}
-    {BASE.format(name="slide_x", kind="prismatic", parent="root", child="x", axis="1 0 0")}
-    {BASE.format(name="slide_y", kind="prismatic", parent="x", child="y", axis="0 1 0")}
-    {BASE.format(name="turn", kind="revolute", parent="y", child="body", axis="0 0 1")}
+    {BASE.format(name="root_x", kind="prismatic", parent="root", child="x", axis="1 0 0")}
+    {BASE.format(name="root_y", kind="prismatic", parent="x", child="y", axis="0 1 0")}
+    {BASE.format(name="root_z", kind="revolute", parent="y", child="body", axis="0 0 1")}
     <joint name="axle" type="fixed"><parent link="body"/><child link="wheel"/></joint></robot>"""
     path = tmp_path / "cart.urdf"
     path.write_text(text)
     base = JointGroup(
-        ("slide_x", "slide_y", "turn"),
+        ("root_x", "root_y", "root_z"),
         command="base_velocity",
         lower=(-1.0, -1.0),
         upper=(1.0, 1.0),
@@ -103,14 +104,23 @@ def cart(tmp_path) -> RobotDescriptor:
     )
 
 
+def test_wheels_of_a_base_that_joints_move_are_guessed(cart, tmp_path):
+    text = cart.urdf.locate().read_text().replace("</robot>", "")
+    path = tmp_path / "arm.urdf"
+    path.write_text(f"{text}{link('arm')}{joint('shoulder', 'body', 'arm')}</robot>")
+    guessed = guess_descriptor(path)
+    assert guessed.descriptor.no_floor_contact == ("wheel",)
+    assert "no_floor_contact: wheel, by name; they do not roll" in guessed.reasons
+
+
 def test_a_trial_drives_on_the_floor(cart):
     assert try_robot(cart, steps=5).problems == ()
 
 
 def test_a_trial_says_what_holds_a_base_on_the_floor(cart):
     forward, turn, cause = try_robot(replace(cart, no_floor_contact=()), steps=5).problems
-    assert forward.startswith("base.forward moves slide_x by 0% of what it asks for")
-    assert re.match(r"base.turn moves turn by \d% of what it asks for", turn)
+    assert forward.startswith("base.forward moves root_x by 0% of what it asks for")
+    assert re.match(r"base.turn moves root_z by \d% of what it asks for", turn)
     assert cause == (
         "the likely cause: at the start wheel and floor overlap by 5 mm;"
         " the descriptor's no_floor_contact=('wheel',) would end that"
