@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from inspect import signature
 from itertools import pairwise
-from typing import Literal, TypeGuard, cast
+from typing import Any, Literal, TypeGuard, cast
 
 from kinematics.quaternions import yaw_quaternion
 from layouts.distances import apart, centred, gaps, ring_of, share_at_table, table_for
@@ -247,12 +247,19 @@ CATALOGUE = {
 
 def _check(given: object, origin: str, name: str) -> Callable[..., Layout]:
     """Return what an entry point gave, if it can be a preset."""
-    if not callable(given) or next(iter(signature(given).parameters), None) != "robots":
+    if _first_argument(given) != "robots":
         raise LayoutError(
             f"{origin} gave {shown(given)}; the preset {name} is needed, a function whose first"
             " argument is robots"
         )
     return cast("Callable[..., Layout]", given)
+
+
+def _first_argument(function: Any) -> str | None:
+    try:
+        return next(iter(signature(function).parameters), None)
+    except (TypeError, ValueError):  # no function, or one of which Python does not know
+        return None
 
 
 PRESETS = Catalogue(

@@ -30,6 +30,7 @@ from robots.descriptor import (
     Home,
     JointGroup,
     Limb,
+    NativeAgent,
     RobotDescriptor,
 )
 from robots.mjcf.locator import LocalMjcf
@@ -52,6 +53,7 @@ __all__ = [
     "LocalMjcf",
     "LocalUrdf",
     "MissingPackageError",
+    "NativeAgent",
     "RecordingError",
     "RobotDescriptor",
     "RobotLayoutsError",

@@ -22,6 +22,7 @@ from robots.parts import (
     GripperMaterial,
     Home,
     Limb,
+    NativeAgent,
     Quaternion,
     Vector3,
     expect,
@@ -39,6 +40,7 @@ __all__ = [
     "Home",
     "JointGroup",
     "Limb",
+    "NativeAgent",
     "Quaternion",
     "RobotDescriptor",
     "UrdfSource",
@@ -79,6 +81,9 @@ class RobotDescriptor:
         allowed_collisions: Pairs of links that may overlap, besides those that a joint joins and
             those that are rigid with each other; checks and physics let them. None takes what
             ManiSkill's loader takes: of the SRDF beside the URDF the pairs of reason ``Default``.
+        no_floor_contact: Links that floors let through, such as the wheels of a base that joints
+            move along the floor and turn: in contact, they would hold it in its place.
+        native_agent: What ManiSkill's agent of it reads otherwise than its other agents.
         limbs: The arms of a robot that has several, by name, such as ``left`` and ``right``;
             ``tcp_link``, ``fingers`` and ``reach`` are then those of the first one. A robot without
             limbs is one arm.
@@ -99,7 +104,9 @@ class RobotDescriptor:
     cameras: tuple[CameraMount, ...] = ()
     home: Home = field(default_factory=Home)
     allowed_collisions: tuple[tuple[str, str], ...] | None = None
+    no_floor_contact: tuple[str, ...] = ()
     tcp_offset: Vector3 = (0.0, 0.0, 0.0)
+    native_agent: NativeAgent = NativeAgent()
     limbs: Mapping[str, Limb] = field(default_factory=dict[str, Limb])
     control_modes: Mapping[str, Mapping[str, JointGroup]] = field(
         default_factory=dict[str, Mapping[str, JointGroup]]
@@ -115,6 +122,7 @@ class RobotDescriptor:
         )
         expect(self.reach > 0, f"{self.name}: reach is {self.reach} m; it must be positive")
         expect_different(f"{self.name}: tcp_position_links", self.tcp_position_links)
+        expect_different(f"{self.name}: no_floor_contact", self.no_floor_contact)
         expect_different(f"{self.name}: cameras", [camera.name for camera in self.cameras])
         pairs = self.allowed_collisions or ()
         for i, pair in enumerate(pairs):
@@ -237,6 +245,12 @@ class RobotDescriptor:
             if not is_gripper(name) and not group.held
         ]
         return tuple(joint for group in driven for joint in group.joints)
+
+    @property
+    def gripper_joints(self) -> tuple[str, ...]:
+        """Joints of every group that is a gripper, by its name."""
+        groups = self.action_split.groups.items()
+        return tuple(joint for name, group in groups if is_gripper(name) for joint in group.joints)
 
     @property
     def dof(self) -> int:

@@ -242,6 +242,7 @@ def on_body(
         reach=first.reach + math.hypot(*parts[0].position[:2]),
         source=" and ".join(dict.fromkeys(robot.source for robot in robots.values())),
         allowed_collisions=_allowed(urdf, [(r, f"{key}_") for key, r in robots.items()]),
+        no_floor_contact=tuple(link for robot in named for link in robot.no_floor_contact),
         limbs=_limbs(dict(zip(robots, named, strict=True)), model, parts),
         control_modes=_joined_modes(dict(zip(robots, named, strict=True))),
     )
@@ -464,6 +465,7 @@ def _prefixed(robot: RobotDescriptor, prefix: str) -> RobotDescriptor:
         control_modes={mode: moved(groups) for mode, groups in robot.control_modes.items()},
         tcp_link=prefix + robot.tcp_link,
         tcp_position_links=renamed(robot.tcp_position_links),
+        no_floor_contact=renamed(robot.no_floor_contact),
         gripper_material=material and replace(material, links=renamed(material.links)),
         fingers=fingers and _renamed_fingers(fingers, prefix),
         cameras=tuple(

@@ -124,6 +124,7 @@ def guess(
     rest, posture = _rest(parts, allowed)
     distance, measured = find_reach(parts.model, main, parts.tools[main.name], rest)
     fingers, grasping = _fingers(parts, main)
+    wheels = _wheels(parts)
     fields: dict[str, Any] = {
         "name": name or _as_name(parts.model.name or path.stem),
         "urdf": source,
@@ -137,6 +138,7 @@ def guess(
         "reach": distance,
         "source": f"guessed from {(file or path).name}",
         "allowed_collisions": (*allowed, *posture.overlapping),
+        "no_floor_contact": wheels,
         "limbs": _limbs(parts, rest),
     }
     unknown = sorted(set(overrides) - set(RobotDescriptor.__dataclass_fields__))
@@ -158,6 +160,8 @@ def guess(
         *drives,
         *_out_of_limits(parts),
     )
+    if wheels:
+        about = (*about, f"no_floor_contact: {', '.join(wheels)}, by name; they do not roll")
     about = (*about, *posture.reasons, measured)
     given = tuple(f"{field}: given, not guessed" for field in overrides)
     return Guess(
@@ -225,6 +229,19 @@ def _action_split(parts: _Parts) -> ActionSplit:
         if limb.name in parts.grippers:
             groups.update(parts.grippers[limb.name].groups)
     return ActionSplit(**groups, **held_groups(parts.anatomy, parts.drives))
+
+
+def _wheels(parts: _Parts) -> tuple[str, ...]:
+    """Return the wheels of a base that joints move: links called so that it carries."""
+    if not parts.anatomy.base:
+        return ()
+    model, body = parts.model, parts.anatomy.base[-1].child
+    wheels = [j for j in model.moving_on(body) if words.has(j.child, words.WHEEL)]
+    links = [joint.child for first in wheels for joint in model.below(first)]
+    carried = [near for link in (body, *links) for near in model.rigid_with(link)]
+    return tuple(
+        link for link in carried if link in model.collisions and words.has(link, words.WHEEL)
+    )
 
 
 def _fingers(parts: _Parts, limb: Limb) -> tuple[Fingers | None, str]:

@@ -98,6 +98,7 @@ def report(robot: RobotDescriptor, store: AssetStore) -> str:
         "Keyframes (rad, m)": _keyframes(robot, urdf),
         "Gripper": _gripper(robot),
         "Links that may overlap": _overlaps(robot),
+        "Links that do not touch floors": robot.no_floor_contact or ["none"],
         "Cameras": _cameras(robot),
         "Files": _files(robot, store),
     }

@@ -87,6 +87,32 @@ class Fingers:
 
 
 @dataclass(frozen=True)
+class NativeAgent:
+    """What ManiSkill's agent of a robot reads otherwise than its other agents; clones do likewise.
+
+    Attributes:
+        tcp_links: Links whose mean pose is its ``tcp_pose``; that of the robot's TCP if empty.
+        base_joints: Joints of its base, static up to ``base_speed`` whatever a task's threshold.
+            Where it has some, joints that move backwards are static however fast they are.
+        base_speed: That speed (m/s, rad/s).
+    """
+
+    tcp_links: tuple[str, ...] = ()
+    base_joints: tuple[str, ...] = ()
+    base_speed: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse repeated names and a negative speed."""
+        settle_fields(self, DescriptorError)
+        expect_different("NativeAgent: tcp_links", self.tcp_links)
+        expect_different("NativeAgent: base_joints", self.base_joints)
+        expect(
+            self.base_speed >= 0,
+            f"NativeAgent: base_speed is {self.base_speed}; it must not be negative",
+        )
+
+
+@dataclass(frozen=True)
 class CameraMount:
     """A camera that rides on a link.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
@@ -15,21 +15,31 @@ from simulation.world import World
 DEPTH = 1e-3  # m; what rests on something sinks in by less
 
 
+def empty(world: World, number: int) -> None:
+    """Add nothing to a world."""
+
+
 class RobotsAlone:
     """A layout's robots in a world of their own, to try postures in."""
 
-    def __init__(self, layout: Layout, physics: PhysicsSettings | None = None) -> None:
+    def __init__(
+        self,
+        layout: Layout,
+        physics: PhysicsSettings | None = None,
+        build: Callable[[World, int], None] = empty,
+    ) -> None:
         """Build the world.
 
         Args:
             layout: The robots.
             physics: Solver settings; None is SAPIEN's own defaults.
+            build: Adds what else is there.
 
         Raises:
             RobotLayoutsError: If a robot cannot be built.
         """
         timestep = (physics or SAPIEN_DEFAULTS).timestep
-        self._simulation = Simulation(layout, empty, 1, physics, control_frequency=1 / timestep)
+        self._simulation = Simulation(layout, build, 1, physics, control_frequency=1 / timestep)
         self._still = np.zeros((1, layout.action_dim), np.float32)
 
     def overlaps(self, postures: Mapping[str, Joints] | None = None) -> list[Overlap]:
@@ -49,7 +59,11 @@ class RobotsAlone:
         return deepest(alone.overlaps(0))
 
 
-def starting_overlaps(layout: Layout, physics: PhysicsSettings | None = None) -> list[Overlap]:
+def starting_overlaps(
+    layout: Layout,
+    physics: PhysicsSettings | None = None,
+    build: Callable[[World, int], None] = empty,
+) -> list[Overlap]:
     """Return what overlaps by more than `DEPTH` where a layout's robots start, the deepest first.
 
     Builds a world of its own, and takes one step of physics in it.
@@ -57,11 +71,12 @@ def starting_overlaps(layout: Layout, physics: PhysicsSettings | None = None) ->
     Args:
         layout: The robots.
         physics: Solver settings; None is SAPIEN's own defaults.
+        build: Adds what else is there.
 
     Raises:
         RobotLayoutsError: If a robot cannot be built.
     """
-    return RobotsAlone(layout, physics).overlaps()
+    return RobotsAlone(layout, physics, build).overlaps()
 
 
 def stand(simulation: Simulation) -> None:
@@ -86,7 +101,3 @@ def between_robots(overlaps: Iterable[Overlap]) -> list[Overlap]:
         if None not in (overlap.one.robot, overlap.other.robot)
         and overlap.one.robot != overlap.other.robot
     ]
-
-
-def empty(world: World, number: int) -> None:
-    """Add nothing to a world."""

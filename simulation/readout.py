@@ -226,7 +226,7 @@ class ReadoutIndex:
         arm = [joint in descriptor.arm_joints for joint in descriptor.joints]
         self.joints[name] = _as_slice(list(joints))
         self.arm_joints[name] = _as_slice(list(compress(joints, arm)))
-        gripper = [i for i, in_arm in enumerate(arm) if not in_arm]
+        gripper = [descriptor.joints.index(joint) for joint in descriptor.gripper_joints]
         widest = np.float32(sum(limits[gripper, 1]))
         self.grippers[name] = [joints[i] for i in gripper], widest
         self.fingers[name] = descriptor.fingers

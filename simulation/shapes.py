@@ -143,7 +143,10 @@ class Capsule(Shape):
 
 @dataclass(frozen=True)
 class Plane(Shape):
-    """An infinite plane; its own +x axis is the outward normal."""
+    """An infinite plane, such as a floor; its own +x axis is the outward normal.
+
+    It lets the links through that a robot's ``no_floor_contact`` names.
+    """
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,7 @@
-"""Tries a robot out: stands it alone, steps it, moves each action number and its TCP."""
+"""Tries a robot out: stands it alone, steps it, moves each action number and its TCP.
+
+A robot whose base drives stands on a floor.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ import numpy as np
 from layouts import Layout, single
 from robots import ActionNumber, RobotDescriptor
 from simulation.backend import Overlap, Part
+from simulation.floor import FLOOR, adds_floor, drives_on_floor
 from simulation.maths import Array, Floats
 from simulation.overlaps import empty, stand, starting_overlaps
 from simulation.simulation import Simulation
@@ -24,9 +28,10 @@ HELD = 20  # steps
 EXPLODES = 10.0  # times a joint's largest speed
 # A relative number is given until its own joints have moved by half of what one step asks for, two
 # steps at most. Others are to move by less than a tenth of what was asked for until then: an arm's
-# links push each other. A number that asks for a position has half a second.
+# links push each other. A number that asks for a position or a speed has half a second.
 OWN_SHARE, OTHER_SHARE = 0.5, 0.1
 RELATIVE_STEPS, ABSOLUTE_STEPS = 2, 10
+ABSOLUTE_TIME = 0.5  # s, of those steps
 MOST_SHARE = 10.0
 LEAST_ASKED = {"rad": 0.1, "m": 0.02}  # by which joints of the other unit are judged
 
@@ -93,11 +98,13 @@ class NumberTrial:
 
 @dataclass(frozen=True)
 class Trial:
-    """What was seen of a robot that stood alone, without gravity on its links and without ground.
+    """What was seen of a robot that stood alone, without gravity on its links.
+
+    One whose base drives stood on a floor at the height of its root link.
 
     Attributes:
         robot: The robot.
-        overlaps: Its links that are inside each other at the start.
+        overlaps: Its links that are inside each other, or the floor, at the start.
         first_step: The joint that moved most in the first step of holding still (rad, m).
         after_hold: The joint that was fastest after `HELD` steps of it (rad/s, m/s).
         steps: Random steps that it was given.
@@ -133,7 +140,11 @@ class Trial:
         problems = tuple(self._problems())
         if not problems or not self.overlaps:
             return problems
-        return (*problems, f"the likely cause: at the start {in_itself(self.overlaps[0])}")
+        cause = f"the likely cause: at the start {in_itself(self.overlaps[0])}"
+        links = sorted({o.one.name for o in self.overlaps if o.other.name == FLOOR})
+        if links:
+            cause += f"; the descriptor's no_floor_contact={(*links,)} would end that"
+        return (*problems, cause)
 
     def _problems(self) -> Iterator[str]:
         joint, amount = self.first_step
@@ -165,7 +176,7 @@ def try_robot(robot: RobotDescriptor, steps: int = 50, seed: int = 0) -> Trial:
         RobotLayoutsError: If it cannot be built.
     """
     alone = _Alone(single({NAME: robot}))
-    overlaps = tuple(starting_overlaps(alone.layout))
+    overlaps = tuple(starting_overlaps(alone.layout, build=alone.build))
     first, after = alone.hold_still()
     fastest, exploded = alone.play(np.random.default_rng(seed), steps)
     moved = [alone.move(number) for number in robot.describe_action()]
@@ -232,7 +243,9 @@ class _Alone:
     def __init__(self, layout: Layout) -> None:
         self.layout = layout
         self.robot, self.start = layout[NAME].robot, layout[NAME].start_qpos
-        self._simulation = Simulation(layout, empty, 1)
+        base = layout[NAME].base_position[2]
+        self.build = adds_floor(base) if drives_on_floor(self.robot) else empty
+        self._simulation = Simulation(layout, self.build, 1)
         self._limits = self._simulation.index.robots[NAME].speeds
         stand(self._simulation)
 
@@ -287,6 +300,8 @@ class _Alone:
             joint: float(shares[self.robot.joints.index(joint)] / abs(factors[joint][0]))
             for joint in number.joints
         }
+        if group.asks.drive:  # forward is along two joints
+            return Moved(number.joints[0], float(np.linalg.norm(list(followed.values()))))
         joint = min(followed, key=lambda joint: followed[joint])
         return Moved(joint, followed[joint])
 
@@ -340,6 +355,9 @@ class _Alone:
             room = max(high - self.start[place], self.start[place] - low)
             return min(abs(number.upper if up else number.lower), room), 1.0 if up else -1.0
         least, most = (-1.0, 1.0) if number.normalised else (number.lower, number.upper)
+        asks = self.robot.action_split.groups[number.group].asks
+        if asks.drive or (asks.velocities and not asks.positions):
+            return number.upper * ABSOLUTE_TIME, most
         end = most if most - present >= present - least else least
         scale = (number.upper - number.lower) / 2 if number.normalised else 1.0
         return abs(end - present) * scale, end
@@ -354,7 +372,7 @@ class _Alone:
 
     def _restart(self) -> None:
         """Stand it at its start again, in a world that knows nothing of what was."""
-        self._simulation.rebuild([0], empty)
+        self._simulation.rebuild([0], self.build)
         stand(self._simulation)
 
     def _qpos(self) -> Floats:

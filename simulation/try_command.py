@@ -99,7 +99,7 @@ def _row(trial: NumberTrial) -> tuple[str, ...]:
         other = f"{trial.other.joint} {percent(trial.other.amount)}"
     return (
         trial.number.name,
-        f"{trial.asked:.3g} {trial.number.unit}",
+        f"{trial.asked:.3g} {trial.number.unit.removesuffix('/s')}",
         percent(trial.least.amount),
         other,
         "WRONG" if trial.problem else "",

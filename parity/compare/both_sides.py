@@ -87,10 +87,13 @@ class NativeSide:
         control_mode: str = CONTROL_MODES[0],
         *,
         picture_size: int | None = None,
+        robot_uid: str | None = None,
     ) -> None:
         """Make the environments; raises what `parity.compare.native_env.make_native` does."""
         self.envs = [
-            make_native(task_id, reward_mode, control_mode, picture_size=picture_size)
+            make_native(
+                task_id, reward_mode, control_mode, picture_size=picture_size, robot_uid=robot_uid
+            )
             for _ in range(num_envs)
         ]
         self.num_envs = num_envs

@@ -28,6 +28,7 @@ def make_native(
     *,
     picture_size: int | None = None,
     obs_mode: str = "state",
+    robot_uid: str | None = None,
 ) -> Any:
     """Make the native environment of a task: one environment, CPU physics.
 
@@ -37,6 +38,7 @@ def make_native(
         control_mode: One of `robots.CONTROL_MODES`.
         picture_size: Width and height of its ``render_rgb_array`` (pixels); None takes native's.
         obs_mode: What it observes, in native's words.
+        robot_uid: Native's name of its robot; None takes the task's own.
 
     Raises:
         MissingPackageError: If mani_skill, or a package that it needs, is not installed.
@@ -47,6 +49,8 @@ def make_native(
         gym = _import_native()
         _expect_task(task_id, reward_mode)
         chosen: dict[str, Any] = {} if reward_mode is None else {"reward_mode": reward_mode}
+        if robot_uid is not None:
+            chosen["robot_uids"] = robot_uid
         if picture_size is not None:
             chosen["human_render_camera_configs"] = {"width": picture_size, "height": picture_size}
         try:

@@ -6,7 +6,15 @@ from math import pi
 from robots.assets.locator import UrdfLocator
 from robots.catalogue import panda
 from robots.control_modes import CONTROL_MODES
-from robots.descriptor import ActionSplit, CameraMount, Fingers, GripperMaterial, Home, JointGroup
+from robots.descriptor import (
+    ActionSplit,
+    CameraMount,
+    Fingers,
+    GripperMaterial,
+    Home,
+    JointGroup,
+    NativeAgent,
+)
 
 FINGERS = ("l_gripper_finger_link", "r_gripper_finger_link")
 OPEN = (0.015, 0.015)
@@ -49,6 +57,8 @@ FETCH = replace(
         "tabletop": (0, -pi / 4, 0, pi / 4, 0, pi / 3, 0, *OPEN, 0, 0, 0.386, 0, 0, 0),
     },
     home=Home(position=(-1.05, 0.0, -0.9196429), keyframe="tabletop"),  # on the floor
+    no_floor_contact=("l_wheel_link", "r_wheel_link"),
+    native_agent=NativeAgent(FINGERS, (*SLIDE.joints, *BASE.joints), base_speed=0.05),
     control_modes=dict.fromkeys(CONTROL_MODES, BODY),
     reach=1.13,  # of the TCP, from the URDF
     source="mani_skill 3.0.1, agents/robots/fetch/fetch.py and scene_builder/table",

@@ -42,6 +42,8 @@ MOBILE_PANDA = replace(
     keyframes={"rest": (*PANDA.keyframe("rest"), 0.0, 0, 0, 0)},
     home=Home(position=(-1.05, 0.0, -0.9196429)),  # on the floor, where Fetch stands
     allowed_collisions=among(("right_panda_link7", "right_panda_hand")),
+    # The column of its lift begins 1.6 m below the floor.
+    no_floor_contact=("body_base_link", "adjustable_body"),
     reach=1.26,  # of the TCP, from the URDF
     source="mani_skill 3.0.1, agents/robots/panda/panda.py and agents/robots/fetch/fetch.py",
 )

@@ -18,7 +18,7 @@ import sapien
 import sapien.physx as physx
 from sapien.wrapper.urdf_loader import URDFLoader
 
-from robots import AssetError, RobotDescriptor
+from robots import AssetError, RobotDescriptor, UnknownNameError
 from robots.urdf.mesh_files import has_body, load_scene
 from robots.urdf.model import UrdfModel
 from robots.urdf.paths import resolve
@@ -26,7 +26,7 @@ from robots.urdf.reading import read_model
 from robots.urdf.shapes import UrdfShape
 from robots.urdf.srdf import ExcludedPair, read_excluded_pairs
 from robots.urdf.summary import parse_urdf, read_urdf
-from simulation.sapien3.collision_groups import overlap_words
+from simulation.sapien3.collision_groups import NO_FLOOR_CONTACT, USUAL, overlap_words
 from simulation.sapien3.mirrored import unmirrored
 
 MOST_PAIRS = 31  # that SAPIEN's loader can keep apart: a bit each
@@ -49,6 +49,7 @@ class Blueprint:
         builder: SAPIEN's builder of an articulation.
         overlaps: Word 2 of the collision groups of links that may overlap others; None where
             SAPIEN's loader has set them.
+        no_floor_contact: Links that floors let through.
         checked: Whether an articulation that it built was compared with the model.
     """
 
@@ -57,6 +58,7 @@ class Blueprint:
     text: str
     builder: Any
     overlaps: dict[str, int] | None = None
+    no_floor_contact: tuple[str, ...] = ()
     checked: bool = False
 
     def build(
@@ -79,12 +81,13 @@ class Blueprint:
         for link in self.builder.link_builders:
             for record in link.visual_records:
                 record.material = _copied(record.material)
+        own = number + 1 if self.overlaps is not None or not links_pass else 0
         for link in self.builder.link_builders:
+            words = NO_FLOOR_CONTACT if link.name in self.no_floor_contact else USUAL
+            overlaps = link.collision_groups[2]
             if self.overlaps is not None:
-                link.collision_groups = [1, 1, self.overlaps.get(link.name, 0), number + 1]
-            else:
-                own = 0 if links_pass else number + 1
-                link.collision_groups = [*link.collision_groups[:3], own]
+                overlaps = self.overlaps.get(link.name, 0)
+            link.collision_groups = [*words, overlaps, own]
         articulation = self.builder.build()
         self.builder.set_scene(None)  # else it would keep the scene alive
         articulation.set_root_pose(pose)
@@ -104,11 +107,17 @@ def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
     Raises:
         AssetError: If its files cannot be found, or make no sense.
         MissingPackageError: If a mesh cannot be read for want of a package.
-        UnknownNameError: If ``allowed_collisions`` names a link that the URDF lacks.
+        UnknownNameError: If ``allowed_collisions`` or ``no_floor_contact`` names a link that the
+            URDF lacks.
     """
     urdf = descriptor.urdf.locate(pictures=visuals)
     contents = read_urdf(urdf)
     model = read_model(contents, urdf.as_posix())
+    for link in descriptor.no_floor_contact:
+        if link not in model.links:
+            raise UnknownNameError(
+                f"link in no_floor_contact of {descriptor.name}", link, model.links
+            )
     _expect_meshes(model, urdf, visuals=visuals)
     loader: Any = _Loader()
     loader.set_scene(sapien.Scene([]))  # which hands out empty builders and is not built in
@@ -131,7 +140,7 @@ def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
         ) from error
     tendons = builder.mimic_joint_records
     builder.mimic_joint_records = [t for t in tendons if _needs_tendon(t, descriptor, model)]
-    return Blueprint(urdf, model, text, builder, overlaps)
+    return Blueprint(urdf, model, text, builder, overlaps, descriptor.no_floor_contact)
 
 
 class _Loader(URDFLoader):

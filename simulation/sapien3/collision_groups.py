@@ -1,8 +1,9 @@
-"""Pairs of links that may overlap, as the collision groups by which SAPIEN tells them.
+"""What may overlap, as the collision groups by which SAPIEN tells it: pairs of links, and floors.
 
 Two shapes collide if word 0 of one has a bit of word 1 of the other, unless their words 2 have a
 bit in common and the lower halves of their words 3 are equal. So every link of a set in which any
-two may overlap gets the same bit of word 2, and every robot of a world a word 3 of its own.
+two may overlap gets the same bit of word 2, and every robot of a world a word 3 of its own. Floors
+and links that they let through have words 0 and 1 by which they collide with all but each other.
 """
 
 from __future__ import annotations
@@ -15,6 +16,11 @@ from robots.bodies.apart import without_distant
 from robots.urdf.model import UrdfModel
 
 BITS = 32  # of word 2
+
+# Words 0 and 1.
+USUAL = (1, 1)
+FLOOR = (1, 0)
+NO_FLOOR_CONTACT = (3, 2)
 
 
 def overlap_words(descriptor: RobotDescriptor, model: UrdfModel, urdf: Path) -> dict[str, int]:

@@ -16,6 +16,7 @@ from simulation.parts import Part
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
 from simulation.sapien3.blueprint import Blueprint, read_blueprint
 from simulation.sapien3.collision import add_collision
+from simulation.sapien3.collision_groups import FLOOR
 from simulation.sapien3.device import expect_render_device, outlive_forks
 from simulation.sapien3.exact_division import divide_exactly
 from simulation.sapien3.robot import SimulatedRobot
@@ -120,11 +121,14 @@ class BuiltWorld:
         entity = builder.build(body.name)
         if self.visuals:
             _draw(entity, body.shapes)
-        component = entity.find_component_by_type(
+        component: Any = entity.find_component_by_type(
             physx.PhysxRigidStaticComponent
             if body.kind == "static"
             else physx.PhysxRigidDynamicComponent
         )
+        for shape in component.collision_shapes:
+            if isinstance(shape, physx.PhysxCollisionShapePlane):
+                shape.set_collision_groups([*FLOOR, 0, 0])
         if body.scale != 1.0:
             pose = _on_its_place(body, component, pose)
         built = self.bodies[body.name] = BuiltBody(body, entity, component, pose)

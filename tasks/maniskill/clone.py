@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from math import inf
+from typing import Any, ClassVar
 
-from tasks import EpisodeRandom, MultiRobotTask, World
+from tasks import EpisodeRandom, MultiRobotTask, State, World
+from tasks.maths import Flags, Floats, like, norm
 
 
 class Clone(MultiRobotTask):
@@ -28,3 +30,42 @@ class Clone(MultiRobotTask):
             rng.joint_noise(world.layout, shared=self.shared_joint_noise)
         for name, noise in rng.joint_noise(world.layout, shared=self.shared_joint_noise).items():
             self.stand(world, name, noise)
+
+    def agent_tcp_pose(self, state: State, robot: str) -> Floats:
+        """Return native's ``agent.tcp_pose``, (N, 7): ``agent.tcp.pose``, unless it has its own."""
+        links = self.layout.arm(robot).robot.native_agent.tcp_links
+        if not links:
+            return state.tcp_pose(robot)
+        total: Any = sum(state.link_pose(robot, link) for link in links)
+        return total / len(links)
+
+    def agent_is_static(self, state: State, robot: str, threshold: float) -> Flags:
+        """Return native's ``agent.is_static(threshold)``, (N,) bool (rad/s)."""
+        descriptor = self.layout.arm(robot).robot
+        agent = descriptor.native_agent
+        if not agent.base_joints:
+            return state.is_static(robot, threshold)
+        limits = dict.fromkeys(descriptor.joints, threshold)
+        limits |= dict.fromkeys(agent.base_joints, agent.base_speed)
+        limits |= dict.fromkeys(descriptor.gripper_joints, inf)
+        qvel = state.qvel(robot)
+        return (qvel <= like(qvel, list(limits.values()))).all(1)
+
+    def agent_speed(self, state: State, robot: str, *, fingers: bool) -> Floats:
+        """Return the norm of native's joint velocities, (N,) (rad/s).
+
+        Args:
+            state: The state.
+            robot: Name of the robot.
+            fingers: Whether those of a gripper count where the robot has a base.
+        """
+        descriptor = self.layout.arm(robot).robot
+        if not descriptor.native_agent.base_joints:
+            return state.arm_speed(robot)
+        _, qvel = state.native_joints(robot)
+        if not fingers:
+            order = self.simulation.index.loaded_order[robot] or range(descriptor.dof)
+            names = [descriptor.joints[i] for i in order]
+            arm = [i for i, name in enumerate(names) if name not in descriptor.gripper_joints]
+            qvel = qvel[:, arm]
+        return norm(qvel)

@@ -110,7 +110,7 @@ class PlaceSphere(Clone):
             distance_to_top(state, "sphere", "bin", WALL, RADIUS),
         )
         released = letting_go(state, "arm", grasped, 16.0)
-        arm_static = state.is_static("arm", STATIC_SPEED)
+        arm_static = self.agent_is_static(state, "arm", STATIC_SPEED)
         placed = 6.0 + (released + stillness(state, "sphere") + arm_static) / 3.0
         reward = where(grasped, 4.0 + place, 2.0 * reach)
         reward = where(info["is_obj_on_bin"], placed, reward)

@@ -75,7 +75,7 @@ class PokeCube(Clone):
         angle = abs(state.last_euler_angle("peg") - state.last_euler_angle("cube"))
         head_distance = norm(_cube_to_head(state)[:, :2])
         return {
-            "success": placed & state.is_static("arm", STATIC_SPEED),
+            "success": placed & self.agent_is_static(state, "arm", STATIC_SPEED),
             "is_cube_placed": placed,
             "is_peg_cube_fit": (angle < MAX_ANGLE) & (head_distance <= MAX_HEAD_DISTANCE),
             "is_peg_grasped": state.is_grasping("arm", "peg"),
@@ -104,7 +104,7 @@ class PokeCube(Clone):
             info["angle_diff"],
             info["head_to_cube_dist"],
             state.distance("cube", "goal_region"),
-            state.arm_speed("arm"),
+            self.agent_speed(state, "arm", fingers=False),
         )
         held = info["is_peg_grasped"] & (tcp_to_peg < GRASP_RADIUS)
         reward = where(held, 4.0 + near + align, 2.0 * reach)

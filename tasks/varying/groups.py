@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, dataclass, fields
 from typing import Any, ClassVar
 
 from robots import TaskError, UnknownNameError
@@ -80,6 +80,9 @@ class Group:
         Raises:
             TaskError: If a field is no distribution, or may draw what makes no sense.
         """
+        for name in self.needed():
+            if getattr(self, name) is None:
+                raise TaskError(f"{type(self).__name__}: {name} is None; it must be declared")
         for name, given in self.declared.items():
             what = f"{type(self).__name__}: {name}"
             object.__setattr__(self, name, self.limits[name].read(given, what))
@@ -95,7 +98,7 @@ class Group:
         """Return the group that was given, or that plain data describes.
 
         Raises:
-            TaskError: If it is none.
+            TaskError: If it is none, or lacks a number that it needs.
             UnknownNameError: If it has no such field.
         """
         if isinstance(data, cls):
@@ -105,7 +108,16 @@ class Group:
         for name in data:
             if name not in cls.names():
                 raise UnknownNameError(f"number of {what}", name, cls.names())
+        for name in cls.needed():
+            if name not in data:
+                raise TaskError(f"{what} lacks {name}; it takes a {cls.__name__}")
         return cls(**data)
+
+    @classmethod
+    def needed(cls) -> tuple[str, ...]:
+        """Return the names of what must be declared."""
+        declared = fields(cls)  # pyright: ignore[reportArgumentType]
+        return tuple(field.name for field in declared if field.default is MISSING)
 
     @classmethod
     def names(cls) -> tuple[str, ...]:

@@ -191,6 +191,7 @@ DECLARATIONS: dict[str, tuple[Callable[..., object], dict[str, tuple[Mapping[str
             ),
             "reach": (NO_NUMBERS, {"0": 0.0, "negative": -1.0}),
             "tcp_position_links": (NO_TUPLES, {"twice the same": ("a", "a")}),
+            "no_floor_contact": ({"a text": "wheel", "twice the same": ("a", "a")},),
             "tcp_offset": (NO_NUMBERS, {"two": (0, 0), "inf": (0, 0, math.inf)}),
             "gripper_material": ({"links": ("a", "b"), "a number": 5},),
             "fingers": ({"links": ("a", "b"), "True": True},),

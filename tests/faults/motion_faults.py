@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from tests.faults.arguments_layouts_faults import WRONG_POINTS, WRONG_ROBOTS
+from tests.faults.arguments_checkers_faults import NO_POINTS
+from tests.faults.arguments_layouts_faults import WRONG_ROBOTS
 from tests.faults.fault import Fault
 
 AREA = "motion"
@@ -75,7 +76,7 @@ def faults() -> Iterator[Fault]:
     for name, values in WRONG_PLANS.items():
         for value in values:
             yield _fault(f"plan({name}={_text(value)})", partial(_plan, {name: value}))
-    for value in WRONG_POINTS:
+    for value in NO_POINTS:
         yield _fault(f"TcpGoal({_text(value)})", partial(_goal, "TcpGoal", value))
         yield _fault(f"RegionGoal({_text(value)}, …)", partial(_goal, "RegionGoal", value, GOAL))
         yield _fault(f"box(position={_text(value)})", partial(_make, "box", (1, 1, 1), value))

@@ -1,4 +1,4 @@
-"""Robots alone in a world move as native's agents do, to the last bit."""
+"""Robots move as native's agents do, to the last bit: in the air, or on a floor if they drive."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import sapien
 from layouts import Layout, Placement
 from robots import CONTROL_MODES, RobotDescriptor, RobotRegistry
 from simulation import PhysicsSettings, Simulation
+from simulation.floor import adds_floor
 from simulation.sapien3.backend import worlds_below
 from tests.native import NATIVE
 
@@ -18,6 +19,7 @@ pytestmark = NATIVE
 
 STEPS = 100
 HEIGHT = 1.5  # m over native's ground, so that nothing touches it
+ON_FLOOR = ("fetch", "fetch_driving")
 AGENTS = {
     "allegro_hand_left": "allegro_hand_left",
     "allegro_hand_right": "allegro_hand_right",
@@ -72,7 +74,7 @@ def native_motion(name: str, actions: np.ndarray, mode: str = DELTAS) -> np.ndar
     native.reset(seed=0)
     agent = native.agent
     agent.reset(torch.from_numpy(start(name)[None]))
-    agent.robot.set_pose(sapien.Pose([0.0, 0.0, HEIGHT]))
+    agent.robot.set_pose(pose(name))
     agent.controller.reset()
     assert [joint.name for joint in agent.robot.active_joints] == active(name)
     rows = []
@@ -85,7 +87,11 @@ def native_motion(name: str, actions: np.ndarray, mode: str = DELTAS) -> np.ndar
 
 def ours(robot: str | RobotDescriptor, mode: str = DELTAS) -> Simulation:
     layout = Layout({"arm": Placement(robot)}).in_control_mode(mode)
-    return Simulation(layout, lambda world, _: None, 1, PhysicsSettings())
+    return Simulation(layout, adds_floor(0.0), 1, PhysicsSettings())
+
+
+def pose(name: str) -> sapien.Pose:
+    return sapien.Pose([0.0, 0.0, 0.0 if name in ON_FLOOR else HEIGHT])
 
 
 def active(name: str) -> list[str]:
@@ -103,7 +109,7 @@ def our_motion(robot: str | RobotDescriptor, actions: np.ndarray, mode: str = DE
     simulation = ours(robot, mode)
     arm = worlds_below(simulation)[0].robots["arm"]
     arm.reset(next(iter(arm.descriptor.keyframes.values())))
-    arm.articulation.set_root_pose(sapien.Pose([0.0, 0.0, HEIGHT]))  # built elsewhere, as native
+    arm.articulation.set_root_pose(pose(arm.descriptor.name))  # built elsewhere, as native
     simulation.touched()
     rows = []
     for action in actions:

@@ -92,7 +92,7 @@ def test_keyframes_are_within_the_joint_limits(robot):
 
 def test_every_link_that_is_named_exists(robot):
     descriptor = robot.descriptor
-    named = {descriptor.tcp_link, *descriptor.tcp_position_links}
+    named = {descriptor.tcp_link, *descriptor.tcp_position_links, *descriptor.no_floor_contact}
     named |= {camera.link for camera in descriptor.cameras}
     named |= set(descriptor.fingers.links) if descriptor.fingers else set()
     named |= set(descriptor.gripper_material.links) if descriptor.gripper_material else set()

@@ -209,6 +209,7 @@ class TestArmsOnABody:
     def test_robots_keep_control_modes_of_their_own(self, bench):
         mounts = {"one": Mount("koch"), "other": Mount("fetch", position=(0.0, 1.0, 0.0))}
         both = on_body("pair", bench, mounts).in_control_mode("pd_joint_pos")
+        assert both.no_floor_contact == ("other_l_wheel_link", "other_r_wheel_link")
         for key, mount in mounts.items():
             alone = RobotRegistry.load(str(mount.robot)).in_control_mode("pd_joint_pos")
             for name, group in alone.action_split.groups.items():

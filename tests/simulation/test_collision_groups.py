@@ -13,7 +13,14 @@ from layouts import Layout, Placement
 from robots import AssetError, RobotDescriptor
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
-from simulation.sapien3.collision_groups import BITS, cover, overlap_words
+from simulation.sapien3.collision_groups import (
+    BITS,
+    FLOOR,
+    NO_FLOOR_CONTACT,
+    USUAL,
+    cover,
+    overlap_words,
+)
 from simulation.sapien3.world import BuiltWorld
 from tests.faults.toy_robots import descriptor, joint, link, robot, toy
 
@@ -79,6 +86,10 @@ def collide(one, other):
         ((1, 1, 6, 1), (1, 1, 4, 2), True),
         ((1, 1, 6, 65535), (1, 1, 4, 65535), False),
         ((1, 1, 6, 1 | 7 << 16), (1, 1, 4, 1), False),
+        ((*FLOOR, 0, 0), (*NO_FLOOR_CONTACT, 0, 1), False),
+        ((*FLOOR, 0, 0), (*USUAL, 0, 1), True),
+        ((*NO_FLOOR_CONTACT, 0, 1), (*USUAL, 0, 0), True),
+        ((*NO_FLOOR_CONTACT, 0, 1), (*NO_FLOOR_CONTACT, 0, 2), True),
     ],
 )
 def test_what_sapien_makes_of_the_groups(one, other, expected):

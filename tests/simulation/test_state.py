@@ -3,8 +3,10 @@ import pytest
 import torch
 
 import tasks
+from layouts import single
 from robots import SimulationError, UnknownNameError
-from simulation import State
+from simulation import Simulation, State
+from simulation.overlaps import empty, stand
 from simulation.sapien3.backend import worlds_below
 from tasks import MultiRobotTask
 
@@ -33,6 +35,12 @@ def test_a_robot_without_a_gripper_is_open(env: MultiRobotTask):
     assert state_of(env).gripper_opening("right").tolist() == [1.0, 1.0]
     with pytest.raises(UnknownNameError, match="Did you mean 'right'"):
         state_of(env).gripper_opening("rigth")
+
+
+def test_joints_that_are_held_are_no_gripper():
+    fetch = Simulation(single({"arm": "fetch"}), empty, 1)  # its base is held
+    stand(fetch)
+    np.testing.assert_allclose(fetch.read().gripper_opening("arm"), [0.3])
 
 
 def test_base_positions_are_where_the_layout_says(env: MultiRobotTask):

@@ -200,6 +200,11 @@ def test_what_cannot_be_is_refused(wrong: Callable[[], Any], message: str) -> No
         wrong()
 
 
+def test_a_file_has_to_say_how_many() -> None:
+    with pytest.raises(TaskError, match="distractors lacks count; it takes a Distractors"):
+        Randomization.from_json({"distractors": {}})
+
+
 def test_they_are_written_and_read() -> None:
     for distractors in (SOME, ALL, Distractors(count=Whole(0, 2), bodies=6, kind="static", x=0.1)):
         declared = Randomization(distractors=distractors)
