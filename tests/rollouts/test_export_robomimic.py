@@ -10,6 +10,7 @@ import pytest
 
 import tasks
 from layouts import Layout, Placement
+from robots import RecordingError
 from rollouts.export.columns import ColumnReader
 from rollouts.export.dataset import Export, export
 from tests.rollouts.recordings import (
@@ -156,3 +157,12 @@ def test_filter_keys_split_the_demonstrations(dataset, tmp_path):
     assert sorted(masks["train"] + masks["valid"]) == sorted(many["data"])
     assert len(masks["train"]) == 19
     assert "success" not in masks
+
+
+@pytest.mark.parametrize("free", [0, 8, 24, 40])  # kB; the dataset takes 48
+def test_a_full_disk_is_one_clear_error(small_disk, recording, free):
+    (small_disk / "others").write_bytes(bytes((512 - free) * 1024))
+    out = small_disk / "dataset"
+    with pytest.raises(RecordingError, match=rf"^cannot write {out}: No space left on device$"):
+        export(Export(recording, "robomimic", out))
+    assert [path.name for path in small_disk.iterdir()] == ["others"]

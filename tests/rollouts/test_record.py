@@ -341,23 +341,15 @@ def test_a_recording_of_many_files_that_is_killed_again_and_again(tmp_path):
 
 
 @pytest.mark.long
-def test_a_full_disk_ends_it_with_what_is_finished(tmp_path):
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=512k", "none", str(disk)]
-    if subprocess.run(mount, capture_output=True).returncode:
-        pytest.skip("file systems cannot be mounted here")
-    try:
-        process = start(*arguments(disk, 1000, 2))
-        _, said = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 1
-        assert "Traceback" not in said
-        kept, error = said.splitlines()[-2:]
-        assert error.startswith(f"error: cannot write {disk}/trajectory.parts/seed-")
-        assert error.endswith("No space left on device")
-        parts = len(list(disk.glob("trajectory.parts/*.part")))
-        assert parts > 3
-        assert kept == f"stopped; {parts} episodes are recorded"
-        wait_until_nobody_is_left(process)
-    finally:
-        subprocess.run(["umount", str(disk)], check=True)
+def test_a_full_disk_ends_it_with_what_is_finished(small_disk):
+    process = start(*arguments(small_disk, 1000, 2))
+    _, said = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    assert "Traceback" not in said
+    kept, error = said.splitlines()[-2:]
+    assert error.startswith(f"error: cannot write {small_disk}/trajectory.parts/seed-")
+    assert error.endswith("No space left on device")
+    parts = len(list(small_disk.glob("trajectory.parts/*.part")))
+    assert parts > 3
+    assert kept == f"stopped; {parts} episodes are recorded"
+    wait_until_nobody_is_left(process)
