@@ -196,6 +196,45 @@ def test_nothing_but_gizmos_keys_and_buttons_is_taken(cell):
         assert at(session, "left", before)
 
 
+def test_of_many_poses_that_wait_the_last_one_counts(cell, monkeypatch):
+    session, aimed, came = cell.session, [], threading.Event()
+
+    def aim(arm, pose):
+        aimed.append(pose)
+        came.wait()
+        type(session).aim(session, arm, pose)
+
+    monkeypatch.setattr(session, "aim", aim)
+    with browsers(cell, 1) as (guest,):
+        last = shifted(session, "left", (0.0, 0.0, 0.03))
+        drag(guest, LEFT, shifted(session, "left", (0.0, 0.0, 0.01)))
+        wait_until(lambda: aimed)
+        for height in np.linspace(-0.02, 0.0, 500):
+            guest.send(moved(LEFT, last + [0, 0, height, 0, 0, 0, 0]))
+        wait_until(lambda: cell.page._waiting.qsize() == 500)
+        came.set()
+        wait_until(lambda: at(session, "left", last))
+    assert len(aimed) == 2
+
+
+def test_a_step_is_taken_though_messages_never_end(cell):
+    session, rounds = cell.session, iter(range(10_000))
+
+    def flood():
+        if next(rounds, None) is not None and not session.actions:
+            cell.page._waiting.put(flood)
+
+    with browsers(cell, 1) as (guest,):
+        press(guest, "Discard (X)")
+        wait_until(lambda: not session.actions)
+        press(guest, "Start (P)")
+        cell.page._waiting.put(flood)
+        wait_until(lambda: session.actions)
+        assert next(rounds, None) is not None
+        press(guest, "Start (P)")
+        wait_until(lambda: session.phase is Phase.STOPPED)
+
+
 def drain(*guests):
     """Read what has come, for a twentieth of a second."""
     for guest in guests:
