@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from robots.common.commands import exit_code, notice, program, start
-from robots.common.new_files import write_new
+from robots.common.errors import DescriptorError
+from robots.common.new_files import check_module_name, write_new
 from robots.from_urdf import guess_descriptor
+from robots.registry import RobotRegistry
 
 _REGISTERED = """
 RobotRegistry.register({constant})  # from here on, it goes by its name: {name!r}
@@ -56,6 +58,11 @@ def _write(options: argparse.Namespace) -> None:
     found = guess_descriptor(options.urdf, options.name)
     name = found.descriptor.name
     module, constant = name.lower(), name.upper()
+    better = f"--name my_{module}"
+    if name in RobotRegistry.names():
+        words = f"there is a robot {name} already; choose another name, such as {better}"
+        raise DescriptorError(words)
+    check_module_name(module, better, DescriptorError)
     first, _, rest = found.module().partition("\n\nfrom ")
     source = f"{first}\n\nfrom robots import RobotRegistry\nfrom {rest}"
     declared = source + _REGISTERED.format(constant=constant, name=name)

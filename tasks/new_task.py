@@ -18,12 +18,13 @@ from kinematics.rotations import rotate
 from layouts import Layout, face_to_face, ring, single
 from robots import RobotDescriptor, TaskError
 from robots.common.commands import exit_code, notice, program, start
-from robots.common.new_files import write_new
+from robots.common.new_files import check_module_name, write_new
 from robots.named import is_path, named_robot
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from robots.urdf.tcp import find_tcp
 from robots.urdf.tree import kinematic_tree
+from tasks.registry import TASKS
 
 SPREAD = 0.06  # of a robot's reach: how far a goal may be from the middle, to each side
 
@@ -239,7 +240,7 @@ def _written(robot: str) -> str:
     """Return a robot as it is written in a task's file."""
     if not is_path(robot):
         return f'"{robot}"'
-    return f'RobotDescriptor.from_urdf("{Path(robot).absolute()}", quiet=True)'
+    return f"RobotDescriptor.from_urdf({str(Path(robot).absolute())!r}, quiet=True)"
 
 
 def _robots(words: Sequence[str]) -> dict[str, str]:
@@ -255,12 +256,28 @@ def _robots(words: Sequence[str]) -> dict[str, str]:
 
 
 def _names(name: str) -> tuple[str, str]:
-    """Return the module and the id of a task that is called ``TwoArmTray`` or ``two_arm_tray``."""
+    """Return the module and the id of a task that is called ``TwoArmTray`` or ``two_arm_tray``.
+
+    Raises:
+        TaskError: If there can be no such task, or its file could not be imported beside others.
+    """
     word, _, version = name.partition("-v")
     title = "".join(part[:1].upper() + part[1:] for part in word.split("_"))
     if not title.isidentifier() or not title.isascii() or not (version or "1").isdigit():
-        raise TaskError(f"{name!r} is no name of a task; letters and digits make one: TwoArmTray")
-    return re.sub("(?<=[a-z0-9])(?=[A-Z])", "_", title).lower(), f"{title}-v{version or 1}"
+        raise TaskError(
+            f"{name!r} cannot be the name of a task: it is made of letters and digits and begins"
+            " with a letter, as TwoArmTray and TwoArmTray-v2 do"
+        )
+    module, task_id = (
+        re.sub("(?<=[a-z0-9])(?=[A-Z])", "_", title).lower(),
+        f"{title}-v{version or 1}",
+    )
+    if task_id in TASKS:
+        raise TaskError(
+            f"there is a task {task_id} already; choose another name, such as My{task_id}"
+        )
+    check_module_name(module, f"My{title}", TaskError)
+    return module, task_id
 
 
 if __name__ == "__main__":
