@@ -168,7 +168,7 @@ def test_how_it_reads():
     assert str(found).splitlines() == [
         "PickCube-v1, MyPolicy: 3 of 4 episodes with success (75.0%)",
         "on average: return 1.25 (0.5 to 2), 25.0 steps (10 to 40)",
-        "no success: seeds 3",
+        "no success: seed 3",
     ]
 
 
