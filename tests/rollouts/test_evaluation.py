@@ -201,7 +201,7 @@ def test_what_cannot_be_evaluated(policy, task, seeds, making, error, complaint)
 
 
 def test_the_command(capsys):
-    words = ["evaluate", f"--task={TASK}", "--episodes=2", "--seed=3"]
+    words = ["evaluate", f"--task={TASK}", "--episodes=2", "--seed=3", "--workers=1"]
     assert main([*words, "--policy=tests.rollouts.policies:still"]) == 0
     printed = capsys.readouterr().out
     assert printed == f"{evaluate(still, TASK, [3, 4], executor=Here())}\n"
