@@ -9,6 +9,7 @@ import argparse
 import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from keyword import iskeyword
 from pathlib import Path
 from typing import NamedTuple
 
@@ -272,6 +273,8 @@ def _names(name: str) -> tuple[str, str]:
         re.sub("(?<=[a-z0-9])(?=[A-Z])", "_", title).lower(),
         f"{title}-v{version or 1}",
     )
+    if iskeyword(title):
+        raise TaskError(f"{title!r} is a keyword of Python; choose another name, such as My{title}")
     if task_id in TASKS:
         raise TaskError(
             f"there is a task {task_id} already; choose another name, such as My{task_id}"
