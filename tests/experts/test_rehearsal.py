@@ -116,6 +116,7 @@ def test_a_closed_loop_that_fails_was_an_episode_too():
     happened = rehearsed(task, 4, plan)
     assert happened is not None
     assert same_episodes(happened, play(task, 4, plan))
+    assert happened.reason == plan.reason == "no success within 9 steps"
 
 
 def test_other_actions_than_those_rehearsed_have_no_episode_yet():

@@ -60,10 +60,11 @@ def test_an_empty_folder_may_be_there_already(recording, tmp_path):
     assert (tmp_path / "out/low_dim.hdf5").is_file()
 
 
-def test_failures_are_left_out(recording, tmp_path, capsys):
+@pytest.mark.parametrize("more", [(), ("--only-successes",)])  # which says what happens anyway
+def test_failures_are_left_out(recording, tmp_path, capsys, more):
     succeed(recording, 0, 2)
     words = ("--format", "lerobot", "--out", str(tmp_path / "out"))
-    assert main(["export", str(recording), *words]) == 0
+    assert main(["export", str(recording), *words, *more]) == 0
     expected = (
         "2 episodes, 7 steps; left out: 1 episode without success (--include-failures exports"
     )
