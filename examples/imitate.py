@@ -481,7 +481,8 @@ def main(
     usual = policies.recipes(task)
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     add = parser.add_argument
-    add("task", nargs="?", default=task, help="task id (default %(default)s)")
+    about = "task id; MODULE:ID for one of your own (default %(default)s)"
+    add("task", nargs="?", default=task, help=about)
     add("--episodes", type=int, default=usual.episodes, help="to learn from (%(default)s)")
     add("--steps", type=int, default=usual.steps, help="batches to learn from (%(default)s)")
     add("--seed", type=int, default=usual.seed, help="of weights and batches (%(default)s)")
@@ -491,6 +492,7 @@ def main(
     add("--recording", type=Path, help="folder of a recording that is there already")
     add("--out", type=Path, help=f"folder (default: runs/{name}/TASK)")
     options = parser.parse_args(arguments)
+    sys.path.append(os.getcwd())  # for MODULE:ID of the present folder
     recipe = policies.recipes(options.task, options.episodes, options.steps, options.seed)
     out = options.out or Path("runs") / name / options.task.rpartition(":")[2]
     try:

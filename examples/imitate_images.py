@@ -101,7 +101,7 @@ def draw_pictures(recording: Path, recipe: PictureRecipe, out: Path, workers: in
     file = out / "image.hdf5"
     if not file.exists():
         size, executor = (recipe.size, recipe.size), choose_executor(workers)
-        wanted = Export(recording, "robomimic", out, cameras="all", size=size, only_successes=True)
+        wanted = Export(recording, "robomimic", out, cameras="all", size=size)
         with LiveLine(recipe.episodes, "episodes") as line:
             export(wanted, lambda done, _: line.update(int(done), "drawing"), executor=executor)
     return file

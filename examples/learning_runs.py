@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -261,7 +262,8 @@ def read_arguments(
     """
     parser = argparse.ArgumentParser(description=description)
     add = parser.add_argument
-    add("--task", default="TwoRobotPickCube-v1", help="task id (default %(default)s)")
+    about = "task id; MODULE:ID for one of your own (default %(default)s)"
+    add("--task", default="TwoRobotPickCube-v1", help=about)
     add("--steps", type=int, help="steps to learn from (default: the recipe's)")
     add("--envs", type=int, default=64, help="environments to learn in (default %(default)s)")
     add("--every", type=int, help="iterations between checkpoints (default: the recipe's)")
@@ -271,6 +273,7 @@ def read_arguments(
     add("--seed", type=int, default=0, help="of weights and episodes (default %(default)s)")
     add("--out", type=Path, default=Path(folder), help="folder of the run (default %(default)s)")
     add("--beside", type=Path, nargs="*", default=[], help="other runs to draw curves of")
+    sys.path.append(os.getcwd())  # for MODULE:ID of the present folder
     return parser.parse_args(arguments)
 
 

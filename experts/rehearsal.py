@@ -72,7 +72,8 @@ def rehearsed(
     if not isinstance(actions, Plan) or actions.episode is None or actions.task() is not task:
         return None
     same = actions.episode.seed == seed and np.array_equal(actions.episode.actions, actions)
-    return actions.episode if same else None
+    reason = "" if actions.episode.solved else actions.reason
+    return replace(actions.episode, reason=reason) if same else None
 
 
 class Rehearsal:
@@ -258,7 +259,7 @@ def search(
                 break
     best = max(made, key=lambda attempt: (attempt.success, len(attempt.actions)))
     if not len(best.actions):
-        raise TaskError(f"{task.task_id}, seed {seed}: no plan: {best.reason}")
+        raise TaskError(f"no plan: {best.reason}")
     return Plan.of(best, task)
 
 

@@ -85,7 +85,9 @@ def _run(options: argparse.Namespace) -> int:
         for number, (name, form) in enumerate(FORMS.items(), 1):
             line.update(number, name)
             out = Path(folder) / str(number)
-            wanted = Export(recording, out=out, cameras=options.cameras, **form)
+            wanted = Export(
+                recording, out=out, cameras=options.cameras, include_failures=True, **form
+            )
             found[name] = exporting(wanted, options.episodes + 1, cameras)
     Console().print(_table(alone, found, options.steps))
     if options.out:

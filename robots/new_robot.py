@@ -11,10 +11,12 @@ from typing import Any
 
 from robots.assets.locator import LocalUrdf
 from robots.common.commands import exit_code, notice, program, start
-from robots.common.new_files import write_new
+from robots.common.errors import DescriptorError
+from robots.common.new_files import check_module_name, write_new
 from robots.data_module import write_module
 from robots.from_urdf import guess_descriptor
 from robots.mjcf.locator import LocalMjcf
+from robots.registry import RobotRegistry
 
 _REGISTERED = """
 RobotRegistry.register({constant})  # from here on, it goes by its name: {name!r}
@@ -62,6 +64,11 @@ def _write(options: argparse.Namespace) -> None:
     found = guess_descriptor(options.urdf, options.name)
     name = found.descriptor.name
     module, constant = name.lower(), name.upper()
+    better = f"--name my_{module}"
+    if name in RobotRegistry.names():
+        words = f"there is a robot {name} already; choose another name, such as {better}"
+        raise DescriptorError(words)
+    check_module_name(module, better, DescriptorError)
     robot = replace(found.descriptor, urdf=_seen_from(options.out, found.descriptor.urdf))
     source = write_module(robot, found.reasons, also=["RobotRegistry"])
     declared = source + _REGISTERED.format(constant=constant, name=name)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from math import fsum
 from pathlib import Path
 from statistics import mean
 from typing import Any
@@ -17,11 +18,12 @@ import tasks
 from experts import find_expert
 from experts.rehearsal import rehearsed
 from layouts import Layout
-from robots import AssetError, MissingPackageError, RecordingError
+from robots import AssetError, MissingPackageError, RecordingError, TaskError
+from robots.common.pages import plural
 from rollouts.recording.recorder import Recorder
 from rollouts.video import film, video_problem
 from tasks import MultiRobotTask
-from tasks.episode import PlayedEpisode, play
+from tasks.episode import PlayedEpisode, Score, play
 from tasks.registry import make_scenario
 
 ENOUGH = 0.9  # share of episodes that must succeed
@@ -67,31 +69,39 @@ def run_demo(options: DemoOptions, console: Console) -> bool:
     expert = find_expert(options.task)
     cls = tasks.get_task_class(options.task)
     layout = make_scenario(cls, **options.making).layout
-    console.print(f"[bold]{options.task}[/], {options.seeds} seeds", highlight=False)
+    console.print(f"[bold]{options.task}[/], {plural(options.seeds, 'seed')}", highlight=False)
     film_why_not = _pictures_problem(layout) if options.video else "not asked for"
     _find_files(layout, console)
     task = tasks.make(options.task, obs_mode="state", **options.making)
     _show_layout(layout, options.out, console)
 
     episodes: list[PlayedEpisode] = []
+    scores: dict[int, Score] = {}
     recording = options.out / "trajectory.h5"
     with Recorder(recording, task, overwrite=True) as recorder, _live(console) as live:
         line = live.add_task("")
         for seed in range(options.seeds):
             live.update(line, description=f"seed {seed}")
-            actions = expert(task, seed)
-            episodes.append(rehearsed(task, seed, actions) or play(task, seed, actions))
-            recorder.add(episodes[-1])
-            live.console.print(_episode_line(episodes[-1]), highlight=False)
-    _report(episodes, console)
+            try:
+                actions = expert(task, seed)
+            except TaskError as error:  # it finds no plan
+                scores[seed] = Score(False, 0.0, 0, str(error))
+            else:
+                episode = rehearsed(task, seed, actions) or play(task, seed, actions)
+                reason = "" if episode.solved else getattr(actions, "reason", "")
+                episodes.append(replace(episode, reason=reason))
+                recorder.add(episodes[-1])
+                scores[seed] = episodes[-1].score
+            live.console.print(_episode_line(seed, scores[seed]), highlight=False, soft_wrap=True)
+    _report(scores, episodes, console)
     console.print(
         f"episodes  {escape(str(recording))}, {escape(recorder.json_path.name)}", highlight=False
     )
-    if film_why_not is None:
+    if film_why_not is None and episodes:
         _film(options, episodes, console)
-    else:
+    elif film_why_not is not None:
         console.print(f"no video: {film_why_not}", highlight=False, soft_wrap=True)
-    return sum(episode.solved for episode in episodes) >= ENOUGH * len(episodes)
+    return sum(score.success for score in scores.values()) >= ENOUGH * len(scores)
 
 
 def _find_files(layout: Layout, console: Console) -> None:
@@ -135,19 +145,23 @@ def _live(console: Console) -> Progress:
     return Progress(*columns, console=console, transient=True)
 
 
-def _episode_line(episode: PlayedEpisode) -> str:
-    outcome = "[green]success[/]" if episode.solved else "[red]failure[/]"
-    return f"seed {episode.seed:>3}  {outcome}  {len(episode.actions):>3} steps"
+def _episode_line(seed: int, score: Score) -> str:
+    outcome = "[green]success[/]" if score.success else "[red]failure[/]"
+    reason = f"  {escape(score.reason)}" if score.reason else ""
+    return f"seed {seed:>3}  {outcome}  {score.steps:>3} steps{reason}"
 
 
-def _report(episodes: Sequence[PlayedEpisode], console: Console) -> None:
-    solved = [episode for episode in episodes if episode.solved]
-    steps = sum(len(episode.actions) for episode in episodes)
-    rate = steps / sum(episode.seconds for episode in episodes)
-    line = f"[bold]{len(solved)} of {len(episodes)} succeeded[/]"
+def _report(
+    scores: Mapping[int, Score], episodes: Sequence[PlayedEpisode], console: Console
+) -> None:
+    solved = [score.steps for score in scores.values() if score.success]
+    line = f"[bold]{len(solved)} of {len(scores)} succeeded[/]"
     if solved:
-        line += f" in {mean(len(episode.actions) for episode in solved):.1f} steps on average"
+        line += f" in {mean(solved):.1f} steps on average"
     console.print(line, highlight=False)
+    if not episodes:
+        return
+    rate = fsum(len(e.actions) for e in episodes) / fsum(e.seconds for e in episodes)
     console.print(
         f"{rate:.0f} steps per second while playing (one environment's step with reward and"
         " success; planning, recording and resets not counted)",

@@ -89,4 +89,4 @@ class _Status:
         if event.result is not None:
             self._played += 1
             self._solved += event.result.success
-        self._line.update(self._played, f"{self._solved} of {self._played} succeeded")
+        self._line.update(self._played, f"evaluating (succeeded so far: {self._solved})")

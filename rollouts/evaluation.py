@@ -16,7 +16,7 @@ from robots.common.writing import writing_errors
 from rollouts.playing.casting import Cast, cast_of
 from rollouts.playing.evaluation_job import EvaluationJob, scores_of
 from rollouts.playing.executor import EPISODE_SECONDS, Event, Executor, choose_executor
-from rollouts.playing.seeds import checked_seeds
+from rollouts.playing.seeds import checked_seeds, seed_lines
 from rollouts.playing.together import grouped
 from rollouts.receipts.evaluated import describe_job, receipt_of
 from rollouts.receipts.receipt import Receipt
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from tasks.engine.making import MakingFields
-
-_SHOWN = 10  # seeds that a text names
 
 
 @dataclass(frozen=True)
@@ -76,19 +74,14 @@ class Evaluation:
 
     def __repr__(self) -> str:
         """Show it as a few lines."""
-        failed = [seed for seed, success in self.successes.items() if not success]
+        failed = {seed: score.reason for seed, score in self.scores.items() if not score.success}
         lines = [
             f"{self.task}, {self.policy}: {len(self.scores) - len(failed)} of {len(self.scores)}"
             f" episodes with success ({self.success_rate:.1%})",
             "on average: return {:.2f} ({:.4g} to {:.4g})".format(*_spread(self.returns))
             + ", {:.1f} steps ({} to {})".format(*_spread(self.lengths)),
         ]
-        if failed:
-            more = f" and {len(failed) - _SHOWN} more" if len(failed) > _SHOWN else ""
-            lines.append(f"no success: seeds {', '.join(map(str, failed[:_SHOWN]))}{more}")
-        reasons = list(self.reasons.items())
-        lines += [f"seed {seed}: {reason}" for seed, reason in reasons[:_SHOWN]]
-        return "\n".join(lines)
+        return "\n".join([*lines, *seed_lines("no success", failed)])
 
 
 def evaluate(

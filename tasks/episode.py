@@ -69,6 +69,7 @@ class PlayedEpisode(Episode):
         actor: Who acted at each step where several did, (T,) uint8: the number of one of the
             ``"actors"`` of ``source``; else None.
         corrections: What a corrector would have done at each step, (T, A), or None.
+        reason: Why it failed, in words; empty if it did not, or if nobody says: an expert does.
     """
 
     states: States
@@ -81,6 +82,7 @@ class PlayedEpisode(Episode):
     drawn: Mapping[str, Any] | None = None
     actor: NDArray[np.uint8] | None = None
     corrections: NDArray[np.float32] | None = None
+    reason: str = ""
 
     @property
     def solved(self) -> bool:
@@ -90,7 +92,8 @@ class PlayedEpisode(Episode):
     @property
     def score(self) -> Score:
         """How it went."""
-        return Score(self.solved, fsum(self.rewards.tolist()), len(self.actions))
+        total = fsum(self.rewards.tolist())
+        return Score(self.solved, total, len(self.actions), self.reason)
 
 
 class Moment(NamedTuple):

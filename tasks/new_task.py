@@ -6,10 +6,12 @@ Writes one file with a task to go on with and its expert, and one with their tes
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from keyword import iskeyword
 from math import cos, pi, sin
 from pathlib import Path
 from typing import NamedTuple
@@ -20,13 +22,14 @@ from kinematics.rotations import rotate
 from layouts import Layout, face_to_face, ring, single
 from robots import RobotDescriptor, TaskError
 from robots.common.commands import exit_code, notice, program, start
-from robots.common.new_files import write_new
+from robots.common.new_files import check_module_name, write_new
 from robots.common.paths import absolute
 from robots.named import FORMS, is_path, named_robot
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from robots.urdf.tcp import find_tcp
 from robots.urdf.tree import kinematic_tree
+from tasks.registry import TASKS
 
 RADIUS = 0.03  # of a goal (m)
 # Shares of a robot's reach: how far a goal may be from its middle to each side, and how far that
@@ -253,7 +256,7 @@ def _written(robot: str, folder: Path) -> str:
     if not is_path(robot):
         return f'"{robot}"'
     path = Path(os.path.relpath(absolute(robot, "the path of a robot"), folder.absolute()))
-    return f'Path(__file__).parent / "{path.as_posix()}"'
+    return f"Path(__file__).parent / {json.dumps(path.as_posix(), ensure_ascii=False)}"
 
 
 def _robots(words: Sequence[str]) -> dict[str, str]:
@@ -269,12 +272,30 @@ def _robots(words: Sequence[str]) -> dict[str, str]:
 
 
 def _names(name: str) -> tuple[str, str]:
-    """Return the module and the id of a task that is called ``TwoArmTray`` or ``two_arm_tray``."""
+    """Return the module and the id of a task that is called ``TwoArmTray`` or ``two_arm_tray``.
+
+    Raises:
+        TaskError: If there can be no such task, or its file could not be imported beside others.
+    """
     word, _, version = name.partition("-v")
     title = "".join(part[:1].upper() + part[1:] for part in word.split("_"))
     if not title.isidentifier() or not title.isascii() or not (version or "1").isdigit():
-        raise TaskError(f"{name!r} is no name of a task; letters and digits make one: TwoArmTray")
-    return re.sub("(?<=[a-z0-9])(?=[A-Z])", "_", title).lower(), f"{title}-v{version or 1}"
+        raise TaskError(
+            f"{name!r} cannot be the name of a task: it is made of letters and digits and begins"
+            " with a letter, as TwoArmTray and TwoArmTray-v2 do"
+        )
+    module, task_id = (
+        re.sub("(?<=[a-z0-9])(?=[A-Z])", "_", title).lower(),
+        f"{title}-v{version or 1}",
+    )
+    if iskeyword(title):
+        raise TaskError(f"{title!r} is a keyword of Python; choose another name, such as My{title}")
+    if task_id in TASKS:
+        raise TaskError(
+            f"there is a task {task_id} already; choose another name, such as My{task_id}"
+        )
+    check_module_name(module, f"My{title}", TaskError)
+    return module, task_id
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import errno
 import http.client
 import io
@@ -18,6 +19,7 @@ from robots import MissingPackageError, RobotLayoutsError
 
 LAST_PORT = 65535
 PROBE_SECONDS = 10.0
+REST = 0.002  # s between two messages of a browser, which sends 120 in a second of dragging
 # What strangers send makes no lines on the terminal; who wants them adds a handler.
 LOG = logging.getLogger(__name__)
 LOG.addHandler(logging.NullHandler())
@@ -121,13 +123,18 @@ def _guarded(guard: Guard, started: list[Any]) -> Generator[None, None, None]:
 
 
 def _sifted(handler: Callable[..., Any], started: list[Any]) -> Callable[..., Any]:
-    """Return a handler of connections that receives only messages which `fits` lets through."""
+    """Return a handler of connections that receives only messages which `fits` lets through.
+
+    And these no faster than one in `REST` seconds, so that whoever floods the page does not keep
+    this process from all else.
+    """
 
     async def handle(connection: Any) -> None:
         receive = connection.recv
 
         async def receive_fitting() -> Any:
             while True:
+                await asyncio.sleep(REST)
                 data = await receive()
                 if started and fits(started[0], data):
                     return data

@@ -2,11 +2,46 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Mapping
 from contextlib import suppress
+from importlib.machinery import PathFinder
+from keyword import iskeyword
 from pathlib import Path
 
-from robots.common.errors import UnwritableFileError
+from robots.common.errors import RobotLayoutsError, UnwritableFileError
+from robots.common.rooms import ROOMS
+
+
+def check_module_name(module: str, better: str, error: type[RobotLayoutsError]) -> None:
+    """Refuse to write a module that cannot be imported, or hides one that others import.
+
+    Args:
+        module: Its name.
+        better: A name that the error proposes.
+        error: Raised if so.
+    """
+    if iskeyword(module):
+        what = "a keyword of Python"
+    elif module in ROOMS:
+        what = "a package of this library"
+    elif module in sys.stdlib_module_names:
+        what = "a module of Python"
+    elif _is_installed(module):
+        what = "an installed module"
+    else:
+        return
+    raise error(
+        f"the file would be {module}.py, but {module!r} is {what}; choose another name, such as"
+        f" {better}"
+    )
+
+
+def _is_installed(module: str) -> bool:
+    here = os.path.realpath(os.curdir)  # whose own files are none of an installation
+    elsewhere = [entry for entry in sys.path if os.path.realpath(entry) != here]
+    return PathFinder.find_spec(module, elsewhere) is not None
 
 
 def write_new(folder: Path, texts: Mapping[str, str]) -> list[Path]:

@@ -201,8 +201,8 @@ def succeeded(trajectory: Trajectory) -> bool:
     """
     if trajectory.success is None:
         raise TrajectoryError(
-            f"episode {trajectory.episode_id} does not say whether it succeeded; export all"
-            " episodes, without only_successes"
+            f"episode {trajectory.episode_id} does not say whether it succeeded; to export it all"
+            " the same, take include_failures (--include-failures)"
         )
     return bool(trajectory.success[-1])
 

@@ -6,12 +6,12 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from robots.common.pages import plural
 from rollouts.playing.command_options import add_arguments as add_executor_arguments
 from rollouts.playing.command_options import chosen_executor, picture_size, stop_signals
 
 if TYPE_CHECKING:
     from rollouts.export.dataset import Exported
-    from rollouts.playing.executor import Executor
 
 DESCRIPTION = "write a recording as a dataset: LeRobot v3.0 or robomimic hdf5"
 EPILOG = (
@@ -45,9 +45,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="pixels of their pictures (each camera's own)",
     )
     add("--instruction", metavar="TEXT", help="what is to be done (what the task says)")
-    add("--only-successes", action="store_true", help="leave out episodes that end in failure")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument(
+        "--include-failures", action="store_true", help="export episodes without success, too"
+    )
+    which.add_argument("--only-successes", action="store_true", help="what happens anyway")
     add("--task", help="the recording's task; MODULE:ID for one of your own")
-    add_executor_arguments(parser, none_given="0")
+    add_executor_arguments(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -68,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
         options.out,
         fps=options.fps,
         video=options.video,
-        only_successes=options.only_successes,
+        include_failures=options.include_failures,
         task=options.task,
         cameras=options.cameras,
         images=options.images,
@@ -76,25 +80,22 @@ def run(options: argparse.Namespace) -> int:
         size=options.size,
         instruction=options.instruction,
     )
+    in_process = options.workers == 0 and options.ray is None
+    executor = None if in_process else chosen_executor(options)
     with LiveLine(unit="episodes") as line, stop_signals():
 
         def show(done: float, total: int) -> None:
             line.total = total
             line.update(round(done, 1), f"exporting {options.recording.name}")
 
-        done = export(wanted, show, executor=_artists(options), tell=line.say)
+        done = export(wanted, show, executor=executor, tell=line.say)
     print(_summary(done))
     return 0
 
 
-def _artists(options: argparse.Namespace) -> Executor | None:
-    """Return who draws; None: this process."""
-    if options.ray is None and not options.workers:
-        return None
-    return chosen_executor(options)
-
-
 def _summary(done: Exported) -> str:
-    left_out = f"; {done.left_out} without success left out" if done.left_out else ""
-    episodes = "1 episode" if done.episodes == 1 else f"{done.episodes} episodes"
-    return f"{done.folder}: {episodes}, {done.steps} steps{left_out}"
+    left_out = ""
+    if done.left_out:
+        failures = plural(done.left_out, "episode")
+        left_out = f"; left out: {failures} without success (--include-failures exports them)"
+    return f"{done.folder}: {plural(done.episodes, 'episode')}, {done.steps} steps{left_out}"

@@ -13,6 +13,7 @@ from rollouts.export.columns import ColumnReader, Columns, succeeded
 from rollouts.export.credits import Credits
 from rollouts.export.folder import new_folder
 from rollouts.export.options import FORMATS, Export
+from rollouts.playing.executor import ProcessExecutor
 from rollouts.reading.recorded_task import task_class, task_for
 from rollouts.reading.recording import open_trajectories
 from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
@@ -86,7 +87,8 @@ def export(
 
     Raises:
         UnknownNameError: If there is no such format, task, robot or camera.
-        TrajectoryError: If the recording cannot be read, holds no states, or no episode is left.
+        TrajectoryError: If the recording cannot be read, holds no states or does not say which
+            episodes succeeded, or no episode is left.
         RecordingError: If the dataset cannot be written, or its folder holds something already.
         MissingPackageError: If a package that the format needs is not installed.
         TaskError: If the options do not go together.
@@ -95,7 +97,7 @@ def export(
         AssetError: If robot files cannot be found.
     """
     out, progress = Path(wanted.out), _rising(progress)
-    wanted.check(here=executor is None)
+    wanted.check(here=executor is None or isinstance(executor, ProcessExecutor))
     with open_trajectories(wanted.recording) as file:
         if not len(file):
             raise TrajectoryError(f"{file.path} holds no episodes; there is nothing to export")
@@ -107,7 +109,7 @@ def export(
             work.artist(folder, executor, progress, tell) as draw,
         ):
             for i, trajectory in enumerate(file):
-                if not wanted.only_successes or succeeded(trajectory):
+                if wanted.include_failures or succeeded(trajectory):
                     columns = work.reader.read(trajectory)
                     watch = _part(progress, i, len(columns) + 1, len(file))
                     drawn = draw(columns)
@@ -117,7 +119,10 @@ def export(
                     episodes, steps = episodes + 1, steps + len(columns)
                 progress(i + 1, len(file))
             if not episodes:
-                raise TrajectoryError(f"none of the {len(file)} episodes of {file.path} succeeded")
+                raise TrajectoryError(
+                    f"none of the {len(file)} episodes of {file.path} succeeded; to export them all"
+                    " the same, take include_failures (--include-failures)"
+                )
         return Exported(out, episodes, steps, len(file) - episodes)
 
 
@@ -206,7 +211,7 @@ class _Work:
 
         path = Path(wanted.recording).absolute()
         job = DrawingJob(path, type(task), shots, last, wanted.layout, wanted.robots)
-        numbers = [i for i in range(len(file)) if not wanted.only_successes or succeeded(file[i])]
+        numbers = [i for i in range(len(file)) if wanted.include_failures or succeeded(file[i])]
         crew = DrawingCrew(job, executor, numbers, folder, lambda n: progress(n, len(file)), tell)
         with closing(crew.episodes()) as drawn:
             yield lambda columns: next(drawn)

@@ -32,7 +32,7 @@ class Export:
             task if None.
         video: Whether pictures are drawn and written as videos (``"lerobot"`` only); those of the
             overview unless ``cameras`` says more.
-        only_successes: Whether episodes whose last step is no success are left out.
+        include_failures: Whether episodes whose last step is no success are exported, too.
         task: The recording's task; ``module:Id`` for one of a module that no package lists.
         layout: Where its robots stood, where the recording cannot say it.
         robots: Which robots these were, where the recording cannot say it.
@@ -53,7 +53,7 @@ class Export:
     out: str | PathLike[str]
     fps: int | None = None
     video: bool = False
-    only_successes: bool = False
+    include_failures: bool = False
     task: str | None = None
     layout: Layout | None = None
     robots: Mapping[str, RobotLike] | None = None
@@ -74,7 +74,7 @@ class Export:
         """Refuse what cannot be done.
 
         Args:
-            here: Whether this process draws the pictures; others say themselves if they cannot.
+            here: Whether this machine draws the pictures; others say themselves if they cannot.
 
         Raises:
             UnknownNameError: If there is no such format.

@@ -12,6 +12,7 @@ import numpy as np
 
 from robots.control_modes import plain_mode
 from rollouts.export.columns import POSE, ColumnReader, Columns, Floats
+from rollouts.export.disk_file import DiskFile
 from rollouts.export.robomimic_pictures import PictureArrays
 from rollouts.export.shots import Channel, Frame
 from rollouts.export.writer import DatasetWriter
@@ -52,7 +53,8 @@ class RobomimicWriter(DatasetWriter):
         self._reader, self._origin, self._size = reader, origin, size
         self._pictures = PictureArrays(channels)
         name = FILE_WITH_PICTURES if channels else FILE_NAME
-        self._file = h5py.File(folder / name, "w")
+        self._disk = DiskFile(folder / name, "w+")
+        self._file = h5py.File(self._disk, "w")
         self._data = self._file.create_group("data")
         self._total, self._solved = 0, list[str]()
 
@@ -72,7 +74,20 @@ class RobomimicWriter(DatasetWriter):
             watch: Called with the number of moments whose pictures are written.
             text: What is to be done in it, which robomimic gives to policies that are told so; None
                 to leave it out.
+
+        Raises:
+            OSError: If it cannot be written.
         """
+        with self._disk.refusals():
+            self._add(columns, frames, watch, text)
+
+    def _add(
+        self,
+        columns: Columns,
+        frames: Iterable[Frame],
+        watch: Callable[[int], None],
+        text: str | None,
+    ) -> None:
         name, steps = f"demo_{len(self._data)}", len(columns)
         demo = self._data.create_group(name)
         demo.attrs["num_samples"] = steps
@@ -107,10 +122,12 @@ class RobomimicWriter(DatasetWriter):
 
     def note(self, about: Mapping[str, Any]) -> None:
         """Keep more about where the last episode comes from: numbers, flags or texts by name."""
-        self._data[f"demo_{len(self._data) - 1}"].attrs.update(about)
+        with self._disk.refusals():
+            self._data[f"demo_{len(self._data) - 1}"].attrs.update(about)
 
     def _let_go(self) -> None:
-        self._file.close()
+        with self._disk, self._disk.refusals():
+            self._file.close()
 
     def _complete(self) -> None:
         self._data.attrs["total"] = self._total

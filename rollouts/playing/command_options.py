@@ -20,20 +20,15 @@ if TYPE_CHECKING:
 INTERRUPTED = 130  # exit code, as shells have it
 
 
-def add_arguments(parser: argparse.ArgumentParser, none_given: str = "1") -> None:
-    """Add the arguments that say who plays.
-
-    Args:
-        parser: Takes them.
-        none_given: How many processes play if the command does not say, in words.
-    """
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments that say who plays."""
     add = parser.add_argument
     add(
         "--workers",
         type=zero_or_more,
         metavar="W",
-        help=f"how many processes ({none_given}; with --ray, one for each CPU of the cluster);"
-        " 0: this one",
+        help="how many processes (one for each core or, with --ray, each CPU of the cluster, but no"
+        " more than episodes); 0: this one",
     )
     add(
         "--episode-timeout",
@@ -63,8 +58,7 @@ def chosen_executor(options: argparse.Namespace) -> Executor:
         return RayExecutor(options.ray, options.workers, episode_timeout=timeout)
     from rollouts.playing.executor import choose_executor
 
-    workers = 1 if options.workers is None else options.workers
-    return choose_executor(workers, episode_timeout=options.episode_timeout)
+    return choose_executor(options.workers, episode_timeout=options.episode_timeout)
 
 
 @contextmanager

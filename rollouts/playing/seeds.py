@@ -1,14 +1,15 @@
-"""Which episodes are asked for."""
+"""Which episodes are asked for, and which of them failed."""
 
 from __future__ import annotations
 
 import operator
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from robots import TaskError
 
 _END = 2**32  # as in native
+_SHOWN = 10  # seeds that a text names
 
 
 def checked_seeds(seeds: Iterable[int]) -> list[int]:
@@ -28,3 +29,18 @@ def checked_seeds(seeds: Iterable[int]) -> list[int]:
     if twice:
         raise TaskError(f"seed {twice[0]} is there twice; each episode is played once")
     return checked
+
+
+def seed_lines(what: str, reasons: Mapping[int, str]) -> list[str]:
+    """Return lines that name seeds, and say why, one line for each seed of which that is known.
+
+    Args:
+        what: What is to be said of them, such as ``"no success"``.
+        reasons: Seed → why, in words; empty if nobody says.
+    """
+    if not reasons:
+        return []
+    more = f" and {len(reasons) - _SHOWN} more" if len(reasons) > _SHOWN else ""
+    named = f"seed{'s' * (len(reasons) > 1)} {', '.join(map(str, [*reasons][:_SHOWN]))}{more}"
+    known = [f"seed {seed}: {reason}" for seed, reason in reasons.items() if reason]
+    return [f"{what}: {named}", *known[:_SHOWN]]

@@ -94,8 +94,7 @@ class Player:
     def score(self) -> Score:
         """How its episode went."""
         if self.rehearsed is not None:
-            score = self.rehearsed.score
-            return replace(score, reason="" if score.success else self.reason)
+            return self.rehearsed.score
         success = bool(self.steps) and self.steps[-1].success
         total = fsum(step.reward for step in self.steps)
         return Score(success, total, len(self.steps), "" if success else self.reason)
@@ -125,6 +124,7 @@ class Player:
             drawn=drawn,
             actor=np.array([step.turn for step in self.steps], np.uint8),
             corrections=np.stack(corrections) if corrections else None,
+            reason=self.score.reason,
         )
 
 

@@ -44,7 +44,7 @@ _EPISODE = {
 # What only a recording of this library says, and not every one.
 _ACTOR = fields({"kind": NAME, "name": TEXT}, {"sha256": maybe(TEXT)})
 _SOURCE = fields({"kind": NAME}, {"actors": items(_ACTOR), "corrects": _ACTOR})
-_ABOUT = {"source": maybe(_SOURCE), "drawn": maybe(OBJECT)}
+_ABOUT = {"source": maybe(_SOURCE), "drawn": maybe(OBJECT), "reason": maybe(TEXT)}
 # An episode's own note in a recording of this library, which becomes its entry in the json.
 OWN_EPISODE = fields({**_EPISODE, "episode_seed": _SEED, "elapsed_steps": _STEPS}, _ABOUT)
 _SUMMARY = fields(
@@ -82,6 +82,7 @@ class Entry:
         success: Whether it ended in success, or None.
         source: Who acted; see `tasks.episode.PlayedEpisode`.
         drawn: What was varied in its world; likewise.
+        reason: Why it failed, in words; likewise.
     """
 
     episode_id: int
@@ -92,6 +93,7 @@ class Entry:
     success: bool | None = None
     source: dict[str, Any] | None = None
     drawn: dict[str, Any] | None = None
+    reason: str = ""
 
     @property
     def group(self) -> str:
@@ -192,6 +194,7 @@ def _entry(episode: Mapping[str, Any]) -> Entry:
         success=None if episode.get("success") is None else bool(episode["success"]),
         source=episode.get("source"),
         drawn=episode.get("drawn"),
+        reason=episode.get("reason") or "",
     )
 
 

@@ -64,6 +64,7 @@ class Trajectory:
         actor: Who acted at each step where several did, (T,) uint8: the number of one of the
             ``"actors"`` of ``source``; else None.
         corrections: What a corrector would have done at each step, (T, A), or None.
+        reason: Why it failed, in words; empty if it did not, or if the file does not say.
     """
 
     episode_id: int
@@ -80,6 +81,7 @@ class Trajectory:
     drawn: Mapping[str, Any] | None = None
     actor: NDArray[np.uint8] | None = None
     corrections: NDArray[np.float32] | None = None
+    reason: str = ""
 
     @property
     def solved(self) -> bool | None:
@@ -253,6 +255,7 @@ class TrajectoryFile(Sequence[Trajectory]):
             drawn=entry.drawn,
             actor=_column(arrays, "actor", np.uint8),
             corrections=_column(arrays, "corrections", np.float32),
+            reason=entry.reason,
         )
 
     def _texts(self, entry: Entry) -> dict[str, str]:

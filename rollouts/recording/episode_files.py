@@ -160,6 +160,7 @@ class PartWriter:
             "elapsed_steps": len(episode.actions),
             "reset_kwargs": {"seed": episode.seed, "options": REBUILT},
             "success": episode.solved,
+            **({"reason": episode.reason} if episode.reason else {}),
             **({"source": dict(episode.source)} if episode.source is not None else {}),
             **({"drawn": dict(episode.drawn)} if episode.drawn is not None else {}),
         }

@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robots import RecordingError
+from robots.common.pages import plural
 from rollouts.playing import command_options as workers
 from rollouts.playing.command_options import INTERRUPTED, one_or_more, stop_signals, zero_or_more
+from rollouts.playing.seeds import seed_lines
 from tasks.cell_options import add_cell_options, chosen_cell
 
 if TYPE_CHECKING:
@@ -132,20 +134,25 @@ class _Status:
             self._line.say(f"seed {event.seed} is not recorded: {event.error}")
         solved = sum(played.success for played in summary.played.values())
         done = summary.already + len(summary.played)
-        who = f", {len(summary.workers)} workers" if len(summary.workers) > 1 else ""
-        self._line.update(done, f"{solved} of {len(summary.played)} succeeded{who}")
+        who = f"; {len(summary.workers)} workers" if len(summary.workers) > 1 else ""
+        self._line.update(done, f"recording (succeeded so far: {solved}{who})")
 
 
 def _report(summary: Summary, path: Path) -> None:
-    solved = sum(played.success for played in summary.played.values())
-    print(f"{path}: {summary.recorded} episodes")
-    if summary.played:
-        count = len(summary.played)
-        steps = sum(played.steps for played in summary.played.values()) / count
-        print(f"recorded now {count}, {solved} with success, {steps:.1f} steps on average")
+    played = summary.played.values()
+    print(f"{path}: {plural(summary.recorded, 'episode')}")
+    if played:
+        solved = sum(score.success for score in played)
+        steps = sum(score.steps for score in played) / len(played)
+        new = plural(len(played), "new episode")
+        print(f"{new}, {solved} with success, {steps:.1f} steps on average")
         if len(summary.workers) > 1:
             print(f"played by {len(summary.workers)} workers")
+    failed = {seed: score.reason for seed, score in summary.played.items() if not score.success}
+    for line in seed_lines("no success", dict(sorted(failed.items()))):
+        print(line)
     for death in summary.deaths:
         print(f"replaced: {death}")
-    if summary.failed:
-        print(f"not recorded: seeds {', '.join(map(str, sorted(summary.failed)))}")
+    reasons = {seed: str(error) for seed, error in sorted(summary.failed.items())}
+    for line in seed_lines("not recorded", reasons):
+        print(line)

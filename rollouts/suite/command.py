@@ -246,5 +246,5 @@ class _Status:
         if event.result is not None:
             self._played += 1
             self._solved += event.result.success
-        words = f"{case.name}; {self._solved} of {self._played} succeeded"
+        words = f"{case.name} (succeeded so far: {self._solved})"
         self._line.update(self._before + self._played, words)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from layouts.view_command import add_server_options
 from robots import TaskError
+from robots.common.pages import plural
 from rollouts.playing import command_options as workers
 from rollouts.playing.command_options import stop_signals, zero_or_more
 from tasks.cell_options import add_cell_options, chosen_cell
@@ -75,5 +76,5 @@ def run(options: argparse.Namespace) -> int:
         except KeyboardInterrupt:
             pass
         kept, total = len(session.kept), len(recorder)
-        print(f"{folder / FILE}: {total} episodes, {kept} of them now")
+        print(f"{folder / FILE}: {plural(total, 'episode')}, {kept} of them new")
     return 0

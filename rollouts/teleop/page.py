@@ -48,6 +48,7 @@ class TeleopPage:
         """
         self._server, self._session = server, session
         self._waiting: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._latest: dict[tuple[int, str], Floats] = {}  # where a browser has dragged a gizmo
         self._said = self._drawn = 0.0  # when
         self.pace, self._seats = Pace(session.seconds), Seats(session.arms)
         self._picture = Picture(server, session)
@@ -95,7 +96,7 @@ class TeleopPage:
                 self._stopwatch.stepped(arm, (x, y, z))
 
     def _handle_waiting(self, patience: float) -> bool:
-        """Do all that browsers have asked for; wait for that if they have not.
+        """Do all that browsers have asked for so far; wait for that if they have not.
 
         Args:
             patience: How long to wait (s).
@@ -103,16 +104,13 @@ class TeleopPage:
         Returns:
             Whether there was anything.
         """
-        asked = False
         try:
-            while True:
-                wait = patience > 0 and not asked
-                self._do(
-                    self._waiting.get(timeout=patience) if wait else self._waiting.get_nowait()
-                )
-                asked = True
+            self._do(self._waiting.get(patience > 0, patience))
         except Empty:
-            return asked
+            return False
+        for _ in range(self._waiting.qsize()):  # what comes meanwhile must not hold up a step
+            self._do(self._waiting.get())
+        return True
 
     def _do(self, act: Callable[[], None]) -> None:
         try:
@@ -143,6 +141,8 @@ class TeleopPage:
         async def dragged(event: Any) -> None:
             pose = np.concatenate([event.target.position, event.target.wxyz])
             client, phase = event.client_id, event.phase
+            if phase == "update":
+                self._latest[client, arm] = pose
             self._waiting.put(lambda: self._drag(client, arm, phase, pose))
 
         gizmo.on_update(dragged)
@@ -151,9 +151,10 @@ class TeleopPage:
     def _drag(self, client: int, arm: str, phase: str, pose: Floats) -> None:
         if phase == "start":
             self._take(client, arm)
-        elif phase == "update" and self._seats.owns(client, arm):
-            pose[3:] /= np.linalg.norm(pose[3:])
-            self._session.aim(arm, pose)
+        elif phase == "update":
+            if self._latest[client, arm] is pose and self._seats.owns(client, arm):
+                pose[3:] /= np.linalg.norm(pose[3:])
+                self._session.aim(arm, pose)
         elif phase == "end" and not self._seats.owns(client, arm):
             self._show_targets()
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import replace
 from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
+import torch
 from numpy.typing import ArrayLike, NDArray
 
 from kinematics.rotations import Floats, multiply, quaternion_about
 from robots import RecordingError, TaskError, UnknownNameError
+from robots.common.catalogue import reason
 from rollouts.recording.recorder import Recorder
 from rollouts.sources.actors import PERSON, Actor, actor_of, episode_source
 from rollouts.sources.policies import check_policy
@@ -81,7 +84,8 @@ class Session:
             policy_name: Where it was imported from, ``module:name``; None: where it is defined.
 
         Raises:
-            TaskError: If the task has several environments, or no arm can be steered.
+            TaskError: If the task has several environments, no arm can be steered, or the policy
+                cannot be copied.
         """
         self.task, self._recorder = task, recorder
         self._passed = None if policy is None else check_policy(policy)
@@ -172,7 +176,11 @@ class Session:
             self.phase = Phase.STOPPED
 
     def step(self) -> None:
-        """Take one control step towards what people ask for."""
+        """Take one control step towards what people ask for.
+
+        Raises:
+            TaskError: If the policy fails, or its action makes no sense; nothing is done then.
+        """
         targets = {arm: pose.copy() for arm, pose in self.targets.items()}
         reference = self.steering.reference.copy()
         moment = _Moment(targets, dict(self.closed), reference, self.by_hand)
@@ -269,7 +277,8 @@ class Session:
     def _begin(self, seed: int) -> None:
         self.observation, _ = self.task.reset(seed, options=REBUILT)
         self.seed, self.phase, self.success = seed, Phase.READY, False
-        self.by_hand, self._policy = self._passed is None, deepcopy(self._passed)
+        with _errors_of_policy():
+            self.by_hand, self._policy = self._passed is None, deepcopy(self._passed)
         self.actions: list[NDArray[np.float32]] = []
         self._moments: list[_Moment] = []
         self._successes: list[bool] = []
@@ -284,7 +293,8 @@ class Session:
     def _advised(self) -> NDArray[np.float32]:
         """Return what the policy does."""
         assert self._policy is not None
-        action = np.asarray(self._policy(self.observation), np.float32)
+        with _errors_of_policy(), torch.no_grad():
+            action = np.asarray(self._policy(self.observation), np.float32)
         if action.size != self.task.layout.action_dim or not np.isfinite(action).all():
             raise TaskError(
                 f"the policy gave an action of shape {action.shape}; it must be"
@@ -320,3 +330,12 @@ class Session:
     def _check(self, arm: str) -> None:
         if arm not in self.targets:
             raise UnknownNameError("arm that can be steered", arm, self.targets)
+
+
+@contextmanager
+def _errors_of_policy() -> Generator[None]:
+    """Say of whatever goes wrong in the user's own code that it was the policy's."""
+    try:
+        yield
+    except (Exception, SystemExit) as error:
+        raise TaskError(f"the policy failed: {reason(error)}") from error

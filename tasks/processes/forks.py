@@ -96,6 +96,8 @@ class _Popen(_ForkServerPopen):
         surroundings = Surroundings.of_this_process()
         preparation = spawn.get_preparation_data(process.name)
         main = {key: preparation.pop(key) for key in [*preparation] if "init_main" in key}
+        if not os.path.exists(main.get("init_main_from_path", os.curdir)):
+            main = {}  # the program was read from standard input
         packed = io.BytesIO()
         set_spawning_popen(self)
         try:

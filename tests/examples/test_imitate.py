@@ -194,3 +194,11 @@ def test_a_recording_that_does_not_serve_is_refused(example, recording, tmp_path
     assert example.main(words) == 1
     assert "has 2 episodes, not 3" in capsys.readouterr().err
     assert not (tmp_path / "policy.pt").exists()
+
+
+def test_it_takes_a_task_of_the_present_folder(example, tmp_path, monkeypatch, capsys):
+    (tmp_path / "mine.py").write_text("")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    assert example.main(["mine:Tray-v1", "--out", "run"]) == 1
+    assert "Importing 'mine' registered no such task" in capsys.readouterr().err

@@ -2,8 +2,10 @@
 
 import json
 import pickle
+import sys
 from contextlib import closing
 from dataclasses import replace
+from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 
@@ -148,3 +150,11 @@ def test_it_learns(tmp_path):
     finish(start("ppo_two_arms", tmp_path, *words))
     curve = json.loads((tmp_path / "curve.json").read_text())
     assert curve[-1]["reward"] > 1.5 * curve[0]["reward"]
+
+
+def test_a_task_of_the_present_folder_can_be_imported(ppo, tmp_path, monkeypatch):
+    (tmp_path / "my_task.py").write_text("")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    assert ppo.read_arguments("", "", ["--task", "my_task:Tray-v1"]).task == "my_task:Tray-v1"
+    assert find_spec("my_task")

@@ -71,9 +71,7 @@ def test_arms_too_far_apart_are_an_error():
     env = tasks.make(
         TASK, layout=face_to_face(dict.fromkeys(("left", "right"), "panda"), spacing=4)
     )
-    with pytest.raises(
-        TaskError, match=r"TwoRobotPickCube-v1, seed 0: no plan: \w+\.\w+ is out of"
-    ):
+    with pytest.raises(TaskError, match=r"^no plan: \w+\.\w+ is out of"):
         find_expert(TASK)(env, 0)
 
 

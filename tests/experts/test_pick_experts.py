@@ -44,7 +44,7 @@ def test_jaws_that_do_not_roll_are_an_error():
 def test_a_cube_out_of_reach_is_an_error():
     layout = Layout({"arm": Placement(RobotRegistry.load("panda"), position=(-3.0, 0.0, 0.0))})
     env = tasks.make("StackCube-v1", layout=layout)
-    with pytest.raises(TaskError, match=r"StackCube-v1, seed 0: no plan: arm\.above cubeA is out"):
+    with pytest.raises(TaskError, match=r"^no plan: arm\.above cubeA is out"):
         find_expert("StackCube-v1")(env, 0)
 
 

@@ -76,7 +76,7 @@ def test_an_arm_without_fingers_is_an_error(name, plan_name):
 def test_an_arm_too_far_away_is_an_error(name):
     robot = task(name).layout["arm"].robot.name
     env = tasks.make(name, layout=Layout({"arm": Placement(robot, position=(-3.0, 0.0, 0.0))}))
-    with pytest.raises(TaskError, match=rf"{name}, seed 0: no plan: arm\.above.* is out of reach"):
+    with pytest.raises(TaskError, match=r"^no plan: arm\.above.* is out of reach"):
         find_expert(name)(env, 0)
 
 
@@ -84,5 +84,5 @@ def test_a_stick_too_far_away_is_an_error(monkeypatch):
     monkeypatch.setattr(push_t_module, "ATTEMPTS", 1)
     away = Layout({"arm": Placement("panda_stick", position=(-3.0, 0.0, 0.0))})
     env = tasks.make("PushT-v1", layout=away)
-    with pytest.raises(TaskError, match="PushT-v1, seed 0: no plan: the T is out of reach"):
+    with pytest.raises(TaskError, match="^no plan: the T is out of reach"):
         find_expert("PushT-v1")(env, 0)

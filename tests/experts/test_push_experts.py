@@ -103,5 +103,5 @@ def test_other_robots_push_as_well(name, robot):
 @pytest.mark.parametrize("name", TASKS)
 def test_an_arm_too_far_away_is_an_error(name):
     env = tasks.make(name, layout=Layout({"arm": Placement("panda", position=(-3.0, 0.0, 0.0))}))
-    with pytest.raises(TaskError, match=rf"{name}, seed 0: no plan: arm\.above is out of reach"):
+    with pytest.raises(TaskError, match=r"^no plan: arm\.above is out of reach"):
         find_expert(name)(env, 0)

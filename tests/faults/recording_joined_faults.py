@@ -90,7 +90,7 @@ def _export(path: Path, format_name: str) -> None:
     from rollouts.export.dataset import Export, export
 
     try:
-        export(Export(path, format_name, path.parent / "out"))
+        export(Export(path, format_name, path.parent / "out", include_failures=True))
     finally:
         assert sorted(p.name for p in path.parent.iterdir()) == [path.name, "trajectory.json"]
 

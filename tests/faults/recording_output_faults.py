@@ -120,7 +120,7 @@ def main():
     def wait(done, total):
         print("writing", flush=True)
         time.sleep(600)
-    export(Export(sys.argv[1], "robomimic", sys.argv[2]), wait)
+    export(Export(sys.argv[1], "robomimic", sys.argv[2], include_failures=True), wait)
 start(main)
 """
 
@@ -142,7 +142,7 @@ def _slow_export(path: Path, out: Path) -> subprocess.Popen[str]:
 def _export(path: Path, out: Path) -> None:
     from rollouts.export.dataset import Export, export
 
-    assert export(Export(path, "robomimic", out)).episodes == 3
+    assert export(Export(path, "robomimic", out, include_failures=True)).episodes == 3
 
 
 def _stopped_export(folder: Path, stop: signal.Signals) -> str:

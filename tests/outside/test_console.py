@@ -1,5 +1,6 @@
 """The console script: one tree of commands, which no file of the user's can hide."""
 
+import ast
 import os
 import re
 import subprocess
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from robots.common.console import COMMANDS, main
+from tests.faults.toy_robots import toy
 from tests.outside.lab import CHECKOUT, make_folder, run
 
 PYPROJECT = (CHECKOUT / "pyproject.toml").read_text()
@@ -127,7 +129,16 @@ class TestNew:
     @pytest.mark.parametrize(
         ("name", "robot", "words"),
         [
-            ("9lives", "a=panda", "is no name of a task"),
+            ("9lives", "a=panda", "'9lives' cannot be the name of a task: it is made of letters"),
+            ("PickCube", "a=panda", "is a task PickCube-v1 already; choose another name, such as"),
+            ("Class", "a=panda", "'class' is a keyword of Python; choose another name"),
+            ("Motion", "a=panda", "'motion' is a package of this library; choose another name"),
+            (
+                "Json",
+                "a=panda",
+                "'json' is a module of Python; choose another name, such as MyJson",
+            ),
+            ("Torch", "a=panda", "the file would be torch.py, but 'torch' is an installed module"),
             ("Reach", "panda", "'panda' should be PLACE=ROBOT"),
             ("Reach", "a=pandda", "Did you mean 'panda'?"),
         ],
@@ -136,6 +147,32 @@ class TestNew:
         assert main(["new", "task", name, "--out", str(tmp_path), "--robots", robot]) > 0
         assert words in capsys.readouterr().err
         assert not list(tmp_path.iterdir())
+
+    @pytest.mark.parametrize(
+        ("name", "words"),
+        [
+            ("panda", "is a robot panda already; choose another name, such as --name my_panda"),
+            ("Random", "the file would be random.py, but 'random' is a module of Python"),
+            ("lambda", "'lambda' is a keyword of Python"),
+            ("tasks", "'tasks' is a package of this library"),
+        ],
+    )
+    def test_robot_refuses(self, tmp_path, capsys, name, words):
+        urdf = tmp_path / "arm.urdf"
+        urdf.write_text(toy())
+        assert main(["new", "robot", str(urdf), "--name", name, "--out", str(tmp_path)]) == 1
+        assert words in capsys.readouterr().err
+        assert list(tmp_path.iterdir()) == [urdf]
+
+    def test_task_of_a_urdf_whose_folder_has_a_quote_in_its_name(self, tmp_path):
+        folder = tmp_path / """a"b'c"""
+        folder.mkdir()
+        (folder / "arm.urdf").write_text(toy())
+        words = ["new", "task", "Reach", "--out", str(folder), "--robots", f"arm={folder}/arm.urdf"]
+        assert main(words) == 0
+        source = ast.parse((folder / "reach.py").read_text())
+        texts = [node.value for node in ast.walk(source) if isinstance(node, ast.Constant)]
+        assert f"{folder}/arm.urdf" in texts
 
     def pytest(self, folder) -> subprocess.CompletedProcess[str]:
         return subprocess.run(

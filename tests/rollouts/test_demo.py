@@ -11,7 +11,8 @@ import pytest
 from rich.console import Console
 
 import rollouts.demo as demo
-from robots import AssetError, UrdfLocator
+from experts.rehearsal import Plan
+from robots import AssetError, TaskError, UrdfLocator
 from rollouts.__main__ import main
 from rollouts.demo import DemoOptions, run_demo
 from rollouts.video import film, video_problem
@@ -53,6 +54,34 @@ def test_too_many_failures_are_told_by_the_exit_code(tmp_path, monkeypatch):
         demo, "find_expert", lambda name: lambda task, seed: np.zeros((2, 16), np.float32)
     )
     assert main(["demo", "--seeds", "1", "--no-video", "--out", str(tmp_path)]) == 1
+
+
+def test_a_failure_is_named_with_its_reason(tmp_path, monkeypatch, capsys):
+    def fails(task, seed):
+        if seed == 1:
+            raise TaskError("no plan: left.ready is out of reach")
+        given = np.zeros((2, 16), np.float32).view(Plan)
+        given.reason = "the episode ended at left.grasp cube"
+        return given
+
+    monkeypatch.setattr(demo, "find_expert", lambda name: fails)
+    assert main(["demo", "--seeds", "2", "--no-video", "--out", str(tmp_path)]) == 1
+    printed = capsys.readouterr().out
+    assert "seed   0  failure    2 steps  the episode ended at left.grasp cube\n" in printed
+    assert "seed   1  failure    0 steps  no plan: left.ready is out of reach\n" in printed
+    (episode,) = json.loads((tmp_path / "trajectory.json").read_text())["episodes"]
+    assert episode["reason"] == "the episode ended at left.grasp cube"
+
+
+def test_a_demo_of_nothing_but_missing_plans(tmp_path, monkeypatch, capsys):
+    def fails(task, seed):
+        raise TaskError("no plan: left.ready is out of reach")
+
+    monkeypatch.setattr(demo, "find_expert", lambda name: fails)
+    assert main(["demo", "--seeds", "1", "--no-video", "--out", str(tmp_path)]) == 1
+    printed = capsys.readouterr().out
+    assert f"{TASK}, 1 seed\n" in printed
+    assert "0 of 1 succeeded\n" in printed
 
 
 @pytest.mark.parametrize(("solved", "enough"), [(9, True), (8, False)])

@@ -168,7 +168,7 @@ def test_how_it_reads():
     assert str(found).splitlines() == [
         "PickCube-v1, MyPolicy: 3 of 4 episodes with success (75.0%)",
         "on average: return 1.25 (0.5 to 2), 25.0 steps (10 to 40)",
-        "no success: seeds 3",
+        "no success: seed 3",
     ]
 
 
@@ -201,7 +201,7 @@ def test_what_cannot_be_evaluated(policy, task, seeds, making, error, complaint)
 
 
 def test_the_command(capsys):
-    words = ["evaluate", f"--task={TASK}", "--episodes=2", "--seed=3"]
+    words = ["evaluate", f"--task={TASK}", "--episodes=2", "--seed=3", "--workers=1"]
     assert main([*words, "--policy=tests.rollouts.policies:still"]) == 0
     printed = capsys.readouterr().out
     assert printed == f"{evaluate(still, TASK, [3, 4], executor=Here())}\n"

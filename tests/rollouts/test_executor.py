@@ -10,6 +10,7 @@ import subprocess
 import sys
 import textwrap
 import time
+from argparse import ArgumentParser
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ import torch
 
 import rollouts.playing.dispatch
 from robots import TaskError
+from rollouts.playing.command_options import add_arguments, chosen_executor
 from rollouts.playing.executor import (
     Event,
     ProcessExecutor,
@@ -400,6 +402,12 @@ def test_who_is_chosen():
             choose_executor(executor=own, **contradiction)
     with pytest.raises(TaskError, match="with workers=0 this process plays, and nobody could end"):
         choose_executor(0, episode_timeout=5.0)
+
+
+def test_commands_use_all_cores_unless_they_are_told_otherwise():
+    add_arguments(parser := ArgumentParser())
+    assert chosen_executor(parser.parse_args([])).workers == len(os.sched_getaffinity(0))
+    assert chosen_executor(parser.parse_args(["--workers", "3"])).workers == 3
 
 
 def test_an_executor_that_forgets_episodes():

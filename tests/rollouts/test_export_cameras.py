@@ -84,7 +84,9 @@ def observed(env, episode) -> Iterator[dict[str, np.ndarray]]:
 @pytest.fixture(scope="module")
 def robomimic(recording, seen, tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("robomimic") / "out"
-    wanted = Export(recording, "robomimic", out, cameras="all", depth=True, size=SIZE)
+    wanted = Export(
+        recording, "robomimic", out, cameras="all", depth=True, size=SIZE, include_failures=True
+    )
     export(wanted)
     assert [path.name for path in out.iterdir()] == ["image.hdf5"]
     return out
@@ -113,7 +115,8 @@ def test_images_of_lerobot_are_what_the_environment_sees(recording, seen, tmp_pa
     names = ["left.hand_camera", "base_camera"]
     words = ["--cameras", *names, "--images", "--depth", "--size", "32x24"]
     out = tmp_path / "out"
-    assert main(["export", str(recording), "--format", "lerobot", "--out", str(out), *words]) == 0
+    words += ["--format", "lerobot", "--include-failures", "--workers", "0", "--out", str(out)]
+    assert main(["export", str(recording), *words]) == 0
     table = pq.read_table(out / "data").to_pydict()
     features = json.loads((out / "meta/info.json").read_text())["features"]
     moments = [moment for episode in seen for moment in episode[:-1]]
@@ -275,7 +278,9 @@ def test_texts_come_from_whoever_says_them(tmp_path):
     entries["episodes"][1]["source"] = {"kind": "person", "instruction": "gently"}
     path.with_suffix(".json").write_text(json.dumps(entries))
     for form in ("lerobot", "robomimic"):
-        export(Export(path, form, tmp_path / form, instruction={2: "at once"}))
+        export(
+            Export(path, form, tmp_path / form, instruction={2: "at once"}, include_failures=True)
+        )
     texts = pq.read_table(tmp_path / "lerobot/meta/episodes").to_pydict()["tasks"]
     assert texts[1:] == [["gently"], ["at once"]]
     assert texts[0][0].startswith("Push")
@@ -283,6 +288,7 @@ def test_texts_come_from_whoever_says_them(tmp_path):
         found = [dict(file[f"data/demo_{i}"].attrs).get("ep_meta") for i in range(3)]
     assert found == [None, '{"lang": "gently"}', '{"lang": "at once"}']
     words = ["--format", "lerobot", "--out", str(tmp_path / "all"), "--instruction", "Slide it"]
+    words.append("--include-failures")
     assert main(["export", str(path), *words]) == 0
     texts = pq.read_table(tmp_path / "all/meta/episodes").to_pydict()["tasks"]
     assert texts == [["Slide it"]] * 3
@@ -320,7 +326,7 @@ def test_a_task_may_say_its_own_instruction():
 def test_options_that_make_no_sense(tmp_path, options, complaint):
     wanted = {"format": "lerobot", "out": tmp_path / "out", **options}
     with pytest.raises(TaskError, match=complaint):
-        export(Export(tmp_path / "none.h5", **wanted))
+        export(Export(tmp_path / "none.h5", **wanted, include_failures=True))
 
 
 def test_cameras_are_chosen_by_place():
@@ -392,7 +398,9 @@ def test_it_does_not_matter_who_draws(recording, tmp_path, options):
     files, told = [], []
     for executor in (None, ProcessExecutor(1), Struck(tmp_path)):
         out = tmp_path / f"{len(files)}"
-        wanted = Export(recording, out=out, cameras="all", size=SIZE, **options)
+        wanted = Export(
+            recording, out=out, cameras="all", size=SIZE, **options, include_failures=True
+        )
         export(wanted, executor=executor, tell=told.append)
         found = {
             path.relative_to(out): path.read_bytes() for path in out.rglob("*") if path.is_file()
@@ -409,7 +417,9 @@ def test_whatever_ends_drawing_in_workers_leaves_nothing(recording, tmp_path):
         raise KeyboardInterrupt
 
     executor = Watched()
-    wanted = Export(recording, "robomimic", tmp_path / "out", cameras="all", size=SIZE)
+    wanted = Export(
+        recording, "robomimic", tmp_path / "out", cameras="all", size=SIZE, include_failures=True
+    )
     with pytest.raises(KeyboardInterrupt):
         export(wanted, interrupt, executor=executor)
     assert list(tmp_path.iterdir()) == []
@@ -424,7 +434,13 @@ def test_a_cluster_draws_the_same(recording, robomimic, tmp_path):
     with running_cluster() as nodes:
         nodes.grow(1)
         wanted = Export(
-            recording, "robomimic", tmp_path / "out", cameras="all", depth=True, size=SIZE
+            recording,
+            "robomimic",
+            tmp_path / "out",
+            cameras="all",
+            depth=True,
+            size=SIZE,
+            include_failures=True,
         )
         export(wanted, executor=RayExecutor(nodes.address))
     name = "image.hdf5"

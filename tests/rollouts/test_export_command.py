@@ -36,7 +36,8 @@ def recording(tmp_path) -> Path:
 
 
 def run(recording: Path, *words: object) -> int:
-    return main(["export", str(recording), *map(str, words)])
+    """Export all episodes: those of random actions are failures."""
+    return main(["export", str(recording), "--include-failures", *map(str, words)])
 
 
 def episodes(dataset: Path) -> list[int]:
@@ -59,11 +60,15 @@ def test_an_empty_folder_may_be_there_already(recording, tmp_path):
     assert (tmp_path / "out/low_dim.hdf5").is_file()
 
 
-def test_failures_can_be_left_out(recording, tmp_path, capsys):
+@pytest.mark.parametrize("more", [(), ("--only-successes",)])  # which says what happens anyway
+def test_failures_are_left_out(recording, tmp_path, capsys, more):
     succeed(recording, 0, 2)
-    words = ("--format", "lerobot", "--only-successes", "--out", tmp_path / "out")
-    assert run(recording, *words) == 0
-    assert "2 episodes, 7 steps; 1 without success left out" in capsys.readouterr().out
+    words = ("--format", "lerobot", "--out", str(tmp_path / "out"))
+    assert main(["export", str(recording), *words, *more]) == 0
+    expected = (
+        "2 episodes, 7 steps; left out: 1 episode without success (--include-failures exports"
+    )
+    assert expected in capsys.readouterr().out
     assert episodes(tmp_path / "out") == [3, 4]
     origin = json.loads((tmp_path / "out/meta/recording.json").read_text())
     assert [episode["episode_id"] for episode in origin["episodes"]] == [0, 2]
@@ -162,9 +167,11 @@ def test_an_empty_recording_is_refused(tmp_path, capsys):
 
 
 def test_a_recording_without_successes_is_refused(recording, tmp_path, capsys):
-    words = ("--format", "robomimic", "--only-successes", "--out", tmp_path / "out")
-    assert run(recording, *words) == 1
-    assert "none of the 3 episodes" in capsys.readouterr().err
+    words = ("--format", "robomimic", "--out", str(tmp_path / "out"))
+    assert main(["export", str(recording), *words]) == 1
+    said = capsys.readouterr().err
+    assert "none of the 3 episodes" in said
+    assert "to export them all the same, take include_failures (--include-failures)" in said
     assert nothing_was_left(tmp_path)
 
 
@@ -198,7 +205,7 @@ def test_whatever_ends_an_export_it_leaves_nothing(recording, tmp_path):
 
     for form in ("lerobot", "robomimic"):
         with pytest.raises(KeyboardInterrupt):
-            export(Export(recording, form, tmp_path / "out"), interrupt)
+            export(Export(recording, form, tmp_path / "out", include_failures=True), interrupt)
         assert nothing_was_left(tmp_path)
 
 
@@ -208,7 +215,7 @@ def test_a_full_disk_is_a_clear_error(recording, tmp_path, monkeypatch):
 
     monkeypatch.setattr(Path, "write_text", full)
     with pytest.raises(RecordingError, match="cannot write .*out: .*No space left on device"):
-        export(Export(recording, "lerobot", tmp_path / "out"))
+        export(Export(recording, "lerobot", tmp_path / "out", include_failures=True))
     assert nothing_was_left(tmp_path)
 
 
@@ -286,7 +293,7 @@ def main():
     def wait(done, total):
         print("writing", flush=True)
         time.sleep(600)
-    export(Export(sys.argv[1], "robomimic", sys.argv[2]), wait)
+    export(Export(sys.argv[1], "robomimic", sys.argv[2], include_failures=True), wait)
 start(main)
 """
 
@@ -302,15 +309,15 @@ def test_what_a_killed_export_leaves_is_removed_by_the_next(recording, tmp_path)
         assert killed.stdout is not None
         assert killed.stdout.readline() == "writing\n"
         with pytest.raises(TaskError):  # refused before anything is removed
-            export(Export(recording, "robomimic", out, fps=3))
-        export(Export(recording, "robomimic", tmp_path / "other"))
+            export(Export(recording, "robomimic", out, fps=3, include_failures=True))
+        export(Export(recording, "robomimic", tmp_path / "other", include_failures=True))
         assert len(partials(tmp_path)) == 1
-        export(Export(recording, "robomimic", out))
+        export(Export(recording, "robomimic", out, include_failures=True))
         assert len(partials(tmp_path)) == 1  # of one that lives
         killed.kill()
     shutil.rmtree(out)
     (tmp_path / ".out.mine.partial").mkdir()  # whoever it is of
-    export(Export(recording, "robomimic", out))
+    export(Export(recording, "robomimic", out, include_failures=True))
     assert partials(tmp_path) == [".out.mine.partial"]
 
 

@@ -42,7 +42,7 @@ def recording(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def dataset(recording, tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("lerobot") / "dataset"
-    done = export(Export(recording, "lerobot", out))
+    done = export(Export(recording, "lerobot", out, include_failures=True))
     assert (done.episodes, done.steps, done.left_out) == (len(LENGTHS), sum(LENGTHS), 0)
     return out
 
@@ -238,7 +238,7 @@ def test_full_files_are_followed_by_others(recording, tmp_path):
 
 def test_another_robot_has_other_columns(tmp_path):
     recording = record(tmp_path / "so100.h5", "PickCubeSO100-v1", [2])
-    export(Export(recording, "lerobot", tmp_path / "out", fps=30))
+    export(Export(recording, "lerobot", tmp_path / "out", fps=30, include_failures=True))
     info = json.loads((tmp_path / "out/meta/info.json").read_text())
     joints = ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper"]
     names = [f"arm.{joint}" for joint in joints]
@@ -265,7 +265,7 @@ def filmed(tmp_path_factory, renderer) -> Path:
         pytest.skip(problem)
     folder = tmp_path_factory.mktemp("filmed")
     recording = record(folder / "recording.h5", FILMED, FRAMES)
-    export(Export(recording, "lerobot", folder / "dataset", video=True))
+    export(Export(recording, "lerobot", folder / "dataset", video=True, include_failures=True))
     return folder
 
 

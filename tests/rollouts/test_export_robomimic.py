@@ -10,6 +10,7 @@ import pytest
 
 import tasks
 from layouts import Layout, Placement
+from robots import RecordingError
 from rollouts.export.columns import ColumnReader
 from rollouts.export.dataset import Export, export
 from tests.rollouts.recordings import (
@@ -38,7 +39,7 @@ def recording(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def dataset(recording, tmp_path_factory) -> pyfive.File:
     out = tmp_path_factory.mktemp("robomimic") / "dataset"
-    export(Export(recording, "robomimic", out))
+    export(Export(recording, "robomimic", out, include_failures=True))
     assert [path.name for path in out.iterdir()] == ["low_dim.hdf5"]
     return pyfive.File(str(out / "low_dim.hdf5"))
 
@@ -149,10 +150,19 @@ def test_filter_keys_split_the_demonstrations(dataset, tmp_path):
     assert masks == {"train": ["demo_0", "demo_1"], "valid": ["demo_2"], "success": ["demo_1"]}
 
     recording = record(tmp_path / "many.h5", "PushT-v1", [1] * 21)
-    export(Export(recording, "robomimic", tmp_path / "many"))
+    export(Export(recording, "robomimic", tmp_path / "many", include_failures=True))
     many = pyfive.File(str(tmp_path / "many/low_dim.hdf5"))
     masks = {name: [x.decode() for x in many[f"mask/{name}"][:]] for name in many["mask"]}
     assert masks["valid"] == ["demo_9", "demo_19"]
     assert sorted(masks["train"] + masks["valid"]) == sorted(many["data"])
     assert len(masks["train"]) == 19
     assert "success" not in masks
+
+
+@pytest.mark.parametrize("free", [0, 8, 24, 40])  # kB; the dataset takes 48
+def test_a_full_disk_is_one_clear_error(small_disk, recording, free):
+    (small_disk / "others").write_bytes(bytes((512 - free) * 1024))
+    out = small_disk / "dataset"
+    with pytest.raises(RecordingError, match=rf"^cannot write {out}: No space left on device$"):
+        export(Export(recording, "robomimic", out, include_failures=True))
+    assert [path.name for path in small_disk.iterdir()] == ["others"]

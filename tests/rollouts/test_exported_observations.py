@@ -38,7 +38,7 @@ def recording(request, tmp_path_factory):
 
 def lerobot(file, folder):
     """Return actions and observations of each episode of an export, (T, k)."""
-    export(Export(file, "lerobot", folder))
+    export(Export(file, "lerobot", folder, include_failures=True))
     table = pq.read_table(folder / "data")
     columns = {
         name: np.array(table[name].to_pylist(), np.float32)
@@ -52,7 +52,7 @@ def lerobot(file, folder):
 
 
 def robomimic(file, folder):
-    export(Export(file, "robomimic", folder))
+    export(Export(file, "robomimic", folder, include_failures=True))
     with h5py.File(folder / "low_dim.hdf5") as data:
         for i in range(len(LENGTHS)):
             demo = data[f"data/demo_{i}"]

@@ -25,7 +25,11 @@ FILE = "trajectory.h5"
 def saved(folder, form):
     """The dataset of a recording, by episode: actor, corrections, source; and all actors."""
     out = folder / form
-    export(Export(folder / FILE, form, out, fps=20 if form == "lerobot" else None))
+    export(
+        Export(
+            folder / FILE, form, out, fps=20 if form == "lerobot" else None, include_failures=True
+        )
+    )
     if form == "robomimic":
         with h5py.File(out / "low_dim.hdf5") as file:
             demos = [

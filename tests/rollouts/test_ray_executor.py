@@ -169,7 +169,7 @@ def test_a_recording_on_a_cluster_is_stopped_and_goes_on(nodes, tmp_path):
     printed, said = last.communicate(timeout=PATIENCE)
     assert last.returncode == 0, said
     assert f"{count} of {whole} episodes were recorded before" in said
-    assert "recorded now 20, 0 with success" in printed
+    assert "20 new episodes, 0 with success" in printed
     assert same_files(out / FILE, recorded_directly(tmp_path / FILE, range(whole)))
 
 

@@ -218,7 +218,7 @@ def test_a_cluster_that_asks_for_a_token(monkeypatch, tmp_path):
         recording = start(*words)
         printed, said = recording.communicate(timeout=PATIENCE)
         assert recording.returncode == 0, said
-        assert "recorded now 3" in printed
+        assert "3 new episodes" in printed
         monkeypatch.setenv("RAY_AUTH_TOKEN", "another token")
         expect_refusal(words)
         monkeypatch.delenv("RAY_AUTH_TOKEN")

@@ -82,7 +82,7 @@ def test_it_is_played_in_the_task_of_all(several):
 def test_replay_and_export_take_the_folder(several, tmp_path, capsys):
     assert main(["replay", str(several)]) == 0
     assert f"in {COUNT} all states are equal" in capsys.readouterr().out
-    done = export(Export(several, "robomimic", tmp_path / "out"))
+    done = export(Export(several, "robomimic", tmp_path / "out", include_failures=True))
     assert done.episodes == COUNT
 
 

@@ -1,5 +1,6 @@
 """`python -m rollouts record`: the same files whatever happens on the way."""
 
+import json
 import os
 import random
 import signal
@@ -16,6 +17,7 @@ import pytest
 import tasks
 from experts import registry
 from experts.maniskill.pick_cube import pick_cube
+from experts.rehearsal import Plan
 from rollouts.__main__ import main
 from rollouts.playing.executor import WorkerError
 from rollouts.playing.in_process import InProcessExecutor
@@ -88,7 +90,7 @@ def test_workers_make_no_difference(tmp_path, capsys):
         assert main(arguments(tmp_path / str(workers), 7, workers, seed=4)) == 0
         printed = capsys.readouterr().out
         assert f"{FILE}: 7 episodes" in printed
-        assert "recorded now 7, 0 with success, 22.0 steps on average" in printed
+        assert "7 new episodes, 0 with success, 22.0 steps on average" in printed
     one, two = (tmp_path / workers / FILE for workers in "12")
     assert same_files(one, two)
     assert same_files(one, recorded_directly(tmp_path / FILE, range(4, 11)))
@@ -103,7 +105,7 @@ def test_the_same_command_goes_on(tmp_path, capsys):
     assert main(arguments(tmp_path, 5)) == 0
     captured = capsys.readouterr()
     assert "2 of 5 episodes were recorded before" in captured.err
-    assert "recorded now 3," in captured.out
+    assert "3 new episodes," in captured.out
     before = (tmp_path / FILE).stat()
     assert main(arguments(tmp_path, 5, workers=2)) == 0
     assert "5 of 5 episodes were recorded before" in capsys.readouterr().err
@@ -129,9 +131,34 @@ def test_joint_positions_are_recorded_from_an_expert_that_speaks_deltas(tmp_path
 
 def test_this_process_records_the_same(tmp_path, capsys):
     assert main(arguments(tmp_path, 3, workers=0, seed=4)) == 0
-    assert "recorded now 3" in capsys.readouterr().out
+    assert "3 new episodes" in capsys.readouterr().out
     direct = recorded_directly(tmp_path / "direct" / FILE, range(4, 7))
     assert same_files(tmp_path / FILE, direct)
+
+
+def gives_up(task, seed):
+    """An expert that goes the first two steps of its way, and says so."""
+    plan = pick_cube(task, seed)[:2].view(Plan)
+    plan.reason, plan.episode = "the episode ended at arm.grasp cube", None
+    return plan
+
+
+@pytest.mark.parametrize("mode", ["pd_joint_delta_pos", "pd_joint_pos"])
+def test_failures_are_named_with_their_reasons(tmp_path, capsys, monkeypatch, mode):
+    monkeypatch.setitem(registry.EXPERTS.registered, "PickCube-v1", gives_up)
+    words = arguments(tmp_path, 2, 0, task="PickCube-v1", seed=4, control_mode=mode)
+    assert main(words) == 0
+    reason = "the episode ended at arm.grasp cube"
+    assert capsys.readouterr().out.splitlines()[1:] == [
+        "2 new episodes, 0 with success, 2.0 steps on average",
+        "no success: seeds 4, 5",
+        f"seed 4: {reason}",
+        f"seed 5: {reason}",
+    ]
+    listed = json.loads((tmp_path / "trajectory.json").read_text())["episodes"]
+    assert [episode["reason"] for episode in listed] == [reason] * 2
+    with TrajectoryFile(tmp_path / FILE) as file:
+        assert [episode.reason for episode in file] == [reason] * 2
 
 
 @wraps(pick_cube)  # a recording names its expert
@@ -193,7 +220,7 @@ def test_a_seed_without_a_plan_is_told_and_tried_again(tmp_path, capsys):
         assert main(arguments(tmp_path, 3, seed=NO_PLAN - 1)) == 1
         captured = capsys.readouterr()
         assert f"seed {NO_PLAN} is not recorded: no plan for seed {NO_PLAN}" in captured.err
-        assert f"not recorded: seeds {NO_PLAN}" in captured.out
+        assert f"not recorded: seed {NO_PLAN}\nseed {NO_PLAN}: no plan for" in captured.out
         with TrajectoryFile(tmp_path / FILE) as file:
             assert file.seeds == (NO_PLAN - 1, NO_PLAN + 1)
 
@@ -300,7 +327,7 @@ def expect_killed_and_resumed(
     printed, said = last.communicate(timeout=PATIENCE)
     assert last.returncode == 0, said
     assert f"{left} of {episodes} episodes were recorded before" in said
-    assert f"recorded now {episodes - left}," in printed
+    assert f"{episodes - left} new episodes," in printed
     assert same_files(out / FILE, recorded_directly(undisturbed, range(episodes)))
     assert sorted(path.name for path in out.iterdir()) == [FILE, "trajectory.json"]
 
@@ -341,23 +368,15 @@ def test_a_recording_of_many_files_that_is_killed_again_and_again(tmp_path):
 
 
 @pytest.mark.long
-def test_a_full_disk_ends_it_with_what_is_finished(tmp_path):
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=512k", "none", str(disk)]
-    if subprocess.run(mount, capture_output=True).returncode:
-        pytest.skip("file systems cannot be mounted here")
-    try:
-        process = start(*arguments(disk, 1000, 2))
-        _, said = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 1
-        assert "Traceback" not in said
-        kept, error = said.splitlines()[-2:]
-        assert error.startswith(f"error: cannot write {disk}/trajectory.parts/seed-")
-        assert error.endswith("No space left on device")
-        parts = len(list(disk.glob("trajectory.parts/*.part")))
-        assert parts > 3
-        assert kept == f"stopped; {parts} episodes are recorded"
-        wait_until_nobody_is_left(process)
-    finally:
-        subprocess.run(["umount", str(disk)], check=True)
+def test_a_full_disk_ends_it_with_what_is_finished(small_disk):
+    process = start(*arguments(small_disk, 1000, 2))
+    _, said = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    assert "Traceback" not in said
+    kept, error = said.splitlines()[-2:]
+    assert error.startswith(f"error: cannot write {small_disk}/trajectory.parts/seed-")
+    assert error.endswith("No space left on device")
+    parts = len(list(small_disk.glob("trajectory.parts/*.part")))
+    assert parts > 3
+    assert kept == f"stopped; {parts} episodes are recorded"
+    wait_until_nobody_is_left(process)

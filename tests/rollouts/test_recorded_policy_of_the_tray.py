@@ -53,7 +53,7 @@ def test_it_is_killed_goes_on_and_replays(tmp_path):
     assert 3 <= left < 16
     printed = finished(*record(tmp_path / "killed", 16, "--workers=1", "--num-envs=7"))
     assert "of 16 episodes were recorded before" in printed
-    assert f"recorded now {16 - left}, {16 - left} with success" in printed
+    assert f"{16 - left} new episodes, {16 - left} with success" in printed
     finished(*record(tmp_path / "whole", 16, "--workers=0"))
     assert same_files(tmp_path / "killed" / FILE, tmp_path / "whole" / FILE)
     with TrajectoryFile(tmp_path / "whole" / FILE) as file:

@@ -497,18 +497,6 @@ def expect_resumable(path: Path, finished: list[int]) -> None:
         assert [episode.seed for episode in file] == finished
 
 
-@pytest.fixture
-def small_disk(tmp_path):
-    """A file system of half a megabyte, as one process per test may mount it."""
-    place = tmp_path / "disk"
-    place.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=512k", "none", str(place)]
-    if subprocess.run(mount, capture_output=True).returncode:
-        pytest.skip("file systems cannot be mounted here")
-    yield place
-    subprocess.run(["umount", str(place)], check=True)
-
-
 def test_a_full_disk(small_disk):
     path = small_disk / "trajectory.h5"
     finished, said = run_full(path)

@@ -308,7 +308,7 @@ def test_the_command_records_a_policy(tmp_path, capsys):
     names = ("policy", "still"), ("takeover", "meddles"), ("corrector", "LEANS")
     words += [f"--{what}=tests.rollouts.policies:{name}" for what, name in names]
     assert main([*words, f"--out={tmp_path}", "--obs-mode=state"]) == 0
-    assert "recorded now 2" in capsys.readouterr().out
+    assert "2 new episodes" in capsys.readouterr().out
     with TrajectoryFile(tmp_path / FILE) as file:
         assert [actor["name"].partition(":")[2] for actor in file[0].source["actors"]] == [
             "still",

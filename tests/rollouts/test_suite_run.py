@@ -245,7 +245,7 @@ def test_a_process_that_is_stopped(how, tmp_path):
     long = Suite("long", (FIRST, replace(LATER, seeds=range(100_000))))
     file, out = tmp_path / "long.yaml", tmp_path / "run"
     save_suite(long, file)
-    words = ["suite", "run", str(file), f"--out={out}", "--policy", STILL]
+    words = ["suite", "run", str(file), f"--out={out}", "--workers=1", "--policy", STILL]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(
         [sys.executable, "-m", "rollouts", *words], stderr=subprocess.PIPE, env=environment

@@ -1,7 +1,10 @@
 """Steering without a browser: targets become actions, episodes are taken back, kept, discarded."""
 
+from threading import Lock
+
 import numpy as np
 import pytest
+import torch
 
 import tasks
 from kinematics.rotations import inverse, multiply
@@ -255,3 +258,47 @@ def test_a_person_takes_over_from_a_policy_and_gives_back(pick, tmp_path):
         assert [actor["name"] for actor in mixed.source["actors"]] == ["mylab:rises", "browser"]
         assert mixed.actor.tolist() == [0] * 6 + [1] * 3
         assert replay(pick, mixed).difference is None
+
+
+class Fails:
+    """Rises for three steps."""
+
+    def __init__(self):
+        self.steps = 0
+
+    def __call__(self, observation):
+        self.steps += 1
+        if self.steps > 3:
+            raise KeyError("layer9")
+        return rises(observation)
+
+
+def test_an_episode_outlives_a_policy_that_raises(pick):
+    session = Session(pick, policy=Fails())
+    go_on(session, 3)
+    with pytest.raises(TaskError, match="^the policy failed: KeyError: 'layer9'$"):
+        session.step()
+    assert len(session.actions) == 3
+    session.take_over()
+    session.step()
+    assert len(session.keep().actions) == 4
+    session.step()  # the next episode has a policy that has not failed
+
+
+def test_a_policy_that_learns_acts_as_in_an_evaluation(pick):
+    weights = torch.zeros(8, requires_grad=True)
+    session = Session(pick, policy=lambda observation: weights * 2)
+    session.step()
+    assert session.actions[0].tolist() == [0.0] * 8
+
+
+def test_a_policy_that_cannot_be_copied_is_named(pick):
+    class Locked:
+        def __init__(self):
+            self.lock = Lock()
+
+        def __call__(self, observation):
+            return np.zeros(8)
+
+    with pytest.raises(TaskError, match="^the policy failed: TypeError: cannot pickle"):
+        Session(pick, policy=Locked())

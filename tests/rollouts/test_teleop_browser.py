@@ -46,7 +46,7 @@ def hands_on(task_id, folder):
         hands.keep()
         print(hands.measured())
         status, said = command.interrupt()
-        assert (status, said) == (0, f"{folder / FILE}: 1 episodes, 1 of them now\n")
+        assert (status, said) == (0, f"{folder / FILE}: 1 episode, 1 of them new\n")
     model.task.close()
 
 

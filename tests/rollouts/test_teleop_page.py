@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tasks
-from layouts.viewer.server import serving
+from layouts.viewer.server import REST, serving
 from rollouts.reading.trajectory import TrajectoryFile
 from rollouts.recording.record import FILE
 from rollouts.recording.recorder import Recorder
@@ -194,6 +194,47 @@ def test_nothing_but_gizmos_keys_and_buttons_is_taken(cell):
         press(guest, "Move +z")
         wait_until(lambda: at(session, "right", right) or not at(session, "left", before))
         assert at(session, "left", before)
+
+
+def test_of_many_poses_that_wait_the_last_one_counts(cell, monkeypatch):
+    session, aimed, came = cell.session, [], threading.Event()
+
+    def aim(arm, pose):
+        aimed.append(pose)
+        came.wait()
+        type(session).aim(session, arm, pose)
+
+    monkeypatch.setattr(session, "aim", aim)
+    with browsers(cell, 1) as (guest,):
+        last = shifted(session, "left", (0.0, 0.0, 0.03))
+        drag(guest, LEFT, shifted(session, "left", (0.0, 0.0, 0.01)))
+        wait_until(lambda: aimed)
+        began = monotonic()
+        for height in np.linspace(-0.02, 0.0, 100):
+            guest.send(moved(LEFT, last + [0, 0, height, 0, 0, 0, 0]))
+        wait_until(lambda: cell.page._waiting.qsize() == 100)
+        assert monotonic() - began >= 100 * REST  # a flood leaves time for other things
+        came.set()
+        wait_until(lambda: at(session, "left", last))
+    assert len(aimed) == 2
+
+
+def test_a_step_is_taken_though_messages_never_end(cell):
+    session, rounds = cell.session, iter(range(10_000))
+
+    def flood():
+        if next(rounds, None) is not None and not session.actions:
+            cell.page._waiting.put(flood)
+
+    with browsers(cell, 1) as (guest,):
+        press(guest, "Discard (X)")
+        wait_until(lambda: not session.actions)
+        press(guest, "Start (P)")
+        cell.page._waiting.put(flood)
+        wait_until(lambda: session.actions)
+        assert next(rounds, None) is not None
+        press(guest, "Start (P)")
+        wait_until(lambda: session.phase is Phase.STOPPED)
 
 
 def drain(*guests):

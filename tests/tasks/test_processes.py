@@ -161,6 +161,13 @@ def test_a_worker_finds_the_libraries_loaded_and_everything_else_as_it_is_now(
     assert capfd.readouterr().out.count("printed by a worker") == 2
 
 
+def test_a_program_that_is_read_from_standard_input_may_have_workers(monkeypatch):
+    main = sys.modules["__main__"]
+    monkeypatch.setattr(main, "__spec__", None)
+    monkeypatch.setattr(main, "__file__", "<stdin>")
+    in_worker(look_around)
+
+
 def test_a_daemonic_process_may_have_a_vector():
     this = multiprocessing.current_process()
     this.daemon = True

@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -33,10 +34,10 @@ sys.path.insert(0, str(ROOT / "integrations" / "lerobot_env_robot_layouts"))
 
 def main(folder: Path) -> None:
     recording = record(folder / "recording" / "trajectory.h5")
-    for name, options in {"videos": {}, "images": {"images": True, "depth": True}}.items():
-        export(
-            Export(recording, "lerobot", folder / name, cameras="all", size=SIZE, **options)  # type: ignore[arg-type]
-        )
+    forms: dict[str, dict[str, Any]] = {"videos": {}, "images": {"images": True, "depth": True}}
+    for name, options in forms.items():
+        options |= {"cameras": "all", "size": SIZE, "include_failures": True}
+        export(Export(recording, "lerobot", folder / name, **options))
 
     env = environment("lerobot+cameras+depth")
     with TrajectoryFile(recording) as file:

@@ -39,7 +39,8 @@ def near(depth):
 
 def main(folder: Path) -> None:
     recording = record(folder / "recording" / "trajectory.h5")
-    wanted = Export(recording, "robomimic", folder / "data", cameras="all", depth=True, size=SIZE)
+    options = {"cameras": "all", "depth": True, "size": SIZE, "include_failures": True}
+    wanted = Export(recording, "robomimic", folder / "data", **options)  # type: ignore[arg-type]
     export(wanted)
     path = str(folder / "data" / "image.hdf5")
 

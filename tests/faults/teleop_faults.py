@@ -1,0 +1,149 @@
+"""Teleoperation: what people and policies ask of a session that it cannot do, and what it keeps."""
+
+from __future__ import annotations
+
+import math
+import resource
+import signal
+from collections.abc import Callable, Iterator
+from functools import cache, partial
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+import tasks
+from robots import RecordingError, TaskError
+from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.recording.record import FILE
+from rollouts.recording.recorder import Recorder
+from rollouts.teleop.session import Session
+from tests.faults.fault import GOES_ON, Fault
+
+AREA = "teleoperation"
+HOME = (0.0, 0.0, 0.3, 0.0, 1.0, 0.0, 0.0)
+
+
+class Locked:
+    """A policy that cannot be copied."""
+
+    def __init__(self) -> None:
+        self.lock = Lock()
+
+    def __call__(self, observation: Any) -> Any:
+        return np.zeros(8)
+
+
+def _raises(error: BaseException) -> Callable[[Any], Any]:
+    def policy(observation: Any) -> Any:
+        raise error
+
+    return policy
+
+
+ASKED: dict[str, Callable[[Session], object]] = {
+    "an arm that there is not": lambda session: session.aim("left", HOME),
+    "a place that is no number": lambda session: session.aim("arm", (math.nan, *HOME[1:])),
+    "a pose without a quaternion": lambda session: session.aim("arm", HOME[:3]),
+    "a quaternion of length 2": lambda session: session.aim("arm", (*HOME[:3], 0, 2, 0, 0)),
+    "a move without end": lambda session: session.shift("arm", (math.inf, 0, 0)),
+    "a step that was not taken": lambda session: session.undo(3),
+    "an episode without steps to be kept": lambda session: session.keep(),
+    "a policy where there is none": lambda session: session.give_back(),
+}
+POLICIES: dict[str, Any] = {
+    "raises": _raises(KeyError("layer9")),
+    "ends the program": _raises(SystemExit("enough")),
+    "returns nothing": lambda observation: None,
+    "returns too few numbers": lambda observation: np.zeros(7),
+    "returns what is no number": lambda observation: np.full(8, math.nan),
+    "returns rows of different lengths": lambda observation: [[0.0], [0.0, 0.0]],
+    "is a class": Locked,
+    "is no function": 5,
+    "cannot be copied": Locked(),
+}
+
+
+def faults() -> Iterator[Fault]:
+    """Go through this area's faults."""
+    for what, ask in ASKED.items():
+        yield Fault(AREA, f"people ask for {what}", partial(_asked, ask))
+    for what, policy in POLICIES.items():
+        yield Fault(AREA, f"a policy {what}", partial(_advised, policy))
+    yield Fault(AREA, "a task of two environments", _two_environments)
+    yield Fault(AREA, "a policy raises in the middle of an episode", _goes_on, GOES_ON)
+    yield Fault(AREA, "the disk is full when an episode is kept", _full_disk, GOES_ON)
+    yield Fault(AREA, "an arm is to go a thousand kilometres away", _far, GOES_ON)
+
+
+@cache
+def _task() -> tasks.MultiRobotTask:
+    return tasks.make("PickCube-v1")
+
+
+def _asked(ask: Callable[[Session], object], folder: Path) -> None:
+    ask(Session(_task()))
+
+
+def _advised(policy: Any, folder: Path) -> None:
+    session = Session(_task(), policy=policy)
+    try:
+        session.step()
+    finally:
+        assert not session.actions
+
+
+def _two_environments(folder: Path) -> None:
+    Session(tasks.make("PickCube-v1", num_envs=2))
+
+
+def _goes_on(folder: Path) -> None:
+    left = iter(range(3))
+
+    class Ends:
+        def __call__(self, observation: Any) -> Any:
+            next(left)
+            return np.zeros(8)
+
+    with Recorder(folder / FILE, _task()) as recorder:
+        session = Session(_task(), recorder, policy=Ends())
+        for _ in range(3):
+            session.step()
+        try:
+            session.step()
+        except TaskError:
+            session.take_over()
+        session.step()
+        session.keep()
+    with TrajectoryFile(folder / FILE) as file:
+        assert [len(episode.actions) for episode in file] == [4]
+
+
+def _full_disk(folder: Path) -> str:
+    with Recorder(folder / FILE, _task()) as recorder:
+        session = Session(_task(), recorder)
+        session.step()
+        soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+        before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+        try:
+            session.keep()
+        except RecordingError as error:
+            said = str(error).rpartition(": ")[2]
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+            signal.signal(signal.SIGXFSZ, before)
+        assert len(session.actions) == 1
+        session.keep()
+    with TrajectoryFile(folder / FILE) as file:
+        assert len(file) == 1
+    return f"{said}; the episode is there, and kept once there is room"
+
+
+def _far(folder: Path) -> None:
+    session = Session(_task())
+    session.aim("arm", (1e6, *HOME[1:]))
+    for _ in range(3):
+        session.step()
+    assert np.isfinite(session.actions).all()
