@@ -20,7 +20,7 @@ import torch
 
 from measurements.robots.record import versions_of
 from robots import CONTROL_MODES, RecordingError, TaskError
-from robots.common.commands import exit_code, program, start
+from robots.common.commands import exit_code, start
 from robots.common.writing import write_whole
 from rollouts.playing.mode_conversion import followed, turned
 from rollouts.playing.replay import open_recording, task_for
@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0 if everything was tried, 1 if something cannot be read or written.
     """
-    parser = argparse.ArgumentParser(prog=program("measurements.conversions"), description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m measurements.conversions", description=__doc__)
     add = parser.add_argument
     add("--tasks", nargs="+", metavar="TASK", help="(all of ManiSkill's that there are)")
     add("--modes", nargs="+", metavar="MODE", default=ALL, choices=ALL, help="(all)")
