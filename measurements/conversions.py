@@ -147,8 +147,8 @@ def markdown(found: Mapping[str, Any]) -> Iterator[str]:
     yield "# Recordings in other control modes"
     yield ""
     yield "Episodes in which experts solve ManiSkill's tasks in `pd_joint_delta_pos`, converted"
-    yield "as `rollouts convert` does; `python -m measurements.conversions` writes this page. In"
-    yield "each cell: how many were kept of how many, as they succeed in the other mode, too; then"
+    yield "as `robot-layouts convert` does; `python -m measurements.conversions` writes this page."
+    yield "In each cell: how many were kept of how many, as they succeed in the other mode, too; then"
     yield "in how many of those native ManiSkill succeeds. *turn* is how far the TCP turns, on the"
     yield "average (°). A dash is where native's robot has no such mode."
     yield f"Made with {versions}."
@@ -158,8 +158,8 @@ def markdown(found: Mapping[str, Any]) -> Iterator[str]:
     yield "## Modes that move the TCP's place alone"
     yield ""
     yield "They cannot turn the TCP, so that a recording is kept only where the task can do without"
-    yield f"the turn; {FEW} of each task were tried. `rollouts convert` says of each that is not"
-    yield "kept how far it turns the TCP."
+    yield f"the turn; {FEW} of each task were tried. `robot-layouts convert` says of each that is"
+    yield "not kept how far it turns the TCP."
     yield ""
     yield from _table(tasks, PLACES)
 
