@@ -148,9 +148,9 @@ def markdown(found: Mapping[str, Any]) -> Iterator[str]:
     yield ""
     yield "Episodes in which experts solve ManiSkill's tasks in `pd_joint_delta_pos`, converted"
     yield "as `robot-layouts convert` does; `python -m measurements.conversions` writes this page."
-    yield "In each cell: how many were kept of how many, as they succeed in the other mode, too; then"
-    yield "in how many of those native ManiSkill succeeds. *turn* is how far the TCP turns, on the"
-    yield "average (°). A dash is where native's robot has no such mode."
+    yield "In each cell: how many were kept of how many, as they succeed in the other mode, too;"
+    yield "then in how many of those native ManiSkill succeeds. *turn* is how far the TCP turns, on"
+    yield "the average (°). A dash is where native's robot has no such mode."
     yield f"Made with {versions}."
     yield ""
     yield from _table(tasks, MODES)

@@ -2,7 +2,8 @@
 
 import pytest
 
-from measurements.site.links import anchors_of, broken_in_site, broken_in_text
+from measurements.site.links import FOLDERS, anchors_of, broken_in_site, broken_in_text
+from tests.checkout import tracked_files
 from tests.docs.blocks import ROOT, blocks
 
 GENERATED = ("docs/faults.md", "docs/gallery/")  # they also name paths of other places
@@ -23,11 +24,18 @@ def test_the_readme_declares_the_tutorials_task():
     assert declared == [(ROOT / "docs/tutorials/tray.py").read_text(encoding="utf-8")]
 
 
+def test_paths_in_every_folder_of_the_repository_are_looked_at():
+    folders = {file.relative_to(ROOT).parts[0] for file in tracked_files() if file.parent != ROOT}
+    assert {*FOLDERS} == folders - {"assets_cache"}
+
+
 class TestText:
     @pytest.fixture
     def root(self, tmp_path):
         (tmp_path / "docs").mkdir()
         (tmp_path / "docs" / "other.md").write_text("# A title: with `code`\n")
+        for made in ("runs", "data", "site", "assets_cache", ".venv"):
+            (tmp_path / made).mkdir()
         return tmp_path
 
     @pytest.mark.parametrize(
@@ -43,7 +51,9 @@ class TestText:
             ("[a](https://example.org/x.md)", []),
             ("see `docs/other.md`", []),
             ("see `docs/othr.md`", ["docs/othr.md"]),
-            ("see `docs/NAME.md`, `data/trajectory.h5`", []),
+            ("see `docs/NAME.md`, `outside/trajectory.h5`", []),
+            ("see `runs/demo`, `data/trajectory.h5`, `site/index.html`", []),
+            ("see `assets_cache/robots/panda.urdf`, `.venv/bin/python`", []),
             ("```\n[a](othr.md) `docs/othr.md`\n```", []),
         ],
     )
