@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import posixpath
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -67,6 +68,25 @@ def broken_in_text(text: str, file: Path, root: Path) -> list[str]:
     missing = [link for link in relative if not _leads_somewhere(link, text, file)]
     named = [path for path in CODE.findall(prose) if _is_of_repository(path)]
     return missing + [path for path in named if not (root / path).exists()]
+
+
+def moved_into_site(text: str, page: str) -> str:
+    """Return Markdown of the repository's folder with links that lead somewhere from a page.
+
+    Args:
+        text: The Markdown.
+        page: The page that shows it, by its path in ``docs/``.
+    """
+
+    def moved(found: re.Match[str]) -> str:
+        path = found[1].removeprefix("docs/")
+        return (
+            f"]({posixpath.relpath(path, posixpath.dirname(page))})"
+            if path != found[1]
+            else found[0]
+        )
+
+    return LINK.sub(moved, text)
 
 
 def anchors_of(text: str) -> set[str]:

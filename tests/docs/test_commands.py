@@ -14,7 +14,7 @@ from tests.docs.blocks import ROOT
 @pytest.mark.long
 def test_every_command_is_there():
     page = (ROOT / "docs/reference/commands.md").read_text(encoding="utf-8")
-    text = on_page_markdown(page)
+    text = on_page_markdown(page, page=None)
     assert PLACE in page
     assert PLACE not in text
     assert all(f"\n## {name}\n" in text for name in FOR_USERS)

@@ -1,7 +1,10 @@
 """What pages refer to is there, in the repository and in the site; what is not is seen."""
 
+from types import SimpleNamespace
+
 import pytest
 
+from measurements.site.hooks import on_page_markdown
 from measurements.site.links import FOLDERS, anchors_of, broken_in_site, broken_in_text
 from tests.checkout import tracked_files
 from tests.docs.blocks import ROOT, blocks
@@ -17,6 +20,16 @@ TEXTS = sorted(
 @pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_links_and_paths_lead_somewhere(path):
     assert broken_in_text(path.read_text(encoding="utf-8"), path, ROOT) == []
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs/project").glob("*.md")), ids=lambda p: p.stem)
+def test_what_the_site_includes_has_links_that_lead_somewhere(page):
+    name = page.relative_to(ROOT / "docs").as_posix()
+    shown = on_page_markdown(
+        page.read_text(), page=SimpleNamespace(file=SimpleNamespace(src_uri=name))
+    )
+    assert (ROOT / f"{page.stem.upper()}.md").read_text().splitlines()[0] in shown
+    assert broken_in_text(shown, page, ROOT) == []
 
 
 def test_the_readme_declares_the_tutorials_task():
