@@ -1,4 +1,4 @@
-"""``python -m parity tables``: the records as tables in docs, and their check."""
+"""``robot-layouts parity tables``: the records as tables in docs, and their check."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
         return 2
     complaints = list(missing_and_extra(record["tasks"], list_clones()))
     if args.check:
-        complaints += [f"{page.name} is stale; run `python -m parity tables`" for page in stale]
+        complaints += [f"{page.name} is stale; run `robot-layouts parity tables`" for page in stale]
     for complaint in complaints:
         print(complaint, file=sys.stderr)
     return 1 if args.check and complaints else 0
@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
 
 def begin(name: str) -> str:
     """Return the line after which something generated stands."""
-    return f"<!-- {name}: begin; written by `python -m parity tables` -->"
+    return f"<!-- {name}: begin; written by `robot-layouts parity tables` -->"
 
 
 def end(name: str) -> str:

@@ -177,4 +177,4 @@ def _keep(report: Report) -> None:
         raise BenchmarkError(f"nothing is recorded, as {', '.join(report.left_out)} was left out")
     write_whole(RECORD, report.as_json())
     save(report, PICTURE)
-    print(f"{RECORD}: recorded; `python -m parity tables` shows it in docs")
+    print(f"{RECORD}: recorded; `robot-layouts parity tables` shows it in docs")

@@ -26,7 +26,7 @@ SPAN = re.compile(r"`([^`]+)`")
 PROGRAM = r"(?:\w+=\S+ +)*(?:\S*/)?(?:robot-layouts|python[\d.]*|make|pip install)\b"
 TYPED = re.compile(rf"^ *(?:\w*\$ +)?({PROGRAM}.*)$", re.MULTILINE)
 SENT = re.compile(r"'([^']*robot-layouts [^']*)'")  # to another machine
-NO_COMMAND = re.compile(r" (COMMAND|ROOM|--version|recording 1)\b")
+NO_COMMAND = re.compile(r" (COMMAND|ROOM|help|--version|recording 1)\b")
 ENDS = {"|", ">", "&", "&&", ";"}  # of a command, in a line of several
 
 PAGES = sorted(
