@@ -8,6 +8,9 @@ RUN := $(VENV)/bin/python
 # Python keeps what it compiled.
 export PYTHONDONTWRITEBYTECODE :=
 
+# Fails if a link leads nowhere. With --quiet, mkdocs would count no warning, and never fail.
+SITE := NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --strict
+
 .PHONY: help demo test test-all faults check docs bench parity clean
 .NOTPARALLEL:
 
@@ -44,12 +47,12 @@ check: $(VENV)/.check
 	$(VENV)/bin/lint-imports
 	$(RUN) -m parity tables --check
 	$(RUN) -m measurements.gallery --check
-	NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --quiet --strict
+	$(SITE)
 	rm -rf $(VENV)/dist && $(RUN) -m hatchling build --directory $(VENV)/dist
 	$(RUN) -m twine check --strict $(VENV)/dist/*
 
 docs: $(VENV)/.docs
-	NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --strict
+	$(SITE)
 	@echo "Open site/index.html."
 
 # ARGS="--record" keeps the figures for docs/parity.md.

@@ -1,4 +1,4 @@
-"""Layouts on the command line: ``python -m layouts show ring a=panda b=so100 --radius 0.6``."""
+"""``robot-layouts layouts``: shows, validates, searches, views or exports a layout."""
 
 from __future__ import annotations
 
@@ -18,25 +18,12 @@ from layouts.validate_command import add_check_options
 from layouts.view_command import add_view_options
 from robots import LayoutError, UnknownNameError
 from robots.common.bounds import shown
-from robots.common.commands import FAILED, exit_code, program, start
+from robots.common.commands import start
+from robots.common.console import add_command, main_of
 from robots.named import FORMS, named_robot
 
 # What presets take besides the robots.
 OPTIONS = ("spacing", "radius", "facing", "columns", "edges", "table", "inset", "keyframe")
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
-
-    Args:
-        arguments: Words after ``python -m layouts``; by default those of this process.
-
-    Returns:
-        Exit status: 0 if all went well, 1 after an error that was printed, or if a layout was
-            checked and is not ok.
-    """
-    options = _parser().parse_args(arguments)
-    return exit_code(lambda: options.run(options), unknown_name=FAILED)
 
 
 def add_layout_words(parser: argparse.ArgumentParser) -> None:
@@ -54,20 +41,28 @@ def add_layout_words(parser: argparse.ArgumentParser) -> None:
         help=f"of a preset, in action order; of others, robots for some places; ROBOT: {FORMS}",
     )
     for name, help_text in (
-        ("--spacing", "between neighbouring bases (m)"),
-        ("--radius", "of the bases from the middle (m)"),
-        ("--inset", "of the bases from the table's edge (m)"),
+        ("--spacing", "distance between neighbouring bases (m)"),
+        ("--radius", "distance of the bases from the middle (m)"),
+        ("--inset", "distance of the bases from the table's edge (m)"),
     ):
         parser.add_argument(name, type=_distance, metavar="M|auto", help=help_text)
-    parser.add_argument("--facing", metavar="WAY", help=f"in a ring: {', '.join(FACING)}")
+    parser.add_argument(
+        "--facing", metavar="WAY", help=f"which way robots of a ring face: {', '.join(FACING)}"
+    )
     parser.add_argument("--columns", type=int, metavar="N", help="robots in a row of a grid")
     parser.add_argument(
-        "--edges", type=_words, metavar="EDGE,…", help=f"of each robot: {', '.join(EDGES)}"
+        "--edges", type=_words, metavar="EDGE,…", help=f"edge of each robot: {', '.join(EDGES)}"
     )
     parser.add_argument(
-        "--table", type=float, nargs=2, metavar=("WIDTH", "DEPTH"), help="along x and y (m)"
+        "--table",
+        type=float,
+        nargs=2,
+        metavar=("WIDTH", "DEPTH"),
+        help="size of the table along x and y (m)",
     )
-    parser.add_argument("--keyframe", metavar="NAME", help="joint positions to start from")
+    parser.add_argument(
+        "--keyframe", metavar="NAME", help="keyframe with the joint positions to start from"
+    )
 
 
 def chosen_layout(options: argparse.Namespace) -> Layout:
@@ -162,29 +157,37 @@ def _words(word: str) -> list[str]:
     return word.split(",")
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=program("layouts"), description="Say which robots stand where, and look at it."
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    show = commands.add_parser("show", help="print a layout as a table, and draw it if asked")
+    show = add_command(commands, "show", "print a layout as a table, and draw it if asked")
     add_layout_words(show)
     show.add_argument("--save", metavar="FILE", help="write the layout as YAML")
     show.add_argument("--preview", metavar="FILE", help="save a top view (.png, .pdf or .svg)")
-    show.set_defaults(run=_show)
-    check = commands.add_parser("validate", help="check a layout for collisions and reach")
+    show.set_defaults(call=_show)
+    check = add_command(commands, "validate", "check a layout for collisions and reach")
     add_layout_words(check)
     add_check_options(check, chosen_layout)
-    search = commands.add_parser("search", help="look for places from which robots reach targets")
+    search = add_command(commands, "search", "look for places from which robots reach targets")
     add_search_options(search, named_robots)
-    view = commands.add_parser("view", help="look at a layout in a browser, and move its joints")
+    view = add_command(commands, "view", "look at a layout in a browser, and move its joints")
     add_layout_words(view)
     add_view_options(view, chosen_layout)
-    export = commands.add_parser("export", help="write a layout for MuJoCo, USD, ROS 2, Drake …")
+    export = add_command(commands, "export", "write a layout for MuJoCo, USD, ROS 2, Drake …")
     add_layout_words(export)
     add_export_options(export, chosen_layout)
-    return parser
 
+
+def run(options: argparse.Namespace) -> int | None:
+    """Run the command that is chosen; returns its exit code, None for 0.
+
+    Raises:
+        RobotLayoutsError: If it makes no sense, or fails.
+    """
+    return options.call(options)
+
+
+main = main_of("layouts")
 
 if __name__ == "__main__":
     start(main)

@@ -37,7 +37,7 @@ def add_export_options(
         action="store_false",
         help="leave out what the robots look like, and fetch only what physics needs",
     )
-    parser.set_defaults(run=lambda options: _run(options, chosen_layout(options)))
+    parser.set_defaults(call=lambda options: _run(options, chosen_layout(options)))
 
 
 def _run(options: Any, layout: Layout) -> None:

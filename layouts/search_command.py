@@ -27,7 +27,7 @@ def add_search_options(
         "robots",
         nargs="+",
         metavar="NAME=ROBOT",
-        help=f"in action order; ROBOT: {FORMS}",
+        help=f"robots in action order; ROBOT: {FORMS}",
     )
     add_target_option(parser)
     add(
@@ -45,27 +45,40 @@ def add_search_options(
         type=float,
         nargs=2,
         metavar=("WIDTH", "DEPTH"),
-        help="bases stand along the edges of a table about the origin (m along x and y)",
+        help="stand the bases along the edges of a table about the origin (m along x and y)",
     )
     where.add_argument(
         "--around",
         type=float,
         nargs=4,
         metavar=corners,
-        help="bases stand on the ground around an area (m)",
+        help="stand the bases on the ground around an area (m)",
     )
-    where.add_argument("--ceiling", type=float, metavar="M", help="bases hang at this height")
+    where.add_argument(
+        "--ceiling", type=float, metavar="M", help="hang the bases at this height (m)"
+    )
     add("--within", type=float, nargs=4, metavar=corners, help="area that bases stand in (m)")
-    add("--height", type=float, default=0.0, metavar="M", help="of bases above the ground (0)")
-    add("--keyframe", metavar="NAME", help="joint positions to start from")
-    add("--clearance", type=float, metavar="M", help="least distance between robots")
+    add(
+        "--height",
+        type=float,
+        default=0.0,
+        metavar="M",
+        help="height of the bases above the ground (0)",
+    )
+    add("--keyframe", metavar="NAME", help="keyframe with the joint positions to start from")
+    add("--clearance", type=float, metavar="M", help="least distance between robots (m)")
     add("--partial", action="store_true", help="leave out targets that cannot be reached")
-    add("--seed", type=int, default=0, metavar="N", help="of the search (0)")
-    add("--tries", type=int, metavar="N", help="places to begin at; more take longer")
-    add("--patience", type=float, metavar="S", help="when to give up (s)")
+    add("--seed", type=int, default=0, metavar="N", help="seed of the search (0)")
+    add(
+        "--tries",
+        type=int,
+        metavar="N",
+        help="number of placements to begin from; more take longer",
+    )
+    add("--patience", type=float, metavar="S", help="time limit (s)")
     add("--out", metavar="FILE", help="write the layout as YAML")
     add("--picture", metavar="FILE", help="save a view (.png, .pdf or .svg)")
-    parser.set_defaults(run=lambda options: _run(options, named_robots(options.robots)))
+    parser.set_defaults(call=lambda options: _run(options, named_robots(options.robots)))
 
 
 def _run(options: argparse.Namespace, robots: dict[str, str]) -> int:

@@ -27,11 +27,13 @@ def add_check_options(
         help="outline of a table with its top at z = 0 (m)",
     )
     parser.add_argument(
-        "--samples", type=int, default=20, metavar="N", help="draws of joint noise (20)"
+        "--samples", type=int, default=20, metavar="N", help="number of draws of joint noise (20)"
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the joint noise (0)")
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="seed of the joint noise (0)"
+    )
     parser.add_argument("--picture", metavar="FILE", help="save a view (.png, .pdf or .svg)")
-    parser.set_defaults(run=lambda options: _run(options, chosen_layout(options)))
+    parser.set_defaults(call=lambda options: _run(options, chosen_layout(options)))
 
 
 def add_target_option(parser: argparse.ArgumentParser) -> None:

@@ -25,7 +25,7 @@ def add_view_options(
         chosen_layout: Returns that layout.
     """
     add_page_options(parser)
-    parser.set_defaults(run=lambda options: _run(options, chosen_layout(options)))
+    parser.set_defaults(call=lambda options: _run(options, chosen_layout(options)))
 
 
 def add_page_options(parser: argparse.ArgumentParser) -> None:

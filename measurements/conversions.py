@@ -20,7 +20,7 @@ import torch
 
 from measurements.robots.record import versions_of
 from robots import CONTROL_MODES, RecordingError, TaskError
-from robots.common.commands import exit_code, program, start
+from robots.common.commands import exit_code, start
 from robots.common.writing import write_whole
 from rollouts.playing.mode_conversion import followed, turned
 from rollouts.playing.replay import open_recording, task_for
@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0 if everything was tried, 1 if something cannot be read or written.
     """
-    parser = argparse.ArgumentParser(prog=program("measurements.conversions"), description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m measurements.conversions", description=__doc__)
     add = parser.add_argument
     add("--tasks", nargs="+", metavar="TASK", help="(all of ManiSkill's that there are)")
     add("--modes", nargs="+", metavar="MODE", default=ALL, choices=ALL, help="(all)")
@@ -147,10 +147,10 @@ def markdown(found: Mapping[str, Any]) -> Iterator[str]:
     yield "# Recordings in other control modes"
     yield ""
     yield "Episodes in which experts solve ManiSkill's tasks in `pd_joint_delta_pos`, converted"
-    yield "as `rollouts convert` does; `python -m measurements.conversions` writes this page. In"
-    yield "each cell: how many were kept of how many, as they succeed in the other mode, too; then"
-    yield "in how many of those native ManiSkill succeeds. *turn* is how far the TCP turns, on the"
-    yield "average (°). A dash is where native's robot has no such mode."
+    yield "as `robot-layouts convert` does; `python -m measurements.conversions` writes this page."
+    yield "In each cell: how many were kept of how many, as they succeed in the other mode, too;"
+    yield "then in how many of those native ManiSkill succeeds. *turn* is how far the TCP turns, on"
+    yield "the average (°). A dash is where native's robot has no such mode."
     yield f"Made with {versions}."
     yield ""
     yield from _table(tasks, MODES)
@@ -158,8 +158,8 @@ def markdown(found: Mapping[str, Any]) -> Iterator[str]:
     yield "## Modes that move the TCP's place alone"
     yield ""
     yield "They cannot turn the TCP, so that a recording is kept only where the task can do without"
-    yield f"the turn; {FEW} of each task were tried. `rollouts convert` says of each that is not"
-    yield "kept how far it turns the TCP."
+    yield f"the turn; {FEW} of each task were tried. `robot-layouts convert` says of each that is"
+    yield "not kept how far it turns the TCP."
     yield ""
     yield from _table(tasks, PLACES)
 

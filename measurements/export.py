@@ -24,7 +24,7 @@ from rich.console import Console
 from rich.table import Table
 
 import tasks
-from robots.common.commands import exit_code, program, start
+from robots.common.commands import exit_code, start
 from robots.common.writing import write_whole
 from rollouts.export.columns import ColumnReader
 from rollouts.export.dataset import Export, export
@@ -64,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0 if every form costs at most 1.15 × the processor time of drawing alone, else 1.
     """
-    parser = argparse.ArgumentParser(prog=program("measurements.export"), description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m measurements.export", description=__doc__)
     add = parser.add_argument
     add("--task", default="TwoRobotPickCube-v1", help="task id (%(default)s)")
     add("--robot", default="panda_wristcam", help="at every place (%(default)s)")

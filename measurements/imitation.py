@@ -75,5 +75,7 @@ PAGE = Page(
     unit="batches learned from (% of the run)",
 )
 
+main = PAGE.main
+
 if __name__ == "__main__":
-    start(PAGE.main)
+    start(main)

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from measurements.robots.record import versions_of
 from robots import RecordingError
-from robots.common.commands import exit_code, program
+from robots.common.commands import exit_code
 from robots.common.writing import write_whole
 from rollouts.suite.statistics import wilson
 
@@ -54,7 +54,9 @@ class Page:
         Returns:
             0 if everything was written, 1 if something cannot be read or written.
         """
-        parser = argparse.ArgumentParser(prog=program(self.name), description=self.description)
+        parser = argparse.ArgumentParser(
+            prog=f"python -m {self.name}", description=self.description
+        )
         add = parser.add_argument
         add("runs", nargs="*", type=Path, metavar="RUN", help="folder of a run to add")
         add("--out", type=Path, default=self.record, metavar="FILE", help="record (%(default)s)")

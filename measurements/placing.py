@@ -18,7 +18,7 @@ from typing import Any
 from layouts import Layout, ring, search
 from measurements.robots.record import SurveyError, versions_of
 from robots import RobotRegistry
-from robots.common.commands import exit_code, notice, program, start
+from robots.common.commands import exit_code, notice, start
 from robots.common.writing import write_whole
 
 RECORD = Path("docs/placing.json")
@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0 if every cell was tried, 1 if something cannot be written.
     """
-    parser = argparse.ArgumentParser(prog=program("measurements.placing"), description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m measurements.placing", description=__doc__)
     add = parser.add_argument
     add("--cells", nargs="+", metavar="CELL", default=list(CELLS), choices=list(CELLS))
     add("--seed", type=int, default=0, metavar="N", help="of the search (0)")

@@ -88,5 +88,7 @@ PAGE = Page(
     unit="steps learned from (millions)",
 )
 
+main = PAGE.main
+
 if __name__ == "__main__":
-    start(PAGE.main)
+    start(main)

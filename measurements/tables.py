@@ -1,10 +1,10 @@
-"""``python -m parity tables``: the records as tables in docs, and their check."""
+"""``robot-layouts parity tables``: the records as tables in docs, and their check."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,6 @@ from measurements.bench import tables as bench_table
 from parity.compare.results import RESULTS, ResultsError, read
 from parity.compare.task_summary import REWARD_MODES, number_text, reward_text, success_text
 from robots import RobotLayoutsError
-from robots.common.commands import program
 from robots.common.writing import write_whole
 from tasks import list_clones
 
@@ -22,26 +21,27 @@ PARITY_TABLE, BENCH_TABLES = "parity table", "benchmarks"  # what the markers ca
 DIFFERENCES = ("object pose", "qpos", "observation")  # the rest stands in the record
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.epilog = (
+        "Writes what `robot-layouts parity compare --all --record` and `robot-layouts parity bench"
+        " --record` found into docs/parity.md, and all of the latter into docs/benchmarks.md."
+    )
+    add = parser.add_argument
+    add("--check", action="store_true", help="write nothing, and exit with 1 if a page is stale")
+    add("--page", type=Path, default=PAGE, help="the page (this project's)")
+    add("--benchmarks", type=Path, default=BENCHMARKS, help="the page of all benchmarks")
+    add("--results", type=Path, default=RESULTS, help="the comparison (this project's)")
+    add("--bench", type=Path, default=bench_table.RECORD, help="the benchmarks (this project's)")
+
+
+def run(args: argparse.Namespace) -> int:
     """Run the command.
 
     Returns:
         0 if the pages show the records, 1 if a check finds that it does not or that the record
         of parity does not hold exactly the tasks there are, 2 if a file cannot be read.
     """
-    parser = argparse.ArgumentParser(
-        prog=f"{program('parity')} tables",
-        description="Write what `python -m parity compare --all --record` and `python -m parity"
-        " bench --record` found into docs/parity.md, and all of the latter into"
-        " docs/benchmarks.md.",
-    )
-    add = parser.add_argument
-    add("--check", action="store_true", help="write nothing; tell what is stale")
-    add("--page", type=Path, default=PAGE, help="the page (this project's)")
-    add("--benchmarks", type=Path, default=BENCHMARKS, help="the page of all benchmarks")
-    add("--results", type=Path, default=RESULTS, help="the comparison (this project's)")
-    add("--bench", type=Path, default=bench_table.RECORD, help="the benchmarks (this project's)")
-    args = parser.parse_args(argv)
     try:
         record, measured = read(args.results), bench_table.read(args.bench)
         text = _read_text(args.page)
@@ -60,7 +60,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     complaints = list(missing_and_extra(record["tasks"], list_clones()))
     if args.check:
-        complaints += [f"{page.name} is stale; run `python -m parity tables`" for page in stale]
+        complaints += [f"{page.name} is stale; run `robot-layouts parity tables`" for page in stale]
     for complaint in complaints:
         print(complaint, file=sys.stderr)
     return 1 if args.check and complaints else 0
@@ -68,7 +68,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def begin(name: str) -> str:
     """Return the line after which something generated stands."""
-    return f"<!-- {name}: begin; written by `python -m parity tables` -->"
+    return f"<!-- {name}: begin; written by `robot-layouts parity tables` -->"
 
 
 def end(name: str) -> str:

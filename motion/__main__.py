@@ -1,4 +1,4 @@
-"""Motions on the command line: ``python -m motion plan cell.yaml --goal left=0.4,0,0.3``."""
+"""``robot-layouts motion``: plans motions, certifies, shows, draws or exports them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from motion.goals import Goal, TcpGoal
 from motion.motion import Motion
 from motion.obstacles import Obstacle, box
 from motion.planning import plan
-from robots.common.commands import FAILED, exit_code, program, start
+from robots.common.commands import FAILED, start
+from robots.common.console import add_command, main_of
 from robots.common.errors import MotionError
 from robots.control_modes import read_mode
 
@@ -21,35 +22,19 @@ JOINTS = "joints:"
 _T = TypeVar("_T")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
-
-    Args:
-        arguments: Words after ``python -m motion``; by default those of this process.
-
-    Returns:
-        Exit status: 0 if all went well, 1 after an error that was printed, or if a motion was
-            checked and is not ok.
-    """
-    options = _parser().parse_args(arguments)
-    return exit_code(lambda: options.run(options), unknown_name=FAILED)
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=program("motion"), description="Plan motions that do not collide, and look at them."
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    _add_plan(commands.add_parser("plan", help="find a motion of a layout's robots to their goals"))
-    check = commands.add_parser("certify", help="check a motion once more, densely and exactly")
-    check.set_defaults(run=_certify)
-    view = commands.add_parser("show", help="look at a motion in a browser, with a timeline")
+    _add_plan(add_command(commands, "plan", "find a motion of a layout's robots to their goals"))
+    check = add_command(commands, "certify", "check a motion once more, densely and exactly")
+    check.set_defaults(call=_certify)
+    view = add_command(commands, "show", "look at a motion in a browser, with a timeline")
     add_page_options(view)
-    view.set_defaults(run=_show)
-    draw = commands.add_parser("draw", help="save a picture of a motion, still or moving")
-    draw.set_defaults(run=_draw)
-    export = commands.add_parser("export", help="write a motion as tables, or for ROS 2")
-    export.set_defaults(run=_export)
+    view.set_defaults(call=_show)
+    draw = add_command(commands, "draw", "save a picture of a motion, still or moving")
+    draw.set_defaults(call=_draw)
+    export = add_command(commands, "export", "write a motion as tables, or for ROS 2")
+    export.set_defaults(call=_export)
     for command in (check, view, draw, export):
         command.add_argument("file", metavar="FILE", help="a motion (.json)")
     draw.add_argument(
@@ -58,8 +43,16 @@ def _parser() -> argparse.ArgumentParser:
     add = export.add_argument
     add("--csv", metavar="DIR", help="a table for each robot, NAME.csv")
     add("--ros2", metavar="DIR", help="a JointTrajectory for each controller of layouts export")
-    add("--frequency", type=float, metavar="HZ", help="rows per second (as the motion has them)")
-    return parser
+    add("--frequency", type=float, metavar="HZ", help="rows per second (those of the motion)")
+
+
+def run(options: argparse.Namespace) -> int | None:
+    """Run the command that is chosen; returns its exit code, None for 0.
+
+    Raises:
+        RobotLayoutsError: If it makes no sense, or fails.
+    """
+    return options.call(options)
 
 
 def _add_plan(parser: argparse.ArgumentParser) -> None:
@@ -89,14 +82,34 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
         metavar=("X_MIN", "Y_MIN", "X_MAX", "Y_MAX"),
         help="outline of a table with its top at z = 0 (m)",
     )
-    add("--clearance", type=float, default=0.01, metavar="M", help="to keep (%(default)s m)")
-    add("--velocity", type=float, default=1.0, metavar="SHARE", help="of the largest (%(default)s)")
-    add("--control-mode", type=read_mode, metavar="MODE", help="in which it is to be carried out")
-    add("--seed", type=int, default=0, metavar="N", help="of all that is random (%(default)s)")
-    add("--patience", type=float, default=30.0, metavar="S", help="time to plan (%(default)s s)")
+    add(
+        "--clearance",
+        type=float,
+        default=0.01,
+        metavar="M",
+        help="distance to keep (%(default)s m)",
+    )
+    add(
+        "--velocity",
+        type=float,
+        default=1.0,
+        metavar="SHARE",
+        help="speed, as a share of the joints' largest (%(default)s)",
+    )
+    add(
+        "--control-mode", type=read_mode, metavar="MODE", help="control mode that will carry it out"
+    )
+    add("--seed", type=int, default=0, metavar="N", help="seed of the planner (%(default)s)")
+    add(
+        "--patience",
+        type=float,
+        default=30.0,
+        metavar="S",
+        help="time limit of the planner (%(default)s s)",
+    )
     add("--out", metavar="FILE", help="save the motion (.json)")
     add("--picture", metavar="FILE", help="save a picture (.png, .pdf, .svg; moving: .webp, .gif)")
-    parser.set_defaults(run=_plan)
+    parser.set_defaults(call=_plan)
 
 
 def _plan(options: argparse.Namespace) -> None:
@@ -194,6 +207,8 @@ def _numbers(word: str, value: str) -> list[float]:
     except ValueError:
         raise MotionError(f"{word} should be numbers with commas between them") from None
 
+
+main = main_of("motion")
 
 if __name__ == "__main__":
     start(main)

@@ -1,4 +1,4 @@
-"""`python -m robots.fetch_assets`: brings robot files to this machine, or tells what is missing."""
+"""``robot-layouts robots fetch``: brings robot files to this machine, or lists what is missing."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from robots.assets.progress import size
 from robots.assets.sources import AssetSource, InstalledPackage, LocalCopy
 from robots.assets.store import AssetStore, FileState, default_root
 from robots.assets.wheel_source import PackageWheel
-from robots.common.commands import exit_code, print_error, printable, program, start
+from robots.common.commands import print_error, printable, start
+from robots.common.console import main_of
 from robots.common.errors import RobotLayoutsError
 from robots.common.paths import absolute
 from robots.descriptor import RobotDescriptor
@@ -26,20 +27,14 @@ SOURCES = ("local", "hf", *(package.name for package in INDEX_PACKAGES), "wheel"
 ONLINE_SOURCES = ("hf", "wheel")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command.
+def run(options: argparse.Namespace) -> int:
+    """Run the command; returns 0 if every file is there and right, 1 if not.
 
-    Returns:
-        0 if every file is there and right, 1 if not, 2 if the command makes no sense.
+    Raises:
+        RobotLayoutsError: If a robot does not exist, or a file cannot be had.
     """
-    parser = _parser()
-    options = parser.parse_args(arguments)
     if options.offline and options.source in ONLINE_SOURCES:
-        parser.error(f"--source {options.source} needs the network, which --offline rules out")
-    return exit_code(lambda: _fetch(options))
-
-
-def _fetch(options: argparse.Namespace) -> int:
+        options.refuse(f"--source {options.source} needs the network, which --offline rules out")
     pictures = not options.physics_only
     failures: list[RobotLayoutsError] = []
     if options.robots:
@@ -90,8 +85,10 @@ def describe_file(file: AssetFile, store: AssetStore) -> str:
     return f"{state.value}: {file} ({size(file.bytes)}, {use}{f'; {source}' if source else ''})"
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog=program("robots.fetch_assets"), description=__doc__)
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.epilog = "Exit code: 0 if every file is there and right, 1 if not, 2 for bad usage."
+    parser.set_defaults(refuse=parser.error)
     add = parser.add_argument
     which = f"robots to fetch; if none is named, all, or all that --source has; ROBOT: {FORMS}"
     add("robots", nargs="*", metavar="ROBOT", help=which)
@@ -110,7 +107,6 @@ def _parser() -> argparse.ArgumentParser:
         metavar="REV",
         help=f"branch, tag or commit of the Hub's dataset (default ${REVISION_VARIABLE} or main)",
     )
-    return parser
 
 
 def _sources(options: argparse.Namespace, store: AssetStore) -> list[AssetSource]:
@@ -148,6 +144,8 @@ def _report(needs: dict[str, tuple[AssetFile, ...]], store: AssetStore) -> int:
         print(f"  {origin.name}: licence {origin.licence}: {origin.licence_note}")
     return 1 if store.unusable(files) else 0
 
+
+main = main_of("robots fetch")
 
 if __name__ == "__main__":
     start(main)

@@ -1,15 +1,11 @@
-"""`python -m robots.from_urdf PATH`: guesses a descriptor from a URDF or MJCF, and says why.
-
-PATH is a URDF or an MJCF (``.xml``) on this machine, or a name of the package robot_descriptions,
-such as `panda_description` or `panda_mj_description`, which keeps its own copies of robots.
-"""
+"""``robot-layouts robots guess``: a descriptor from a URDF or MJCF, and the reasons."""
 
 from __future__ import annotations
 
 import argparse
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import redirect_stdout
 from importlib import import_module
 from importlib.util import find_spec
@@ -17,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from robots.assets.locator import LocalUrdf
-from robots.common.commands import exit_code, program, start
+from robots.common.commands import start
+from robots.common.console import main_of
 from robots.common.errors import (
     AssetError,
     DescriptorError,
@@ -93,15 +90,15 @@ def _semantics(source: LocalUrdf, srdf: str | os.PathLike[str]) -> Hints:
     return hints_of(read_semantics(file, model), file.name)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the guess, or with ``--module`` the data module to paste.
-
-    Returns:
-        0, or 1 if the URDF is unusable, or 2 if there is no robot of that name.
-    """
-    parser = argparse.ArgumentParser(prog=program("robots.from_urdf"), description=__doc__)
-    parser.add_argument("urdf", metavar="PATH", help="URDF or MJCF, or name in robot_descriptions")
-    parser.add_argument("--name", help="registry name of the robot")
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument(
+        "urdf",
+        metavar="PATH",
+        help="a URDF or an MJCF (.xml) on this machine, or a name of the package"
+        " robot_descriptions, such as panda_description or panda_mj_description",
+    )
+    parser.add_argument("--name", help="registry name of the robot (the name in its file)")
     parser.add_argument("--module", action="store_true", help="print the data module to paste")
     parser.add_argument(
         "--xacro",
@@ -111,16 +108,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         type=_argument,
         help="argument of a xacro template; may be given again",
     )
-    parser.add_argument("--srdf", metavar="FILE", help="groups, states and disabled pairs of it")
-    options = parser.parse_args(arguments)
-    return exit_code(lambda: _print(options))
+    parser.add_argument(
+        "--srdf", metavar="FILE", help="SRDF with the robot's groups, states and disabled pairs"
+    )
 
 
-def _print(options: argparse.Namespace) -> None:
+def run(options: argparse.Namespace) -> int:
+    """Print the guess, or with ``--module`` the data module to paste; returns 0.
+
+    Raises:
+        RobotLayoutsError: If the file is unusable, or there is no robot of that name.
+    """
     found = guess_descriptor(
         options.urdf, options.name, xacro=dict(options.xacro), srdf=options.srdf
     )
     print(found.module().rstrip("\n") if options.module else found)
+    return 0
 
 
 def _argument(text: str) -> tuple[str, str]:
@@ -166,6 +169,8 @@ def _described(name: str, form: str | None) -> Path:
         raise AssetError(f"{name} of robot_descriptions is a xacro template, not a URDF")
     return Path(path)
 
+
+main = main_of("robots guess")
 
 if __name__ == "__main__":
     start(main)

@@ -1,8 +1,4 @@
-"""`python -m robots.inspect panda`: joints, action numbers, gripper, cameras, files of a robot.
-
-ROBOT is a name of the catalogue, or the path of a URDF or MJCF, whose descriptor is guessed. With
-`--try` robots are stood, stepped and moved in physics instead, and the report is what was seen.
-"""
+"""``robot-layouts robots inspect``: joints, action numbers, gripper, cameras, files of a robot."""
 
 from __future__ import annotations
 
@@ -19,12 +15,13 @@ from robots.assets.manifest import AssetFile, AssetPackage, load_manifest
 from robots.assets.packages import SourceError, find_package
 from robots.assets.progress import size
 from robots.assets.store import AssetStore, FileState, default_root
-from robots.common.commands import exit_code, print_error, program, start
+from robots.common.commands import start
+from robots.common.console import main_of
 from robots.descriptor import JointGroup, RobotDescriptor
 from robots.fetch_assets import describe_file
+from robots.listing import table
 from robots.mjcf.locator import LocalMjcf
 from robots.named import FORMS, named_robot
-from robots.registry import RobotRegistry
 from robots.urdf.model import ModelJoint
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_cleaned, read_urdf
@@ -34,39 +31,39 @@ from robots.urdf.tree import kinematic_tree
 TRY_COMMAND = "simulation.try_command"  # with run(robots)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Print reports, or the catalogue if no robot is named; fetches nothing.
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.epilog = "Exit code: 0, or 1 if a robot that is tried does not work, or 2 for bad usage."
+    parser.add_argument(
+        "robots",
+        nargs="+",
+        metavar="ROBOT",
+        help=FORMS,
+    )
+    parser.add_argument(
+        "--try",
+        action="store_true",
+        dest="tries",
+        help="stand the robots, step them and move them in physics, and print what was seen",
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print reports; fetches nothing.
 
     Returns:
-        0, or 1 if files are unreadable or a robot that is tried does not work, or 2 if a robot
-        does not exist.
+        0, or 1 if a robot that is tried does not work.
+
+    Raises:
+        RobotLayoutsError: If a robot does not exist, or its files cannot be read.
     """
-    parser = argparse.ArgumentParser(prog=program("robots.inspect"), description=__doc__)
-    parser.add_argument("robots", nargs="*", metavar="ROBOT", help=FORMS)
-    parser.add_argument(
-        "--try", action="store_true", dest="tries", help="stand, step and move them in physics"
-    )
-    options = parser.parse_args(arguments)
-    if options.tries and not options.robots:
-        parser.error("--try takes robots to try")
-    return exit_code(lambda: (_try if options.tries else _print)(options.robots))
-
-
-def _try(names: Sequence[str]) -> int:
-    command: Any = import_module(TRY_COMMAND)
-    return command.run([named_robot(name) for name in names])
-
-
-def _print(names: Sequence[str]) -> int:
-    for name in names:
-        print(report(named_robot(name), AssetStore(default_root())))
-    if names:
-        return 0
-    robots, failures = RobotRegistry.load_all()
-    print("\n".join(_catalogue(robots)))
-    for failure in failures:
-        print_error(failure)
-    return 1 if failures else 0
+    robots = map(named_robot, options.robots)
+    if options.tries:
+        command: Any = import_module(TRY_COMMAND)
+        return command.run(list(robots))
+    for robot in robots:
+        print(report(robot, AssetStore(default_root())))
+    return 0
 
 
 def report(robot: RobotDescriptor, store: AssetStore) -> str:
@@ -140,13 +137,7 @@ def find_urdf(robot: RobotDescriptor, store: AssetStore) -> tuple[Path | None, s
 
 
 def _fetch_hint(robot: RobotDescriptor) -> str:
-    return f"`{program('robots.fetch_assets')} {robot.name}` fetches it"
-
-
-def _catalogue(robots: Iterable[RobotDescriptor]) -> Iterator[str]:
-    rows = [("robot", "joints", "action", "reach (m)", "numbers from")]
-    rows += [(r.name, str(r.dof), str(r.action_dim), f"{r.reach:g}", r.source) for r in robots]
-    return _table(rows)
+    return f"`robot-layouts robots fetch {robot.name}` fetches it"
 
 
 def _joints(robot: RobotDescriptor, urdf: Path | None) -> Iterable[str]:
@@ -160,7 +151,7 @@ def _joints(robot: RobotDescriptor, urdf: Path | None) -> Iterable[str]:
         driven = groups.get(joint.name, "nothing")
         mimics = f" (URDF: mimics {joint.mimics})" if joint.mimics else ""
         rows.append((joint.name, joint.type, _limits(joint), *_bounds(joint), driven + mimics))
-    return _table(rows)
+    return table(rows)
 
 
 def _limits(joint: ModelJoint) -> str:
@@ -192,7 +183,7 @@ def _drives(robot: RobotDescriptor) -> Iterator[str]:
                 f"{_numbers(group.armature)} {'kg' if group.unit == 'm' else 'kg·m²'}",
             )
         )
-    return _table(rows)
+    return table(rows)
 
 
 def _how_driven(group: JointGroup) -> str:
@@ -298,11 +289,7 @@ def _row(values: Iterable[float]) -> str:
     return "(" + ", ".join(f"{round(value, 6) + 0.0:.4g}" for value in values) + ")"
 
 
-def _table(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        yield "  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip()
-
+main = main_of("robots inspect")
 
 if __name__ == "__main__":
     start(main)

@@ -1,16 +1,16 @@
-"""``robot-layouts new robot arm.urdf``: a file that declares a robot of one's own, and its test."""
+"""``robot-layouts new robot``: a file that declares a robot, and its test."""
 
 from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from robots.assets.locator import LocalUrdf
-from robots.common.commands import exit_code, notice, program, start
+from robots.common.commands import notice, start
+from robots.common.console import main_of
 from robots.common.errors import DescriptorError
 from robots.common.new_files import check_module_name, write_new
 from robots.data_module import write_module
@@ -44,23 +44,21 @@ def test_every_action_number_moves_its_own_joints():
 '''
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Guess a robot from its URDF, and write its file and its test.
-
-    Returns:
-        0, or 1 if the URDF is unusable or a file is there already.
-    """
-    parser = argparse.ArgumentParser(prog=program("robots.new_robot"), description=__doc__)
-    parser.add_argument("urdf", metavar="URDF", help="URDF, or name in robot_descriptions")
-    parser.add_argument("--name", help="what the robot is called (the name in its URDF)")
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("urdf", metavar="URDF", help="URDF or MJCF, or name in robot_descriptions")
+    parser.add_argument("--name", help="name of the robot (the name in its URDF)")
     parser.add_argument(
         "--out", type=Path, default=Path(), metavar="DIR", help="folder of the files (this one)"
     )
-    options = parser.parse_args(arguments)
-    return exit_code(lambda: _write(options))
 
 
-def _write(options: argparse.Namespace) -> None:
+def run(options: argparse.Namespace) -> int:
+    """Guess a robot from its URDF, and write its file and its test; returns 0.
+
+    Raises:
+        RobotLayoutsError: If the URDF is unusable, or a file is there already.
+    """
     found = guess_descriptor(options.urdf, options.name)
     name = found.descriptor.name
     module, constant = name.lower(), name.upper()
@@ -80,12 +78,15 @@ def _write(options: argparse.Namespace) -> None:
         f" python -m pytest {options.out / f'test_{module}.py'}\n"
         f"In {options.out.absolute()} it goes wherever a robot goes, as {module}:{constant}"
     )
+    return 0
 
 
 def _seen_from(folder: Path, source: Any) -> LocalUrdf | LocalMjcf:
     """Return where a user's file is, with its path relative to a folder."""
     return replace(source, path=Path(os.path.relpath(source.path, folder.absolute())))
 
+
+main = main_of("new robot")
 
 if __name__ == "__main__":
     start(main)

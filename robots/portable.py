@@ -12,36 +12,35 @@ import shutil
 from collections.abc import Sequence
 from typing import NoReturn
 
-from robots.common.commands import exit_code, program, start
+from robots.common.commands import start
+from robots.common.console import main_of
 from robots.common.errors import RobotLayoutsError, SimulationError
 from robots.common.portable import portable_variables
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command: become the program, or print the variables.
-
-    Returns:
-        1 if there is no such program; it does not return if there is.
-    """
-    parser = argparse.ArgumentParser(
-        prog=program("robots.portable"),
-        description="Begin a program with the variables of the environment with which physics is"
-        " the same to the last bit on every x86-64 processor.",
-        epilog="robot-layouts portable python train.py",
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.epilog = "For example: robot-layouts portable python train.py"
     parser.add_argument(
         "program",
         nargs=argparse.REMAINDER,
         metavar="PROGRAM",
-        help="the program and its arguments; none: print the variables instead",
+        help="the program and its arguments; without one, the variables that it would get in its"
+        " environment are printed",
     )
-    words: list[str] = parser.parse_args(arguments).program
-    return exit_code(lambda: _become(words) if words else _print())
 
 
-def _print() -> None:
+def run(options: argparse.Namespace) -> int:
+    """Become the program, or print the variables; returns 0 in the latter case.
+
+    Raises:
+        RobotLayoutsError: If there is no such program.
+    """
+    if options.program:
+        _become(options.program)
     for name, value in _variables().items():
         print(f"{name}={value}")
+    return 0
 
 
 def _become(words: Sequence[str]) -> NoReturn:
@@ -76,6 +75,8 @@ def numpy_versions() -> tuple[str, ...]:
             raise RobotLayoutsError("this NumPy does not tell what processors it knows") from None
     return tuple(__cpu_dispatch__)
 
+
+main = main_of("portable")
 
 if __name__ == "__main__":
     start(main)

@@ -1,4 +1,4 @@
-"""Rewrites `assets_cache/manifest.json` from installed packages, when a robot is added."""
+"""``robot-layouts robots manifest``: rewrites ``assets_cache/manifest.json`` from packages."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ from robots.assets.packages import (
     SourceError,
     find_package,
 )
-from robots.common.commands import exit_code, program, start
+from robots.common.commands import start
+from robots.common.console import main_of
 from robots.common.errors import AssetError
 from robots.common.files import read_regular, read_text
 from robots.common.writing import write_whole
@@ -51,22 +52,24 @@ TERMS = {
 }
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Write the manifest, or with ``--check`` tell whether it is up to date."""
-    parser = argparse.ArgumentParser(prog=program("robots.write_manifest"), description=__doc__)
-    parser.add_argument("--check", action="store_true", help="only compare; exit code 1 if stale")
-    check = parser.parse_args(arguments).check
-    return exit_code(lambda: _write(check=check))
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument(
+        "--check", action="store_true", help="write nothing, and exit with 1 if it is stale"
+    )
 
 
-def _write(*, check: bool) -> int:
+def run(options: argparse.Namespace) -> int:
+    """Write the manifest, or with ``--check`` say whether it is up to date; returns 1 if not.
+
+    Raises:
+        RobotLayoutsError: If a package cannot be read, or the manifest not be written.
+    """
     path = CHECKOUT_CACHE / "manifest.json"
     text = build_manifest().to_json()
-    if check:
+    if options.check:
         fresh = path.is_file() and read_text(path, LARGEST_FILE) == text
-        print(
-            f"{path} is {'up to date' if fresh else 'stale; run python -m robots.write_manifest'}"
-        )
+        print(f"{path} is {'up to date' if fresh else 'stale; run robot-layouts robots manifest'}")
         return 0 if fresh else 1
     write_whole(path, text, AssetError)
     print(f"wrote {path}")
@@ -277,6 +280,8 @@ def _asset_file(
         tuple(sorted(pictures)),
     )
 
+
+main = main_of("robots manifest")
 
 if __name__ == "__main__":
     start(main)

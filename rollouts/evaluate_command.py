@@ -1,4 +1,4 @@
-"""``python -m rollouts evaluate``: how well a policy or an expert does."""
+"""``robot-layouts evaluate``: how well a policy or an expert does."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from rollouts.playing.executor import Event
     from rollouts.progress import LiveLine
 
-DESCRIPTION = "let a policy play episodes in worker processes, and tell how well it does"
 EPILOG = (
     "A policy maps an observation to an action; see rollouts.evaluate. Exit code: 0 if all was"
     " played, 1 if not, 2 for bad usage, 130 if interrupted."
@@ -33,7 +32,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="MODULE:NAME",
         help="a policy that can be imported; by default the task's expert",
     )
-    add("--episodes", type=one_or_more, default=100, metavar="N", help="how many (%(default)s)")
+    add(
+        "--episodes",
+        type=one_or_more,
+        default=100,
+        metavar="N",
+        help="number of episodes (%(default)s)",
+    )
     workers.add_arguments(parser)
     add("--seed", type=zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
     add("--receipt", type=Path, metavar="JSON", help="write a receipt, which `verify` plays again")

@@ -1,4 +1,4 @@
-"""``python -m rollouts view``: an episode of a recording on a page, with a timeline."""
+"""``robot-layouts view``: an episode of a recording on a page, with a timeline."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from rollouts.reading.trajectory import Trajectory, TrajectoryFile
     from tasks import MultiRobotTask
 
-DESCRIPTION = "look at an episode of a recording, ours or ManiSkill's, step by step in a browser"
 EPILOG = (
     "Shows the recorded states; where a file holds none, the actions are played again. Exit code: 0"
     " if the page was served or saved, 1 if not."

@@ -20,7 +20,7 @@ Writing a task (functions of arrays are in `tasks.maths`):
     State, World, EpisodeRandom: What its methods are given.
     closeness, stillness, lies_on, …: Terms of rewards and of success.
 
-``python -m tasks list`` prints a table of all tasks. Importing this loads neither torch nor sapien.
+``robot-layouts tasks list`` prints them as a table. Importing this loads neither torch nor sapien.
 """
 
 from kinematics.own_rooms import expect_own

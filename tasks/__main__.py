@@ -1,18 +1,17 @@
-"""``python -m tasks``: lists tasks, describes one, or shows it on a page."""
+"""``robot-layouts tasks``: lists tasks, describes one, or shows it on a page."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
-from importlib import import_module
-from typing import Any
 
 from rich.console import Console
 
 from layouts.progress import Progress
 from layouts.view_command import add_page_options, page_words, show
 from robots import RobotLayoutsError, TaskError
-from robots.common.commands import exit_code, print_error, program, start
+from robots.common.commands import print_error, start
+from robots.common.console import add_command, main_of
+from robots.common.console import main as run_command
 from tasks.cell_options import add_cell_options, chosen_cell
 from tasks.description import (
     TaskFacts,
@@ -25,7 +24,6 @@ from tasks.description import (
 from tasks.registry import list_tasks, load_tasks, make
 from tasks.view import task_cell
 
-RECORDINGS = "rollouts.__main__"  # with main(words)
 MIN_WIDTH = 140  # columns that a table may take; a narrower terminal wraps it
 TASK_HELP = "task id or another of its names; MODULE:ID for one of your own"
 LEGEND = (
@@ -33,19 +31,6 @@ LEGEND = (
     " comparison with native ManiSkill, where there was one; obs is the size recorded there."
     " `describe TASK` counts the observation of any task, which takes its robots' files."
 )
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
-
-    Args:
-        arguments: Words after ``python -m tasks``; by default those of this process.
-
-    Returns:
-        Exit status: 0 if all went well, 1 after an error, 2 if there is no such task.
-    """
-    options = _parser().parse_args(arguments)
-    return exit_code(lambda: options.run(options))
 
 
 def _list(options: argparse.Namespace) -> int:
@@ -83,8 +68,7 @@ def _view(options: argparse.Namespace) -> int:
                 f"--demo takes no --{' and no --'.join(cell)}: the recording says who stands where"
             )
         words = ["view", options.demo, "--task", options.task, "--episode", str(options.episode)]
-        command: Any = import_module(RECORDINGS)
-        return command.main([*words, *page_words(options)])
+        return run_command([*words, *page_words(options)])
     env = make(options.task, obs_mode="none", **chosen_cell(options))
     env.reset(options.seed)
     status = show(lambda: task_cell(env, f"{env.task_id}, seed {options.seed}"), options)
@@ -116,52 +100,74 @@ def _console() -> Console:
     return console
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=program("tasks"), description="See which tasks there are, and what each is."
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    every = commands.add_parser("list", help="print every task as a row of a table")
+    every = add_command(commands, "list", "print every task as a row of a table")
     every.add_argument(
         "modules",
         nargs="*",
         metavar="MODULE",
-        help="modules of your own whose tasks to list, too, such as mylab.tray",
+        help="module whose tasks are listed as well, such as mylab.tray",
     )
-    every.set_defaults(run=_list)
-    one = commands.add_parser("describe", help="print everything about a task")
+    every.set_defaults(call=_list)
+    one = add_command(commands, "describe", "print everything about a task")
     one.add_argument("task", metavar="TASK", help=TASK_HELP)
     add_cell_options(one)
-    one.set_defaults(run=_describe)
-    view = commands.add_parser(
+    one.set_defaults(call=_describe)
+    view = add_command(
+        commands,
         "view",
-        help="look at a task, or at a demonstration of it, in a browser",
-        epilog=f"--demo hands over to `{program('rollouts')} view`.",
+        "look at a task, or at a demonstration of it, in a browser",
+        epilog="With --demo, it is the same as `robot-layouts view`.",
     )
     view.add_argument("task", metavar="TASK", help=TASK_HELP)
-    view.add_argument("--seed", type=int, default=0, metavar="N", help="of the reset (0)")
-    view.add_argument("--demo", metavar="FILE", help="an h5 file of recorded episodes")
-    view.add_argument("--episode", type=int, default=0, metavar="N", help="the Nth of them (0)")
+    view.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the reset (0)")
+    view.add_argument("--demo", metavar="FILE", help="show this recording (.h5) instead")
+    view.add_argument(
+        "--episode",
+        type=int,
+        default=0,
+        metavar="N",
+        help="which episode of the recording, from 0 (0)",
+    )
     add_cell_options(view)
     add_page_options(view)
-    view.set_defaults(run=_view)
-    preview = commands.add_parser("preview", help="save one picture of several draws of a task")
+    view.set_defaults(call=_view)
+    preview = add_command(commands, "preview", "save one picture of several draws of a task")
     preview.add_argument("task", metavar="TASK", help=TASK_HELP)
     preview.add_argument(
-        "--out", default="preview.png", metavar="FILE", help=".png, .jpg or .webp (preview.png)"
+        "--out",
+        default="preview.png",
+        metavar="FILE",
+        help="the picture: .png, .jpg or .webp (preview.png)",
     )
-    preview.add_argument("--draws", type=int, default=12, metavar="N", help="how many (12)")
-    preview.add_argument("--seed", type=int, default=0, metavar="N", help="of the first (0)")
+    preview.add_argument(
+        "--draws", type=int, default=12, metavar="N", help="how many resets to draw (12)"
+    )
+    preview.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="seed of the first reset (0)"
+    )
     preview.add_argument(
         "--camera",
         metavar="NAME",
-        help="the camera that sees them, such as base_camera or left.hand_camera (the first one"
-        " that varies, or the place from which people see the task)",
+        help="camera to draw from, such as base_camera or left.hand_camera (the first one that"
+        " varies, or the view that people see)",
     )
     add_cell_options(preview)
-    preview.set_defaults(run=_preview)
-    return parser
+    preview.set_defaults(call=_preview)
 
+
+def run(options: argparse.Namespace) -> int | None:
+    """Run the command that is chosen; returns its exit code, None for 0.
+
+    Raises:
+        RobotLayoutsError: If it makes no sense, or fails.
+    """
+    return options.call(options)
+
+
+main = main_of("tasks")
 
 if __name__ == "__main__":
     start(main)

@@ -7,7 +7,7 @@ from typing import Any
 
 from layouts import Layout
 from robots import RobotDescriptor, TaskError
-from robots.common.commands import notice, program
+from robots.common.commands import notice
 from robots.named import FORMS, is_path, named_robot
 from tasks.language.needs import ACT, HOLD
 from tasks.varying.randomization import Randomization
@@ -26,24 +26,24 @@ def add_cell_options(
         varying: Whether to add ``--randomization``; recordings say themselves what varied.
     """
     add = parser.add_argument
-    add("--layout", metavar="FILE", help="other places for the robots: a layout in YAML")
+    add("--layout", metavar="FILE", help="stand the robots as in this layout (.yaml)")
     if robots:
         add(
             "--robots",
             nargs="+",
             metavar="PLACE=ROBOT",
-            help=f"other robots in some places: left=ur5e.urdf right=xarm7; ROBOT: {FORMS}",
+            help=f"put other robots in some places: left=ur5e.urdf right=xarm7; ROBOT: {FORMS}",
         )
     add(
         "--bystanders",
         choices=(HOLD, ACT),
-        help="what robots of the layout do that have no place in the task (refuse them)",
+        help="what robots without a place in the task do (without this, they are refused)",
     )
     if varying:
         add(
             "--randomization",
             metavar="FILE",
-            help="what varies from episode to episode: a tasks.Randomization in YAML or json",
+            help="let things vary from episode to episode: a tasks.Randomization in YAML or json",
         )
 
 
@@ -90,6 +90,6 @@ def chosen_robots(words: list[str]) -> RobotDescriptor | dict[str, RobotDescript
 def _robot(name: str) -> RobotDescriptor:
     robot = named_robot(name)
     if is_path(name):
-        guess = program("robots.from_urdf")
-        notice(f"{robot.name}: guessed from {name}; `{guess} {name}` says what, and why")
+        command = f"robot-layouts robots guess {name}"
+        notice(f"{robot.name}: guessed from {name}; `{command}` says what, and why")
     return robot

@@ -23,7 +23,7 @@ from tasks.engine.cameras import cameras_of
 from tasks.engine.task import MultiRobotTask
 from tasks.registry import full_name, get_task_class, make, origin, other_names
 
-# Written by ``python -m parity compare --all --record``; a checkout and the wheel both carry it.
+# Written by ``robot-layouts parity compare --all --record``; in a checkout and in the wheel.
 PARITY_RESULTS = Path(__file__).parents[1] / "parity" / "results.json"
 UNKNOWN = "–"
 OURS = "robot-layouts"  # where built-in tasks come from

@@ -21,7 +21,8 @@ import numpy as np
 from kinematics.rotations import rotate
 from layouts import Layout, face_to_face, ring, single
 from robots import RobotDescriptor, TaskError
-from robots.common.commands import exit_code, notice, program, start
+from robots.common.commands import notice, start
+from robots.common.console import main_of
 from robots.common.new_files import check_module_name, write_new
 from robots.common.paths import absolute
 from robots.named import FORMS, is_path, named_robot
@@ -132,29 +133,27 @@ def test_rewards_stay_below_their_largest():
 '''
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Write a task's file and its test.
-
-    Returns:
-        0, or 1 if a word makes no sense or a file is there already, or 2 for an unknown robot.
-    """
-    parser = argparse.ArgumentParser(prog=program("tasks.new_task"), description=__doc__)
-    parser.add_argument("name", metavar="NAME", help="what it is called, such as TwoArmTray")
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("name", metavar="NAME", help="name of the task, such as TwoArmTray")
     parser.add_argument(
         "--robots",
         nargs="+",
         required=True,
         metavar="PLACE=ROBOT",
-        help=f"who stands in its places: left=panda right=arm.urdf; ROBOT: {FORMS}",
+        help=f"robot of each place: left=panda right=arm.urdf; ROBOT: {FORMS}",
     )
     parser.add_argument(
         "--out", type=Path, default=Path(), metavar="DIR", help="folder of the files (this one)"
     )
-    options = parser.parse_args(arguments)
-    return exit_code(lambda: _write(options))
 
 
-def _write(options: argparse.Namespace) -> None:
+def run(options: argparse.Namespace) -> int:
+    """Write a task's file and its test; returns 0.
+
+    Raises:
+        RobotLayoutsError: If a word makes no sense, or a file is there already.
+    """
     module, task_id = _names(options.name)
     texts = {
         f"{module}.py": task_source(task_id, _robots(options.robots), options.out),
@@ -162,12 +161,12 @@ def _write(options: argparse.Namespace) -> None:
     }
     for path in write_new(options.out, texts):
         print(path)
-    commands = program("rollouts")
     notice(
         f"Try it: python -m pytest {options.out / f'test_{module}.py'}\n"
-        f"In {options.out.absolute()}: {commands} record --task {module}:{task_id} --episodes 10"
-        " --out data"
+        f"In {options.out.absolute()}: robot-layouts record --task {module}:{task_id}"
+        " --episodes 10 --out data"
     )
+    return 0
 
 
 def task_source(task_id: str, robots: Mapping[str, str], folder: Path) -> str:
@@ -297,6 +296,8 @@ def _names(name: str) -> tuple[str, str]:
     check_module_name(module, f"My{title}", TaskError)
     return module, task_id
 
+
+main = main_of("new task")
 
 if __name__ == "__main__":
     start(main)

@@ -6,19 +6,18 @@ import subprocess
 import sys
 import zipfile
 from importlib import metadata
-from pathlib import Path
 
 import pytest
 import yaml
 
 from robots.common.rooms import ROOMS
+from tests.checkout import ROOT, tracked_files
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
-ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 ROBOT_FILES = (".urdf", ".srdf", ".stl", ".obj", ".dae", ".glb", ".gltf", ".ply")
@@ -38,12 +37,7 @@ def wheel(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def files():
-    """Everything that is committed, or would be."""
-    command = ["git", "-c", "safe.directory=*", "ls-files", "-co", "--exclude-standard"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        pytest.skip(f"not a git checkout: {done.stderr.strip()}")
-    return [ROOT / name for name in done.stdout.splitlines() if (ROOT / name).is_file()]
+    return tracked_files()
 
 
 class TestWheel:

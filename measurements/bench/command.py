@@ -1,4 +1,4 @@
-"""``python -m rollouts bench``: what everything costs, as tables, json and a plot."""
+"""``robot-layouts bench``: what everything costs, as tables, json and a plot."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from measurements.bench.report import Report
     from measurements.bench.settings import Benchmark, Settings
 
-DESCRIPTION = "measure what steps, resets, workers and recordings cost, beside the physics alone"
 EPILOG = (
     "Benchmarks: step, reset, vector, varying, looks, pictures, environments, workers, robots,"
     " contacts, memory, start, recording, validation. One after the other, they take some minutes."
@@ -31,8 +30,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--only", nargs="+", metavar="NAME", help="these benchmarks; all if left out")
     add("--out", type=Path, metavar="DIR", help="write bench.json, bench.md and bench.png there")
     add("--task", nargs="+", metavar="TASK", help="task ids; what takes one takes the first")
-    add("--rounds", type=one_or_more, metavar="N", help="samples of each (12)")
-    add("--processor-time", action="store_true", help="for a machine that does other things too")
+    add("--rounds", type=one_or_more, metavar="N", help="samples of each measurement (12)")
+    add(
+        "--processor-time",
+        action="store_true",
+        help="measure processor time, on a machine that does other things as well",
+    )
     add_cell_options(parser, robots=False)
     add(
         "--robots",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import gc
 import logging
-import sys
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing, contextmanager
 from functools import partial
@@ -14,8 +13,9 @@ from typing import Any
 from gymnasium.vector import AsyncVectorEnv
 
 import tasks
+from measurements.bench import command
 from measurements.bench.catalogue import BENCHMARKS
-from measurements.bench.command import add_arguments, run_benchmarks, settings_of
+from measurements.bench.command import run_benchmarks, settings_of
 from measurements.bench.episodes import timed_resets
 from measurements.bench.measurement import BenchmarkError, Measurement, by_series
 from measurements.bench.pictures import OBS_MODE, Variant, pictures
@@ -25,8 +25,7 @@ from measurements.bench.steps import PHYSICS, Played
 from measurements.bench.tables import PICTURE, RECORD
 from measurements.bench.vectors import HERE, NATIVE, PROCESSES, vectors
 from parity.compare.native_env import make_native, make_native_front, native_action
-from robots import RobotLayoutsError, TaskError
-from robots.common.commands import program, start
+from robots import TaskError
 from robots.common.writing import write_whole
 from tasks import MultiRobotTask, get_task_class, list_clones
 
@@ -140,28 +139,30 @@ def _native_front(task_id: str, obs_mode: str) -> AsyncVectorEnv:
     return AsyncVectorEnv(make, context="spawn")
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit code."""
-    parser = argparse.ArgumentParser(prog=f"{program('parity')} bench", description=__doc__)
-    add_arguments(parser)
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    command.add_arguments(parser)
     parser.epilog = f"Benchmarks: {', '.join(benchmarks(()))}. All of them take some minutes."
     parser.add_argument("--record", action="store_true", help=f"keep all of it in {RECORD.name}")
-    options = parser.parse_args(argv)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command; returns its exit code.
+
+    Raises:
+        RobotLayoutsError: If it makes no sense, or nothing can be recorded.
+    """
     logging.disable(logging.WARNING)
-    try:
-        if options.record and (options.only or options.task):
-            raise BenchmarkError("a record holds every benchmark; leave out --only and --task")
-        settings = settings_of(options)
-        if settings.making:
-            raise BenchmarkError("native takes no layout and no other robots; leave them out")
-        task_ids = settings.tasks if options.task else list_clones()
-        _expect_clones(task_ids)
-        status, report = run_benchmarks(options, benchmarks(task_ids), settings)
-        if options.record and report is not None:
-            _keep(report)
-    except RobotLayoutsError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+    if options.record and (options.only or options.task):
+        raise BenchmarkError("a record holds every benchmark; leave out --only and --task")
+    settings = settings_of(options)
+    if settings.making:
+        raise BenchmarkError("native takes no layout and no other robots; leave them out")
+    task_ids = settings.tasks if options.task else list_clones()
+    _expect_clones(task_ids)
+    status, report = run_benchmarks(options, benchmarks(task_ids), settings)
+    if options.record and report is not None:
+        _keep(report)
     return status
 
 
@@ -176,8 +177,4 @@ def _keep(report: Report) -> None:
         raise BenchmarkError(f"nothing is recorded, as {', '.join(report.left_out)} was left out")
     write_whole(RECORD, report.as_json())
     save(report, PICTURE)
-    print(f"{RECORD}: recorded; `python -m parity tables` shows it in docs")
-
-
-if __name__ == "__main__":
-    start(main)
+    print(f"{RECORD}: recorded; `robot-layouts parity tables` shows it in docs")

@@ -17,7 +17,7 @@ import torch
 
 from measurements.datasets import costs, memory
 from measurements.datasets.large import FIVE, make_large
-from robots.common.commands import exit_code, program, start
+from robots.common.commands import exit_code, start
 from robots.common.writing import write_whole
 from rollouts.playing.command_options import add_file_size, one_or_more, stop_signals, zero_or_more
 from rollouts.playing.executor import ProcessExecutor
@@ -30,7 +30,7 @@ LARGE = (TASK, "FourRobotStack-v1")
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; returns its exit code."""
-    parser = argparse.ArgumentParser(prog=program("measurements.datasets"), description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m measurements.datasets", description=__doc__)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     bench = commands.add_parser("bench", help="record and certify; what more would take")

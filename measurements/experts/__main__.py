@@ -24,7 +24,7 @@ from measurements.experts.cells import TASKS, other_layout
 from measurements.experts.table import markdown
 from measurements.robots.record import versions_of
 from robots import LayoutError, RecordingError, TaskError
-from robots.common.commands import exit_code, program, start
+from robots.common.commands import exit_code, start
 from robots.common.writing import write_whole
 from rollouts.progress import LiveLine
 from tasks import MultiRobotTask, make
@@ -41,7 +41,7 @@ def main(arguments: list[str] | None = None) -> int:
     Returns:
         0 if everything was played, 1 if something cannot be read or written.
     """
-    parser = argparse.ArgumentParser(prog=program("measurements.experts"), description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m measurements.experts", description=__doc__)
     add = parser.add_argument
     add("--tasks", nargs="+", choices=TASKS, default=TASKS, metavar="TASK", help="(all)")
     add("--seeds", type=int, default=100, metavar="N", help="in its own layout (%(default)s)")

@@ -14,7 +14,7 @@ from pathlib import Path
 from measurements.gallery.pages import complaints, write_pages
 from measurements.gallery.record import Record
 from robots import AssetError, UnknownNameError
-from robots.common.commands import FAILED, exit_code, notice, program, start
+from robots.common.commands import FAILED, exit_code, notice, start
 from robots.registry import CATALOGUE as ROBOTS
 from rollouts.progress import LiveLine
 from tasks.registry import CATALOGUE as TASKS
@@ -29,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0; 1 if a check finds that pages are not what would be written, or something cannot be read,
         written or drawn; 2 if there is no such task or robot.
     """
-    parser = argparse.ArgumentParser(prog=program("measurements.gallery"), description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m measurements.gallery", description=__doc__)
     add = parser.add_argument
     add("names", nargs="*", metavar="NAME", help="tasks and robots to measure or draw (all)")
     what = parser.add_mutually_exclusive_group()

@@ -120,8 +120,8 @@ def _console(robot: RobotDescriptor) -> Iterator[str]:
     yield from code(
         "console",
         f"""
-{install}$ python -m robots.fetch_assets {robot.name}
-$ python -m robots.inspect {robot.name} --try    # stand it, step it, move each number
+{install}$ robot-layouts robots fetch {robot.name}
+$ robot-layouts robots inspect {robot.name} --try    # stand it, step it, move each number
 """,
     )
 

@@ -153,9 +153,9 @@ def _console(cls: type[MultiRobotTask]) -> Iterator[str]:
     yield from code(
         "console",
         f"""
-$ python -m tasks view {cls.task_id}    # look at it in the browser
-$ python -m rollouts record --task {cls.task_id} --episodes 100 --out data
-$ python -m rollouts evaluate expert --task {cls.task_id}
+$ robot-layouts tasks view {cls.task_id}    # look at it in the browser
+$ robot-layouts record --task {cls.task_id} --episodes 100 --out data
+$ robot-layouts evaluate --task {cls.task_id}    # how often its expert succeeds
 """,
     )
 

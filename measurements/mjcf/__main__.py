@@ -16,7 +16,7 @@ from measurements.robots.expectations import read_expectations
 from measurements.robots.record import Record, versions_of
 from measurements.robots.sources import Robot, named_folder
 from measurements.robots.survey import survey_into
-from robots.common.commands import exit_code, program, start
+from robots.common.commands import exit_code, start
 from robots.common.writing import write_whole
 
 EXPECTED = Path(__file__).with_name("expected.yaml")
@@ -30,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0 if every MJCF was tried, 1 if something cannot be read or written.
     """
-    parser = argparse.ArgumentParser(prog=program("measurements.mjcf"), description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m measurements.mjcf", description=__doc__)
     add = parser.add_argument
     add("folders", nargs="*", metavar="NAME=FOLDER", help="packages, unpacked")
     add("--out", type=Path, default=RECORD, metavar="FILE", help="the record (default %(default)s)")

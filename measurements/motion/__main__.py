@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 
 from measurements.motion import checks, queries
-from robots.common.commands import exit_code, program, start
+from robots.common.commands import exit_code, start
 
 BENCHMARKS = {"queries": queries, "checks": checks}
 
@@ -17,7 +17,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0, or 1 if something cannot be read or written.
     """
-    parser = argparse.ArgumentParser(prog=program("measurements.motion"), description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m measurements.motion", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     for name, benchmark in BENCHMARKS.items():
         benchmark.add_arguments(commands.add_parser(name, description=benchmark.__doc__))

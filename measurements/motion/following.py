@@ -19,7 +19,7 @@ from kinematics.rotations import Floats
 from layouts import Layout, face_to_face, ring
 from motion import Motion, NoPlanError, TcpGoal, plan
 from robots import CONTROL_MODES, RobotLayoutsError
-from robots.common.commands import exit_code, program, start
+from robots.common.commands import exit_code, start
 from simulation import State, World
 from tasks import EpisodeRandom, MultiRobotTask
 
@@ -86,7 +86,7 @@ class Row(NamedTuple):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command."""
-    parser = argparse.ArgumentParser(prog=program("measurements.motion.following"))
+    parser = argparse.ArgumentParser(prog="python -m measurements.motion.following")
     add = parser.add_argument
     add("--motions", type=int, default=5, metavar="N", help="of each cell (%(default)s)")
     add("--velocity", type=float, default=1.0, metavar="SHARE", help="of the largest (%(default)s)")

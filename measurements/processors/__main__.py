@@ -25,7 +25,7 @@ from measurements.processors.settings import PORTABLE, Setting, settings
 from measurements.processors.table import markdown
 from measurements.robots.record import versions_of
 from robots import RecordingError
-from robots.common.commands import exit_code, program, start
+from robots.common.commands import exit_code, start
 from robots.common.writing import write_whole
 from rollouts.progress import LiveLine
 from tasks import list_tasks
@@ -48,7 +48,7 @@ def main(arguments: list[str] | None = None) -> int:
     Returns:
         0 if everything was played, 1 if something cannot be played, read or written.
     """
-    parser = argparse.ArgumentParser(prog=program("measurements.processors"), description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m measurements.processors", description=__doc__)
     add = parser.add_argument
     add("--tasks", nargs="+", default=list_tasks(), metavar="TASK", help="(all)")
     add("--seeds", type=int, default=1, metavar="N", help="of each expert and mode (%(default)s)")

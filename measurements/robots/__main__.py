@@ -1,15 +1,9 @@
-"""``python -m measurements.robots``: tries URDFs of other packages, and writes what it saw.
-
-Sources are packages that are installed (all that it knows, if nothing else is named) and folders.
-The record is JSON; the table, beside it as markdown, compares it with what is expected of robots
-that are known.
-"""
+"""``robot-layouts robots survey``: tries URDFs of other packages, and writes what it saw."""
 
 from __future__ import annotations
 
 import argparse
 import fnmatch
-from collections.abc import Sequence
 from pathlib import Path
 
 from measurements.robots.expectations import EXPECTED, read_expectations
@@ -18,20 +12,19 @@ from measurements.robots.sources import PACKAGES, Robot, find_robots, named_fold
 from measurements.robots.survey import survey_into
 from measurements.robots.table import markdown
 from robots import MissingPackageError
-from robots.common.commands import exit_code, notice, program, start
+from robots.common.commands import notice, start
+from robots.common.console import main_of
 from robots.common.writing import write_whole
 
 RECORD = Path("docs/robots.json")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command.
-
-    Returns:
-        0 if every robot was tried, 1 if something cannot be read or written, 2 if a source does
-        not exist.
-    """
-    parser = argparse.ArgumentParser(prog=program("measurements.robots"), description=__doc__)
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.epilog = (
+        "The record is JSON; the table beside it, in Markdown, compares it with what is expected of"
+        " robots that are known. Without a source, all installed packages that it knows are tried."
+    )
     add = parser.add_argument
     add("folders", nargs="*", metavar="[NAME=]FOLDER", help="folders with URDFs")
     add(
@@ -41,14 +34,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add("--expected", type=Path, default=EXPECTED, metavar="FILE", help="what is expected of them")
     add("--out", type=Path, default=RECORD, metavar="FILE", help="the record (default %(default)s)")
     add("--workers", type=int, default=1, metavar="N", help="processes at a time (%(default)s)")
-    add("--seconds", type=float, default=180.0, metavar="S", help="for a robot (%(default)g)")
+    add(
+        "--seconds",
+        type=float,
+        default=180.0,
+        metavar="S",
+        help="time limit for a robot (%(default)g)",
+    )
     add("--resume", action="store_true", help="keep what the record holds, and try the others")
     add("--table", action="store_true", help="try nothing; write the table of the record anew")
-    options = parser.parse_args(arguments)
-    return exit_code(lambda: _run(options))
 
 
-def _run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
+    """Run the command; returns 0 if every robot was tried.
+
+    Raises:
+        RobotLayoutsError: If a source does not exist, or something cannot be read or written.
+    """
     expected = read_expectations(options.expected)
     keeps = options.resume and options.out.exists()
     record = Record.read(options.out) if keeps or options.table else Record()
@@ -84,6 +86,8 @@ def _installed() -> list[tuple[str, Path]]:
             notice(f"{name} is left out: {error}")
     return folders
 
+
+main = main_of("robots survey")
 
 if __name__ == "__main__":
     start(main)

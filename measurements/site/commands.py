@@ -4,75 +4,42 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from importlib import import_module
-from typing import Any, NoReturn
-from unittest.mock import patch
+from collections.abc import Iterable, Iterator
+from typing import Any
 
-from parity.__main__ import COMMANDS as COMPARISONS
-from robots.common.commands import commands_spelt
-from robots.common.console import COMMANDS, NAME, spellings
-
-WITH_COMMANDS_OF_THEIR_OWN = {"parity": tuple(COMPARISONS)}
+from robots.common.console import (
+    FOR_DEVELOPERS,
+    FOR_USERS,
+    NAME,
+    HelpFormatter,
+    parser_of,
+    sentence,
+)
 
 
 def markdown() -> str:
     """Return every command of `robot-layouts`: what it does, how it is used, and its options."""
-    return "\n".join(line for name in COMMANDS for line in _command(name))
+    users = (line for name in FOR_USERS for line in _command(name, "##"))
+    developers = (line for name in FOR_DEVELOPERS for line in _command(name, "###"))
+    return "\n".join([*users, "", "## Commands for developers of the library", *developers])
 
 
-def parser_of(module: str, words: Sequence[str]) -> argparse.ArgumentParser:
-    """Return the parser that a command reads its words with.
-
-    Args:
-        module: The command's module, with ``main(words)``.
-        words: What comes before the command's own words.
-
-    Raises:
-        LookupError: If the command does not print help.
-    """
-    main: Any = import_module(module).main
-    with patch.object(argparse.ArgumentParser, "print_help", _give), commands_spelt(spellings()):
-        try:
-            main([*words, "--help"])
-        except _ParserError as given:
-            return given.parser
-    raise LookupError(f"{' '.join([module, *words])} --help printed no help of a parser")
+def _command(name: str, level: str) -> Iterator[str]:
+    yield from ("", f"{level} {name}", "")
+    yield from _parser(parser_of(name), f"{NAME} {name}", f"{level}#")
 
 
-class _ParserError(Exception):
-    """Brings a parser out of the function that made it."""
-
-    def __init__(self, parser: argparse.ArgumentParser) -> None:
-        super().__init__(parser.prog)
-        self.parser = parser
-
-
-def _give(parser: argparse.ArgumentParser, file: object = None) -> NoReturn:
-    raise _ParserError(parser)
-
-
-def _command(name: str) -> Iterator[str]:
-    command = COMMANDS[name]
-    yield from ("", f"## {name}", "")
-    if name in WITH_COMMANDS_OF_THEIR_OWN:
-        yield from (_sentence(command.about), "")
-    for word in WITH_COMMANDS_OF_THEIR_OWN.get(name, (None,)):
-        words = command.words if word is None else (*command.words, word)
-        yield from _parser(parser_of(command.module, words), f"{NAME} {name}")
-
-
-def _parser(parser: argparse.ArgumentParser, heading: str) -> Iterator[str]:
+def _parser(parser: argparse.ArgumentParser, heading: str, level: str) -> Iterator[str]:
     """Yield what a parser reads; below it, that of the commands that it has."""
     if parser.prog != heading:
-        yield from ("", f"### {parser.prog}", "")
+        yield from ("", f"{level} {parser.prog}", "")
     if parser.description:
-        yield from (_sentence(_markdown_text(parser.description)), "")
+        yield from (sentence(_markdown_text(parser.description)), "")
     below = _Below()
     parser.description, parser.formatter_class = None, below.formatter
     yield from (parser.format_help(), "")
     for one in below.parsers:
-        yield from _parser(one, heading)
+        yield from _parser(one, heading, level)
 
 
 class _Below:
@@ -85,7 +52,7 @@ class _Below:
         return _Markdown(prog, self.parsers)
 
 
-class _Markdown(argparse.HelpFormatter):
+class _Markdown(HelpFormatter):
     """Writes a parser's help as Markdown: the usage in a block, then a list of definitions."""
 
     def __init__(self, prog: str, below: list[argparse.ArgumentParser]) -> None:
@@ -98,7 +65,7 @@ class _Markdown(argparse.HelpFormatter):
 
     def add_text(self, text: str | None) -> None:
         if text:
-            self._lines += [_sentence(_markdown_text(text)), ""]
+            self._lines += [sentence(_markdown_text(text)), ""]
 
     def start_section(self, heading: str | None) -> None:
         """Nothing: usage says what is an option."""
@@ -115,7 +82,7 @@ class _Markdown(argparse.HelpFormatter):
                 about = self._expand_help(action) if action.help else ""
                 self._lines += [
                     f"`{self._format_action_invocation(action)}`",
-                    f":   {_sentence(_markdown_text(about))}",
+                    f":   {sentence(_markdown_text(about))}",
                     "",
                 ]
 
@@ -126,8 +93,3 @@ class _Markdown(argparse.HelpFormatter):
 def _markdown_text(text: str) -> str:
     """Return a text of a parser without reST's double backticks, and with nothing that is HTML."""
     return re.sub(r"``(.+?)``", r"`\1`", " ".join(text.split())).replace("<", "&lt;")
-
-
-def _sentence(text: str) -> str:
-    text = text if text[:1] in "`" else f"{text[:1].upper()}{text[1:]}"
-    return f"{text.rstrip('.')}." if text else "–"

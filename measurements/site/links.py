@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import posixpath
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -9,6 +10,11 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+# Of the repository. What programs write into it, such as runs/demo, is not there yet.
+FOLDERS = (
+    *(".ci", "constraints", "docs", "examples", "experts", "integrations", "kinematics", "layouts"),
+    *("measurements", "motion", "parity", "robots", "rollouts", "simulation", "tasks", "tests"),
+)
 LOADED = {"img": "src", "script": "src", "link": "href", "source": "src", "iframe": "src"}
 NEEDS_NOTHING_LOADED = {"canonical", "next", "prev"}  # <link rel=…> that browsers do not load
 FENCED = re.compile(r"^ *(```+).*?^ *\1$", re.MULTILINE | re.DOTALL)
@@ -60,8 +66,27 @@ def broken_in_text(text: str, file: Path, root: Path) -> list[str]:
     prose = FENCED.sub("", text)
     relative = [link for link in LINK.findall(prose) if not urlsplit(link).scheme]
     missing = [link for link in relative if not _leads_somewhere(link, text, file)]
-    named = [path for path in CODE.findall(prose) if _is_of_repository(path, root)]
+    named = [path for path in CODE.findall(prose) if _is_of_repository(path)]
     return missing + [path for path in named if not (root / path).exists()]
+
+
+def moved_into_site(text: str, page: str) -> str:
+    """Return Markdown of the repository's folder with links that lead somewhere from a page.
+
+    Args:
+        text: The Markdown.
+        page: The page that shows it, by its path in ``docs/``.
+    """
+
+    def moved(found: re.Match[str]) -> str:
+        path = found[1].removeprefix("docs/")
+        return (
+            f"]({posixpath.relpath(path, posixpath.dirname(page))})"
+            if path != found[1]
+            else found[0]
+        )
+
+    return LINK.sub(moved, text)
 
 
 def anchors_of(text: str) -> set[str]:
@@ -112,7 +137,7 @@ def _leads_somewhere(link: str, text: str, file: Path) -> bool:
     return target.exists() and fragment in anchors_of(target.read_text(encoding="utf-8"))
 
 
-def _is_of_repository(path: str, root: Path) -> bool:
+def _is_of_repository(path: str) -> bool:
     """Return whether a path begins in a folder of the repository; NAME stands for any name."""
     first, slash, _ = path.partition("/")
-    return bool(slash) and "NAME" not in path and (root / first).is_dir()
+    return bool(slash) and "NAME" not in path and first in FOLDERS

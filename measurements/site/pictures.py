@@ -17,7 +17,7 @@ from experts import find_expert
 from layouts import Layout, ring, search, table
 from motion import TcpGoal, plan
 from robots import RecordingError
-from robots.common.commands import exit_code, program, start
+from robots.common.commands import exit_code, start
 from robots.common.writing import written_whole
 from rollouts.progress import LiveLine
 from simulation.cameras import Camera
@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0 if every picture was drawn, 1 if not.
     """
-    parser = argparse.ArgumentParser(prog=program("measurements.site.pictures"))
+    parser = argparse.ArgumentParser(prog="python -m measurements.site.pictures")
     parser.add_argument("only", nargs="*", metavar="NAME", help=f"of {', '.join(PICTURES)}")
     parser.add_argument("--out", type=Path, default=FOLDER, metavar="DIR", help=f"({FOLDER})")
     options = parser.parse_args(arguments)

@@ -1,4 +1,4 @@
-"""``python -m rollouts soak``: step every task for long, and see whether anything grows."""
+"""``robot-layouts soak``: step every task for long, and see whether anything grows."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from measurements.soak.process_resources import Level
     from measurements.soak.soak import Soaked
 
-DESCRIPTION = "step every task for long, and see whether memory, files or processes grow"
 EPILOG = (
     "Growth is what the rounds of equal work after the first third add: in the worst of the"
     " workers, and in this process while it makes and closes vectors. Exit code: 0 if nothing"
@@ -27,8 +26,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--steps", type=int, default=2_000_000, metavar="N", help="environment steps (%(default)s)")
     add("--tasks", nargs="+", metavar="TASK", help="task ids (all)")
     add("--envs", type=int, default=32, metavar="N", help="environments of a vector (%(default)s)")
-    add("--workers", type=int, default=2, metavar="W", help="processes (%(default)s)")
-    add("--laps", type=int, default=3, metavar="L", help="times through all tasks (%(default)s)")
+    add("--workers", type=int, default=2, metavar="W", help="number of processes (%(default)s)")
+    add(
+        "--laps",
+        type=int,
+        default=3,
+        metavar="L",
+        help="how many times all tasks are stepped (%(default)s)",
+    )
 
 
 def run(options: argparse.Namespace) -> int:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from measurements.robots.record import versions_of
 from measurements.teleop.latency import measure
-from robots.common.commands import exit_code, program, start
+from robots.common.commands import exit_code, start
 from robots.common.writing import write_whole
 from rollouts.playing.command_options import one_or_more
 from rollouts.progress import LiveLine
@@ -32,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0 if half of the drags are seen within 150 ms, else 1.
     """
-    parser = argparse.ArgumentParser(prog=program("measurements.teleop"), description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m measurements.teleop", description=__doc__)
     add = parser.add_argument
     add("--task", default=TASK, help="task id (%(default)s)")
     words = f"how many, at most {MOST} (%(default)s)"

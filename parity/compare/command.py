@@ -26,7 +26,6 @@ from parity.compare.results import RESULTS, record
 from parity.compare.runs import Run, play
 from parity.compare.task_summary import summarise, summary_table
 from robots import CONTROL_MODES, RecordingError, TaskError, closest_match
-from robots.common.commands import program
 from robots.common.writing import write_whole
 from rollouts.progress import LiveLine
 from tasks import MultiRobotTask
@@ -40,16 +39,15 @@ class _Source(NamedTuple):
     episodes: list[Episode]
 
 
-def parser() -> argparse.ArgumentParser:
-    """Return the command's argument parser."""
-    arguments = argparse.ArgumentParser(
-        prog=f"{program('parity')} compare",
-        description="Step tasks beside the native ManiSkill environments that they clone, with the"
-        " same seeds and actions, and compare observations, states, rewards and info exactly.",
-        epilog="Exit code: 0 if every difference is exactly zero, 1 if not, 2 for bad usage.",
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.epilog = (
+        "Both sides get the same seeds and actions; observations, states, rewards and info are"
+        " compared exactly. Exit code: 0 if every difference is exactly zero, 1 if not, 2 for bad"
+        " usage."
     )
-    add = arguments.add_argument
-    which = arguments.add_mutually_exclusive_group(required=True)
+    add = parser.add_argument
+    which = parser.add_mutually_exclusive_group(required=True)
     which.add_argument("--task", action="append", metavar="TASK", help="task id; may be repeated")
     which.add_argument(
         "--all",
@@ -76,22 +74,14 @@ def parser() -> argparse.ArgumentParser:
     add("--num-envs", type=int, default=1, metavar="N", help="environments that play at once (1)")
     add("--json", type=Path, metavar="FILE", help="write the results to FILE")
     add("--record", action="store_true", help="keep the results of --all in parity/results.json")
-    return arguments
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command.
-
-    Returns:
-        0 if everything is equal, 1 if not.
+def run(args: argparse.Namespace) -> int:
+    """Run the command; returns 0 if everything is equal, 1 if not.
 
     Raises:
         RobotLayoutsError: If it could not be compared.
     """
-    return _compare(parser().parse_args(argv))
-
-
-def _compare(args: argparse.Namespace) -> int:
     _check(args)
     torch.set_num_threads(1)  # the tensors are small
     runs = plan(args)

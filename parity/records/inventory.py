@@ -17,7 +17,6 @@ from experts import list_experts
 from parity.compare.native_env import native_tasks
 from parity.compare.results import RESULTS, read
 from robots import MissingPackageError, RobotRegistry
-from robots.common.commands import program
 from rollouts.reading.summary import recorded_task
 from rollouts.reading.trajectory import TrajectoryError
 from tasks import get_task_class, list_clones, list_tasks
@@ -95,29 +94,24 @@ class Missing:
     reason: str
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command.
-
-    Returns:
-        0.
-
-    Raises:
-        RobotLayoutsError: If something that it needs cannot be read.
-    """
-    parser = argparse.ArgumentParser(
-        prog=f"{program('parity')} inventory",
-        description="List every task: sizes, expert, the recorded comparison with native,"
-        " demonstrations; and the tasks of native's that have no clone here.",
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.epilog = (
+        "Prints sizes, expert, the recorded comparison with native and demonstrations; and the"
+        " tasks of native ManiSkill that have no clone here."
     )
     add = parser.add_argument
     add("--demos", type=Path, metavar="DIR", help="look for demonstrations below DIR")
     add("--results", type=Path, default=RESULTS, help="the record (this project's)")
     add("--json", action="store_true", help="print json instead of tables")
-    _run(parser.parse_args(argv))
-    return 0
 
 
-def _run(args: argparse.Namespace) -> None:
+def run(args: argparse.Namespace) -> int:
+    """Run the command; returns 0.
+
+    Raises:
+        RobotLayoutsError: If something that it needs cannot be read.
+    """
     demonstrations, unreadable = find_files(args.demos) if args.demos else ({}, [])
     entries = list(take_inventory(read(args.results)["tasks"], demonstrations))
     try:
@@ -126,13 +120,14 @@ def _run(args: argparse.Namespace) -> None:
         missing, note = None, f"native's other tasks are not known here: {error}"
     if args.json:
         print(json.dumps(document(entries, missing, note, unreadable), indent=1))
-        return
+        return 0
     console = Console(markup=False, highlight=False)
     console.width = max(console.width, TABLE_WIDTH)
     console.print(entries_table(entries, with_demonstrations=args.demos is not None))
     for file in unreadable:
         console.print(f"{file.path} is not counted: {file.problem}", soft_wrap=True)
     console.print(note or missing_table(missing or []), soft_wrap=True)
+    return 0
 
 
 def find_files(folder: Path) -> tuple[dict[str, list[Path]], list[Demonstration]]:

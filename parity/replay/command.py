@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 import torch
@@ -17,7 +16,6 @@ from parity.compare.episodes import recorded_episodes
 from parity.compare.lockstep import EpisodeResult
 from parity.compare.runs import Run, RunResult, play
 from robots import TaskError
-from robots.common.commands import program
 from rollouts.playing.executor import ProcessExecutor
 from rollouts.playing.replay import find_official, task_for
 from rollouts.progress import LiveLine
@@ -26,15 +24,14 @@ from rollouts.recording.record import FILE, record
 from tasks import MultiRobotTask
 
 
-def parser() -> argparse.ArgumentParser:
-    """Return the command's argument parser."""
-    arguments = argparse.ArgumentParser(
-        prog=f"{program('parity')} replay",
-        description="Play recorded actions in native ManiSkill and here, both from a reset with"
-        " the recorded seed that rebuilds the world, and compare everything exactly.",
-        epilog="Exit code: 0 if every episode agrees to the last bit, 1 if not, 2 for bad usage.",
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.epilog = (
+        "Both sides begin with a reset by the recorded seed that rebuilds the world, and everything"
+        " is compared exactly. Exit code: 0 if every episode agrees to the last bit, 1 if not, 2"
+        " for bad usage."
     )
-    add = arguments.add_argument
+    add = parser.add_argument
     add("--task", required=True, help="task id or another of its names, such as pick_cube")
     add("--episodes", type=int, default=25, metavar="N", help="play the first N episodes (25)")
     add(
@@ -44,23 +41,21 @@ def parser() -> argparse.ArgumentParser:
         help="recording to play (.h5 or .npz); else the task's official one in $MS_ASSET_DIR/demos,"
         " else N episodes by its expert, recorded into --out first",
     )
-    add("--out", type=Path, default=Path("runs"), metavar="DIR", help="(%(default)s)")
-    return arguments
+    add(
+        "--out",
+        type=Path,
+        default=Path("runs"),
+        metavar="DIR",
+        help="folder for recorded episodes (%(default)s)",
+    )
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command.
-
-    Returns:
-        0 if everything is equal, 1 if not.
+def run(args: argparse.Namespace) -> int:
+    """Run the command; returns 0 if everything is equal, 1 if not.
 
     Raises:
         RobotLayoutsError: If it could not be compared.
     """
-    return _replay(parser().parse_args(argv))
-
-
-def _replay(args: argparse.Namespace) -> int:
     if args.episodes < 1:
         raise TaskError(f"--episodes is {args.episodes}; it must be 1 or more")
     torch.set_num_threads(1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import platform
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,6 @@ from parity.compare.snapshot import Snapshot, largest_difference
 from parity.compare.task_summary import number_text
 from parity.show.native_pictures import NativeScene
 from robots import CONTROL_MODES, RecordingError, RobotLayoutsError
-from robots.common.commands import program
 from robots.common.writing import written_whole
 from rollouts.progress import LiveLine
 from rollouts.reading.trajectory import TrajectoryError
@@ -93,20 +92,12 @@ class Rollout:
         return max(self.differences.values())
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command.
-
-    Returns:
-        0 if both sides are equal, 1 if not.
-
-    Raises:
-        RobotLayoutsError: If they could not be played.
-    """
-    parser = argparse.ArgumentParser(
-        prog=f"{program('parity')} rollout",
-        description="Play one episode in native ManiSkill and here, keep every array of both in"
-        f" DIR/TASK/{NATIVE_FILE} and {OUR_FILE}, film native, and compare the two.",
-        epilog="Exit code: 0 if every difference is exactly zero, 1 if not, 2 for bad usage.",
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.epilog = (
+        f"Keeps every array of both sides in DIR/TASK/{NATIVE_FILE} and {OUR_FILE}, films native,"
+        " and compares the two. Exit code: 0 if every difference is exactly zero, 1 if not, 2 for"
+        " bad usage."
     )
     add = parser.add_argument
     add("--task", required=True, metavar="TASK", help="task id")
@@ -117,12 +108,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         metavar="S",
         help="reset seed (0); of --demo, the episode with it (its first)",
     )
-    add("--out", type=Path, default=Path("runs"), metavar="DIR", help="default %(default)s")
+    add("--out", type=Path, default=Path("runs"), metavar="DIR", help="folder (%(default)s)")
     add("--no-video", action="store_true", help="make no film of native")
-    return _run(parser.parse_args(argv))
 
 
-def _run(args: argparse.Namespace) -> int:
+def run(args: argparse.Namespace) -> int:
+    """Run the command; returns 0 if both sides are equal, 1 if not.
+
+    Raises:
+        RobotLayoutsError: If they could not be played.
+    """
     torch.set_num_threads(1)  # the tensors are small
     cls = tasks.get_task_class(args.task)
     source = find_source(cls, args.demo, args.seed)

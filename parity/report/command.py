@@ -1,9 +1,8 @@
-"""``python -m parity report``: what a sweep found, as one HTML page that needs nothing else."""
+"""``robot-layouts parity report``: what a sweep found, as one HTML page that needs nothing else."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 
 from parity.compare.results import RESULTS, ResultsError, read
@@ -12,33 +11,40 @@ from parity.report.html import render
 from parity.show import embedding
 from parity.sweep.entries import SUMMARY, read_summary
 from robots import RecordingError, TaskError
-from robots.common.commands import program
 from robots.common.writing import write_whole
 
 LIMIT = 25.0  # MB
 MARGIN = 20_000  # bytes kept free when clips are made to fit
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command.
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.epilog = "The page holds its clips, and needs nothing else."
+    add = parser.add_argument
+    add(
+        "--runs",
+        type=Path,
+        default=Path("runs"),
+        metavar="DIR",
+        help="folder of the sweep (%(default)s)",
+    )
+    add(
+        "--out",
+        type=Path,
+        default=Path("report.html"),
+        metavar="FILE",
+        help="the page (%(default)s)",
+    )
+    add("--results", type=Path, default=RESULTS, help="the record (this project's)")
+    add("--limit", type=float, default=LIMIT, metavar="MB", help="largest page (%(default)g MB)")
 
-    Returns:
-        0.
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command; returns 0.
 
     Raises:
         RobotLayoutsError: If the page could not be written.
     """
-    parser = argparse.ArgumentParser(
-        prog=f"{program('parity')} report",
-        description="Make one self-contained HTML page of what `python -m parity sweep` and the"
-        " recorded comparison found, clips included.",
-    )
-    add = parser.add_argument
-    add("--runs", type=Path, default=Path("runs"), metavar="DIR", help="the sweep's (%(default)s)")
-    add("--out", type=Path, default=Path("report.html"), metavar="FILE", help="%(default)s")
-    add("--results", type=Path, default=RESULTS, help="the record (this project's)")
-    add("--limit", type=float, default=LIMIT, metavar="MB", help="largest page (%(default)g MB)")
-    args = parser.parse_args(argv)
     page = make(args.runs, args.results, args.limit)
     write_whole(args.out, page, RecordingError)
     print(f"{args.out}: {len(page.encode()) / 1e6:.1f} MB")
@@ -58,7 +64,7 @@ def make(runs: Path, results: Path = RESULTS, limit: float = LIMIT) -> str:
         TaskError: If the page cannot be made as small as that.
     """
     if not (runs / SUMMARY).is_file():
-        raise ResultsError(f"there is no {runs / SUMMARY}; `python -m parity sweep` writes it")
+        raise ResultsError(f"there is no {runs / SUMMARY}; `robot-layouts parity sweep` writes it")
     swept, recorded = read_summary(runs / SUMMARY), read(results)
     paths = {
         task_id: runs / task_id / entry["clip"]["clip"]
@@ -66,7 +72,9 @@ def make(runs: Path, results: Path = RESULTS, limit: float = LIMIT) -> str:
         if entry["clip"]
     }
     if lost := [str(path) for path in paths.values() if not path.is_file()]:
-        raise ResultsError(f"{', '.join(lost)} is gone; `python -m parity sweep --again` makes it")
+        raise ResultsError(
+            f"{', '.join(lost)} is gone; `robot-layouts parity sweep --again` makes it"
+        )
     posters = {path: embedding.poster(path) for path in paths.values()}
     context = page_content(runs, swept, recorded)
     bare = len(render(context, {}).encode()) + sum(_encoded(len(p)) for p in posters.values())

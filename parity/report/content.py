@@ -43,9 +43,9 @@ def page_content(
         "swept_with": _with(swept) if "versions" in swept else "versions that were not noted",
         "date": datetime.now(timezone.utc).strftime("%-d %B %Y"),
         "commands": [
-            "python -m parity compare --all --demos DIR --record",
-            f"python -m parity sweep --demos DIR --out {shlex.quote(str(runs))}",
-            f"python -m parity report --runs {shlex.quote(str(runs))}",
+            "robot-layouts parity compare --all --demos DIR --record",
+            f"robot-layouts parity sweep --demos DIR --out {shlex.quote(str(runs))}",
+            f"robot-layouts parity report --runs {shlex.quote(str(runs))}",
         ],
     }
 

@@ -99,14 +99,14 @@ def _caption(clip: Mapping[str, Any], cls: type[MultiRobotTask]) -> str:
 
 
 def _commands(task_id: str, entry: Mapping[str, Any] | None, runs: Path) -> Iterator[str]:
-    yield f"python -m parity compare --task {task_id} --seeds 10 --steps 100"
+    yield f"robot-layouts parity compare --task {task_id} --seeds 10 --steps 100"
     rollout = entry["rollout"] if entry else None
     if rollout is None or rollout["source"] == "random":
-        yield f"python -m parity sweep --tasks {task_id} --out {shlex.quote(str(runs))}"
+        yield f"robot-layouts parity sweep --tasks {task_id} --out {shlex.quote(str(runs))}"
         return
     demo = "" if rollout["source"] == "expert" else f" --demo {shlex.quote(rollout['source'])}"
     if demo:
-        yield f"python -m parity replay --task {task_id}{demo}"
+        yield f"robot-layouts parity replay --task {task_id}{demo}"
     options = f"--task {task_id}{demo} --seed {rollout['seed']} --out {shlex.quote(str(runs))}"
-    yield f"python -m parity rollout {options}"
-    yield f"python -m parity render {options}"
+    yield f"robot-layouts parity rollout {options}"
+    yield f"robot-layouts parity render {options}"

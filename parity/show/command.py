@@ -18,7 +18,6 @@ from parity.compare.both_sides import NativeSide, OurSide
 from parity.compare.episodes import load_episodes, recorded_control_mode
 from parity.show.clip import Candidate, Clip, ClipOptions, SideBySide, choose
 from robots import CONTROL_MODES, MissingPackageError, RecordingError, TaskError
-from robots.common.commands import program
 from rollouts.progress import LiveLine
 from rollouts.video import package_problem
 from tasks import MultiRobotTask
@@ -28,17 +27,15 @@ SIZES = (192, 1024)  # smallest and largest panel (pixels)
 EXPERT_EPISODES = 5  # to choose from
 
 
-def parser() -> argparse.ArgumentParser:
-    """Return the command's argument parser."""
-    arguments = argparse.ArgumentParser(
-        prog=f"{program('parity')} render",
-        description="Play recorded actions on native ManiSkill and here, in lock-step, and show"
-        " native | ours | their amplified difference, all drawn in native's own scene, so that only"
-        " the physics state differs.",
-        epilog="Writes DIR/TASK/side_by_side.mp4, .png (a contact sheet) and .json. Exit code: 0"
-        " if both sides succeed and nothing differs, 1 if not, 2 if there is nothing to show.",
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.epilog = (
+        "Shows native | ours | their amplified difference, all drawn in native's own scene, so that"
+        " only the physics state differs. Writes DIR/TASK/side_by_side.mp4, .png (a contact sheet)"
+        " and .json. Exit code: 0 if both sides succeed and nothing differs, 1 if not, 2 if there"
+        " is nothing to show."
     )
-    add = arguments.add_argument
+    add = parser.add_argument
     add("--task", required=True, metavar="TASK", help="task id")
     add("--demo", type=Path, metavar="FILE", help="recorded episodes, .h5 or .npz (the expert's)")
     add(
@@ -67,22 +64,14 @@ def parser() -> argparse.ArgumentParser:
     )
     add("--diff-gain", type=float, default=8.0, metavar="X", help="amplify the difference (8)")
     add("--size", type=int, default=384, metavar="PIXELS", help="width of a panel (384)")
-    return arguments
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command.
-
-    Returns:
-        0 if both sides succeed and nothing differs, 1 if not.
+def run(args: argparse.Namespace) -> int:
+    """Run the command; returns 0 if both sides succeed and nothing differs, 1 if not.
 
     Raises:
         RobotLayoutsError: If it could not be shown.
     """
-    return _render(parser().parse_args(argv))
-
-
-def _render(args: argparse.Namespace) -> int:
     _check(args)
     torch.set_num_threads(1)  # the tensors are small
     task_id = tasks.get_task_class(args.task).task_id

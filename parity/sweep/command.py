@@ -16,11 +16,30 @@ from parity.sweep.entries import SUMMARY, Entry, is_done, line, read_summary, wr
 from parity.sweep.plan import Plan, plan
 from parity.sweep.processes import STAGE_SECONDS, Progressed, sweep
 from parity.sweep.stages import STAGES
-from robots.common.commands import program
 from rollouts.playing.executor import Executor
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.epilog = (
+        "For each task: compares episodes with native, keeps a rollout of both sides, makes a"
+        f" side-by-side clip, and writes everything into DIR/{SUMMARY}. A sweep that was stopped"
+        " goes on where it was. Exit code: 0 if everything is equal, 1 if not or a task failed, 2"
+        " for bad usage."
+    )
+    add = parser.add_argument
+    add("--tasks", nargs="+", metavar="TASK", help="task ids (all)")
+    add("--demos", type=Path, metavar="DIR", help="play the demonstrations below DIR")
+    add("--experts", action="store_true", help="where there is an expert, play it, not --demos")
+    add("--episodes", type=int, default=3, metavar="N", help="episodes of each task (3)")
+    add("--out", type=Path, default=Path("runs"), metavar="DIR", help="folder (%(default)s)")
+    add("--workers", type=int, default=1, metavar="W", help="tasks at a time (1)")
+    add("--ray", metavar="ADDRESS", help="sweep on a Ray cluster whose machines share all DIRs")
+    add("--again", action="store_true", help="sweep tasks again that are done")
+    add("--no-video", action="store_true", help="no film of native and no clip")
+
+
+def run(args: argparse.Namespace) -> int:
     """Run the command.
 
     Returns:
@@ -29,24 +48,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     Raises:
         RobotLayoutsError: If the arguments make no sense.
     """
-    parser = argparse.ArgumentParser(
-        prog=f"{program('parity')} sweep",
-        description="For each task: compare episodes with native, keep a rollout of both sides,"
-        f" make a side-by-side clip, and write everything into DIR/{SUMMARY}. A sweep that was"
-        " stopped goes on where it was.",
-        epilog="Exit code: 0 if everything is equal, 1 if not or a task failed, 2 for bad usage.",
-    )
-    add = parser.add_argument
-    add("--tasks", nargs="+", metavar="TASK", help="task ids (all)")
-    add("--demos", type=Path, metavar="DIR", help="play the demonstrations below DIR")
-    add("--experts", action="store_true", help="where there is an expert, play it, not --demos")
-    add("--episodes", type=int, default=3, metavar="N", help="episodes of each task (3)")
-    add("--out", type=Path, default=Path("runs"), metavar="DIR", help="default %(default)s")
-    add("--workers", type=int, default=1, metavar="W", help="tasks at a time (1)")
-    add("--ray", metavar="ADDRESS", help="sweep on a Ray cluster whose machines share all DIRs")
-    add("--again", action="store_true", help="sweep tasks again that are done")
-    add("--no-video", action="store_true", help="no film of native and no clip")
-    args = parser.parse_args(argv)
     try:
         return _run(args)
     except KeyboardInterrupt:

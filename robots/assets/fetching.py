@@ -13,7 +13,6 @@ from robots.assets.progress import listing, say, size
 from robots.assets.sources import AssetSource, InstalledPackage
 from robots.assets.store import AssetStore, FileState, default_root
 from robots.assets.wheel_source import PackageWheel
-from robots.common.commands import program
 from robots.common.errors import AssetError
 from robots.urdf.summary import read_references
 
@@ -169,7 +168,7 @@ class _Fetch:
     def say_kept(self) -> None:
         """Say in one line what was kept that nobody asked for."""
         if self._kept:
-            command = f"`{program('robots.fetch_assets')} --check` lists it, with licences"
+            command = "`robot-layouts robots fetch --check` lists it, with licences"
             say(f"kept what came along of {len(self._kept)} packages; {command}")
 
 
@@ -207,6 +206,6 @@ def _failure_text(wanted: list[AssetFile], store: AssetStore, failures: list[str
         f"{len(wanted)} robot files cannot be used in {store.root}\n"
         f"  sources tried:{tried}\n"
         f"  files:\n    {states}\n"
-        f"  what to do: connect to the network and run `{program('robots.fetch_assets')}`, or"
+        f"  what to do: connect to the network and run `robot-layouts robots fetch`, or"
         f" `pip install {wheels}`, or copy the files into {store.root} from another machine"
     )

@@ -7,8 +7,8 @@ import io
 import os
 import signal
 import sys
-from collections.abc import Callable, Generator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, NoReturn, TextIO
 
 from robots.common.errors import RobotLayoutsError, UnknownNameError
@@ -16,7 +16,6 @@ from robots.common.errors import RobotLayoutsError, UnknownNameError
 FAILED, MEANINGLESS, INTERRUPTED = 1, 2, 130  # exit codes; 130 is what shells have for Ctrl-C
 LOOPBACK = "127.0.0.1"  # where a server is reached from this machine alone
 
-_spelt: dict[str, str] = {}  # module -> how the console script calls its command
 _NOBODY_READS = (errno.EPIPE, errno.EIO)  # the end of a pipe, or of a terminal
 
 
@@ -24,41 +23,22 @@ class OutputError(RobotLayoutsError, OSError):
     """What a command prints cannot be written, to a full disk, say."""
 
 
-def exit_code(
-    run: Callable[[], int | None], *, failed: int = FAILED, unknown_name: int = MEANINGLESS
-) -> int:
+def exit_code(run: Callable[[], int | None], *, failed: int = FAILED) -> int:
     """Run a command; what it refuses is printed on stderr in one line.
 
     Args:
         run: The command; returns its exit code, or None for 0.
-        failed: The exit code after an error of this library.
-        unknown_name: The exit code if a name is not in a catalogue.
+        failed: The exit code after an error of this library; that of a name which is in no
+            catalogue is 2.
     """
     try:
         return run() or 0
     except UnknownNameError as error:
         print_error(error)
-        return unknown_name
+        return MEANINGLESS
     except RobotLayoutsError as error:
         print_error(error)
         return failed
-
-
-def program(module: str) -> str:
-    """Return how the command of a module is called: by `python -m`, or by the console script."""
-    return _spelt.get(module, f"python -m {module}")
-
-
-@contextmanager
-def commands_spelt(spelt: Mapping[str, str]) -> Generator[None]:
-    """Let `program` call commands otherwise, by their modules, as long as one of them runs."""
-    before = dict(_spelt)
-    _spelt.update(spelt)
-    try:
-        yield
-    finally:
-        _spelt.clear()
-        _spelt.update(before)
 
 
 def print_error(error: RobotLayoutsError) -> None:

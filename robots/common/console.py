@@ -1,4 +1,4 @@
-"""``robot-layouts COMMAND``: every command of the library under one name.
+"""``robot-layouts COMMAND``: the table of all commands, and how one of them is run.
 
 ``python -m tasks`` runs whatever is called ``tasks`` in the present folder. A console script looks
 for this library first: the folder comes last, for the modules of tasks, experts and policies.
@@ -6,14 +6,15 @@ for this library first: the folder comes last, for the modules of tasks, experts
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module, metadata
 from typing import Any, NamedTuple, NoReturn
 
-from robots.common.commands import MEANINGLESS, commands_spelt, print_error, start
+from robots.common.commands import FAILED, MEANINGLESS, exit_code, print_error, start
 from robots.common.errors import UnknownNameError
 
 NAME = "robot-layouts"
@@ -23,51 +24,134 @@ class Command(NamedTuple):
     """A command of the console script.
 
     Attributes:
-        module: What runs it, with ``main(words)``; ``python -m`` runs the same.
-        about: What it does, in a few words.
-        words: Passed before those of the command line.
+        module: What runs it, with ``add_arguments(parser)`` and ``run(options)``.
+        about: What it does, as a sentence without its capital letter and full stop.
+        failed: The exit code after an error of this library.
     """
 
     module: str
     about: str
-    words: tuple[str, ...] = ()
+    failed: int = FAILED
 
 
-def _of_rollouts(**about: str) -> dict[str, Command]:
-    return {name: Command("rollouts.__main__", text, (name,)) for name, text in about.items()}
+def _of_parity(**commands: tuple[str, str]) -> dict[str, Command]:
+    """Return commands that exit with 1 where something differs, and with 2 after an error."""
+    return {
+        f"parity {name}": Command(module, about, MEANINGLESS)
+        for name, (module, about) in commands.items()
+    }
 
 
-COMMANDS: Mapping[str, Command] = {
-    **_of_rollouts(
-        demo="let an expert play a task, and keep recording, picture and video",
-        record="let an expert play episodes in worker processes, and record them",
-        replay="play a recording again, and compare what happens",
-        certify="play every episode of a recording again, and certify that it is the same",
-        evaluate="let a policy or an expert play, and tell how well it does",
-        verify="play what a receipt is of again, and compare every bit",
-        suite="play tasks × seeds × layouts of one file with receipts; report and verify that",
-        convert="record a recording again in another control mode",
-        report="write one page on a data set: counts, lengths, sources, what was varied, clips",
-        export="write a recording as a dataset for LeRobot or robomimic",
-        view="look at an episode of a recording in a browser",
-        bench="measure what steps, resets, workers and recordings cost",
-        soak="step all tasks for long; nothing may grow",
+FOR_USERS: Mapping[str, Command] = {
+    "demo": Command(
+        "rollouts.demo_command",
+        "let an expert play a task, and keep a recording, a picture and a video",
     ),
-    "tasks": Command("tasks.__main__", "list tasks, describe one, or look at it"),
-    "layouts": Command("layouts.__main__", "show, validate, export or look at a layout"),
+    "record": Command(
+        "rollouts.recording.record_command",
+        "let an expert or a policy play episodes in worker processes, and record them",
+    ),
+    "teleop": Command(
+        "rollouts.teleop.command",
+        "steer the arms of a task in a browser, and record the episodes that you keep",
+    ),
+    "replay": Command(
+        "rollouts.playing.replay_command",
+        "play the actions of a recording again, and compare what happens",
+    ),
+    "certify": Command(
+        "rollouts.dataset.certify_command",
+        "play every episode of a recording again, and certify that every bit is the same",
+    ),
+    "convert": Command(
+        "rollouts.recording.convert_command",
+        "record the episodes of a recording again in another control mode",
+    ),
+    "export": Command(
+        "rollouts.export.command", "write a recording as a dataset for LeRobot or robomimic"
+    ),
+    "report": Command(
+        "rollouts.dataset.report_command",
+        "write one HTML page on a data set: counts, lengths, sources, variations, clips",
+    ),
+    "view": Command("rollouts.view_command", "look at an episode of a recording in a browser"),
+    "evaluate": Command(
+        "rollouts.evaluate_command",
+        "let a policy or an expert play episodes, and print how well it does",
+    ),
+    "verify": Command(
+        "rollouts.receipts.verify_command",
+        "play the episodes of a receipt again, and compare every bit",
+    ),
+    "suite": Command(
+        "rollouts.suite.command", "show, play, report or verify a suite of tasks, with receipts"
+    ),
+    "tasks": Command("tasks.__main__", "list tasks, describe one, or look at one"),
+    "layouts": Command("layouts.__main__", "show, validate, search, view or export a layout"),
     "motion": Command("motion.__main__", "plan motions that do not collide, and look at them"),
-    "robots inspect": Command("robots.inspect", "joints, action numbers and files of robots"),
-    "robots fetch": Command("robots.fetch_assets", "bring the files of robots here, or check them"),
-    "robots guess": Command("robots.from_urdf", "guess a robot from its URDF"),
-    "robots manifest": Command("robots.write_manifest", "list the files of the robots"),
-    "robots survey": Command("measurements.robots.__main__", "guess many robots, and judge that"),
-    "new task": Command("tasks.new_task", "write the file of a task, its expert and its test"),
-    "new robot": Command(
-        "robots.new_robot", "write the file of a robot from its URDF, and its test"
+    "robots list": Command(
+        "robots.listing", "list the robots: joints, action numbers, reach, source of the numbers"
     ),
-    "portable": Command("robots.portable", "begin a program, with the same bits on any processor"),
-    "parity": Command("parity.__main__", "comparisons with native ManiSkill"),
+    "robots inspect": Command(
+        "robots.inspect", "print everything about robots, or try them in physics"
+    ),
+    "robots fetch": Command(
+        "robots.fetch_assets", "bring the files of robots to this machine, or check them"
+    ),
+    "robots guess": Command(
+        "robots.from_urdf", "guess a robot's descriptor from its URDF or MJCF, and say why"
+    ),
+    "new task": Command(
+        "tasks.new_task", "write the file of a new task and its expert, and a test"
+    ),
+    "new robot": Command(
+        "robots.new_robot", "write the file of a new robot from its URDF, and a test"
+    ),
 }
+
+FOR_DEVELOPERS: Mapping[str, Command] = {
+    "portable": Command(
+        "robots.portable",
+        "run a program so that physics has the same bits on every x86-64 processor",
+    ),
+    "bench": Command(
+        "measurements.bench.command", "measure what steps, resets, workers and recordings cost"
+    ),
+    "soak": Command(
+        "measurements.soak.command",
+        "step every task for a long time, and check that memory and processes do not grow",
+    ),
+    "robots manifest": Command(
+        "robots.write_manifest",
+        "write the manifest of robot files from installed packages, when a robot is added",
+    ),
+    "robots survey": Command(
+        "measurements.robots.__main__",
+        "guess the robots in other packages' URDFs, and record which of them work",
+    ),
+    **_of_parity(
+        inventory=(
+            "parity.records.inventory",
+            "list every task, and how it was compared with native ManiSkill",
+        ),
+        compare=("parity.compare.command", "step tasks beside native, and compare every bit"),
+        replay=(
+            "parity.replay.command",
+            "play recorded actions in native and here, episode by episode",
+        ),
+        rollout=(
+            "parity.replay.rollout",
+            "play one episode in native and here, and keep its arrays",
+        ),
+        render=("parity.show.command", "draw native and ours side by side, with their difference"),
+        sweep=("parity.sweep.command", "compare, roll out and draw every task, for one summary"),
+        report=("parity.report.command", "write one HTML page on a sweep and the recorded results"),
+        bench=("measurements.bench.native", "measure steps, resets and vectors beside native"),
+        tables=("measurements.tables", "write the recorded results into the documentation"),
+    ),
+}
+
+COMMANDS: Mapping[str, Command] = {**FOR_USERS, **FOR_DEVELOPERS}
 
 
 def run() -> NoReturn:
@@ -85,43 +169,109 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The command's exit code; 2 if there is no such command.
     """
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
-    if words[0] in ("-h", "--help"):
-        print(_usage(COMMANDS))
-        return 0
     if words[0] == "--version":
         print(f"{NAME} {metadata.version(NAME)}")
         return 0
-    for count in (2, 1):
-        if command := COMMANDS.get(" ".join(words[:count])):
-            return _run(command, words[count:])
-    group = {name: command for name, command in COMMANDS.items() if name.startswith(f"{words[0]} ")}
-    if group and (not words[1:] or words[1] in ("-h", "--help")):
-        print(_usage(group))
+    if words[0] == "help":
+        words = [*words[1:], "--help"]
+    if words[0] in ("-h", "--help"):
+        print(f"usage: {NAME} COMMAND ...\n\n{_rows(FOR_USERS)}")
+        print(f"\nfor developers of the library:\n{_rows(FOR_DEVELOPERS)}")
+        print(f"\n`{NAME} help COMMAND` describes one of them.")
         return 0
-    print_error(UnknownNameError("command", " ".join(words[: 1 + bool(group)]), group or COMMANDS))
-    return MEANINGLESS
-
-
-def spellings() -> dict[str, str]:
-    """Return how the console script calls the command of each module; see `commands_spelt`."""
-    return {
-        about.module.removesuffix(".__main__"): f"{NAME} {name}".removesuffix(
-            f" {' '.join(about.words)}"
-        )
-        for name, about in COMMANDS.items()
-    }
-
-
-def _run(command: Command, words: Sequence[str]) -> int:
+    group = {name: about for name, about in COMMANDS.items() if name.startswith(f"{words[0]} ")}
+    if group and (not words[1:] or words[1] in ("-h", "--help")):
+        print(f"usage: {NAME} {words[0]} COMMAND ...\n\n{_rows(group)}")
+        return 0
     with suppress(OSError):  # it may have been deleted
         if (folder := os.getcwd()) not in sys.path:
             sys.path.append(folder)
+    try:
+        options = parse(words)
+    except UnknownNameError as error:
+        print_error(error)
+        return MEANINGLESS
+    return exit_code(lambda: options.run(options), failed=options.failed)
+
+
+def main_of(name: str) -> Callable[..., int]:
+    """Return what ``python -m`` runs for a command, or for all with the same first word."""
+    return lambda arguments=None: main(
+        [*name.split(), *(sys.argv[1:] if arguments is None else arguments)]
+    )
+
+
+def name_of(words: Sequence[str]) -> str:
+    """Return the name of the command that a command line begins with.
+
+    Raises:
+        UnknownNameError: If there is no such command.
+    """
+    for count in (2, 1):
+        if (name := " ".join(words[:count])) in COMMANDS:
+            return name
+    group = [name for name in COMMANDS if name.startswith(f"{words[0]} ")]
+    raise UnknownNameError("command", " ".join(words[: 1 + bool(group)]), group or COMMANDS)
+
+
+def parser_of(name: str) -> argparse.ArgumentParser:
+    """Return the parser of a command's own words."""
+    command = COMMANDS[name]
     module: Any = import_module(command.module)
-    with commands_spelt(spellings()):
-        return module.main([*command.words, *words])
+    parser = Parser(prog=f"{NAME} {name}", description=sentence(command.about))
+    parser.set_defaults(run=module.run, failed=command.failed)
+    module.add_arguments(parser)
+    return parser
 
 
-def _usage(commands: Mapping[str, Command]) -> str:
-    width = max(map(len, commands))
-    lines = (f"  {name:<{width}}  {command.about}" for name, command in commands.items())
-    return "\n".join([f"usage: {NAME} COMMAND ...\n", *lines])
+def parse(words: Sequence[str]) -> argparse.Namespace:
+    """Return the options of a command line; argparse ends the process if they make no sense.
+
+    Raises:
+        UnknownNameError: If there is no such command.
+    """
+    name = name_of(words)
+    return parser_of(name).parse_args(words[len(name.split()) :])
+
+
+def add_command(commands: Any, name: str, about: str, epilog: str | None = None) -> Parser:
+    """Add a command of a command's own; see `Command.about`."""
+    return commands.add_parser(name, help=about, description=sentence(about), epilog=epilog)
+
+
+def sentence(text: str) -> str:
+    """Return a text with a capital letter and a full stop."""
+    text = text if text[:1] in "`" else f"{text[:1].upper()}{text[1:]}"
+    return f"{text.rstrip('.')}." if text else "–"
+
+
+class HelpFormatter(argparse.HelpFormatter):
+    """Shows which options are required: they come first in the usage, and their help says so."""
+
+    def add_usage(
+        self,
+        usage: str | None,
+        actions: Iterable[argparse.Action],
+        groups: Iterable[Any],
+        prefix: str | None = None,
+    ) -> None:
+        """Write the usage, required options first."""
+        super().add_usage(usage, sorted(actions, key=lambda one: not one.required), groups, prefix)
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        is_required = action.option_strings and action.required
+        return f"{action.help} (required)" if is_required else action.help
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose help, and that of its commands, is written by `HelpFormatter`."""
+
+    def __init__(self, **options: Any) -> None:
+        """Take what `argparse.ArgumentParser` takes."""
+        options.setdefault("formatter_class", HelpFormatter)
+        super().__init__(**options)
+
+
+def _rows(commands: Mapping[str, Command]) -> str:
+    width = max(map(len, COMMANDS))
+    return "\n".join(f"  {name:<{width}}  {command.about}" for name, command in commands.items())

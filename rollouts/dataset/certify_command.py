@@ -1,4 +1,4 @@
-"""``python -m rollouts certify``: every episode of a recording is played again, to the last bit."""
+"""``robot-layouts certify``: every episode of a recording is played again, to the last bit."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from rollouts.playing.executor import Event
     from rollouts.progress import LiveLine
 
-DESCRIPTION = "play every episode again in worker processes, and certify that every bit is the same"
 EPILOG = (
     "Compares states, rewards and flags of every step, and counts contacts between arms in every"
     " step of physics. The same command goes on where it was stopped. With --ray, every machine"

@@ -1,4 +1,4 @@
-"""``python -m rollouts report``: what a data set holds, on one HTML page."""
+"""``robot-layouts report``: what a data set holds, on one HTML page."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from robots.common.commands import printable
 from rollouts.playing.command_options import zero_or_more
 from tasks.cell_options import add_cell_options, chosen_cell
 
-DESCRIPTION = "write one HTML page on a data set: counts, lengths, sources, what was varied, clips"
 EPILOG = (
     "The page needs nothing else, and loads nothing. A certificate beside the recording is shown."
     " Exit code: 0 if the page was written, 1 if not, 2 for bad usage."

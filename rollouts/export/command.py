@@ -1,4 +1,4 @@
-"""`python -m rollouts export`: a recording becomes a dataset for a training tool."""
+"""`robot-layouts export`: a recording becomes a dataset for a training tool."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from rollouts.playing.command_options import chosen_executor, picture_size, stop
 if TYPE_CHECKING:
     from rollouts.export.dataset import Exported
 
-DESCRIPTION = "write a recording as a dataset: LeRobot v3.0 or robomimic hdf5"
 EPILOG = (
     "The dataset appears when it is complete. Exit code: 0 if it was written, 1 if not, 2 for bad"
     " usage."
@@ -25,10 +24,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = EPILOG
     add = parser.add_argument
     add("recording", type=Path, metavar="FILE", help="an h5 file, or a recording's folder")
-    add("--format", required=True, metavar="FORMAT", help="lerobot or robomimic")
+    add(
+        "--format",
+        required=True,
+        metavar="FORMAT",
+        help="format of the dataset: lerobot or robomimic",
+    )
     add("--out", type=Path, required=True, metavar="DIR", help="new folder for the dataset")
     add("--fps", type=int, metavar="N", help="steps per second to state (default: the task's, 20)")
-    add("--video", action="store_true", help="draw every step, too (lerobot; needs Vulkan)")
+    add("--video", action="store_true", help="draw every step as well (lerobot; needs Vulkan)")
     add(
         "--cameras",
         nargs="+",
@@ -36,15 +40,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="draw what these cameras see, as videos (lerobot) or arrays (robomimic): all,"
         " overview, or by place: base_camera, left.hand_camera",
     )
-    add("--images", action="store_true", help="png images, which lose nothing, in place of videos")
-    add("--depth", action="store_true", help="what the cameras tell of depth, too (mm, 16 bits)")
+    add(
+        "--images",
+        action="store_true",
+        help="write png images, which lose nothing, in place of videos",
+    )
+    add("--depth", action="store_true", help="write the cameras' depth as well (mm, 16 bits)")
     add(
         "--size",
         type=picture_size,
         metavar="WxH",
-        help="pixels of their pictures (each camera's own)",
+        help="width and height of the pictures in pixels (each camera's own)",
     )
-    add("--instruction", metavar="TEXT", help="what is to be done (what the task says)")
+    add("--instruction", metavar="TEXT", help="what the policy is to do, in words (the task's own)")
     which = parser.add_mutually_exclusive_group()
     which.add_argument(
         "--include-failures", action="store_true", help="export episodes without success, too"

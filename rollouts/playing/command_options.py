@@ -129,9 +129,9 @@ def _at_least(least: int, text: str) -> int:
 def add_observed(parser: argparse.ArgumentParser) -> None:
     """Add the options that say what policies observe."""
     add = parser.add_argument
-    words = "what they observe: state, state_dict, rgb and others (%(default)s)"
+    words = "what policies observe: state, state_dict, rgb and others (%(default)s)"
     add("--obs-mode", default="state", metavar="MODE", help=words)
-    words = "pixels of the pictures that they observe (each camera's own)"
+    words = "width and height in pixels of the pictures observed (each camera's own)"
     add("--camera-size", type=picture_size, metavar="WxH", help=words)
 
 

@@ -10,7 +10,6 @@ from typing import Literal
 import numpy as np
 
 from robots import TaskError
-from robots.common.commands import program
 from rollouts.reading.recorded_task import task_class, task_for
 from rollouts.reading.recording import FILE, open_trajectories
 from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
@@ -137,7 +136,7 @@ def find_official(task_id: str) -> Path:
     if not playable:
         raise TrajectoryError(
             f"there is no recording of {task_id} in {folder} that can be played; give a file, or"
-            f" record one with `{program('rollouts')} record`{''.join(reasons)}"
+            f" record one with `robot-layouts record`{''.join(reasons)}"
         )
     return min(playable)[1]
 

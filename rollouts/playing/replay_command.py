@@ -1,4 +1,4 @@
-"""``python -m rollouts replay``: recorded actions are played again."""
+"""``robot-layouts replay``: recorded actions are played again."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
     from rollouts.playing.replay import Replayed
 
-DESCRIPTION = "play the actions of a recording, ours or ManiSkill's, and compare what happens"
 EPILOG = (
     "Exit code: 0 if every episode ends as recorded, 1 if not, or if a file cannot be played."
     " Episodes whose reset rebuilt the world must also have the recorded states to the last bit;"

@@ -1,4 +1,4 @@
-"""``python -m rollouts verify``: what a receipt is of is played again, to the last bit."""
+"""``robot-layouts verify``: what a receipt is of is played again, to the last bit."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from rollouts.progress import LiveLine
     from rollouts.receipts.receipt import Receipt
 
-DESCRIPTION = "play the episodes of a receipt again, and tell what is not the same"
 EPILOG = (
     "Tells the first seed and step whose states differ, and which robot files, sources, versions"
     " and parts of the processor are not those of the receipt. Exit code: 0 if every bit and file"
@@ -37,7 +36,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PLACE=ROBOT",
         help="which robots these were, where the receipt cannot say it",
     )
-    add("--num-envs", type=one_or_more, default=1, metavar="N", help="episodes at once (1)")
+    add(
+        "--num-envs",
+        type=one_or_more,
+        default=1,
+        metavar="N",
+        help="episodes that play at once (1)",
+    )
     workers.add_arguments(parser)
 
 

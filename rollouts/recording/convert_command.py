@@ -1,4 +1,4 @@
-"""``python -m rollouts convert``: a recording in another control mode."""
+"""``robot-layouts convert``: a recording in another control mode."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from rollouts.playing.command_options import add_control_mode
 from rollouts.playing.replay_command import add_recording
 from tasks.cell_options import chosen_cell
 
-DESCRIPTION = "record the episodes of a recording, ours or ManiSkill's, in another control mode"
 EPILOG = (
     "Each episode is played in its own mode and in the other, and kept if it succeeds there too."
     " Those that did not succeed when they were recorded are left out. Exit code: 0 if all others"

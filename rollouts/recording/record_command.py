@@ -1,4 +1,4 @@
-"""``python -m rollouts record``: episodes of an expert or a policy become a data set."""
+"""``robot-layouts record``: episodes of an expert or a policy become a data set."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from rollouts.progress import LiveLine
     from rollouts.recording.record import Summary
 
-DESCRIPTION = "let an expert or a policy play episodes in worker processes, and record them"
 EPILOG = (
     "The same command goes on where it was stopped or killed. Exit code: 0 if every episode was"
     " recorded, 1 if not, 2 for bad usage, 130 if interrupted. A policy maps an observation to an"
@@ -33,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = EPILOG
     add = parser.add_argument
     add("--task", required=True, help="task id; MODULE:ID for one of your own")
-    add("--episodes", type=one_or_more, required=True, metavar="N", help="how many episodes")
+    add("--episodes", type=one_or_more, required=True, metavar="N", help="number of episodes")
     workers.add_arguments(parser)
     add("--seed", type=zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
     add("--out", type=Path, required=True, metavar="DIR", help="folder of trajectory.h5 and .json")
@@ -46,12 +45,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--takeover",
         metavar="MODULE:NAME",
-        help="acts in the policy's place at the steps for which it returns an action, not None",
+        help="policy that acts instead at every step for which it returns an action, not None",
     )
     add(
         "--corrector",
         metavar="MODULE:NAME",
-        help="says at every step what it would do, which is recorded beside what is done",
+        help="policy whose action is recorded at every step beside the one that is played",
     )
     workers.add_observed(parser)
     add(

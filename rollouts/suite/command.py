@@ -1,4 +1,4 @@
-"""``python -m rollouts suite``: tasks × seeds × layouts in one file, played, reported, verified."""
+"""``robot-layouts suite``: tasks × seeds × layouts in one file, played, reported, verified."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robots.common.commands import printable
+from robots.common.console import add_command
 from rollouts.playing import command_options as workers
 from rollouts.playing.command_options import INTERRUPTED, stop_signals
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
 _FOLDER = "the folder of a run"
 
-DESCRIPTION = "play a suite of tasks × seeds × layouts with receipts, report it, verify it"
 RUN_EPILOG = (
     "The same command goes on where it was stopped: what has a receipt is not played again. Exit"
     " code: 0 if all was played, 1 if not, 2 for bad usage, 130 if interrupted."
@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for name, (about, epilog, add_own, run_own) in _COMMANDS.items():
-        own = commands.add_parser(name, help=about, description=about, epilog=epilog)
+        own = add_command(commands, name, about, epilog)
         add_own(own)
         own.set_defaults(suite_command=run_own)
 

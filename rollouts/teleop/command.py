@@ -1,4 +1,4 @@
-"""``python -m rollouts teleop``: steer a task's arms in a browser, and record that."""
+"""``robot-layouts teleop``: steer a task's arms in a browser, and record that."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from rollouts.playing import command_options as workers
 from rollouts.playing.command_options import stop_signals, zero_or_more
 from tasks.cell_options import add_cell_options, chosen_cell
 
-DESCRIPTION = "steer the arms of a task in a browser, and record the episodes that are kept"
 EPILOG = (
     "Prints the address of the page, and serves it until Ctrl-C. Every episode that is kept is on"
     " the disk at once; the same command goes on with the next seed. Exit code: 0 if the page was"
@@ -27,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = EPILOG
     add = parser.add_argument
     add("task", metavar="TASK", help="task id; MODULE:ID for one of your own")
-    add("--seed", type=zero_or_more, default=0, metavar="S", help="of the first episode (0)")
+    add("--seed", type=zero_or_more, default=0, metavar="S", help="seed of the first episode (0)")
     add(
         "--out",
         type=Path,
@@ -37,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--policy",
         metavar="MODULE:NAME",
-        help="acts until somebody takes an arm; obs → action, as evaluate has it",
+        help="policy that acts until somebody takes an arm, as for `robot-layouts evaluate`",
     )
     add_cell_options(parser)
     workers.add_control_mode(parser)

@@ -4,24 +4,24 @@ import argparse
 
 import pytest
 
-from measurements.site.commands import _parser, parser_of
+from measurements.site.commands import _parser
 from measurements.site.hooks import COMMANDS as PLACE
 from measurements.site.hooks import on_page_markdown, on_post_page
-from parity.__main__ import COMMANDS as COMPARISONS
-from robots.common.console import COMMANDS
+from robots.common.console import FOR_DEVELOPERS, FOR_USERS
 from tests.docs.blocks import ROOT
 
 
 @pytest.mark.long
 def test_every_command_is_there():
     page = (ROOT / "docs/reference/commands.md").read_text(encoding="utf-8")
-    text = on_page_markdown(page)
+    text = on_page_markdown(page, page=None)
     assert PLACE in page
     assert PLACE not in text
-    assert all(f"\n## {name}\n" in text for name in COMMANDS)
-    assert all(f"\n### robot-layouts parity {name}\n" in text for name in COMPARISONS)
-    assert "\n### robot-layouts layouts validate\n" in text
-    assert "`--episodes N`\n:   How many episodes.\n" in text
+    assert all(f"\n## {name}\n" in text for name in FOR_USERS)
+    users, developers = text.split("\n## Commands for developers of the library\n")
+    assert all(f"\n### {name}\n" in developers for name in FOR_DEVELOPERS)
+    assert "\n### robot-layouts layouts validate\n" in users
+    assert "`--episodes N`\n:   Number of episodes (required).\n" in users
 
 
 def test_a_parser_as_markdown():
@@ -29,17 +29,12 @@ def test_a_parser_as_markdown():
     parser.add_argument("what", metavar="WHAT", help="a file (%(default)s)", default="x.yaml")
     parser.add_argument("--hidden", help=argparse.SUPPRESS)
     parser.add_argument("--twice", action="store_true", help="do it twice.")
-    text = "\n".join(_parser(parser, "lab show"))
+    text = "\n".join(_parser(parser, "lab show", "###"))
     assert text.startswith("Show `it`.\n\n```text\nlab show [-h]")
     assert "`WHAT`\n:   A file (x.yaml).\n" in text
     assert "`--twice`\n:   Do it twice.\n" in text
     assert "Exit &lt;code>." in text
     assert "hidden" not in text.replace("[--hidden", "")
-
-
-def test_a_module_without_a_parser_is_an_error():
-    with pytest.raises(LookupError, match="robots.common.console --help printed no help"):
-        parser_of("robots.common.console", [])
 
 
 def test_nothing_is_loaded_from_elsewhere():

@@ -1,8 +1,12 @@
 """What pages refer to is there, in the repository and in the site; what is not is seen."""
 
+from types import SimpleNamespace
+
 import pytest
 
-from measurements.site.links import anchors_of, broken_in_site, broken_in_text
+from measurements.site.hooks import on_page_markdown
+from measurements.site.links import FOLDERS, anchors_of, broken_in_site, broken_in_text
+from tests.checkout import tracked_files
 from tests.docs.blocks import ROOT, blocks
 
 GENERATED = ("docs/faults.md", "docs/gallery/")  # they also name paths of other places
@@ -18,9 +22,24 @@ def test_links_and_paths_lead_somewhere(path):
     assert broken_in_text(path.read_text(encoding="utf-8"), path, ROOT) == []
 
 
+@pytest.mark.parametrize("page", sorted((ROOT / "docs/project").glob("*.md")), ids=lambda p: p.stem)
+def test_what_the_site_includes_has_links_that_lead_somewhere(page):
+    name = page.relative_to(ROOT / "docs").as_posix()
+    shown = on_page_markdown(
+        page.read_text(), page=SimpleNamespace(file=SimpleNamespace(src_uri=name))
+    )
+    assert (ROOT / f"{page.stem.upper()}.md").read_text().splitlines()[0] in shown
+    assert broken_in_text(shown, page, ROOT) == []
+
+
 def test_the_readme_declares_the_tutorials_task():
     declared = [one.code for one in blocks(ROOT / "README.md") if "register_task" in one.code]
     assert declared == [(ROOT / "docs/tutorials/tray.py").read_text(encoding="utf-8")]
+
+
+def test_paths_in_every_folder_of_the_repository_are_looked_at():
+    folders = {file.relative_to(ROOT).parts[0] for file in tracked_files() if file.parent != ROOT}
+    assert {*FOLDERS} == folders - {"assets_cache"}
 
 
 class TestText:
@@ -28,6 +47,8 @@ class TestText:
     def root(self, tmp_path):
         (tmp_path / "docs").mkdir()
         (tmp_path / "docs" / "other.md").write_text("# A title: with `code`\n")
+        for made in ("runs", "data", "site", "assets_cache", ".venv"):
+            (tmp_path / made).mkdir()
         return tmp_path
 
     @pytest.mark.parametrize(
@@ -43,7 +64,9 @@ class TestText:
             ("[a](https://example.org/x.md)", []),
             ("see `docs/other.md`", []),
             ("see `docs/othr.md`", ["docs/othr.md"]),
-            ("see `docs/NAME.md`, `data/trajectory.h5`", []),
+            ("see `docs/NAME.md`, `outside/trajectory.h5`", []),
+            ("see `runs/demo`, `data/trajectory.h5`, `site/index.html`", []),
+            ("see `assets_cache/robots/panda.urdf`, `.venv/bin/python`", []),
             ("```\n[a](othr.md) `docs/othr.md`\n```", []),
         ],
     )

@@ -5,30 +5,49 @@ import os
 import re
 import subprocess
 import sys
-from importlib.util import find_spec
-from pathlib import Path
 
 import pytest
 
-from robots.common.console import COMMANDS, main
+from robots.common.console import COMMANDS, FOR_DEVELOPERS, FOR_USERS, main
 from tests.faults.toy_robots import toy
 from tests.outside.lab import CHECKOUT, make_folder, run
 
 PYPROJECT = (CHECKOUT / "pyproject.toml").read_text()
 
 
-def test_every_command_has_a_main():
-    for command in COMMANDS.values():
-        source = Path(find_spec(command.module).origin).read_text()
-        assert "\ndef main(" in source
+def test_it_is_the_console_script():
     assert 'robot-layouts = "robots.common.console:run"' in PYPROJECT
 
 
-def test_it_lists_its_commands(capsys):
-    assert main([]) == 0
+@pytest.mark.parametrize("words", [[], ["help"], ["--help"]], ids=" ".join)
+def test_it_lists_its_commands(capsys, words):
+    assert main(words) == 0
+    users, developers = capsys.readouterr().out.split("for developers of the library:")
+    for printed, commands in ((users, FOR_USERS), (developers, FOR_DEVELOPERS)):
+        for name, command in commands.items():
+            assert re.search(f"^  {name} +{re.escape(command.about)}$", printed, re.MULTILINE)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_begins_with_what_the_command_does(capsys, name):
+    with pytest.raises(SystemExit) as stopped:
+        main(["help", *name.split()])
+    assert stopped.value.code == 0
     printed = capsys.readouterr().out
-    for name, command in COMMANDS.items():
-        assert re.search(f"^  {name} +{re.escape(command.about)}$", printed, re.MULTILINE)
+    assert printed.startswith(f"usage: robot-layouts {name}")
+    about = " ".join(printed.partition("\n\n")[2].split())
+    assert about.casefold().startswith(f"{COMMANDS[name].about.casefold()}.")
+
+
+def test_required_options_come_first_and_say_so(capsys):
+    with pytest.raises(SystemExit):
+        main(["record", "--help"])
+    printed = capsys.readouterr().out
+    assert printed.startswith("usage: robot-layouts record --task TASK --episodes N --out DIR")
+    assert printed.count("(required)") == 3
+
+
+def test_a_group_lists_its_commands(capsys):
     assert main(["robots"]) == 0
     assert "robots inspect" in capsys.readouterr().out
     assert main(["--version"]) == 0
@@ -42,6 +61,7 @@ def test_it_lists_its_commands(capsys):
         (["robots", "inspekt"], "robots inspect"),
         (["new", "tsk"], "new task"),
         (["task"], "tasks"),
+        (["help", "recrod"], "record"),
     ],
 )
 def test_a_wrong_word_gets_its_closest_match(capsys, words, near):

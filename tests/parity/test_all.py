@@ -8,7 +8,7 @@ import pytest
 import tasks
 from measurements.tables import markdown
 from parity.__main__ import main
-from parity.compare.command import parser, plan
+from parity.compare.command import plan
 from parity.compare.episodes import over_range_episodes
 from parity.compare.results import read
 from parity.compare.task_summary import (
@@ -18,13 +18,15 @@ from parity.compare.task_summary import (
     summarise,
     summary_table,
 )
+from robots.common.console import parse
 from tests.native import NATIVE
 
 TASK = "TwoRobotPickCube-v1"
+COMPARE = ("parity", "compare")
 
 
 def planned(*options: str) -> list:
-    return plan(parser().parse_args(["--all", "--seeds", "2", "--steps", "5", *options]))
+    return plan(parse([*COMPARE, "--all", "--seeds", "2", "--steps", "5", *options]))
 
 
 class TestPlan:
@@ -44,7 +46,7 @@ class TestPlan:
         assert {run.history for run in planned("--reward-mode", "sparse")} == {"fresh"}
 
     def test_one_task_is_played_as_before(self):
-        runs = plan(parser().parse_args(["--task", TASK, "--seeds", "1", "--steps", "2"]))
+        runs = plan(parse([*COMPARE, "--task", TASK, "--seeds", "1", "--steps", "2"]))
         assert [(run.source, run.history) for run in runs] == [("random", "fresh")]
 
 

@@ -13,6 +13,7 @@ import torch
 import tasks
 from parity.__main__ import main
 from robots import TaskError
+from robots.common.console import parse
 from tests.native import NATIVE, TASKS
 
 ROOT = Path(__file__).parents[2]
@@ -185,7 +186,9 @@ def test_errors_take_one_line(capsys):
 
 def test_unknown_command(capsys):
     assert main(["comare"]) == 2
-    assert "unknown command 'comare'. Did you mean 'compare'?" in capsys.readouterr().err
+    assert (
+        "unknown command 'parity comare'. Did you mean 'parity compare'?" in capsys.readouterr().err
+    )
 
 
 def test_help(capsys):
@@ -219,35 +222,37 @@ def test_importing_the_room_loads_no_native():
     assert done.returncode == 0, done.stderr
 
 
-def test_all_means_every_task(monkeypatch):
-    from parity.compare.command import parser, plan
+def asked(*words):
+    return parse(["parity", "compare", *words])
 
-    runs = plan(parser().parse_args(["--all", "--seeds", "2", "--steps", "3"]))
+
+def test_all_means_every_task(monkeypatch):
+    from parity.compare.command import plan
+
+    runs = plan(asked("--all", "--seeds", "2", "--steps", "3"))
     assert list(dict.fromkeys(run.task for run in runs)) == list(TASKS)
     assert {run.steps for run in runs} == {6}
 
 
 def test_a_file_says_in_which_control_mode_it_was_recorded(tmp_path):
-    from parity.compare.command import parser, plan
+    from parity.compare.command import plan
     from tests.parity.test_episodes import demonstration
 
     path = demonstration(tmp_path, control_mode="pd_joint_pos")
     arguments = ["--task", "PickCube-v1", "--actions", str(path)]
-    (found,) = plan(parser().parse_args(arguments))
+    (found,) = plan(asked(*arguments))
     assert found.control_mode == "pd_joint_pos"
-    assert len(plan(parser().parse_args([*arguments, "--control-mode", "pd_joint_pos"]))) == 1
+    assert len(plan(asked(*arguments, "--control-mode", "pd_joint_pos"))) == 1
     with pytest.raises(TaskError, match=r"recorded in pd_joint_pos; leave --control-mode pd_joi"):
-        plan(parser().parse_args([*arguments, "--control-mode", "pd_joint_delta_pos"]))
+        plan(asked(*arguments, "--control-mode", "pd_joint_delta_pos"))
 
 
 def test_random_positions_lie_within_the_limits_and_partly_beyond():
-    from parity.compare.command import parser, plan
+    from parity.compare.command import plan
 
     layout = tasks.get_task_class("PickCube-v1").layout.in_control_mode("pd_joint_pos")
     low, high = np.array(layout.action_bounds).T
-    (found,) = plan(
-        parser().parse_args(["--task", "PickCube-v1", "--control-mode", "pd_joint_pos"])
-    )
+    (found,) = plan(asked("--task", "PickCube-v1", "--control-mode", "pd_joint_pos"))
     for episode in found.episodes:
         beyond = np.any((episode.actions < low) | (episode.actions > high), axis=1)
         assert beyond[40:60].any()
@@ -255,12 +260,12 @@ def test_random_positions_lie_within_the_limits_and_partly_beyond():
 
 
 def test_demonstrations_are_played_beside_random_actions(tmp_path):
-    from parity.compare.command import parser, plan
+    from parity.compare.command import plan
     from tests.parity.test_episodes import demonstration
 
     demonstration(tmp_path / "PickCube-v1" / "planned", "trajectory.none.pd_joint_delta_pos")
     demonstration(tmp_path / "Unknown-v1", env_id="Unknown-v1")
-    runs = plan(parser().parse_args(["--all", "--demos", str(tmp_path), "--seeds", "1"]))
+    runs = plan(asked("--all", "--demos", str(tmp_path), "--seeds", "1"))
     sources = {task: {run.source for run in runs if run.task == task} for task in TASKS}
     assert sources.pop("PickCube-v1") == {"random", "over-range", "planned/trajectory"}
     assert all(own == {"random", "over-range"} for own in sources.values())

@@ -3,6 +3,7 @@
 import copy
 import json
 import re
+import shlex
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,12 +14,13 @@ import pytest
 
 import tasks
 from measurements.browser import PATIENCE, running_browser
-from parity.__main__ import COMMANDS, main
+from parity.__main__ import main
 from parity.compare.results import RESULTS, read
 from parity.report.figures import COLUMNS, RECORDED_COLUMNS, UNKNOWN, cells, is_verified, tiles
 from parity.report.gaps import grouped
 from parity.show.embedding import ClipError, fit, poster, share, size
 from parity.sweep.entries import SUMMARY, blank, write_summary
+from robots.common.console import parse
 
 DESKTOP, PHONE = (1280, 900), (390, 844)
 INJECTION = '</p><script>document.title = "taken over"</script><img src=x onerror=alert(1)>'
@@ -418,12 +420,12 @@ class TestInABrowser:
         page = visit().page
         page.locator(f"#{VERIFIED} summary").click()
         lines = page.locator(f"#{VERIFIED} pre").inner_text().splitlines()
-        assert lines[0] == f"python -m parity compare --task {VERIFIED} --seeds 10 --steps 100"
+        assert lines[0] == f"robot-layouts parity compare --task {VERIFIED} --seeds 10 --steps 100"
         assert "--demo 'a demos/trajectory.h5' --seed 3" in lines[-1]
         for line in lines:
-            _, _, room, command, *_ = line.split()
-            assert room == "parity"
-            assert command in COMMANDS
+            name, *words = shlex.split(line)
+            assert name == "robot-layouts"
+            parse(words)
 
     def test_headline_figures(self, visit):
         page = visit().page
@@ -504,7 +506,7 @@ class TestSize:
 class TestRefusals:
     def test_no_sweep(self, tmp_path, capsys):
         assert report(tmp_path, tmp_path / "report.html") == 2
-        assert "`python -m parity sweep` writes it" in capsys.readouterr().err
+        assert "`robot-layouts parity sweep` writes it" in capsys.readouterr().err
 
     def test_a_clip_that_is_gone(self, tmp_path, capsys):
         runs = write_runs(tmp_path, {VERIFIED: an_entry(VERIFIED, clip=a_clip())})

@@ -1,4 +1,4 @@
-"""``python -m parity tables``: the table, and every way in which it can be stale."""
+"""``robot-layouts parity tables``: the table, and every way in which it can be stale."""
 
 import copy
 import json
@@ -158,7 +158,7 @@ def test_all_benchmarks_are_on_a_page(files, capsys):
     assert "| PushT-v1 | 2.00 | 6.00 | 1.00 | 3.00 | 2.00 |" in page
     files.benchmarks.write_text(page.replace("6.00", "7.00"), encoding="utf-8")
     assert files.run("--check") == 1
-    assert "benchmarks.md is stale; run `python -m parity tables`" in capsys.readouterr().err
+    assert "benchmarks.md is stale; run `robot-layouts parity tables`" in capsys.readouterr().err
 
 
 def test_a_fresh_table_passes_and_stays(files, capsys):
@@ -178,7 +178,7 @@ class TestStale:
         assert files.page.read_bytes() == before
 
     def test_no_table_yet(self, files, capsys):
-        self.expect(files, capsys, "parity.md is stale; run `python -m parity tables`")
+        self.expect(files, capsys, "parity.md is stale; run `robot-layouts parity tables`")
 
     def test_an_edited_cell(self, files, capsys):
         files.run()

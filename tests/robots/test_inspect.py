@@ -10,6 +10,7 @@ import pytest
 
 from robots import RobotRegistry
 from robots.assets.store import AssetStore, default_root
+from robots.common import console
 from robots.inspect import find_urdf, main, report
 from tests.catalogue import every_robot
 
@@ -56,7 +57,7 @@ def test_without_any_copy_the_report_says_what_is_missing(store, monkeypatch):
 
     monkeypatch.setattr("robots.inspect.find_package", refuse)
     text = report(RobotRegistry.load("panda"), store)
-    assert "is missing; `python -m robots.fetch_assets panda` fetches it" in text
+    assert "is missing; `robot-layouts robots fetch panda` fetches it" in text
     assert "not known without the URDF" in text
     assert "arm.panda_joint7" in text
 
@@ -66,14 +67,18 @@ def test_inspecting_fetches_nothing(store):
     assert not store.root.exists()
 
 
-def test_the_command_prints_a_report_and_without_a_name_the_catalogue():
-    command = [sys.executable, "-m", "robots.inspect"]
+def test_the_module_is_the_command():
+    command = [sys.executable, "-m", "robots.inspect", "panda_stick"]
     settings = {"cwd": Path(__file__).parents[2], "capture_output": True, "text": True}
-    done = subprocess.run([*command, "panda_stick"], check=True, **settings)
+    done = subprocess.run(command, check=True, **settings)
     assert done.stdout.startswith("panda_stick: 7 joints, 7 action numbers")
     assert done.stderr == ""
-    catalogue = subprocess.run(command, check=True, **settings).stdout.splitlines()
-    assert [line.split()[0] for line in catalogue[1:]] == list(ROBOTS)
+
+
+def test_list_has_a_row_for_every_robot(capsys):
+    assert console.main(["robots", "list"]) == 0
+    rows = capsys.readouterr().out.splitlines()
+    assert [row.split()[0] for row in rows[1:]] == list(ROBOTS)
 
 
 def test_an_unknown_robot_is_one_line(capsys):

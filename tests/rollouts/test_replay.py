@@ -219,7 +219,7 @@ class TestOfficialFiles:
         code, _, said = run(capsys, "--task", TASK)
         assert code == 1
         assert f"there is no recording of PushT-v1 in {demos} that can be played" in said
-        assert "python -m rollouts record" in said
+        assert "robot-layouts record" in said
         self.put(recording, demos / "a", control_mode="pd_ee_dance")
         with pytest.raises(TrajectoryError, match=r"\n  .*was recorded in pd_ee_dance"):
             open_recording(None, TASK)

@@ -120,7 +120,7 @@ class TestCommand:
         with pytest.raises(SystemExit) as ended:
             main(["--try"])
         assert ended.value.code == 2
-        assert "--try takes robots to try" in capsys.readouterr().err
+        assert "the following arguments are required: ROBOT" in capsys.readouterr().err
 
     def test_a_file_that_is_not_there(self, tmp_path, capsys):
         assert main([str(tmp_path / "nowhere.urdf"), "--try"]) == 1

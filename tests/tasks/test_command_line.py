@@ -141,7 +141,7 @@ def test_bad_usage(arguments, capsys):
     with pytest.raises(SystemExit) as stop:
         main(arguments)
     assert stop.value.code == 2
-    assert "usage: python -m tasks" in capsys.readouterr().err
+    assert "usage: robot-layouts tasks" in capsys.readouterr().err
 
 
 class TestVerdicts:

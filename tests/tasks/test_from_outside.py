@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -112,15 +113,18 @@ def test_a_module_and_an_id_go_wherever_an_id_goes(mylab):
 
 
 def test_gymnasium_takes_them_by_module_and_id(mylab):
+    (named,) = re.findall(r"`gymnasium\.make\(([^)]*)\)`", (CHECKOUT / "README.md").read_text())
     code = (
-        "import gymnasium, tasks\n"
+        "import gymnasium, sys\n"
+        "assert 'tasks' not in sys.modules\n"
+        f"print(gymnasium.make({named}).action_space.shape)\n"
         "envs = gymnasium.make_vec('RobotLayouts/PickCube-v1', num_envs=1, num_workers=1,"
         " task_id='mylab.tray:TwoArmTray-v1')\n"
         "print(envs.single_action_space.shape)\n"
         "envs.close()\n"
         "print(gymnasium.make('mylab.tray:RobotLayouts/TwoArmTray-v1').action_space.shape)\n"
     )
-    assert run(mylab, "-c", code).splitlines() == ["(16,)", "(16,)"]
+    assert run(mylab, "-c", code).splitlines() == ["(8,)", "(16,)", "(16,)"]
 
 
 def test_a_module_that_cannot_be_imported_is_named(mylab, monkeypatch):
