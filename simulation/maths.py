@@ -248,7 +248,8 @@ def norm(x: Array) -> Any:
     """Return torch's Euclidean norms along the last axis."""
     if isinstance(x, Tensor):
         return torch.linalg.vector_norm(x, dim=-1)
-    return torch.linalg.vector_norm(torch.from_numpy(x), dim=-1).numpy()
+    rows = np.ascontiguousarray(x)  # else torch adds in another order than for a single row
+    return torch.linalg.vector_norm(torch.from_numpy(rows), dim=-1).numpy()
 
 
 @by_torch

@@ -62,10 +62,7 @@ class Clone(MultiRobotTask):
         descriptor = self.layout.arm(robot).robot
         if not descriptor.native_agent.base_joints:
             return state.arm_speed(robot)
-        _, qvel = state.native_joints(robot)
-        if not fingers:
-            order = self.simulation.index.loaded_order[robot] or range(descriptor.dof)
-            names = [descriptor.joints[i] for i in order]
-            arm = [i for i, name in enumerate(names) if name not in descriptor.gripper_joints]
-            qvel = qvel[:, arm]
-        return norm(qvel)
+        order = self.simulation.index.loaded_order[robot] or range(descriptor.dof)  # native's
+        grips = () if fingers else descriptor.gripper_joints
+        counted = [i for i in order if descriptor.joints[i] not in grips]
+        return norm(state.qvel(robot)[:, counted])

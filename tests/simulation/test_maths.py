@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from simulation.maths import added, arctan2, closeness, tanh
+from simulation.maths import added, arctan2, closeness, norm, tanh
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -42,3 +42,10 @@ def test_arc_tangents_are_those_of_single_numbers():
     y, x = np.random.default_rng(0).normal(size=(2, 40)).astype(np.float32)
     single = [torch.atan2(*pair) for pair in zip(*map(torch.from_numpy, (y, x)), strict=True)]
     np.testing.assert_array_equal(arctan2(y, x), torch.stack(single).numpy())
+
+
+def test_norms_of_chosen_columns_are_those_of_single_rows():
+    rows = np.random.default_rng(0).normal(size=(500, 15)).astype(np.float32)
+    chosen = [3, 1, 0, 2, 4, 9, 8, 7, 6, 5, 10, 11, 14]
+    single = [norm(rows[i : i + 1, chosen])[0] for i in range(len(rows))]
+    np.testing.assert_array_equal(norm(rows[:, chosen]), single)

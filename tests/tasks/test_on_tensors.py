@@ -68,9 +68,14 @@ def leaves(tree):
             yield key, value
 
 
-@pytest.mark.parametrize("task_id", tasks.list_tasks())
-def test_a_task_computes_the_same_on_tensors(task_id):
-    env = tasks.make(task_id, num_envs=ENVS)
+FETCH = [(task_id, "fetch_driving") for task_id in ("PickCube-v1", "PokeCube-v1")]
+
+
+@pytest.mark.parametrize(
+    ("task_id", "robot"), [*((task_id, None) for task_id in tasks.list_tasks()), *FETCH]
+)
+def test_a_task_computes_the_same_on_tensors(task_id, robot):
+    env = tasks.make(task_id, num_envs=ENVS, robots=robot)
     rng = np.random.RandomState(0)
     space = env.single_action_space
     obs, _ = env.reset(seed=3)
