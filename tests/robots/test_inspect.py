@@ -66,6 +66,7 @@ def test_inspecting_fetches_nothing(store):
     assert not store.root.exists()
 
 
+@pytest.mark.long
 def test_the_command_prints_a_report_and_without_a_name_the_catalogue():
     command = [sys.executable, "-m", "robots.inspect"]
     settings = {"cwd": Path(__file__).parents[2], "capture_output": True, "text": True}

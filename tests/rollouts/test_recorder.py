@@ -509,6 +509,7 @@ def small_disk(tmp_path):
     subprocess.run(["umount", str(place)], check=True)
 
 
+@pytest.mark.long
 def test_a_full_disk(small_disk):
     path = small_disk / "trajectory.h5"
     finished, said = run_full(path)

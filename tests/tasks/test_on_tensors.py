@@ -8,6 +8,7 @@ import torch
 
 import tasks
 from simulation import State
+from tests.quick import quick_cases
 
 STEPS, ENVS = 12, 3
 
@@ -68,7 +69,7 @@ def leaves(tree):
             yield key, value
 
 
-@pytest.mark.parametrize("task_id", tasks.list_tasks())
+@pytest.mark.parametrize("task_id", quick_cases(tasks.list_tasks()))
 def test_a_task_computes_the_same_on_tensors(task_id):
     env = tasks.make(task_id, num_envs=ENVS)
     rng = np.random.RandomState(0)
