@@ -29,11 +29,13 @@ demo: $(VENV)/.demo
 	$(RUN) -m rollouts demo $(ARGS)
 
 # One thread a process: the tests share the cores among processes, and results stay the same.
+# To collect the faults, which are tried by `make faults`, takes every process some seconds.
 test: $(VENV)/.test
-	OMP_NUM_THREADS=1 $(RUN) -m pytest -n auto --maxprocesses 8 $(ARGS)
+	OMP_NUM_THREADS=1 $(RUN) -m pytest -n auto --maxprocesses 8 --ignore tests/faults $(ARGS)
 
 test-all: $(VENV)/.test
-	OMP_NUM_THREADS=1 $(RUN) -m pytest -n auto --maxprocesses 8 -m "not fault" $(ARGS)
+	OMP_NUM_THREADS=1 $(RUN) -m pytest -n auto --maxprocesses 8 --ignore tests/faults \
+		-m "not fault" $(ARGS)
 
 # However it hangs, a fault fails after so many seconds.
 faults: $(VENV)/.test

@@ -29,6 +29,7 @@ def run(pytester, monkeypatch):
     return run
 
 
+@pytest.mark.long
 def test_without_vulkan_it_is_skipped_and_says_why(run):
     result = run(NATIVE_TEST.format("assert False"), required=False, vulkan=False)
     assert result.ret == pytest.ExitCode.OK
@@ -36,12 +37,14 @@ def test_without_vulkan_it_is_skipped_and_says_why(run):
     result.stdout.re_match_lines([r"SKIPPED.*(needs a Vulkan driver|mani_skill is not installed)"])
 
 
+@pytest.mark.long
 def test_without_vulkan_it_fails_if_required(run):
     result = run(NATIVE_TEST.format("pass"), required=True, vulkan=False)
     assert result.ret == pytest.ExitCode.TESTS_FAILED
     result.stdout.fnmatch_lines(["*native comparison is required here, but: *"])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("required", [False, True])
 def test_without_a_browser_it_is_skipped_or_fails_if_required(run, monkeypatch, tmp_path, required):
     monkeypatch.setenv("PATH", str(tmp_path))
@@ -58,6 +61,7 @@ def test_a_skip_inside_the_test_fails_if_required(run, how):
     assert result.ret == pytest.ExitCode.TESTS_FAILED
 
 
+@pytest.mark.long
 def test_a_module_skipped_for_want_of_mani_skill_fails_if_required(run):
     source = "import pytest\npytest.skip('could not import mani_skill', allow_module_level=True)"
     assert run(source, required=False).ret == pytest.ExitCode.NO_TESTS_COLLECTED
@@ -67,6 +71,7 @@ def test_a_module_skipped_for_want_of_mani_skill_fails_if_required(run):
     )
 
 
+@pytest.mark.long
 def test_no_native_test_at_all_fails_if_required(run):
     source = "def test_something_else(): pass"
     assert run(source, required=False).ret == pytest.ExitCode.OK
@@ -75,6 +80,7 @@ def test_no_native_test_at_all_fails_if_required(run):
     result.stdout.fnmatch_lines(["native comparison: required, but no test of it passed"])
 
 
+@pytest.mark.long
 def test_a_native_test_that_passes_is_counted(run):
     result = run(NATIVE_TEST.format("pass"), required=True)
     assert result.ret == pytest.ExitCode.OK

@@ -62,6 +62,7 @@ def expect_equal(found, expected):
         assert torch.equal(found[name], values), name
 
 
+@pytest.mark.long
 def test_it_records_learns_and_leaves_its_files(example, learned, tmp_path, capsys):
     assert example.main([*WORDS, "--workers", "0", "--out", str(tmp_path)]) in (0, 1)
     names = {"learning_curve.json", "learning_curve.png", "policy.pt"}
@@ -76,6 +77,7 @@ def test_it_records_learns_and_leaves_its_files(example, learned, tmp_path, caps
     assert (tmp_path / "policy.pt").read_bytes() == (learned / "policy.pt").read_bytes()
 
 
+@pytest.mark.long
 def test_another_seed_makes_other_weights(example, learned, recording, tmp_path):
     words = [*WORDS, "--seed", "1", "--recording", str(recording), "--out", str(tmp_path)]
     example.main(words)
@@ -84,6 +86,7 @@ def test_another_seed_makes_other_weights(example, learned, recording, tmp_path)
     assert torch.equal(found["linear.weight"], other["linear.weight"])
 
 
+@pytest.mark.long
 def test_a_killed_run_goes_on_to_the_same_weights(example, learned, recording, tmp_path):
     words = [*WORDS, "--recording", str(recording), "--out", str(tmp_path)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -135,6 +138,7 @@ def test_chunks_hold_the_last_action(example):
     assert chunks.tolist() == [[0, 1, 2, 3], [2, 3, 4, 5], [4, 5, 4, 5]]
 
 
+@pytest.mark.long
 def test_the_policy_plays_alike_alone_and_beside_others(example, learned):
     policy = example.ClonedPolicy.load(learned / "policy.pt")
     how = {"control_mode": MODE, "obs_mode": "state_dict", "workers": 0}

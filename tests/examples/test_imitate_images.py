@@ -47,6 +47,7 @@ def learned(example, kept):
     return kept
 
 
+@pytest.mark.long
 def test_it_records_draws_learns_and_leaves_its_files(learned):
     names = {"learning_curve.json", "learning_curve.png", "policy.pt", "recording", "pictures"}
     assert {path.name for path in learned.iterdir()} == names
@@ -136,6 +137,7 @@ def test_pictures_may_be_of_any_size(example, size):
     assert eye(pictures).shape == (2, example.SEEN)
 
 
+@pytest.mark.long
 def test_the_policy_plays_alike_alone_and_beside_others(example, learned):
     policy = example.SeeingPolicy.load(learned / "policy.pt")
     alone = evaluate(policy, TASK, range(50, 52), workers=0, **policy.making)

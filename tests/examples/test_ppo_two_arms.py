@@ -59,6 +59,7 @@ def last(folder):
     return state(folder / CHECKPOINTS[-1])
 
 
+@pytest.mark.long
 def test_a_run_leaves_checkpoints_and_its_curve(ppo, tmp_path, capsys):
     assert ppo.run([*WORDS, "--workers", "0", "--out", str(tmp_path / "run")]) == 1
     assert sorted(path.name for path in (tmp_path / "run").iterdir()) == CHECKPOINTS + FILES
@@ -78,6 +79,7 @@ def test_it_learns_from_one_checkpoint_to_the_next(ppo, tmp_path):
     assert all(not one[weight].equal(two[weight]) for one, two in pairwise(states))
 
 
+@pytest.mark.long
 def test_a_killed_run_and_another_have_the_same_weights(ppo, tmp_path):
     process = start("ppo_two_arms", tmp_path / "killed", *WORDS, "--workers", "1")
     kill_while_it_learns(process, tmp_path / "killed", 1)

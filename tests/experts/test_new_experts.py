@@ -23,6 +23,7 @@ def test_it_succeeds_on_18_of_20_seeds(task_id: str):
     assert sum(solved) >= 18, f"failed: {[seed for seed, good in enumerate(solved) if not good]}"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "layout",
     [three_kinds(), mixed(5, 0.85), mixed(8, 0.95)],
@@ -80,6 +81,7 @@ def test_arms_that_stand_elsewhere_are_planned_for():
     assert play(env, 0, find_expert("TwoRobotLiftBar-v1")(env, 0)).solved
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("factor", [0.95, 1.05])
 def test_four_arms_stack_cubes_of_another_size(factor: float):
     larger = tasks.Randomization(size={"cube_*": factor})

@@ -82,6 +82,7 @@ def test_ways_are_the_same_every_time(two_arms: Rehearsal):
     np.testing.assert_array_equal(*plays)
 
 
+@pytest.mark.long
 def test_an_arm_waits_until_its_place_is_free(two_arms: Rehearsal):
     """The left one leaves the middle after 50 steps; until then the right one stays away."""
     script = {

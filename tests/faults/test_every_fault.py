@@ -12,6 +12,7 @@ from tests.faults.fault import GOES_ON, REFUSED
 FAULTS = list(all_faults())
 
 
+@pytest.mark.fault
 def test_no_fault_is_listed_twice():
     names = [(fault.area, fault.what) for fault in FAULTS]
     assert len(set(names)) == len(names)

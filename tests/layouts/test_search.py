@@ -34,6 +34,7 @@ def pair():
 
 
 class TestResult:
+    @pytest.mark.long
     def test_all_who_must_reach_a_target_do(self, pair):
         assert isinstance(pair, Layout)
         assert list(pair) == list(PAIR)
@@ -43,6 +44,7 @@ class TestResult:
         (clearance,) = pair.validate(workspaces=False).clearances
         assert clearance.noisy_distance >= QUICK["clearance"]
 
+    @pytest.mark.long
     def test_they_share_more_than_in_a_ring(self, pair):
         (found,), (before,) = (layout.validate().shared for layout in (pair, ring(PAIR)))
         assert found.volume > 1.3 * before.volume
@@ -54,6 +56,7 @@ class TestResult:
     def test_it_can_be_written(self, pair):
         assert Layout.from_yaml(pair.to_yaml()) == pair
 
+    @pytest.mark.long
     def test_another_process_gets_the_same(self, pair):
         code = (
             "from layouts import search; print(search("
@@ -111,6 +114,7 @@ class TestOutOfReach:
         ):
             search(PANDA, self.FAR, **QUICK)
 
+    @pytest.mark.long
     def test_it_may_be_left_out(self):
         layout = search(PANDA, self.FAR, partial=True, **QUICK)
         assert reached(layout, CUBE) == {("cube", "arm")}
@@ -288,6 +292,7 @@ class TestCommand:
         assert message in err
         assert "Traceback" not in err
 
+    @pytest.mark.long
     def test_what_is_left_out_is_told_by_the_exit_status(self, capsys):
         words = "arm=so100 --target cube=0,0,0.1 --target moon=0,0,3 --partial"
         status, out, _ = self.run(words, capsys)

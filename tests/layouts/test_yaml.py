@@ -346,6 +346,7 @@ class TestBounds:
         with pytest.raises(LayoutError, match="this is not YAML: "):
             Layout.from_yaml(text)
 
+    @pytest.mark.long
     def test_a_tower_of_thousands_is_resolved(self):
         count = 3000
         robots = [f"  r{i}: {{robot: panda, on: r{i + 1}}}" for i in range(count)]

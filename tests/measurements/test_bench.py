@@ -25,6 +25,7 @@ from robots import MissingPackageError, SimulationError
 from rollouts.__main__ import main
 from rollouts.progress import LiveLine
 from simulation.sapien3.backend import worlds_below
+from tests.quick import quick_cases
 
 TINY = Settings(
     rounds=2,
@@ -156,13 +157,10 @@ class TestWhatIsTimed:
         assert not multiprocessing.active_children()
 
 
-SLOW = ("memory", "pictures", "start")  # they start processes again and again, or four that draw
+QUICK = ("reset", "step", "validation")  # the others start processes, draw, or take longer
 
 
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=pytest.mark.long) if n in SLOW else n for n in BENCHMARKS],
-)
+@pytest.mark.parametrize("name", quick_cases(BENCHMARKS, QUICK))
 def test_every_benchmark_measures(name):
     shares = []
     found = BENCHMARKS[name].measure(replace(TINY, tick=shares.append))

@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 from measurements.conversions import main, markdown
 from tasks import list_clones
 
 RECORD = Path(__file__).parents[2] / "docs" / "conversions.json"
 
 
+@pytest.mark.long
 def test_what_is_kept_is_counted(tmp_path, capsys):
     out = tmp_path / "seen.json"
     words = ["--tasks", "PickCube-v1", "--modes", "pd_ee_pose", "--episodes", "1"]

@@ -46,6 +46,7 @@ def copy(tmp_path) -> Path:
 
 
 class TestCommitted:
+    @pytest.mark.long
     def test_pages_are_fresh(self, capsys):
         assert command.main(["--check"]) == 0, capsys.readouterr().err
 
@@ -75,6 +76,7 @@ class TestCommitted:
 
 
 class TestCheck:
+    @pytest.mark.long
     def test_tells_what_was_altered(self, record, copy):
         (copy / "tasks" / "PickCube-v1.md").write_text("changed")
         (copy / "robots" / "panda.md").unlink()
@@ -96,6 +98,7 @@ class TestCheck:
         stale = {line.split()[0] for line in told if " is stale" in line}
         assert stale == {"tasks/PickCube-v1.md", "robots/so100.md", "index.md"}
 
+    @pytest.mark.long
     def test_fails_when_a_page_was_altered(self, copy, monkeypatch, capsys):
         monkeypatch.setattr(command, "FOLDER", copy)
         (copy / "index.md").write_text("changed")
@@ -107,6 +110,7 @@ class TestCheck:
         assert "Did you mean 'panda'?" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_writing_removes_pages_of_nothing(record, copy):
     (copy / "tasks" / "Gone-v1.md").touch()
     count = write_pages(record, copy)

@@ -78,6 +78,7 @@ def test_differences_are_named_by_the_first_moment():
     assert differences([played], [None], [one]) == {}
 
 
+@pytest.mark.long
 def test_a_process_that_ends_too_early_is_reported():
     with pytest.raises(SimulationError, match="after 0 of 1 episodes"):
         play_under(Setting("", {}), [Played("PickCubr-v1", 0, EXPERT, 0)])

@@ -253,6 +253,7 @@ def fingerprint() -> str:
     return sha256(b"".join(qpos.tobytes() for qpos in motion.positions.values())).hexdigest()
 
 
+@pytest.mark.long
 def test_a_seed_gives_one_motion_however_many_threads_there_are(monkeypatch):
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         monkeypatch.setenv(name, "2")  # here it is 1

@@ -154,6 +154,7 @@ class TestComparing:
     def only_push_t(self, monkeypatch):
         monkeypatch.setattr("tasks.list_clones", lambda: ("PushT-v1",))
 
+    @pytest.mark.long
     def test_what_is_found_is_shown_written_and_recorded(self, capsys, monkeypatch, tmp_path):
         json_file, record_file = tmp_path / "found.json", tmp_path / "results.json"
         monkeypatch.setattr("parity.compare.command.RESULTS", record_file)

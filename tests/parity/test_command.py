@@ -123,6 +123,7 @@ class TestComparing:
         assert run("--task", "PickCube-v1", "--seeds", 1, "--steps", 3) == 0
         assert "PickCube-v1 random fresh: 1 of 3 steps (33%)" in capsys.readouterr().err
 
+    @pytest.mark.long
     def test_without_a_vulkan_driver(self):
         nowhere = {"VK_DRIVER_FILES": "/nowhere.json", "VK_ICD_FILENAMES": "/nowhere.json"}
         done = run_alone(COMPARE, **nowhere)
@@ -214,6 +215,7 @@ def test_without_a_package_that_mani_skill_needs():
     assert "needs dacite" in done.stderr or "needs mani_skill" in done.stderr
 
 
+@pytest.mark.long
 def test_importing_the_room_loads_no_native():
     done = run_alone(
         "import sys, parity.compare.command, parity.compare.native_env;"

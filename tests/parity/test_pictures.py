@@ -78,6 +78,7 @@ class TestDrawing:
     def test_what_is_drawn_is_what_native_shows_in_every_task(self, task_id):
         expect_honest(task_id)
 
+    @pytest.mark.long
     @pytest.mark.parametrize(("task_id", "quantity", "entry", "number"), IN_VIEW)
     def test_a_millimetre_or_milliradian_is_seen(self, task_id, quantity, entry, number):
         scene, found = after_reset(task_id)

@@ -69,6 +69,7 @@ class TestRolling:
         assert about["versions"]["mani_skill"]
         assert about["arrays"] == LEGEND
 
+    @pytest.mark.long
     def test_the_arrays_are_what_their_names_say(self, file, tmp_path, actions):
         roll_out(file, tmp_path, "--no-video")
         found, _ = load(tmp_path / TASK / NATIVE_FILE)
@@ -102,6 +103,7 @@ class TestRolling:
         }
         assert set(lengths.values()) == {STEPS, STEPS + 1}
 
+    @pytest.mark.long
     def test_a_robot_without_a_tcp_link(self, tmp_path):
         path = tmp_path / "actions.npz"
         np.savez(path, seeds=[0], a0=np.full((2, 6), 0.5, np.float32))
@@ -111,6 +113,7 @@ class TestRolling:
         found, _ = load(tmp_path / task / NATIVE_FILE)
         assert found["arm.tcp_pose"].shape == (3, 7)
 
+    @pytest.mark.long
     def test_a_file_says_in_which_control_mode_it_is(self, tmp_path):
         env = tasks.make("PickCube-v1", control_mode="pd_joint_pos")
         rest = np.array([*env.layout["arm"].start_qpos[:7], 1], np.float32)

@@ -200,6 +200,7 @@ def is_running(process: int) -> bool:
 class TestSweeping:
     pytestmark = NATIVE
 
+    @pytest.mark.long
     def test_a_failure_stops_nothing_and_the_rest_is_not_done_again(self, tmp_path, capsys):
         demos, out = tmp_path / "demos", tmp_path / "runs"
         record(demos, TASK)
@@ -235,6 +236,7 @@ class TestSweeping:
         assert (out / TASK / "maniskill.npz").stat().st_mtime_ns == first
         assert json.loads((out / SUMMARY).read_text())["tasks"][OTHER]["equal"] is True
 
+    @pytest.mark.long
     def test_a_process_that_is_killed(self, tmp_path):
         one = Plan(TASK, (str(record(tmp_path, TASK, (50,))),), 1, tmp_path / "runs", False)
         stages: list[str] = []

@@ -290,6 +290,7 @@ def test_missing_files_are_named(files, capsys):
     assert f"cannot read {files.results}" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_the_check_needs_no_native():
     code = (
         "import sys; sys.modules['mani_skill'] = None\n"

@@ -52,6 +52,7 @@ def test_what_has_no_clear_meaning_is_refused(kind, tmp_path):
     assert reason in str(error.value)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("robot", [name for name in CATALOGUE if not is_optional(name)])
 def test_the_catalogue_needs_no_repair(robot):
     urdf = RobotRegistry.load(robot).urdf.locate()

@@ -88,6 +88,7 @@ def test_a_notice_is_no_reason_to_fail(monkeypatch, tmp_path, stream):
     assert not is_watched()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("words", ROOMS.values(), ids=ROOMS)
 def test_every_command_ends_quietly_when_nobody_reads_it(words):
     done = shell(f"set -o pipefail; python -m {words} | true")

@@ -65,6 +65,7 @@ def test_offline_fetches_from_the_installed_package_alone(store, physics):
     assert store.unusable(physics) == []
 
 
+@pytest.mark.long
 def test_all_robots_with_pictures_and_scenery_is_the_default(store, capsys):
     assert main(["--source", "mani_skill"]) == 0
     assert "scenery: complete, 2 files" in capsys.readouterr().out

@@ -45,6 +45,7 @@ def finish(process: subprocess.Popen[str]) -> tuple[int, str]:
     return process.returncode, out + err
 
 
+@pytest.mark.long
 def test_a_killed_fetch_leaves_nothing_that_is_trusted(hub: HubServer, store, physics):
     reached = threading.Event()
     hub.fail("GET", HAND, stall(reached), times=1)
@@ -94,6 +95,7 @@ def test_a_process_killed_while_writing_leaves_no_half_file(store, physics, tmp_
     assert not (store.root / ".partial").exists()
 
 
+@pytest.mark.long
 def test_four_processes_at_once_download_each_file_once(hub: HubServer, store, physics):
     results = [finish(process) for process in [start("panda", "--source", "hf") for _ in range(4)]]
     assert [code for code, _ in results] == [0] * 4, results

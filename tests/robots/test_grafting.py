@@ -245,6 +245,7 @@ class TestFiles:
             [first.parent.name, second.parent.name]
         )
 
+    @pytest.mark.long
     def test_many_processes_at_once(self, pen, tmp_path):
         code = (
             "import sys; from robots import RobotRegistry, LocalUrdf;"

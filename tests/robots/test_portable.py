@@ -35,12 +35,14 @@ def python(code: str, *before: str, **variables: str) -> str:
 SAYS = "from robots import is_portable; print(is_portable())"
 
 
+@pytest.mark.long
 def test_a_process_says_how_it_was_begun():
     assert python(SAYS) == "False"
     assert python(SAYS, *BEGIN) == "True"
     assert python(SAYS, *BEGIN, *BEGIN) == "True"
 
 
+@pytest.mark.long
 def test_what_a_portable_process_begins_is_portable():
     spawned = (
         "from multiprocessing import get_context; from robots import is_portable\n"

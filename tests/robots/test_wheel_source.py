@@ -59,7 +59,7 @@ def test_one_download_brings_the_files_of_all_robots_with_their_licences(
     assert store.unusable(SMALL) == []
     said = capfd.readouterr().err
     assert "kept what came along of " in said
-    assert "`python -m robots.fetch_assets --check` lists it, with licences\n" in said
+    assert "`robot-layouts robots fetch --check` lists it, with licences\n" in said
     assert said.count("licence ") == len({file.origin for file in physics})
     index.requests.clear()
     for package in load_manifest().packages.values():  # as a demonstration does, group by group
@@ -77,6 +77,7 @@ def test_what_comes_along_replaces_nothing_that_is_there(index, store, physics):
     assert store.path(mine).read_text() == "my own"
 
 
+@pytest.mark.long
 def test_two_processes_at_once_download_once(index, store, physics):
     fetches = [start_fetch(), start_fetch()]
     said = [fetch.communicate(timeout=120)[1] for fetch in fetches]
@@ -85,6 +86,7 @@ def test_two_processes_at_once_download_once(index, store, physics):
     assert store.unusable(physics) == []
 
 
+@pytest.mark.long
 def test_processes_that_lack_different_files_download_once(index, store):
     """As they do when somebody starts several programs on a new machine."""
     robots = {RobotRegistry.load(name): pictures for name, pictures in LACKING.items()}
@@ -114,6 +116,7 @@ RobotRegistry.load(sys.argv[1]).urdf.locate(pictures=sys.argv[2] == "True")
     assert sum("downloading the wheel" in words for words in said) == 1
 
 
+@pytest.mark.long
 def test_a_fetch_killed_while_pip_downloads_leaves_nothing_behind(index, store, physics):
     reached, end = threading.Event(), threading.Event()
 

@@ -44,6 +44,7 @@ def read(folder: Path) -> dict:
     return json.loads((folder / "certificate.json").read_text())
 
 
+@pytest.mark.long
 def test_other_processes_certify_the_same_as_this_one(copy, tmp_path, capsys):
     assert main(["certify", str(copy), "--workers=1"]) == 0
     assert f"{COUNT} of {COUNT} episodes equal to the last bit" in capsys.readouterr().out

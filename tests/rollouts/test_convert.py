@@ -37,6 +37,7 @@ def replays(folder):
         return [replay(task, episode) for episode in file]
 
 
+@pytest.mark.long
 def test_there_and_back(recording, tmp_path, capsys):
     assert main(["convert", str(recording), "--to", MODE, "--out", str(tmp_path / "poses")]) == 0
     assert "2 of 2 successful episodes succeed" in capsys.readouterr().out
@@ -51,6 +52,7 @@ def test_there_and_back(recording, tmp_path, capsys):
     assert all(episode.success for episode in replays(tmp_path / "deltas"))
 
 
+@pytest.mark.long
 def test_what_pressed_presses_as_much(tmp_path):
     record("PegInsertionSide-v1", [0], tmp_path / "deltas", workers=0)
     for mode in ("pd_joint_vel", "pd_joint_delta_pos_vel"):
@@ -66,6 +68,7 @@ def test_what_pressed_presses_as_much(tmp_path):
             np.testing.assert_array_equal(same[0].states["articulations"][name], rows)
 
 
+@pytest.mark.long
 def test_a_conversion_goes_on_where_it_stopped(recording, tmp_path, capsys):
     words = ["convert", str(recording), "--to", "pd_joint_vel", "--out", str(tmp_path)]
     assert main([*words, "--episodes", "1"]) == 0
@@ -111,6 +114,7 @@ def test_what_is_no_mode(recording, tmp_path, capsys, mode, complaint):
     assert not (tmp_path / "x").exists()
 
 
+@pytest.mark.long
 def test_experts_record_with_a_mode_for_each_arm(tmp_path):
     mode = {"left": "pd_ee_delta_pose", "right": "pd_joint_pos"}
     summary = record("TwoRobotPickCube-v1", [0], tmp_path, workers=0, control_mode=mode)

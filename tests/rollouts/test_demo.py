@@ -44,6 +44,7 @@ def test_the_command_plays_records_and_reports(tmp_path, capsys):
     assert not (tmp_path / "video.mp4").exists()
 
 
+@pytest.mark.long
 def test_the_demo_may_be_run_again(tmp_path, console):
     for _ in range(2):
         assert run_demo(DemoOptions(seeds=1, out=tmp_path, video=False), console)
@@ -84,6 +85,7 @@ def test_a_demo_of_nothing_but_missing_plans(tmp_path, monkeypatch, capsys):
     assert "0 of 1 succeeded\n" in printed
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("solved", "enough"), [(9, True), (8, False)])
 def test_nine_of_ten_are_enough(tmp_path, monkeypatch, console, solved, enough):
     good, bad = plan(0), np.zeros((1, 16), np.float32)
@@ -104,6 +106,7 @@ def test_where_nothing_can_be_drawn_one_line_says_so(tmp_path, monkeypatch, cons
     assert "no video: no usable Vulkan driver (none found)\n" in console.export_text()
 
 
+@pytest.mark.long
 def test_without_visual_meshes_one_line_says_so(tmp_path, monkeypatch, console):
     locate = UrdfLocator.locate
 
@@ -147,6 +150,7 @@ def test_a_number_of_seeds_is_one_or_more(count, capsys):
     assert "--seeds" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_video_shows_the_episodes(tmp_path, renderer):
     if problem := video_problem():
         pytest.skip(problem)

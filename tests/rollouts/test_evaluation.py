@@ -25,6 +25,7 @@ from tests.rollouts.policies import TASK, Wanders, fails, still
 ROOT = Path(__file__).parents[2]
 
 
+@pytest.mark.long
 def test_who_plays_makes_no_difference():
     here = evaluate(Wanders(0.5), TASK, range(4), executor=Here())
     assert evaluate(Wanders(0.5), TASK, [3, 1, 0, 2], workers=2).scores == here.scores
@@ -66,6 +67,7 @@ class AtOnce:
         return torch.tanh(obs[:, :7] * 3)
 
 
+@pytest.mark.long
 def test_episodes_played_at_once_are_those_played_alone():
     """Whatever the policy draws or remembers; the last process plays fewer than the others."""
     alone = evaluate(Wanders(0.5), TASK, range(5), workers=0)
@@ -89,6 +91,7 @@ def test_an_error_of_several_episodes_names_them():
         evaluate(fails, TASK, [7, 8], workers=0, num_envs=2)
 
 
+@pytest.mark.long
 def test_a_policy_of_a_notebook():
     program = """
         from rollouts import evaluate

@@ -111,6 +111,7 @@ def test_what_an_episode_says_of_itself():
     assert said == [(0, "halfway"), (0, 0), (1, "halfway"), (1, 1)]
 
 
+@pytest.mark.long
 def test_ctrl_c_reaches_no_worker():
     """Not even the first one, whose start begins with that of a helper."""
     program = """
@@ -136,6 +137,7 @@ def test_an_episode_that_cannot_be_played(tmp_path):
     assert "plays.py:" in str(events[2].error)
 
 
+@pytest.mark.long
 def test_workers_that_cannot_begin():
     with pytest.raises(TaskError, match="nothing can be made here"):
         run(cannot_prepare, range(3))
@@ -150,6 +152,7 @@ def test_a_worker_that_dies_before_it_is_ready_is_replaced(tmp_path):
     assert squares(events) == {seed: seed**2 for seed in range(4)}
 
 
+@pytest.mark.long
 def test_deaths_are_counted_from_the_last_worker_that_was_ready(tmp_path):
     events = list(ProcessExecutor(1, fresh=True).run(EveryOtherDies(tmp_path), range(4)))
     assert len([event for event in events if event.died is not None]) == 4
@@ -186,6 +189,7 @@ def test_an_episode_that_hangs_is_played_again(tmp_path):
     assert squares(events) == {seed: seed**2 for seed in range(6)}
 
 
+@pytest.mark.long
 def test_an_episode_that_hangs_again_and_again_is_given_up(tmp_path):
     executor = ProcessExecutor(1, attempts=2, episode_timeout=0.5)
     events = list(executor.run(Play(tmp_path, hangs_at=1, always=True), range(3)))
@@ -295,6 +299,7 @@ def test_a_session_without_a_file():
     assert done.stderr == ""
 
 
+@pytest.mark.long
 def test_a_program_without_a_guard(tmp_path):
     (tmp_path / "program.py").write_text(
         "from rollouts.playing.executor import ProcessExecutor\n"

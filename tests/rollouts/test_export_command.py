@@ -302,6 +302,7 @@ def partials(folder: Path) -> list[str]:
     return [path.name for path in folder.iterdir() if path.name.endswith(".partial")]
 
 
+@pytest.mark.long
 def test_what_a_killed_export_leaves_is_removed_by_the_next(recording, tmp_path):
     out = tmp_path / "out"
     words = [sys.executable, "-c", UNFINISHED, str(recording), str(out)]
@@ -321,6 +322,7 @@ def test_what_a_killed_export_leaves_is_removed_by_the_next(recording, tmp_path)
     assert partials(tmp_path) == [".out.mine.partial"]
 
 
+@pytest.mark.long
 def test_ctrl_c_ends_an_export_without_a_traceback(recording, tmp_path):
     words = [sys.executable, "-c", UNFINISHED, str(recording), str(tmp_path / "out")]
     with subprocess.Popen(

@@ -101,6 +101,7 @@ class Disturbance:
             os.kill(int(second.split()[1]), signal.SIGKILL)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("_cheap_expert")
 def test_a_cluster_records_what_this_machine_does(cluster, tmp_path):
     cluster.grow(1)
@@ -241,6 +242,7 @@ def test_ray_is_not_installed(monkeypatch, tmp_path, capsys):
     assert not (tmp_path / "never").exists()
 
 
+@pytest.mark.long
 def test_nodes_get_all_the_code(tmp_path):
     gather_code(tmp_path, ["tests.rollouts.plays"])
     assert {path.name for path in tmp_path.iterdir()} == {*PLAYING, "tests"}

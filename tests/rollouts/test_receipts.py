@@ -55,6 +55,7 @@ def test_the_states_are_those_of_the_state_dict(receipt):
     assert len({e.states for e in Receipt.read(receipt).episodes}) == 3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "who", [{"workers": 1}, {"workers": 2}, {"num_envs": 4}, {"workers": 2, "num_envs": 2}], ids=str
 )
@@ -79,6 +80,7 @@ def test_the_order_of_seeds_is_that_of_the_receipt(receipt, tmp_path):
     assert set(turned.episodes) == set(Receipt.read(receipt).episodes)
 
 
+@pytest.mark.long
 def test_threads_of_the_processor_make_no_difference(tmp_path):
     """Experts plan with matrices, which libraries share among threads."""
     for threads in ("1", "2"):
@@ -115,6 +117,7 @@ def test_what_is_equal(receipt):
     assert found.here == Receipt.read(receipt)
 
 
+@pytest.mark.long
 def test_everything_that_a_task_is_made_with_comes_back(tmp_path):
     path = tmp_path / "receipt.json"
     ring = tasks.get_task_class("TwoRobotPickCube-v1").layout

@@ -332,6 +332,7 @@ def expect_killed_and_resumed(
     assert sorted(path.name for path in out.iterdir()) == [FILE, "trajectory.json"]
 
 
+@pytest.mark.long
 def test_a_recording_that_is_killed_loses_nothing(tmp_path):
     expect_killed_and_resumed(tmp_path, 60, [random.uniform(0, 0.2)], 1)
 

@@ -73,6 +73,7 @@ def test_a_header_that_makes_no_sense_is_refused(tmp_path: Path) -> None:
         task_for(file)
 
 
+@pytest.mark.long
 def test_commands_take_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     VARIED.save(tmp_path / "varied.yaml")
     words = ["--task", TASK, "--episodes", "1", "--workers", "0", "--randomization"]
@@ -87,6 +88,7 @@ def test_commands_take_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert "Did you mean 'mass'" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_policies_are_judged_in_worlds_that_vary() -> None:
     alone = evaluate("expert", TASK, SOLVED, workers=0, randomization=VARIED)
     plain = evaluate("expert", TASK, SOLVED, workers=0)
@@ -94,6 +96,7 @@ def test_policies_are_judged_in_worlds_that_vary() -> None:
     assert alone.scores != plain.scores
 
 
+@pytest.mark.long
 def test_experts_do_the_same_in_workers(tmp_path: Path) -> None:
     here, there = (recorded(tmp_path / str(w), SOLVED, workers=w) for w in (0, 2))
     assert same_files(here, there)

@@ -497,6 +497,7 @@ def expect_resumable(path: Path, finished: list[int]) -> None:
         assert [episode.seed for episode in file] == finished
 
 
+@pytest.mark.long
 def test_a_full_disk(small_disk):
     path = small_disk / "trajectory.h5"
     finished, said = run_full(path)

@@ -60,6 +60,7 @@ def test_a_policy_is_recorded_whoever_plays(tmp_path):
     assert same_files(tmp_path / "one" / FILE, tmp_path / "two" / FILE)
 
 
+@pytest.mark.long
 def test_worlds_that_vary_are_recorded(tmp_path):
     varied = tasks.Randomization(mass={"Tee": tasks.Uniform(0.5, 2.0)})
     episodes = recorded(tmp_path / "one", randomization=varied)
@@ -80,6 +81,7 @@ def test_processes_make_no_difference(tmp_path):
     assert same_files(tmp_path / "here" / FILE, tmp_path / "there" / FILE)
 
 
+@pytest.mark.long
 def test_a_batched_policy_records_what_it_does_alone(tmp_path):
     recorded(tmp_path / "alone", policy=Leans(batched=False))
     recorded(tmp_path / "at once", policy=Leans(batched=True), num_envs=3)
@@ -91,6 +93,7 @@ def overlong(task, seed):
     return np.tile(at_random(task, seed), (6, 1))
 
 
+@pytest.mark.long
 def test_an_expert_is_recorded_as_ever(tmp_path, monkeypatch):
     """To the end of its plan."""
     monkeypatch.setitem(registry.EXPERTS.registered, TASK, overlong)
@@ -105,6 +108,7 @@ def test_an_expert_is_recorded_as_ever(tmp_path, monkeypatch):
     assert same_files(tmp_path / "1" / FILE, tmp_path / FILE)
 
 
+@pytest.mark.long
 def test_somebody_takes_over_now_and_then(tmp_path):
     """Each step says who acted, and the policy is the same afterwards: it sees everything."""
     episodes = recorded(tmp_path / "one", takeover=meddles)
@@ -127,6 +131,7 @@ def test_somebody_takes_over_now_and_then(tmp_path):
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("batched", [False, True])
 def test_a_takeover_that_never_acts_changes_nothing(tmp_path, batched):
     policy = Leans(batched)
@@ -137,6 +142,7 @@ def test_a_takeover_that_never_acts_changes_nothing(tmp_path, batched):
         assert other.actor is None
 
 
+@pytest.mark.long
 def test_corrections_name_the_policy_that_they_correct(tmp_path):
     """They stand beside what was carried out, which whoever took over may have done."""
     both = {"takeover": meddles, "corrector": "tests.rollouts.policies:LEANS"}
@@ -152,6 +158,7 @@ def test_corrections_name_the_policy_that_they_correct(tmp_path):
     assert same_files(tmp_path / "one" / FILE, tmp_path / "at once" / FILE)
 
 
+@pytest.mark.long
 def test_several_sources_in_one_data_set(tmp_path, monkeypatch, capsys):
     """In whichever order they come, and each episode says who acted."""
     monkeypatch.setitem(registry.EXPERTS.registered, TASK, at_random)
@@ -200,6 +207,7 @@ def test_what_was_left_by_a_killed_recording_keeps_its_source(tmp_path):
     )
 
 
+@pytest.mark.long
 def test_one_that_fails_does_not_cost_the_others(tmp_path):
     summary = record(TASK, range(6), tmp_path, workers=0, policy=policies.fails_at_times)
     failed = {seed: str(error) for seed, error in summary.failed.items()}
@@ -213,6 +221,7 @@ def test_one_that_fails_does_not_cost_the_others(tmp_path):
     assert same_files(tmp_path / FILE, tmp_path / "more" / FILE)
 
 
+@pytest.mark.long
 def test_one_that_ends_its_workers_does_not_cost_the_others(tmp_path):
     rare, died = policies.fails_at_times, policies.dies_at_times
     failed = record(TASK, range(6), tmp_path / "rare", workers=0, policy=rare).failed
@@ -228,6 +237,7 @@ def test_one_that_ends_its_workers_does_not_cost_the_others(tmp_path):
     assert again.already == 6 - len(failed)
 
 
+@pytest.mark.long
 def test_a_policy_that_ends_all_workers_ends_the_recording(tmp_path, monkeypatch):
     monkeypatch.setattr("rollouts.recording.record.LOST_IN_A_ROW", 2)
     with pytest.raises(WorkerError, match="seed 1 ended 3 worker processes; .* SIGKILL"):

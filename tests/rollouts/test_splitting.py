@@ -209,6 +209,7 @@ def test_another_task_is_refused(tmp_path, push_t, straight):
     assert contents(path) == contents(straight)
 
 
+@pytest.mark.long
 def test_a_kill_at_any_moment_loses_nothing(tmp_path, push_t, straight, monkeypatch):
     """Stop at every change of the disk, as a kill would, while files fill up out of order."""
     env, episodes = push_t

@@ -62,12 +62,14 @@ def test_there_is_a_receipt_for_each_case(played):
     ]  # fmt: skip
 
 
+@pytest.mark.long
 def test_workers_make_no_difference(played, tmp_path):
     run = run_suite(SUITE, tmp_path, STILL, workers=2)
     before = read_run(played).receipts
     assert {n: r.hash for n, r in run.receipts.items()} == {n: r.hash for n, r in before.items()}
 
 
+@pytest.mark.long
 def test_it_goes_on_where_it_was_killed(played, tmp_path, monkeypatch):
     events = []
 
@@ -181,6 +183,7 @@ def test_all_is_played_again(played):
     assert {*seen} == {"First", "Later"}
 
 
+@pytest.mark.long
 def test_a_policy_that_is_named_plays_again(played, tmp_path):
     assert verify_run(played, {"push_t": STILL}, workers=0)["Later"].equal
     found = verify_run(played, LEANS, workers=0)

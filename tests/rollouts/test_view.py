@@ -35,6 +35,7 @@ def test_the_motion_is_the_recorded_one(recording):
     assert {"cube", "table-workspace", "ground"} <= set(cell.things)
 
 
+@pytest.mark.long
 def test_a_file_without_states_is_played_again(recording, tmp_path):
     path = tmp_path / "trajectory.h5"
     for suffix in (".h5", ".json"):
@@ -61,6 +62,7 @@ def test_a_recording_of_another_task(recording, capsys):
     assert "was recorded in TwoRobotPickCube-v1, not in PickCube-v1" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_page_is_saved(recording, tmp_path, capsys):
     path = tmp_path / "episode.html"
     assert main(["view", str(recording), "--html", str(path)]) == 0

@@ -88,6 +88,7 @@ def expect_agreement(descriptor):
     assert (separations[overlaps] >= TOUCH).sum() <= MISSED * overlaps.sum() + 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", every_robot(sorted({*QUICK} - {"floating_panda_gripper"}), quick=("panda", "so100"))
 )

@@ -138,6 +138,7 @@ LOOSE = ("floating_inspire_hand_left", "floating_inspire_hand_right", "tiago_pro
 FIRM = [name for name in CATALOGUE if name not in LOOSE]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("robot", [*every_robot(FIRM), *HANDS])
 def test_a_robot_that_was_only_guessed_stands_and_moves(robot):
     if robot in HANDS:

@@ -50,6 +50,7 @@ def cube_askew_on_another(exact: bool) -> bytes:
     return b"".join(places)
 
 
+@pytest.mark.long
 def test_contacts_of_two_boxes_divide_exactly():
     estimated = in_fresh_process(cube_askew_on_another, False)
     exact = in_fresh_process(cube_askew_on_another, True)
@@ -68,6 +69,7 @@ def refuse_another_library() -> str:
     return str(raised.value)
 
 
+@pytest.mark.long
 def test_another_library_is_left_alone():
     assert "libsapien.so is not that of sapien 3.0.3" in in_fresh_process(refuse_another_library)
 
@@ -80,6 +82,7 @@ def test_a_library_that_is_not_loaded_is_missed(monkeypatch):
     exact_division.divide_exactly.cache_clear()
 
 
+@pytest.mark.long
 def test_worlds_of_a_portable_process_divide_exactly():
     code = (
         "import tasks; from simulation.sapien3.exact_division import divide_exactly as d;"

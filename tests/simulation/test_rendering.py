@@ -129,6 +129,7 @@ def run_without_driver(code: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.long
 def test_without_a_driver_every_task_runs_and_one_is_told_why_there_are_no_pictures():
     done = run_without_driver(
         "import tasks, torch\n"

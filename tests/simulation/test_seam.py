@@ -18,6 +18,7 @@ from robots import RobotDescriptor, RobotRegistry
 from simulation import Simulation
 from simulation.backend import Backend
 from simulation.sapien3.backend import SapienBackend, worlds_below
+from tests.quick import quick_cases
 
 VERBS = [name for name in vars(Backend) if not name.startswith("_")]
 TASKS = ("PickCube-v1", "TwoRobotPickCube-v1", "PushT-v1", "PegInsertionSide-v1", "Relay-v1")
@@ -114,7 +115,7 @@ def calls(monkeypatch: pytest.MonkeyPatch, task_id: str, num_envs: int) -> list[
     return counted
 
 
-@pytest.mark.parametrize("task_id", tasks.list_tasks())
+@pytest.mark.parametrize("task_id", quick_cases(tasks.list_tasks()))
 def test_a_task_needs_the_verbs_alone_and_as_many_calls_for_many_worlds_as_for_one(
     task_id, monkeypatch
 ):

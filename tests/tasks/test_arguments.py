@@ -168,6 +168,7 @@ def test_listing_names_loads_no_torch():
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+@pytest.mark.long
 def test_a_list_of_tasks_needs_no_robot_files(tmp_path):
     """Neither here nor from anywhere: the folder for them stays empty."""
     command = [sys.executable, "-m", "tasks", "list"]

@@ -190,6 +190,7 @@ def test_a_list_of_no_tasks_is_a_heading():
     assert list_table([], {}).row_count == 0
 
 
+@pytest.mark.long
 def test_importing_the_room_loads_no_rich():
     code = "import sys, tasks; tasks.get_task_class('PickCube-v1'); sys.exit('rich' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0

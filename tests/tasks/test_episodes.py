@@ -5,6 +5,7 @@ import torch
 import tasks
 from robots import SimulationError, TaskError
 from tasks import MultiRobotTask
+from tests.quick import quick_cases
 
 ALL = tasks.list_tasks()
 
@@ -51,7 +52,7 @@ def test_observation_slices_cover_the_observation_in_order(task_id: str):
         assert torch.equal(flat[:, env.observation_slices[name]], expected), name
 
 
-@pytest.mark.parametrize("task_id", ALL)
+@pytest.mark.parametrize("task_id", quick_cases(ALL))
 def test_one_environment_of_many_equals_one_alone(task_id: str):
     many = tasks.make(task_id, num_envs=3)
     steps = actions(many, 20)
@@ -62,7 +63,7 @@ def test_one_environment_of_many_equals_one_alone(task_id: str):
             assert torch.equal(a[i], b[0]), f"environment {i}, step {t}"
 
 
-@pytest.mark.parametrize("task_id", ALL)
+@pytest.mark.parametrize("task_id", quick_cases(ALL))
 def test_a_partial_reset_leaves_the_others_alone(task_id: str):
     env, undisturbed = tasks.make(task_id, num_envs=3), tasks.make(task_id, num_envs=3)
     steps = actions(env, 8)

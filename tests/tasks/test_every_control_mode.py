@@ -275,6 +275,7 @@ def test_a_tcp_goes_where_it_is_sent(robot):
     assert np.abs(goal - simulation.read().tcp_position("arm")[0]).max() < 5e-4
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", ["pd_ee_pose", "pd_ee_delta_pos"])
 def test_a_robot_from_a_urdf_goes_along_a_square(mode):
     urdf = RobotRegistry.load("xarm7_ability").urdf.locate()

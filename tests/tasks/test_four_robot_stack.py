@@ -44,6 +44,7 @@ def test_a_cube_that_moves_is_no_success():
     assert not env.evaluate(env.simulation.read())["success"].any()
 
 
+@pytest.mark.long
 def test_each_placed_cube_is_worth_one():
     env = tasks.make(TASK, reward_mode="dense")
     env.reset(0, options={"reconfigure": True})

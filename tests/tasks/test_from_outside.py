@@ -112,6 +112,7 @@ def test_a_module_and_an_id_go_wherever_an_id_goes(mylab):
     assert second.endswith(" Importing 'mylab.tray' registered no such task.")
 
 
+@pytest.mark.long
 def test_gymnasium_takes_them_by_module_and_id(mylab):
     (named,) = re.findall(r"`gymnasium\.make\(([^)]*)\)`", (CHECKOUT / "README.md").read_text())
     code = (
@@ -144,6 +145,7 @@ def test_an_unknown_task_says_how_to_name_one_from_outside():
         tasks.get_task_class("Trey-v1")
 
 
+@pytest.mark.long
 def test_an_installed_package_brings_tasks_experts_and_presets(installed):
     code = (
         "import sys, gymnasium, tasks, experts\n"
@@ -158,6 +160,7 @@ def test_an_installed_package_brings_tasks_experts_and_presets(installed):
     assert run(installed, "-c", code).splitlines() == ["(16,)", "(2, 16)", "a b"]
 
 
+@pytest.mark.long
 def test_a_broken_entry_point_is_named(installed):
     broken = {
         "Other-v1": "is listed as 'Other-v1', but its task is 'TwoArmTray-v1'",

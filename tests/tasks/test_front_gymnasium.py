@@ -16,6 +16,7 @@ from simulation.rendering.pictures import vulkan_problem
 from tasks import fronts
 from tasks.fronts.gymnasium import GymnasiumTask
 from tasks.registry import CATALOGUE
+from tests.quick import quick_cases
 
 CONTACT = 8  # steps
 HARMLESS = (
@@ -24,7 +25,7 @@ HARMLESS = (
 )
 
 
-@pytest.mark.parametrize("task_id", tasks.list_tasks())
+@pytest.mark.parametrize("task_id", quick_cases(tasks.list_tasks()))
 def test_gymnasiums_own_checks(task_id):
     env = gymnasium.make(f"RobotLayouts/{task_id}")
     with warnings.catch_warnings(record=True) as caught:
@@ -153,6 +154,7 @@ def test_importing_tasks_registers_them_without_torch_or_sapien():
     assert run_python(code) == "[] RobotLayouts/PickCube-v1"
 
 
+@pytest.mark.long
 def test_the_id_may_name_the_module_instead_of_an_import():
     code = (
         "import gymnasium; env = gymnasium.make('tasks:RobotLayouts/PickCube-v1');"
@@ -161,6 +163,7 @@ def test_the_id_may_name_the_module_instead_of_an_import():
     assert run_python(code) == "(42,)"
 
 
+@pytest.mark.long
 def test_a_task_of_ones_own_is_known_to_gymnasium():
     code = """
 import gymnasium, tasks

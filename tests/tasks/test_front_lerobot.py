@@ -103,6 +103,7 @@ def test_another_instruction_and_length():
         assert env.call("_max_episode_steps") == (7,)
 
 
+@pytest.mark.long
 def test_success_is_told_when_the_episode_ends_and_from_then_on(played, plan):
     solved = np.array([info["is_success"] for *_, info in played])
     terminated = np.array([step[2] for step in played])
@@ -157,6 +158,7 @@ def test_episodes_are_those_of_an_evaluation(env, played, plan):
         assert expected[seed].total == pytest.approx(total, rel=1e-12)
 
 
+@pytest.mark.long
 def test_nothing_stays_of_what_was_played_before(plan):
     """Contacts that PhysX remembers would show in the last bits: worlds are rebuilt."""
     with closing(make(num_envs=1)) as used, closing(make(num_envs=1)) as fresh:
@@ -170,6 +172,7 @@ def test_nothing_stays_of_what_was_played_before(plan):
             assert all(np.array_equal(one[name], other[name]) for name in one)
 
 
+@pytest.mark.long
 def test_processes_change_nothing(env, plan):
     with closing(make(num_workers=2)) as spread:
         for vector in (env, spread):

@@ -7,6 +7,7 @@ import pytest
 
 import tasks
 from robots import ActionError, MissingPackageError, TaskError, UnknownNameError
+from tests.quick import quick_cases
 
 checks = pytest.importorskip("pettingzoo.test")
 
@@ -18,7 +19,7 @@ def env():
     return tasks.parallel_env(TWO)
 
 
-@pytest.mark.parametrize("task_id", tasks.list_tasks())
+@pytest.mark.parametrize("task_id", quick_cases(tasks.list_tasks()))
 # Its random actions may hit the table, which is reported.
 @pytest.mark.filterwarnings("error", "ignore:robot .* is thrown about:RuntimeWarning")
 def test_pettingzoos_own_checks(task_id, capsys):

@@ -80,6 +80,7 @@ def test_it_says_what_their_own_vector_says(actions):
     assert ends(ours, 0) == [49]
 
 
+@pytest.mark.long
 def test_workers_change_nothing(spread, actions):
     np.testing.assert_equal(play(spread, actions), play(make(), actions))
 
@@ -199,6 +200,7 @@ def test_their_wrappers():
     assert infos[0]["terminal_observation"].shape == (70,)
 
 
+@pytest.mark.long
 def test_a_training_run_does_not_depend_on_workers(spread, tmp_path):
     fresh = make()
     for env in (fresh, spread):

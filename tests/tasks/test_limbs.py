@@ -99,6 +99,7 @@ def test_control_modes_are_those_of_the_whole_robot(mode):
     assert (low[:7] < -1.5).any() == (mode == "pd_joint_pos")
 
 
+@pytest.mark.long
 @pytest.mark.example_robots
 def test_baxter_hands_over():
     if problem := optional_problem():

@@ -81,6 +81,7 @@ def test_last_batch_may_be_smaller(task_id):
     assert complaints(both.play(episodes)) == []
 
 
+@pytest.mark.long
 def test_rows_belong_to_their_own_environment():
     """A batch whose rows were shuffled is noticed."""
     both = pair("PickCube-v1", num_envs=NUM_ENVS)

@@ -147,6 +147,7 @@ def in_worker(target):
     return answer
 
 
+@pytest.mark.long
 def test_a_worker_finds_the_libraries_loaded_and_everything_else_as_it_is_now(
     monkeypatch, tmp_path, capfd
 ):
@@ -168,6 +169,7 @@ def test_a_program_that_is_read_from_standard_input_may_have_workers(monkeypatch
     in_worker(look_around)
 
 
+@pytest.mark.long
 def test_a_daemonic_process_may_have_a_vector():
     this = multiprocessing.current_process()
     this.daemon = True
@@ -191,6 +193,7 @@ def descriptors(more):
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("more", [0, 3, 8])
 def test_too_few_descriptors_are_one_error_and_nothing_is_left(more):
     in_worker(look_around)  # the server is there already
@@ -228,6 +231,7 @@ def test_threads_may_look_at_each_others_processes(times):
             thread.join()
 
 
+@pytest.mark.long
 def test_a_worker_that_is_stopped_before_it_has_read_what_to_run_holds_nobody_up(monkeypatch):
     in_worker(look_around)  # the server is there already
     fork, pids = forks._fork, []
@@ -249,6 +253,7 @@ def test_a_worker_that_is_stopped_before_it_has_read_what_to_run_holds_nobody_up
     in_worker(look_around)
 
 
+@pytest.mark.long
 def test_a_worker_whose_server_is_stopped_can_be_ended(monkeypatch):
     in_worker(look_around)
     with vector(1) as env:
@@ -277,6 +282,7 @@ def test_an_error_of_a_task_arrives_with_its_traceback_and_no_hint_that_leads_no
     assert "in step" in cause
 
 
+@pytest.mark.long
 def test_a_task_that_cannot_be_built_says_where_and_that_there_is_no_vector():
     with pytest.raises(WorkerError) as caught:
         VectorTask("Breaks_build_soon-v1", 2, num_workers=2)
@@ -302,6 +308,7 @@ class Unpicklable(TaskError):
         raise ValueError("not to be pickled")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("error", "words"),
     [
@@ -327,6 +334,7 @@ def test_any_error_arrives_whether_it_was_raised_or_not(error, words):
 # -- threads --------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("workers", [0, 2])
 def test_a_second_thread_is_refused_at_once_and_the_first_goes_on(workers):
     with vector(workers, "SlowSteps-v1") as env:
@@ -386,6 +394,7 @@ def test_a_task_is_the_same_in_a_fork():
         assert forked == env.step(ACTION)[0].numpy().tobytes()
 
 
+@pytest.mark.long
 def test_pictures_in_a_fork_are_refused_in_the_place_of_a_hang():
     if problem := vulkan_problem():
         pytest.skip(problem)
@@ -411,6 +420,7 @@ def through_pickle(env):
     return pickle.loads(pickle.dumps(env))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("front", [*FRONTS, "workers"])
 @pytest.mark.parametrize(
     "make_copy",
@@ -435,6 +445,7 @@ def begin(env):
     return {k: x.tolist() for k, x in obs.items()} if isinstance(obs, dict) else obs.tolist()
 
 
+@pytest.mark.long
 def test_a_copy_that_fails_leaves_the_vector_alone():
     with vector(2) as env:
         env.reset(seed=1)

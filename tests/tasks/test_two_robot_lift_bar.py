@@ -51,6 +51,7 @@ def test_success_needs_both_grippers_and_rest():
     assert info["is_right_grasping"].all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("robot", ["left", "right"])
 @pytest.mark.parametrize("what", ["is_grasping", "is_static"])
 def test_neither_arm_may_let_go_or_move(monkeypatch, robot: str, what: str):

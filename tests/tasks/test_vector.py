@@ -11,6 +11,7 @@ import tasks
 from robots import ActionError, TaskError, UnknownNameError
 from tasks.fronts.vector import VectorTask
 from tests.native import NATIVE, pair
+from tests.quick import quick_cases
 
 NUM_ENVS = 3
 WORKERS = 2  # one of them holds one environment, the other two
@@ -80,7 +81,7 @@ def expect_as_alone(task_id, mode, steps, **fields):
 RECONFIGURE = ("reconfigure", "_reconfigure")
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", quick_cases(MODES, MODES[:1]))
 def test_it_says_what_gymnasiums_own_vector_says(mode):
     expect_as_alone("PushCube-v1", mode, 63)
 
@@ -97,7 +98,7 @@ def test_it_says_so_of_every_task(task_id, mode):
     expect_as_alone(task_id, mode, tasks.get_task_class(task_id).max_episode_steps + 12)
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", quick_cases(MODES, MODES[:1]))
 def test_workers_change_nothing(mode):
     together = play(make(autoreset_mode=mode), mode, 63)
     with closing(make(num_workers=WORKERS, autoreset_mode=mode)) as env:

@@ -13,6 +13,7 @@ from robots import ActionError, SimulationError, TaskError
 from tasks.fronts.shares import Sharing
 from tasks.fronts.vector import VectorTask
 from tasks.fronts.workers import WorkerError
+from tests.quick import quick_cases
 from tests.tasks.test_vector import differences, make
 from tests.tasks.test_vector_failures import interrupted
 
@@ -79,8 +80,8 @@ def shared():
     env.close()
 
 
-@pytest.mark.parametrize("num_workers", [0, 2])
-@pytest.mark.parametrize("batch_size", [1, 2, 3])
+@pytest.mark.parametrize("num_workers", quick_cases([0, 2], [2]))
+@pytest.mark.parametrize("batch_size", quick_cases([1, 2, 3], [2]))
 def test_every_environment_does_what_it_does_in_lockstep(num_workers, batch_size, lockstep):
     for mode in AutoresetMode if (num_workers, batch_size) == (0, 2) else ["NEXT_STEP"]:
         making = {"num_workers": num_workers, "batch_size": batch_size, "autoreset_mode": mode}
@@ -114,6 +115,7 @@ def test_a_step_of_one_leaves_what_was_said_of_another_of_its_part():
             assert ((info["elapsed_steps"] > 0) == (reward > 0)).all()
 
 
+@pytest.mark.long
 def test_nobody_waits_for_the_slowest(shared):
     shared.reset(seed=0)
     slow, quick = shared._crew._crew[0], [2, 3, 4]
@@ -181,6 +183,7 @@ def test_a_reset_forgets_what_was_sent(shared):
     assert shared.recv()[4]["env_id"].tolist() == [3, 4]
 
 
+@pytest.mark.long
 def test_a_worker_that_dies_is_told_and_the_others_can_be_received(shared):
     shared.reset(seed=7)
     victim = shared._crew._crew[0].pid
@@ -198,6 +201,7 @@ def test_a_worker_that_dies_is_told_and_the_others_can_be_received(shared):
     assert len(set(came)) == 4
 
 
+@pytest.mark.long
 def test_it_is_of_use_after_an_interrupt_at_any_instruction(shared):
     def hears(code):
         return code.co_name in ("receive_now", "_read", "hear", "_take", "take")

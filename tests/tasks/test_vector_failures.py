@@ -39,6 +39,7 @@ def first_worker(env):
     return env._crew._crew[0].pid
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("how", ["killed", "hung"])
 def test_a_worker_that_fails_is_told_and_replaced(shared, how):
     reference = VectorTask("PickCube-v1", num_envs=4, num_workers=0)
@@ -134,6 +135,7 @@ def interrupted(moment, event, matches, call):
     return False
 
 
+@pytest.mark.long
 def test_a_vector_is_of_use_after_an_interrupt_at_any_instruction_of_a_conversation():
     def talks(code):
         return code.co_filename.endswith(
@@ -162,6 +164,7 @@ def test_an_interrupt_as_a_call_begins_locks_nobody_out():
             env.reset()
 
 
+@pytest.mark.long
 def test_a_worker_s_death_is_seen_although_a_process_that_it_forked_holds_its_connection():
     with breaking.offered(), closing(VectorTask("Forks-v1", num_workers=1, timeout=20.0)) as env:
         os.kill(first_worker(env), signal.SIGKILL)

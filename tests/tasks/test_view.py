@@ -62,6 +62,7 @@ def test_everything_stands_where_the_task_put_it(task_id):
     env.close()
 
 
+@pytest.mark.long
 def test_a_task_is_served_until_ctrl_c():
     with served("tasks", "view", "PickCube-v1", "--seed", "4", "--port", "0") as view:
         assert view.lines[-1].startswith("PickCube-v1, seed 4: http://127.0.0.1:")
