@@ -105,9 +105,9 @@ def test_drives_limits_and_home_are_the_descriptors(cell, model):
     actuators = {element.get("name"): element for element in model.find("actuator")}
     home = model.find("keyframe/key")
     standing = ExportedCell.read(cell, visuals=False).robots
-    leaders = [f"{n}/{joint}" for n, robot in standing.items() for joint in robot.source.leaders]
-    assert list(actuators) == leaders
-    assert "hung/close_2" not in actuators  # it follows another joint
+    driven = [f"{n}/{joint}" for n, placement in cell.items() for joint in placement.robot.joints]
+    assert list(actuators) == driven
+    assert "hung/close_2" in actuators  # though it follows another joint
     group = cell["up"].robot.action_split.groups["arm"]
     for joint, (stiffness, damping, force) in zip(group.joints, group.drives, strict=True):
         own = actuators[f"up/{joint}"]
@@ -115,9 +115,10 @@ def test_drives_limits_and_home_are_the_descriptors(cell, model):
         assert numbers(own.get("forcerange")) == [-force, force]
     order = [joint.get("name") for joint in model.find("worldbody").iter("joint")]
     qpos = dict(zip(order, numbers(home.get("qpos")), strict=True))
+    standing = ExportedCell.read(cell, visuals=False).robots
     expected = {f"{n}/{joint}": x for n, r in standing.items() for joint, x in r.home.items()}
     assert qpos == expected
-    assert numbers(home.get("ctrl")) == [expected[joint] for joint in leaders]
+    assert numbers(home.get("ctrl")) == [expected[joint] for joint in driven]
 
 
 def test_followers_are_tied_to_what_they_follow(model):
@@ -125,6 +126,22 @@ def test_followers_are_tied_to_what_they_follow(model):
     assert ties.keys() == {"hung/close_2", "hung/close_3"}
     assert ties["hung/close_2"].get("joint2") == "hung/close_3"
     assert numbers(ties["hung/close_2"].get("polycoef")) == [0.1, 2.0, 0.0, 0.0, 0.0]
+
+
+def test_contacts_and_ties_are_as_stiff_as_the_timestep_allows(model):
+    stiff = [2 * float(model.find("option").get("timestep")), 1.0]
+    assert numbers(model.find("default/geom").get("solref")) == stiff
+    assert all(numbers(tie.get("solref")) == stiff for tie in model.find("equality"))
+
+
+def test_joints_weigh_enough_for_their_dampers(cell, model):
+    """The damper of a drive at its force limit acts once a step, so that it must not overshoot."""
+    timestep = float(model.find("option").get("timestep"))
+    joints = {joint.get("name"): joint for joint in model.find("worldbody").iter("joint")}
+    group = cell["up"].robot.action_split.groups["arm"]
+    for joint, (_, damping, _) in zip(group.joints, group.drives, strict=True):
+        armature = float(joints[f"up/{joint}"].get("armature"))
+        assert 0.9 * damping * timestep < armature <= damping * timestep  # light links add the rest
 
 
 def test_what_a_urdf_says_of_joints_is_kept(model):
@@ -162,9 +179,9 @@ def test_masses_are_those_of_the_urdf(model):
 def test_the_timestep_is_one_at_which_drives_are_stable(tmp_path):
     soft = outside(tmp_path)
     name, group = next(iter(soft.action_split.groups.items()))
-    hard = replace(group, stiffness=1e6, damping=1.0, armature=0.0)
+    hard = replace(group, stiffness=1e7, damping=1.0, armature=0.0)
     stiff = soft.action_split.replace(**{name: hard})
-    for robot, step in ((soft, TIMESTEPS[0]), (replace(soft, action_split=stiff), 0.0001)):
+    for robot, step in ((soft, TIMESTEPS[0]), (replace(soft, action_split=stiff), 0.0002)):
         path = single({"arm": robot}).to_mjcf(tmp_path / "arm.xml")
         option = ElementTree.parse(path).getroot().find("option")
         assert float(option.get("timestep")) == step
