@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
@@ -29,6 +29,8 @@ HOME = "home"
 TIMESTEPS = (0.002, 0.001, 0.0005, 0.0002, 0.0001)  # s; the first at which all drives are stable
 TIED = "0.99 0.99 0.001"  # impedance of what ties a joint to the one that it follows
 HULLS = ("mesh",)  # all other shapes of a URDF are MuJoCo's, too
+FEWEST_CORNERS = 4  # of a mesh that MuJoCo reads
+LEAST_VOLUME = 1e-14  # m³; of a mesh that MuJoCo takes for a body
 DRAWN, SOLID = "drawn", "solid"  # default classes
 SOLID_RGBA = (0.5, 0.6, 0.7, 0.5)
 # MuJoCo's own are a black sky and a dim light.
@@ -95,7 +97,7 @@ class _Model:
         geoms: dict[str, list[dict[str, str]]] = {link: [] for link in source.model.links}
         for link, drawn in drawn_meshes(source, visuals=visuals).items():
             for mesh in drawn:
-                file = files.save(mesh.mesh, f"{link}_visual")
+                file = files.save(_with_corners(mesh.mesh), f"{link}_visual")
                 name = self._add_mesh(f"{source.name}/{file}", "shell")
                 geoms[link].append(_drawn(mesh, name))
         for link, solids in solid_shapes(source, HULLS).items():
@@ -103,7 +105,8 @@ class _Model:
                 name = ""
                 if solid.hull is not None:
                     file = files.save(solid.hull, f"{link}_collision")
-                    name = self._add_mesh(f"{source.name}/{file}", "convex")
+                    inertia = "convex" if solid.hull.volume > LEAST_VOLUME else "shell"
+                    name = self._add_mesh(f"{source.name}/{file}", inertia)
                 geoms[link].append(_solid(solid, name, source.friction_of(link)))
         self._shapes[id(source)] = geoms
 
@@ -230,6 +233,16 @@ def _stable_steps(source: RobotSource) -> Iterator[float]:
             inertia = drive.armature + _least_inertia(joint, source)
             root = math.sqrt(drive.damping**2 + 2 * drive.stiffness * inertia)
             yield (drive.damping + root) / drive.stiffness
+
+
+def _with_corners(mesh: Any) -> Any:
+    """Return a trimesh that looks the same and has as many corners as MuJoCo wants."""
+    corners = np.asarray(mesh.triangles, np.float32)
+    few = all(
+        len(np.unique(some.reshape(-1, 3), axis=0)) < FEWEST_CORNERS
+        for some in (corners[:FEWEST_CORNERS], corners)  # most meshes show it at once
+    )
+    return mesh.subdivide() if few else mesh
 
 
 def _drawn(drawn: Drawn, mesh: str) -> dict[str, str]:
