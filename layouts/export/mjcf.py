@@ -56,8 +56,7 @@ def write_mjcf(layout: Arrangement, path: str | os.PathLike[str], *, visuals: bo
         model = _Model(cell, target.stem, folder.name)
         for source in cell.sources:
             model.add_meshes(source, made / source.name, visuals=visuals)
-        text = model.text()
-    write_whole(target, text)
+        write_whole(target, model.text())
     return target
 
 
