@@ -151,14 +151,17 @@ class Layout(Arrangement):
     def to_mjcf(self, path: str | PathLike[str], *, visuals: bool = True) -> Path:
         """Save the layout as one MJCF model for MuJoCo, with meshes in a folder ``NAME_assets``.
 
-        Names of bodies, joints and actuators stand behind their place: ``left/panda_hand``. Each
-        joint that follows no other has a position actuator with stiffness, damping and force limit
-        of the descriptor, in the order of its joints; joints that mimic others are tied to them.
+        Names of bodies, joints and actuators stand behind their place: ``left/panda_hand``. Every
+        joint of the descriptor, in its order, has a position actuator with its stiffness, damping
+        and force limit: force = clamp(stiffness · (ctrl - position) - damping · speed), as in
+        SAPIEN. Joints that mimic others are tied to them as well, so their ``ctrl`` must follow,
+        too: both fingers of a Panda get the same. Where a link is too light for its drive's damper
+        at the model's timestep, its joint has more armature than the descriptor gives it.
         Links have no weight (``gravcomp``), as in the tasks here, so that the keyframe ``home``,
         where the layout starts, holds. Bodies may touch unless `validate` lets their links
         overlap. Meshes collide by their convex hulls. TCPs (``left/tcp``) and frames are sites,
         tables are boxes; there is no floor, as a layout has none. The timestep is the longest of
-        2 ms and less at which every drive is stable.
+        2 ms and less at which every drive is stable; ``solref`` of contacts is twice as long.
 
         Args:
             path: Where to save; must end in ``.xml``. The folder beside it is replaced if it

@@ -13,7 +13,7 @@ import numpy as np
 
 from kinematics.rotations import Floats
 from robots import AssetError, MissingPackageError
-from robots.urdf.mesh_files import load_scene
+from robots.urdf.mesh_files import expect_near, load_scene
 from robots.urdf.numbers import numbers_of
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model
@@ -25,6 +25,7 @@ Rgba = tuple[float, float, float, float]  # 0 … 1
 GREY: Rgba = (0.7, 0.7, 0.7, 1.0)
 SIDES = 48  # of the polygon that stands for a circle
 MANY_TRIANGLES = 60_000  # of one mesh; with more it is drawn coarser
+MOST_TRIANGLES = 200_000  # of one mesh; MuJoCo reads no more
 FEW_TRIANGLES = 500  # of one mesh; with more its hull is drawn in quick pictures
 COARSE_CELLS = 40  # along the longest side of such a mesh
 CELLS = 300  # along the longest side of a mesh that is drawn coarser
@@ -50,7 +51,8 @@ def read_visuals(urdf: Path) -> dict[str, tuple[Part, ...]]:
         urdf: A URDF with its visual meshes beside it, as ``locate(pictures=True)`` returns it.
 
     Raises:
-        AssetError: If a mesh is missing or cannot be read, or a shape is unknown.
+        AssetError: If a mesh is missing or cannot be read or is as large as no robot, or a shape
+            is unknown.
         MissingPackageError: If trimesh is not installed.
     """
     require_trimesh("drawing a robot")
@@ -100,22 +102,29 @@ def coloured(mesh: Any, rgba: Rgba) -> Part:
     return Part(mesh, rgba)
 
 
-def simplified(part: Part) -> Part:
+def simplified(part: Part, cells: int = CELLS) -> Part:
     """Return a part whose corners lie on a fine grid, if it has very many triangles.
 
-    Corners move by less than 1/300 of the mesh's longest side.
+    Corners move by less than 1/300 of the mesh's longest side; by more only if more than
+    `MOST_TRIANGLES` would be left.
+
+    Args:
+        part: The part.
+        cells: Of the grid, along the mesh's longest side.
     """
     import trimesh
 
     mesh = part.mesh
     if len(mesh.faces) <= MANY_TRIANGLES:
         return part
-    cell = float(np.ptp(mesh.vertices, axis=0).max()) / CELLS
+    cell = float(np.ptp(mesh.vertices, axis=0).max()) / cells
     places, corner = np.unique(np.round(mesh.vertices / cell), axis=0, return_inverse=True)
     faces = corner.reshape(-1)[mesh.faces]
     distinct = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
     _, first = np.unique(np.sort(faces[distinct], axis=1), axis=0, return_index=True)
     faces = faces[distinct][np.sort(first)]
+    if len(faces) > MOST_TRIANGLES:
+        return simplified(part, cells // 2)
     return coloured(trimesh.Trimesh(places * cell, faces, process=False), part.rgba)
 
 
@@ -187,6 +196,7 @@ def _mesh_parts(shape: UrdfShape, urdf: Path, pose: Floats, rgba: Rgba | None) -
     path = resolve(shape.file, urdf.as_posix(), os.path.isfile)
     for mesh in load_meshes(path, shape.where, urdf.as_posix()):
         mesh.apply_transform(pose)
+        expect_near(mesh.vertices, path, shape.where)
         own = _own_colour(mesh)
         yield coloured(mesh, rgba or GREY) if own is None else Part(mesh, own)
 

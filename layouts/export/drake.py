@@ -41,13 +41,16 @@ def write_drake(layout: Arrangement, path: str | os.PathLike[str], *, visuals: b
         )
     require_trimesh("meshes that Drake can read")
     folder = target.absolute().with_name(target.name.removesuffix(ENDING) + "_robots")
-    models = _write_models([placement.robot for placement in layout.values()], folder, visuals)
-    directives = [
-        directive
-        for place, placement in layout.items()
-        for directive in _directives(place, placement, models[placement.robot])
-    ]
-    write_whole(target, yaml.dump({"directives": directives}, Dumper=_Dumper, sort_keys=False))
+    with replaced_folder(folder, _is_own, "save the directives under another name") as made:
+        files = _write_models([placement.robot for placement in layout.values()], made, visuals)
+        directives = [
+            directive
+            for place, placement in layout.items()
+            for file in [files[placement.robot]]
+            for directive in _directives(place, placement, folder / file, base_link(made / file))
+        ]
+        text = yaml.dump({"directives": directives}, Dumper=_Dumper, sort_keys=False)
+        write_whole(target, text)
     return target
 
 
@@ -62,7 +65,9 @@ class _Dumper(yaml.SafeDumper):
 _Dumper.add_representer(_Rpy, lambda dumper, rotation: dumper.represent_mapping("!Rpy", rotation))
 
 
-def _directives(place: str, placement: Placement, urdf: Path) -> Iterator[dict[str, Any]]:
+def _directives(
+    place: str, placement: Placement, urdf: Path, base: str
+) -> Iterator[dict[str, Any]]:
     robot = placement.robot
     start = zip(robot.joints, placement.start_qpos, strict=True)
     yield {
@@ -76,7 +81,7 @@ def _directives(place: str, placement: Placement, urdf: Path) -> Iterator[dict[s
     yield {
         "add_weld": {
             "parent": "world",
-            "child": f"{place}::{base_link(urdf)}",
+            "child": f"{place}::{base}",
             "X_PC": {
                 "translation": list(placement.base_position),
                 "rotation": _Rpy(deg=turn),
@@ -88,15 +93,16 @@ def _directives(place: str, placement: Placement, urdf: Path) -> Iterator[dict[s
 def _write_models(
     robots: Sequence[RobotDescriptor], folder: Path, visuals: bool
 ) -> dict[RobotDescriptor, Path]:
-    """Write each robot once into a folder, which takes its place whole, and return the URDFs."""
+    """Write each robot once into a folder, and return where in it the URDFs are."""
     given = Names()
-    names = {robot: given.new(robot.name) for robot in dict.fromkeys(robots)}
-    with replaced_folder(folder, _is_own, "save the directives under another name") as made:
-        for robot, name in names.items():
-            urdf = robot.urdf.locate(pictures=visuals)
-            drawn = read_visuals(urdf) if visuals else {}
-            _write_model(urdf, drawn, made / name, f"{name}.urdf")
-    return {robot: folder / name / f"{name}.urdf" for robot, name in names.items()}
+    files: dict[RobotDescriptor, Path] = {}
+    for robot in dict.fromkeys(robots):
+        name = given.new(robot.name)
+        urdf = robot.urdf.locate(pictures=visuals)
+        drawn = read_visuals(urdf) if visuals else {}
+        _write_model(urdf, drawn, folder / name, f"{name}.urdf")
+        files[robot] = Path(name, f"{name}.urdf")
+    return files
 
 
 def _is_own(found: Path) -> bool:

@@ -18,6 +18,7 @@ from robots.bodies.hulls import shape_corners
 from robots.urdf.shapes import SIZES, UrdfShape
 
 AS_HULLS = ("mesh", "capsule")  # of which most formats' own shapes are not what they are here
+LEAST_AREA = 1e-12  # m²; of a mesh that is drawn: with less, nobody sees it
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +51,8 @@ class Solid:
 def drawn_meshes(source: RobotSource, *, visuals: bool) -> dict[str, tuple[Drawn, ...]]:
     """Return what is drawn of each link; meshes of very many triangles are made coarser.
 
+    Meshes without an area are left out.
+
     Args:
         source: The robot.
         visuals: Whether anything is to be drawn.
@@ -65,7 +68,16 @@ def drawn_meshes(source: RobotSource, *, visuals: bool) -> dict[str, tuple[Drawn
         return {link: tuple(Drawn(s.hull, GREY) for s in some) for link, some in solids.items()}
     parts = read_visuals(source.urdf)
     coarse = {link: map(simplified, of_link) for link, of_link in parts.items()}
-    return {link: tuple(Drawn(p.mesh, p.rgba) for p in some) for link, some in coarse.items()}
+    return {
+        link: tuple(Drawn(p.mesh, p.rgba) for p in some if _area(p.mesh) > LEAST_AREA)
+        for link, some in coarse.items()
+    }
+
+
+def _area(mesh: Any) -> float:
+    """Return the area (m²) of a trimesh as single precision has it, in which it is saved."""
+    one, other, last = np.moveaxis(np.asarray(mesh.triangles, np.float32), 1, 0)
+    return float(np.linalg.norm(np.cross(other - one, last - one), axis=1).sum() / 2)
 
 
 def solid_shapes(

@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
@@ -27,7 +27,10 @@ if TYPE_CHECKING:
 
 HOME = "home"
 TIMESTEPS = (0.002, 0.001, 0.0005, 0.0002, 0.0001)  # s; the first at which all drives are stable
+TIED = "0.99 0.99 0.001"  # impedance of what ties a joint to the one that it follows
 HULLS = ("mesh",)  # all other shapes of a URDF are MuJoCo's, too
+FEWEST_CORNERS = 4  # of a mesh that MuJoCo reads
+LEAST_VOLUME = 1e-14  # m³; of a mesh that MuJoCo takes for a body
 DRAWN, SOLID = "drawn", "solid"  # default classes
 SOLID_RGBA = (0.5, 0.6, 0.7, 0.5)
 # MuJoCo's own are a black sky and a dim light.
@@ -53,8 +56,7 @@ def write_mjcf(layout: Arrangement, path: str | os.PathLike[str], *, visuals: bo
         model = _Model(cell, target.stem, folder.name)
         for source in cell.sources:
             model.add_meshes(source, made / source.name, visuals=visuals)
-        text = model.text()
-    write_whole(target, text)
+        write_whole(target, model.text())
     return target
 
 
@@ -70,10 +72,13 @@ class _Model:
     def __init__(self, cell: ExportedCell, name: str, meshes: str) -> None:
         self._cell, self._shapes = cell, dict[int, Mapping[str, list[dict[str, str]]]]()
         self._root = Element("mujoco", model=name)
+        self._timestep = _timestep(cell.sources)
+        # MuJoCo's own 20 ms is so soft that what is light and held sinks into fingers.
+        self._stiff = _text([2 * self._timestep, 1.0])
         compiler = {"angle": "radian", "autolimits": "true", "balanceinertia": "true"}
         SubElement(self._root, "compiler", compiler, meshdir=meshes)
         option = SubElement(
-            self._root, "option", timestep=repr(_timestep(cell.sources)), integrator="implicitfast"
+            self._root, "option", timestep=repr(self._timestep), integrator="implicitfast"
         )
         # Which links may touch is said pair by pair, below.
         SubElement(option, "flag", filterparent="disable")
@@ -91,7 +96,7 @@ class _Model:
         geoms: dict[str, list[dict[str, str]]] = {link: [] for link in source.model.links}
         for link, drawn in drawn_meshes(source, visuals=visuals).items():
             for mesh in drawn:
-                file = files.save(mesh.mesh, f"{link}_visual")
+                file = files.save(_with_corners(mesh.mesh), f"{link}_visual")
                 name = self._add_mesh(f"{source.name}/{file}", "shell")
                 geoms[link].append(_drawn(mesh, name))
         for link, solids in solid_shapes(source, HULLS).items():
@@ -99,7 +104,8 @@ class _Model:
                 name = ""
                 if solid.hull is not None:
                     file = files.save(solid.hull, f"{link}_collision")
-                    name = self._add_mesh(f"{source.name}/{file}", "convex")
+                    inertia = "convex" if solid.hull.volume > LEAST_VOLUME else "shell"
+                    name = self._add_mesh(f"{source.name}/{file}", inertia)
                 geoms[link].append(_solid(solid, name, source.friction_of(link)))
         self._shapes[id(source)] = geoms
 
@@ -119,6 +125,7 @@ class _Model:
 
     def _add_defaults(self) -> None:
         defaults = SubElement(self._root, "default")
+        SubElement(defaults, "geom", solref=self._stiff)
         drawn = SubElement(defaults, "default", {"class": DRAWN})
         SubElement(drawn, "geom", type="mesh", contype="0", conaffinity="0", group="2", mass="0")
         solid = SubElement(defaults, "default", {"class": SOLID})
@@ -160,7 +167,8 @@ class _Model:
         if link in source.inertials:
             SubElement(body, "inertial", _inertial(source.inertials[link]))
         if joint is not None and joint.moves:
-            SubElement(body, "joint", _joint(joint, source), name=f"{place}/{joint.name}")
+            numbers = _joint(joint, source, self._timestep)
+            SubElement(body, "joint", numbers, name=f"{place}/{joint.name}")
             self._qpos.append(standing.home[joint.name])
         for geom in self._shapes[id(source)][link]:
             SubElement(body, "geom", geom)
@@ -178,14 +186,14 @@ class _Model:
             for joint in standing.source.followers:
                 ends = {"joint1": f"{place}/{joint.name}", "joint2": f"{place}/{joint.mimics}"}
                 law = _text([joint.offset, joint.multiplier, 0.0, 0.0, 0.0])
-                SubElement(equality, "joint", ends, polycoef=law)
+                SubElement(equality, "joint", ends, polycoef=law, solref=self._stiff, solimp=TIED)
 
     def _add_actuators(self) -> None:
         actuators = SubElement(self._root, "actuator")
         for place, standing in self._cell.robots.items():
             limits = {joint.name: joint for joint in standing.source.model.moving}
-            for name in standing.source.leaders:
-                drive, joint = standing.source.drives[name], limits[name]
+            for name, drive in standing.source.drives.items():
+                joint = limits[name]
                 strong = drive.force > 0
                 numbers = {
                     "kp": repr(drive.stiffness if strong else 0.0),
@@ -202,7 +210,7 @@ class _Model:
         return [
             standing.home[joint]
             for standing in self._cell.robots.values()
-            for joint in standing.source.leaders
+            for joint in standing.source.drives
         ]
 
 
@@ -218,15 +226,22 @@ def _timestep(sources: Iterable[RobotSource]) -> float:
 
 def _stable_steps(source: RobotSource) -> Iterator[float]:
     yield TIMESTEPS[0]
-    children = {joint.name: joint.child for joint in source.model.moving}
-    for joint in source.leaders:
-        drive, moved = source.drives[joint], source.model.rigid_with(children[joint])
-        own = (source.inertials[link].tensor for link in moved if link in source.inertials)
-        least = sum(max(0.0, float(np.linalg.eigvalsh(tensor)[0])) for tensor in own)
-        inertia = drive.armature + least
-        if drive.stiffness > 0 and drive.force > 0:
+    for joint in source.model.moving:
+        drive = source.drives.get(joint.name)
+        if drive is not None and drive.stiffness > 0 and drive.force > 0:
+            inertia = drive.armature + _least_inertia(joint, source)
             root = math.sqrt(drive.damping**2 + 2 * drive.stiffness * inertia)
             yield (drive.damping + root) / drive.stiffness
+
+
+def _with_corners(mesh: Any) -> Any:
+    """Return a trimesh that looks the same and has as many corners as MuJoCo wants."""
+    corners = np.asarray(mesh.triangles, np.float32)
+    few = all(
+        len(np.unique(some.reshape(-1, 3), axis=0)) < FEWEST_CORNERS
+        for some in (corners[:FEWEST_CORNERS], corners)  # most meshes show it at once
+    )
+    return mesh.subdivide() if few else mesh
 
 
 def _drawn(drawn: Drawn, mesh: str) -> dict[str, str]:
@@ -256,7 +271,7 @@ def _shape(solid: Solid, mesh: str) -> dict[str, str]:
     return {"type": shape.kind, "size": _text(size), **_pose(shape.origin)}
 
 
-def _joint(joint: ModelJoint, source: RobotSource) -> dict[str, str]:
+def _joint(joint: ModelJoint, source: RobotSource, timestep: float) -> dict[str, str]:
     found = {
         "type": "slide" if joint.type == "prismatic" else "hinge",
         "axis": _text(joint.axis),
@@ -264,13 +279,36 @@ def _joint(joint: ModelJoint, source: RobotSource) -> dict[str, str]:
     if joint.lower is not None and joint.upper is not None:
         found["range"] = _text([joint.lower, joint.upper])
     damping, friction = source.dynamics.get(joint.name, (0.0, 0.0))
-    drive = source.drives.get(joint.name)
     numbers = {
         "damping": damping,
         "frictionloss": friction,
-        "armature": drive.armature if drive else 0.0,
+        "armature": _armature(joint, source, timestep),
     }
     return {**found, **{key: repr(value) for key, value in numbers.items() if value}}
+
+
+def _armature(joint: ModelJoint, source: RobotSource, timestep: float) -> float:
+    """Return the armature of a joint: its own, or what it takes for its drive to be stable.
+
+    A drive's force is clamp(stiffness · way - damping · speed). MuJoCo takes the damper implicitly,
+    but explicitly while the force is clamped; what weighs less than damping · timestep is then
+    thrown beyond the speed at which the damper would hold it.
+    """
+    drive = source.drives.get(joint.name)
+    if drive is None:
+        return 0.0
+    if not drive.force > 0:
+        return drive.armature
+    return max(drive.armature, drive.damping * timestep - _least_inertia(joint, source))
+
+
+def _least_inertia(joint: ModelJoint, source: RobotSource) -> float:
+    """Return the least inertia that the links rigid with a joint's child can have (kg·m², kg)."""
+    moved = source.model.rigid_with(joint.child)
+    own = [source.inertials[link] for link in moved if link in source.inertials]
+    if joint.type == "prismatic":
+        return sum(inertial.mass for inertial in own)
+    return sum(max(0.0, float(np.linalg.eigvalsh(inertial.tensor)[0])) for inertial in own)
 
 
 def _inertial(inertial: Inertial) -> dict[str, str]:

@@ -109,18 +109,34 @@ def read_corners(path: str, scale: Sequence[float], where: str, urdf: str) -> Fl
         raise AssetError(f"{where}: cannot read the mesh {path}: {_line(error)}") from error
     if len(corners) == 0 or len(mesh.faces) == 0:
         raise AssetError(f"{where}: the mesh {path} is empty")
-    farthest = float(np.abs(corners).max())
-    if not farthest <= LARGEST:
-        raise AssetError(
-            f"{where}: the mesh {path} has corners {farthest:.3g} m away; robots end at"
-            f" {LARGEST:g} m (are its lengths in other units? then give it a scale)"
-        )
+    expect_near(corners, path, where)
     if not has_volume(corners):
         raise _NoVolumeError(
             f"{where}: the mesh {path} is a collision shape without a volume: all its corners lie"
             " in one plane"
         )
     return corners
+
+
+def expect_near(corners: Floats, path: str, where: str) -> None:
+    """Refuse corners of a mesh that are no robot's, such as those of other units.
+
+    Args:
+        corners: (n, 3) (m).
+        path: The mesh's file.
+        where: What refers to it, for messages.
+
+    Raises:
+        AssetError: If any is more than `LARGEST` away, or not finite.
+    """
+    import numpy as np
+
+    farthest = float(np.abs(corners).max(initial=0.0))
+    if not farthest <= LARGEST:
+        raise AssetError(
+            f"{where}: the mesh {path} has corners {farthest:.3g} m away; robots end at"
+            f" {LARGEST:g} m (are its lengths in other units? then give it a scale)"
+        )
 
 
 def has_body(path: str, scale: Sequence[float], where: str, urdf: str) -> bool:

@@ -17,7 +17,7 @@ from stable_baselines3.common.vec_env.base_vec_env import (
     VecEnvObs,
 )
 
-from robots import TaskError
+from robots import SimulationError, TaskError
 from tasks.engine.arguments import RECONFIGURE, own_options
 from tasks.engine.remade import Remade
 from tasks.fronts.attributes import UnknownAttributeError
@@ -112,9 +112,13 @@ class SB3Task(Remade, VecEnv):
 
         Raises:
             ActionError: If the action has a wrong shape, type or number; nothing moves then.
+            SimulationError: If `step_async` has given no actions since the last step.
             WorkerError: If workers die, hang or fail.
         """
-        obs, reward, terminated, truncated, info = self.vector.step(self._actions)
+        if self._actions is None:
+            raise SimulationError("step_wait() has no actions; give them to step_async() before it")
+        actions, self._actions = self._actions, None
+        obs, reward, terminated, truncated, info = self.vector.step(actions)
         self._returns += reward
         done = terminated | truncated
         infos = _rows(info, self.num_envs)

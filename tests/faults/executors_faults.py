@@ -28,6 +28,7 @@ def _deaths() -> Iterator[Fault]:
     for name in ("SIGKILL", "SIGTERM", "SIGSEGV", "SIGABRT", "SIGSTOP"):
         run = functools.partial(_plays_again, f"signal {name}")
         yield Fault(AREA, f"an episode gets {name}", run, GOES_ON)
+    yield Fault(AREA, "an episode is stopped for a while", _naps, GOES_ON)
     for what in ("exit 0", "exit 3", "busy", "lock", "sleep", "fifo", "half an answer"):
         run = functools.partial(_plays_again, what)
         yield Fault(AREA, f"an episode's end: {what}", run, GOES_ON)
@@ -46,6 +47,12 @@ def _plays_again(what: str, folder: Path, during: str = "play") -> str:
 
     executor = ProcessExecutor(1, episode_timeout=1.0)
     return expect_squares(executor, Mischief(folder, what, during))
+
+
+def _naps(folder: Path) -> str:
+    from rollouts.playing.executor import ProcessExecutor
+
+    return expect_squares(ProcessExecutor(1), Mischief(folder, "nap", "play"), deaths=0)
 
 
 def _gives_up(what: str, folder: Path, during: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -118,6 +119,13 @@ def _do(what: str, folder: Path) -> None:
     kind, _, detail = what.partition(" ")
     if kind == "signal":
         os.kill(os.getpid(), getattr(signal, detail))
+    elif kind == "nap":
+        pid = os.getpid()
+        if os.fork() == 0:
+            time.sleep(0.5)
+            os.kill(pid, signal.SIGCONT)
+            os._exit(0)
+        os.kill(pid, signal.SIGSTOP)
     elif kind == "exit":
         os._exit(int(detail))
     elif kind == "busy":
@@ -145,4 +153,4 @@ def expect_squares(executor: Any, prepare: Any, deaths: int = 1) -> str:
     assert sorted(results) == [(seed, seed**2) for seed in range(4)], results
     died = [event.died for event in events if event.died is not None]
     assert len(died) == deaths, died
-    return f"{died[0]}; all four episodes are played, each once"
+    return f"{died[0] if died else 'nobody dies'}; all four episodes are played, each once"

@@ -4,16 +4,18 @@ from dataclasses import replace
 from itertools import combinations
 from xml.etree import ElementTree
 
+import mujoco
 import numpy as np
 import pytest
+import trimesh
 
 from kinematics.rotations import pose_matrix
 from layouts import Layout, Placement, ceiling, single, table
 from layouts.export.cell import ExportedCell
 from layouts.export.mjcf import TIMESTEPS
-from robots import AssetError, CameraMount, LayoutError
+from robots import AssetError, CameraMount, LayoutError, RobotDescriptor
 from robots.bodies.hulls import load_model
-from tests.layouts.travelling import link_poses, outside
+from tests.layouts.travelling import OUTSIDE, link_poses, outside
 
 # Numbers that MuJoCo needs are exact to the last bit when read back.
 EXACT = 1e-12  # m
@@ -105,9 +107,9 @@ def test_drives_limits_and_home_are_the_descriptors(cell, model):
     actuators = {element.get("name"): element for element in model.find("actuator")}
     home = model.find("keyframe/key")
     standing = ExportedCell.read(cell, visuals=False).robots
-    leaders = [f"{n}/{joint}" for n, robot in standing.items() for joint in robot.source.leaders]
-    assert list(actuators) == leaders
-    assert "hung/close_2" not in actuators  # it follows another joint
+    driven = [f"{n}/{joint}" for n, placement in cell.items() for joint in placement.robot.joints]
+    assert list(actuators) == driven
+    assert "hung/close_2" in actuators  # though it follows another joint
     group = cell["up"].robot.action_split.groups["arm"]
     for joint, (stiffness, damping, force) in zip(group.joints, group.drives, strict=True):
         own = actuators[f"up/{joint}"]
@@ -115,9 +117,10 @@ def test_drives_limits_and_home_are_the_descriptors(cell, model):
         assert numbers(own.get("forcerange")) == [-force, force]
     order = [joint.get("name") for joint in model.find("worldbody").iter("joint")]
     qpos = dict(zip(order, numbers(home.get("qpos")), strict=True))
+    standing = ExportedCell.read(cell, visuals=False).robots
     expected = {f"{n}/{joint}": x for n, r in standing.items() for joint, x in r.home.items()}
     assert qpos == expected
-    assert numbers(home.get("ctrl")) == [expected[joint] for joint in leaders]
+    assert numbers(home.get("ctrl")) == [expected[joint] for joint in driven]
 
 
 def test_followers_are_tied_to_what_they_follow(model):
@@ -125,6 +128,22 @@ def test_followers_are_tied_to_what_they_follow(model):
     assert ties.keys() == {"hung/close_2", "hung/close_3"}
     assert ties["hung/close_2"].get("joint2") == "hung/close_3"
     assert numbers(ties["hung/close_2"].get("polycoef")) == [0.1, 2.0, 0.0, 0.0, 0.0]
+
+
+def test_contacts_and_ties_are_as_stiff_as_the_timestep_allows(model):
+    stiff = [2 * float(model.find("option").get("timestep")), 1.0]
+    assert numbers(model.find("default/geom").get("solref")) == stiff
+    assert all(numbers(tie.get("solref")) == stiff for tie in model.find("equality"))
+
+
+def test_joints_weigh_enough_for_their_dampers(cell, model):
+    """The damper of a drive at its force limit acts once a step, so that it must not overshoot."""
+    timestep = float(model.find("option").get("timestep"))
+    joints = {joint.get("name"): joint for joint in model.find("worldbody").iter("joint")}
+    group = cell["up"].robot.action_split.groups["arm"]
+    for joint, (_, damping, _) in zip(group.joints, group.drives, strict=True):
+        armature = float(joints[f"up/{joint}"].get("armature"))
+        assert 0.9 * damping * timestep < armature <= damping * timestep  # light links add the rest
 
 
 def test_what_a_urdf_says_of_joints_is_kept(model):
@@ -162,12 +181,61 @@ def test_masses_are_those_of_the_urdf(model):
 def test_the_timestep_is_one_at_which_drives_are_stable(tmp_path):
     soft = outside(tmp_path)
     name, group = next(iter(soft.action_split.groups.items()))
-    hard = replace(group, stiffness=1e6, damping=1.0, armature=0.0)
+    hard = replace(group, stiffness=1e7, damping=1.0, armature=0.0)
     stiff = soft.action_split.replace(**{name: hard})
-    for robot, step in ((soft, TIMESTEPS[0]), (replace(soft, action_split=stiff), 0.0001)):
+    for robot, step in ((soft, TIMESTEPS[0]), (replace(soft, action_split=stiff), 0.0002)):
         path = single({"arm": robot}).to_mjcf(tmp_path / "arm.xml")
         option = ElementTree.parse(path).getroot().find("option")
         assert float(option.get("timestep")) == step
+
+
+# Corners and faces of meshes that are little more than nothing, and whether they are drawn.
+ODD_MESHES = {
+    "a triangle": ([(0, 0, 0), (0.1, 0, 0), (0, 0.1, 0)], [(0, 1, 2)], True),
+    "a triangle with two sides": (
+        [(0, 0, 0), (0.1, 0, 0), (0, 0.1, 0)],
+        [(0, 1, 2), (2, 1, 0)],
+        True,
+    ),
+    "flat": ([(0, 0, 0), (0.1, 0, 0), (0, 0.1, 0), (0.1, 0.1, 0)], [(0, 1, 2), (1, 3, 2)], True),
+    "a line": ([(0, 0, 0), (0.1, 0, 0), (0.2, 0, 0)], [(0, 1, 2)], False),
+    "a point": ([(1, 1, 1)] * 4, [(0, 1, 2), (1, 2, 3)], False),
+    "of no size once it is saved": (
+        [(500, 500, 500), (500.00001, 500, 500), (500, 500.00001, 500)],
+        [(0, 1, 2)],
+        False,
+    ),
+    "a body of 10 µm": (
+        [(0, 0, 0), (1e-5, 0, 0), (0, 1e-5, 0), (0, 0, 1e-5)],
+        [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)],
+        True,
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", ["visual", "collision"])
+@pytest.mark.parametrize("what", ODD_MESHES)
+def test_mujoco_reads_what_comes_of_odd_meshes(what, kind, tmp_path):
+    corners, faces, drawn = ODD_MESHES[what]
+    trimesh.Trimesh(corners, faces, process=False).export(tmp_path / "odd.obj")
+    odd, box = '<mesh filename="odd.obj"/>', '<box size="0.1 0.1 0.1"/>'
+    shapes = {"visual": box, "collision": box, kind: odd}
+    path = tmp_path / "odd.urdf"
+    path.write_text(
+        OUTSIDE.replace(
+            "</robot>",
+            '<link name="odd">'
+            + "".join(f"<{k}><geometry>{s}</geometry></{k}>" for k, s in shapes.items())
+            + '</link><joint name="odd" type="fixed"><parent link="tip"/><child link="odd"/>'
+            "</joint></robot>",
+        )
+    )
+    robot = RobotDescriptor.from_urdf(path, quiet=True)
+    model = mujoco.MjModel.from_xml_path(str(single({"arm": robot}).to_mjcf(tmp_path / "cell.xml")))
+    odd = model.body("arm/odd").id
+    geoms = (model.geom_group[model.geom_bodyid == odd]).tolist()
+    solid = kind == "visual" or what == "a body of 10 µm"
+    assert geoms == [2] * (drawn or kind == "collision") + [3] * solid
 
 
 def test_nothing_is_half_done(tmp_path, monkeypatch):

@@ -8,6 +8,7 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
+import trimesh
 
 from layouts import side_by_side, single
 from layouts.__main__ import main
@@ -16,7 +17,7 @@ from layouts.viewer.cell import Contact
 from layouts.viewer.page import Page, contacts_text
 from layouts.viewer.saved import NO_SLIDERS, save_html
 from layouts.viewer.server import serving
-from layouts.visuals import coloured, read_visuals
+from layouts.visuals import MOST_TRIANGLES, coloured, read_visuals, simplified
 from measurements.browser import served
 from robots import LayoutError, MissingPackageError, RobotRegistry
 from tests.layouts.cells import link_poses, mixed_cell, random_positions
@@ -28,8 +29,6 @@ def make_cell(moments: int = 0) -> Cell:
     layout = single({"arm": "so100"})
     if not moments:
         return Cell("arm", layout)
-    import trimesh
-
     start = np.array(layout["arm"].start_qpos)
     ball = Thing((coloured(trimesh.creation.icosphere(), (1, 0, 0, 1)),), np.eye(7)[3])
     poses = np.tile(np.eye(7)[3], (moments, 1))
@@ -225,6 +224,20 @@ def test_visuals_have_the_colours_of_their_files():
     panda = read_visuals(RobotRegistry.load("panda").urdf.locate(pictures=True))
     assert len({part.rgba for parts in panda.values() for part in parts}) > 1
     assert len(panda["panda_hand"]) == 2
+
+
+def test_no_mesh_is_drawn_of_more_triangles_than_other_programs_read():
+    side = 200  # corners of a sheet, of which there are three
+    grid = np.stack(np.meshgrid(*[np.arange(side) / side] * 2, np.arange(3) / 3), -1).reshape(-1, 3)
+    corner = np.arange(len(grid)).reshape(side, side, 3)
+    one, two, three, four = (
+        part.ravel()
+        for part in (corner[1:, 1:], corner[1:, :-1], corner[:-1, 1:], corner[:-1, :-1])
+    )
+    faces = np.concatenate([np.stack([one, two, three], 1), np.stack([two, three, four], 1)])
+    fine = coloured(trimesh.Trimesh(grid, faces, process=False), (1.0, 0.0, 0.0, 1.0))
+    assert len(faces) > MOST_TRIANGLES
+    assert 10_000 < len(simplified(fine).mesh.faces) <= MOST_TRIANGLES
 
 
 def test_a_robot_without_visual_meshes_is_shown_by_its_collision_shapes(capsys, tmp_path):

@@ -9,7 +9,13 @@ import pytest
 
 import tasks
 from experts import find_expert
-from robots import ActionError, MissingPackageError, TaskError, UnknownNameError
+from robots import (
+    ActionError,
+    MissingPackageError,
+    SimulationError,
+    TaskError,
+    UnknownNameError,
+)
 from simulation.rendering.pictures import vulkan_problem
 
 pytest.importorskip("stable_baselines3")
@@ -247,6 +253,8 @@ def test_wrong_arguments():
     env.reset()
     with pytest.raises(ActionError, match=r"must be \(3, 8\)"):
         env.step(np.zeros((2, 8), np.float32))
+    with pytest.raises(SimulationError, match="give them to step_async"):
+        env.step_wait()
     with pytest.raises(UnknownNameError, match="Did you mean 'obs_mode'"):
         make(obs_mod="state")
     with pytest.raises(TaskError, match="takes no autoreset_mode"):
