@@ -3,9 +3,9 @@
 Neighbours stand `HAND_OVER` of the sum of their reaches apart: the last eighth of that sum is where
 both can work, so one can hand an object to the other. They never stand so near that one can reach
 the other's base; where one reaches less than half as far as the other, hardly farther than that, as
-the reach of a tall robot shrinks towards the height at which a small one works. Robots of the
-catalogue, however mixed, keep clear of each other so. Where a robot is of elsewhere, presets also
-look at its bodies, and stand all robots so much farther apart (``more``) that none collide.
+the reach of a tall robot shrinks towards the height at which a small one works. Arms of the
+catalogue, however mixed, keep clear of each other so. Where there are others, presets also look at
+their bodies, and stand all robots so much farther apart (``more``) that none collide.
 """
 
 from __future__ import annotations

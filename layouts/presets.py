@@ -5,7 +5,7 @@ whose own front is not its base's +x faces like the others.
 
 A distance given as ``"auto"`` comes from the robots' reach; see `layouts.distances`. Where it has
 to serve several pairs of neighbours, it is that of the pair that asks for the most. Where a robot
-is not of the catalogue, the layout is also checked as by `Layout.validate`, which reads the robots'
+is no arm of the catalogue, the layout is also checked as by `Layout.validate`, which reads their
 files, and stood so much farther apart that no robots collide; if one collides with itself, that is
 an error. At a table of a given size nobody is moved: a task or `Layout.validate` checks it. Without
 python-fcl there is no such check, and the distance comes from reach alone.
@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 Distance = float | Literal["auto"]  # m
 
 FARTHEST = 3.0  # m; as much farther apart than by their reach robots stand at most
+
+ARM = 0.3  # m; what reaches less is a hand
 
 EDGE = 0.1  # from a table's edge to a base's middle (m); native's single Pandas have 0.11 m
 
@@ -316,7 +318,7 @@ def _placed(
 def _clear(robots: Mapping[str, RobotDescriptor], placed: Callable[[float], Layout]) -> Layout:
     """Return a layout in which no robots collide, at the distances of reach if that suffices.
 
-    Robots of the catalogue are not checked: their distances of reach suffice, as tests show.
+    Arms of the catalogue are not checked: their distances of reach suffice, as tests show.
 
     Args:
         robots: Robot by name.
@@ -326,7 +328,7 @@ def _clear(robots: Mapping[str, RobotDescriptor], placed: Callable[[float], Layo
         LayoutError: If there is none; says why.
     """
     layout, more = placed(0.0), 0.0
-    if all(map(_is_of_the_catalogue, robots.values())):
+    if all(map(_is_known, robots.values())):
         return layout
     try:
         while found := _problems(layout, "collision"):
@@ -346,8 +348,10 @@ def _problems(layout: Layout, *kinds: str, samples: int = 20) -> list[Finding]:
     return [finding for finding in report.findings if finding.serious and finding.kind in kinds]
 
 
-def _is_of_the_catalogue(robot: RobotDescriptor) -> bool:
-    return robot.name in ROBOTS and RobotRegistry.load(robot.name) == robot
+def _is_known(robot: RobotDescriptor) -> bool:
+    """Tell whether a robot is an arm of the catalogue; hands are as wide as they reach."""
+    known = robot.name in ROBOTS and RobotRegistry.load(robot.name) == robot
+    return known and robot.reach >= ARM
 
 
 def _is_auto(distance: object) -> TypeGuard[Literal["auto"]]:

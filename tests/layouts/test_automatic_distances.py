@@ -137,3 +137,8 @@ def test_without_fcl_the_distance_is_that_of_reach(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "fcl", None)
     reach = apart(robots["left"], RobotRegistry.load("panda"))
     assert side_by_side(robots, spacing="auto") == side_by_side(robots, spacing=reach)
+
+
+def test_hands_that_met_stand_clear():
+    two = {"a": "allegro_hand_right", "b": "allegro_hand_left"}
+    assert side_by_side(two, spacing="auto").validate(workspaces=False).ok
