@@ -15,7 +15,7 @@ from tests import three_links
 from tests.layouts.small_robots import robot
 from tests.motion.random_scenes import MISSED, missed
 
-GRAZING = (13, 14, 45, 69, 82, 135, 139, 147, 149, 198)  # looks at the knots' ends miss these
+GRAZING = (13, 14, 69, 82, 135, 139, 149)  # whoever looks at the ends of pieces alone misses these
 
 
 def out_and_back(seconds=2.0, speed=1.5):
@@ -59,7 +59,7 @@ def standing_past(cart):
 
 def through_the_base():
     ends = np.tile(np.eye(4), (2, 1, 1))
-    ends[:, :3, 3] = (-0.6, 0.0, 0.15), (0.6, 0.0, 0.15)
+    ends[:, :3, 3] = (-0.65, -0.6, 0.15), (-0.65, 0.6, 0.15)
     return box("cart", (0.2, 0.2, 0.2)).moved(Track(np.array([0.0, 2.0]), ends))
 
 
@@ -83,7 +83,7 @@ def turning_into_it():
     ids=["out and back", "a full turn", "a cart", "a bar that turns"],
 )
 def test_what_is_hit_between_two_knots_is_found(make, name, tmp_path):
-    certificate = make(tmp_path).certify()
+    certificate = make(tmp_path).certify(step=0.01, turn=0.1)
     assert not certificate.ok
     assert any(name in collision.names for collision in certificate.collisions)
 
