@@ -3,8 +3,9 @@
 Neighbours stand `HAND_OVER` of the sum of their reaches apart: the last eighth of that sum is where
 both can work, so one can hand an object to the other. They never stand so near that one can reach
 the other's base; where one reaches less than half as far as the other, hardly farther than that, as
-the reach of a tall robot shrinks towards the height at which a small one works. Robots of the
-catalogue, however mixed, keep clear of each other so.
+the reach of a tall robot shrinks towards the height at which a small one works. Arms of the
+catalogue, however mixed, keep clear of each other so. Where there are others, presets also look at
+their bodies, and stand all robots so much farther apart (``more``) that none collide.
 """
 
 from __future__ import annotations
@@ -33,9 +34,9 @@ def apart(one: RobotDescriptor, other: RobotDescriptor) -> float:
     return larger if smaller < UNEQUAL * larger else max(HAND_OVER * (smaller + larger), larger)
 
 
-def gaps(row: Iterable[RobotDescriptor]) -> list[float]:
-    """Return the hand-over distances (m) of neighbours in a row."""
-    return [apart(*pair) for pair in pairwise(row)]
+def gaps(row: Iterable[RobotDescriptor], more: float = 0.0) -> list[float]:
+    """Return the hand-over distances of neighbours in a row, and as much more each (m)."""
+    return [apart(*pair) + more for pair in pairwise(row)]
 
 
 def centred(gaps: Sequence[float]) -> list[float]:
@@ -43,15 +44,17 @@ def centred(gaps: Sequence[float]) -> list[float]:
     return list(accumulate(gaps, initial=-sum(gaps) / 2))
 
 
-def ring_of(robots: Sequence[RobotDescriptor]) -> tuple[float, list[float]]:
+def ring_of(robots: Sequence[RobotDescriptor], more: float) -> tuple[float, list[float]]:
     """Return the radius (m) and the angles (rad) that put neighbours at hand-over distance.
+
+    Or as much more (m) farther apart.
 
     The neighbours' distances are the sides of a polygon whose corners lie on the circle.
     """
     count = len(robots)
     if count == 1:
         return HAND_OVER * robots[0].reach, [0.0]
-    sides = gaps([*robots, robots[0]])
+    sides = gaps([*robots, robots[0]], more)
     longest = max(range(count), key=lambda i: sides[i])
     if sides[longest] - min(sides) < 1e-12:
         radius = sides[0] / (2 * math.sin(math.pi / count))
@@ -68,7 +71,7 @@ def share_at_table(rows: Rows) -> float:
     return ROUND_CORNERS if along_x and along_y else HAND_OVER
 
 
-def table_for(rows: Rows, inset: float) -> tuple[float, float]:
+def table_for(rows: Rows, inset: float, more: float) -> tuple[float, float]:
     """Return width and depth (m) of a table with robots at its edges.
 
     One robot at an edge works in the middle. Of several, the outer ones stand as far from the
@@ -77,15 +80,16 @@ def table_for(rows: Rows, inset: float) -> tuple[float, float]:
     Args:
         rows: The robots of each edge.
         inset: Of their bases from the edge (m).
+        more: How much farther apart they stand than by their reach (m).
     """
     farthest = max(robot.reach for row in rows.values() for robot in row)
     alone = share_at_table(rows) * farthest
 
     def length(edge: str) -> float:
-        span = sum(gaps(rows[edge]))
+        span = sum(gaps(rows[edge], more))
         return span + 2 * (farthest if span > 0 else alone)
 
-    width, depth = (max(map(length, pair)) + 2 * inset for pair in OPPOSITE)
+    width, depth = (max(map(length, pair)) + 2 * inset + more for pair in OPPOSITE)
     return width, depth
 
 

@@ -4,7 +4,11 @@ Every preset turns robots by where they reach out at home (`Placement.facing`), 
 whose own front is not its base's +x faces like the others.
 
 A distance given as ``"auto"`` comes from the robots' reach; see `layouts.distances`. Where it has
-to serve several pairs of neighbours, it is that of the pair that asks for the most.
+to serve several pairs of neighbours, it is that of the pair that asks for the most. Where a robot
+is no arm of the catalogue, the layout is also checked as by `Layout.validate`, which reads their
+files, and stood so much farther apart that no robots collide; if one collides with itself, that is
+an error. At a table of a given size nobody is moved: a task or `Layout.validate` checks it. Without
+python-fcl there is no such check, and the distance comes from reach alone.
 """
 
 from __future__ import annotations
@@ -13,7 +17,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from inspect import signature
 from itertools import pairwise
-from typing import Any, Literal, TypeGuard, cast
+from typing import TYPE_CHECKING, Any, Literal, TypeGuard, cast
 
 from kinematics.quaternions import yaw_quaternion
 from layouts.distances import apart, centred, gaps, ring_of, share_at_table, table_for
@@ -21,12 +25,27 @@ from layouts.frames import EDGES, check_positive
 from layouts.frames import table as table_frames
 from layouts.layout import Layout
 from layouts.placement import Placement, RobotLike, check_robots, faced, load_robot
-from robots import LayoutError, RobotDescriptor, UnknownNameError
+from robots import (
+    AssetError,
+    LayoutError,
+    MissingPackageError,
+    RobotDescriptor,
+    RobotRegistry,
+    UnknownNameError,
+)
 from robots.common.bounds import checked_whole, shown
 from robots.common.catalogue import Catalogue
 from robots.descriptor import Vector3
+from robots.registry import CATALOGUE as ROBOTS
+
+if TYPE_CHECKING:
+    from layouts.validation.findings import Finding
 
 Distance = float | Literal["auto"]  # m
+
+FARTHEST = 3.0  # m; as much farther apart than by their reach robots stand at most
+
+ARM = 0.3  # m; what reaches less is a hand
 
 EDGE = 0.1  # from a table's edge to a base's middle (m); native's single Pandas have 0.11 m
 
@@ -60,18 +79,20 @@ def side_by_side(
         keyframe: Keyframe every robot starts from; None is each one's home.
     """
     loaded = _loaded(robots)
+
+    def placed(along: Sequence[float]) -> Layout:
+        return Layout(
+            {
+                name: _placed(robot, (0.0, y, 0.0), 0.0, keyframe)
+                for y, (name, robot) in zip(along, loaded.items(), strict=True)
+            }
+        )
+
     if _is_auto(spacing):
-        along = centred(gaps(loaded.values()))
-    else:
-        distance = _given("spacing", spacing)
-        first = -distance * (len(loaded) - 1) / 2
-        along = [first + i * distance for i in range(len(loaded))]
-    return Layout(
-        {
-            name: _placed(robot, (0.0, y, 0.0), 0.0, keyframe)
-            for y, (name, robot) in zip(along, loaded.items(), strict=True)
-        }
-    )
+        return _clear(loaded, lambda more: placed(centred(gaps(loaded.values(), more))))
+    distance = _given("spacing", spacing)
+    first = -distance * (len(loaded) - 1) / 2
+    return placed([first + i * distance for i in range(len(loaded))])
 
 
 def face_to_face(
@@ -86,13 +107,18 @@ def face_to_face(
     """
     _expect_count("face_to_face", robots, 2)
     loaded = _loaded(robots)
-    distance = apart(*loaded.values()) if _is_auto(spacing) else _given("spacing", spacing)
-    return Layout(
-        {
-            name: _placed(robot, (0.0, side * distance / 2, 0.0), -side * math.pi / 2, keyframe)
-            for side, (name, robot) in zip((-1, 1), loaded.items(), strict=True)
-        }
-    )
+
+    def placed(distance: float) -> Layout:
+        return Layout(
+            {
+                name: _placed(robot, (0.0, side * distance / 2, 0.0), -side * math.pi / 2, keyframe)
+                for side, (name, robot) in zip((-1, 1), loaded.items(), strict=True)
+            }
+        )
+
+    if _is_auto(spacing):
+        return _clear(loaded, lambda more: placed(apart(*loaded.values()) + more))
+    return placed(_given("spacing", spacing))
 
 
 def ring(
@@ -120,17 +146,19 @@ def ring(
     if not isinstance(facing, str) or facing not in FACING:
         raise UnknownNameError("way to face", facing, FACING)
     loaded = _loaded(robots)
+
+    def placed(radius: float, angles: Sequence[float]) -> Layout:
+        placements: dict[str, Placement] = {}
+        for angle, (name, robot) in zip(angles, loaded.items(), strict=True):
+            x, y = radius * math.sin(angle), -radius * math.cos(angle)
+            yaw = math.remainder(angle - math.pi / 2 + FACING[facing], 2 * math.pi)
+            placements[name] = _placed(robot, (_rounded(x), _rounded(y), 0.0), yaw, keyframe)
+        return Layout(placements)
+
     if _is_auto(radius):
-        radius, angles = ring_of(list(loaded.values()))
-    else:
-        radius = _given("radius", radius)
-        angles = [2 * math.pi * i / len(loaded) for i in range(len(loaded))]
-    placements: dict[str, Placement] = {}
-    for angle, (name, robot) in zip(angles, loaded.items(), strict=True):
-        position = (_rounded(radius * math.sin(angle)), _rounded(-radius * math.cos(angle)), 0.0)
-        yaw = math.remainder(angle - math.pi / 2 + FACING[facing], 2 * math.pi)
-        placements[name] = _placed(robot, position, yaw, keyframe)
-    return Layout(placements)
+        return _clear(loaded, lambda more: placed(*ring_of(list(loaded.values()), more)))
+    count = len(loaded)
+    return placed(_given("radius", radius), [2 * math.pi * i / count for i in range(count)])
 
 
 def around_table(
@@ -167,25 +195,31 @@ def around_table(
     rows = {edge: [n for n in loaded if sides[n] == edge] for edge in EDGES}
     standing = {edge: [loaded[name] for name in row] for edge, row in rows.items()}
     least = EDGE if _is_auto(inset) else _given("inset", inset)
-    size = table_for(standing, least) if _is_auto(table) else _given_table(table, least)
-    lengths = {edge: size[0] if edge in ("north", "south") else size[1] for edge in EDGES}
-    along: dict[str, float] = {}
-    for edge, row in rows.items():
-        even = [lengths[edge] / len(row) for _ in pairwise(row)]
-        spaces = gaps(standing[edge]) if _is_auto(table) else even
-        along.update(zip(row, centred(spaces), strict=False))
+    given = None if _is_auto(table) else _given_table(table, least)
     share = share_at_table(standing)
     farthest = max(robot.reach for robot in loaded.values())
-    placements: dict[str, Placement] = {}
-    for name, robot in loaded.items():
-        across = size[1] if sides[name] in ("north", "south") else size[0]
-        shorter = share * (farthest - robot.reach)
-        to_middle = across / 2 - share * robot.reach
-        inwards = max(EDGE, min(EDGE + shorter, to_middle)) if _is_auto(inset) else least
-        placements[name] = Placement(
-            robot, (inwards, along[name], 0.0), keyframe=keyframe, on=f"table.{sides[name]}"
-        )
-    return Layout(placements, table_frames(*size))
+
+    def placed(more: float) -> Layout:
+        size = given or table_for(standing, least, more)
+        lengths = {edge: size[0] if edge in ("north", "south") else size[1] for edge in EDGES}
+        along: dict[str, float] = {}
+        for edge, row in rows.items():
+            even = [lengths[edge] / len(row) for _ in pairwise(row)]
+            along.update(
+                zip(row, centred(even if given else gaps(standing[edge], more)), strict=False)
+            )
+        placements: dict[str, Placement] = {}
+        for name, robot in loaded.items():
+            across = size[1] if sides[name] in ("north", "south") else size[0]
+            shorter = share * (farthest - robot.reach)
+            to_middle = (across - more) / 2 - share * robot.reach
+            inwards = max(EDGE, min(EDGE + shorter, to_middle)) if _is_auto(inset) else least
+            placements[name] = Placement(
+                robot, (inwards, along[name], 0.0), keyframe=keyframe, on=f"table.{sides[name]}"
+            )
+        return Layout(placements, table_frames(*size))
+
+    return placed(0.0) if given else _clear(loaded, placed)
 
 
 def grid(
@@ -222,16 +256,19 @@ def grid(
         for other in ((row + 1, column), (row, column + 1))
         if other in cells
     ]
+
+    def placed(distance: float) -> Layout:
+        placements: dict[str, Placement] = {}
+        for i, (name, robot) in enumerate(loaded.items()):
+            row, column = divmod(i, columns)
+            x, y = (row - (rows - 1) / 2) * distance, (column - (columns - 1) / 2) * distance
+            placements[name] = _placed(robot, (x, y, 0.0), 0.0, keyframe)
+        return Layout(placements)
+
     if _is_auto(spacing):
         distance = max((apart(*pair) for pair in neighbours), default=0.0)
-    else:
-        distance = _given("spacing", spacing)
-    placements: dict[str, Placement] = {}
-    for i, (name, robot) in enumerate(loaded.items()):
-        row, column = divmod(i, columns)
-        x, y = (row - (rows - 1) / 2) * distance, (column - (columns - 1) / 2) * distance
-        placements[name] = _placed(robot, (x, y, 0.0), 0.0, keyframe)
-    return Layout(placements)
+        return _clear(loaded, lambda more: placed(distance + more))
+    return placed(_given("spacing", spacing))
 
 
 # One line per preset, sorted by name: name -> module:function.
@@ -283,6 +320,45 @@ def _placed(
 ) -> Placement:
     """Place a robot upright so that it reaches out along ``yaw`` (rad from +x)."""
     return Placement(robot, position, faced(robot, yaw_quaternion(yaw)), keyframe)
+
+
+def _clear(robots: Mapping[str, RobotDescriptor], placed: Callable[[float], Layout]) -> Layout:
+    """Return a layout in which no robots collide, at the distances of reach if that suffices.
+
+    Arms of the catalogue are not checked: their distances of reach suffice, as tests show.
+
+    Args:
+        robots: Robot by name.
+        placed: Makes the layout, with distances that are so much larger than those of reach (m).
+
+    Raises:
+        LayoutError: If there is none; says why.
+    """
+    layout, more = placed(0.0), 0.0
+    if all(map(_is_known, robots.values())):
+        return layout
+    try:
+        while found := _problems(layout, "collision"):
+            more += max(finding.farther or FARTHEST for finding in found)
+            if more >= FARTHEST:
+                raise LayoutError(f"no distance keeps these robots apart\n{found[0]}")
+            layout = placed(more)
+        for finding in _problems(layout, "self-collision", "joint limit", "table", samples=0):
+            raise LayoutError(f"no distance makes this layout sound\n{finding}")
+    except (AssetError, MissingPackageError):
+        pass  # their bodies are not known here
+    return layout
+
+
+def _problems(layout: Layout, *kinds: str, samples: int = 20) -> list[Finding]:
+    report = layout.validate(workspaces=False, samples=samples)
+    return [finding for finding in report.findings if finding.serious and finding.kind in kinds]
+
+
+def _is_known(robot: RobotDescriptor) -> bool:
+    """Tell whether a robot is an arm of the catalogue; hands are as wide as they reach."""
+    known = robot.name in ROBOTS and RobotRegistry.load(robot.name) == robot
+    return known and robot.reach >= ARM
 
 
 def _is_auto(distance: object) -> TypeGuard[Literal["auto"]]:

@@ -27,6 +27,7 @@ from robots.urdf.tree import link_index
 _Body = TypeVar("_Body", Obstacle, Held)
 
 WORLD = 0  # the part that never moves
+MOST_SHAPES = 2000  # convex parts of obstacles; a check of more takes minutes and gigabytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +107,8 @@ class Bodies:
 
         Raises:
             AssetError: If a robot's files cannot be found or make no sense.
-            LayoutError: If two bodies have one name, or an argument is of another type.
+            LayoutError: If two bodies have one name, obstacles have too many parts, or an argument
+                is of another type.
             MissingPackageError: If trimesh or python-fcl is not installed.
             UnknownNameError: If there is no place that is said to hold something.
         """
@@ -115,6 +117,12 @@ class Bodies:
         self.layout = layout
         self.obstacles = _all_of("obstacles", obstacles, Obstacle)
         self.held = _all_of("held", held, Held)
+        shapes = sum(len(o.shapes) for o in (*self.obstacles, *(h.obstacle for h in self.held)))
+        if shapes > MOST_SHAPES:
+            raise LayoutError(
+                f"the obstacles have {shapes} convex parts together; it takes {MOST_SHAPES} at"
+                " most, so let larger ones stand for several"
+            )
         self.robots = tuple(layout)
         self.models: Mapping[str, RobotModel] = {
             name: load_model(placement.robot) for name, placement in layout.items()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,11 +15,15 @@ from layouts.validation.findings import length_text
 from motion import timing
 from motion.cell import Cell, cell_of
 from motion.collisions import Checker
-from motion.curves import hermite, hermite_slopes
+from motion.continuous import Curve, look_along
+from motion.curves import hermite_extremes
+from robots.common.bounds import FAR, checked_number
+from robots.common.errors import MotionError
 
-CHUNK = 2000  # moments that are looked at together
+SMALLEST = 1e-6  # m, rad; of steps between moments
 TOLERANCE = 0.01  # share of a limit of velocity or acceleration that is rounding
 BEYOND = 1e-4  # rad, m: so far beyond a joint limit is rounding
+MEASURED = 100  # moments at most at which the depth of overlaps is measured, which takes long
 REACHES = 3  # moments around which the least clearance is looked for once more
 
 
@@ -55,11 +59,12 @@ class Certificate:
 
     Attributes:
         duration: Of the motion (s).
-        moments: How many postures were checked.
+        moments: How many postures were checked; 0 if joints leave their limits or are too fast.
         step: The farthest that any point of any robot moves between two of them (m).
         turn: The farthest that any link turns between two of them (rad).
         collisions: The deepest overlap of each two bodies that collide.
-        clearance: What came nearest, links of one robot left out; None if nothing was near.
+        clearance: What came nearest, links of one robot left out; None if nothing was near, or if
+            bodies collide.
         joint_limits: Joints beyond their limits, in words.
         too_fast: Joints that exceed their largest velocity or acceleration, in words.
         velocity: The largest share of a joint's largest velocity that is used.
@@ -80,19 +85,23 @@ class Certificate:
     @property
     def ok(self) -> bool:
         """Whether nothing collides and all limits are kept."""
-        return not (self.collisions or self.joint_limits or self.too_fast)
+        near = self.clearance
+        apart = near is None or near.distance >= 0
+        return apart and not (self.collisions or self.joint_limits or self.too_fast)
 
     def __str__(self) -> str:
         """Show what was checked and what was found."""
-        lines = [
-            f"{'certified' if self.ok else 'NOT CERTIFIED'}: {self.duration:.2f} s,"
-            f" {self.moments} moments at most {self.step * 1e3:.2g} mm and"
+        looked = (
+            f"{self.moments} moments at most {self.step * 1e3:.2g} mm and"
             f" {np.degrees(self.turn):.2g}° apart"
-        ]
+            if self.moments
+            else "collisions were not looked for, as joints do what they cannot"
+        )
+        lines = [f"{'certified' if self.ok else 'NOT CERTIFIED'}: {self.duration:.2f} s, {looked}"]
         lines += [f"  collision: {collision}" for collision in self.collisions]
         lines += [f"  joint limit: {text}" for text in self.joint_limits]
         lines += [f"  too fast: {text}" for text in self.too_fast]
-        if self.clearance is not None and not self.collisions:
+        if self.clearance is not None:
             lines.append(f"  least clearance: {self.clearance}")
         used = f"{self.velocity:.0%} of the largest velocities"
         if self.acceleration is not None:
@@ -115,130 +124,75 @@ def certify(
     turn: float,
 ) -> Certificate:
     """Check a motion; see `motion.Motion.certify`."""
+    step = checked_number("step", step, SMALLEST, FAR, MotionError, "m")
+    turn = checked_number("turn", turn, SMALLEST, FAR, MotionError, "rad")
     cell = cell_of(layout, obstacles, held, table)
-    curve = _Curve(
+    curve = Curve(
         times,
         np.concatenate([positions[name] for name in cell.robots], axis=1),
         np.concatenate([velocities[name] for name in cell.robots], axis=1),
     )
-    moments = _moments(cell, curve, step, turn)
-    states = curve.at(moments)
-    speed, too_fast = _speeds(cell, curve, _fastest(layout, largest_velocities))
+    moments, places, speeds = hermite_extremes(curve.times, curve.positions, curve.velocities)
+    joint_limits = _beyond_limits(cell, curve.positions[0], moments, places)
+    speed, too_fast = _speeds(cell, moments, speeds, _fastest(layout, largest_velocities))
     acceleration, too_hasty = _accelerations(cell, curve, largest_accelerations)
-    collisions = _collisions(cell.checker(), moments, states)
-    return Certificate(
+    found = Certificate(
         duration=float(times[-1]),
-        moments=len(moments),
+        moments=0,
         step=step,
         turn=turn,
-        collisions=collisions,
-        clearance=_clearance(cell, curve),
-        joint_limits=tuple(_beyond_limits(cell, moments, states)),
+        collisions=(),
+        clearance=None,
+        joint_limits=tuple(joint_limits),
         too_fast=(*too_fast, *too_hasty),
         velocity=speed,
         acceleration=acceleration,
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Curve:
-    """All coordinates over time."""
-
-    times: Floats
-    positions: Floats
-    velocities: Floats
-
-    def at(self, moments: Floats) -> Floats:
-        return hermite(self.times, self.positions, self.velocities, moments)
-
-    def speeds(self, moments: Floats) -> Floats:
-        return hermite_slopes(self.times, self.positions, self.velocities, moments)
-
-
-# -- moments -----------------------------------------------------------------------------------
-
-
-def _moments(cell: Cell, curve: _Curve, step: float, turn: float) -> Floats:
-    """Return moments so dense that nothing moves or turns farther between two of them.
-
-    Pieces in which something does are halved, or cut more finely, until nothing does.
-    """
-    moments, radii = curve.times, _radii(cell)
-    while True:
-        travel, turned = _travel(cell, curve.at(moments), radii)
-        pieces = np.maximum(np.ceil(travel / step), np.ceil(turned / turn))
-        if (pieces <= 1).all():
-            return moments
-        cuts = np.where(pieces > 1, np.ceil(1.1 * pieces), 1).astype(int)
-        parts = [
-            np.linspace(a, b, n, endpoint=False)
-            for a, b, n in zip(moments[:-1], moments[1:], cuts.tolist(), strict=True)
-        ]
-        moments = np.concatenate([*parts, moments[-1:]])
-
-
-def _travel(cell: Cell, states: Floats, radii: Floats) -> tuple[Floats, Floats]:
-    """Return how far any point of any link moves and any link turns from state to state, (n - 1,).
-
-    A point moves at most as far as the link's origin, and with the turn around that.
-    """
-    moved, turned = [], []
-    for first in range(0, len(states) - 1, CHUNK):
-        poses = cell.poses(states[first : first + CHUNK + 1])
-        shift = np.linalg.norm(np.diff(poses[:, :, :3, 3], axis=0), axis=-1)
-        change = np.linalg.norm(np.diff(poses[:, :, :3, :3], axis=0), axis=(-2, -1))
-        angle = 2 * np.arcsin(np.minimum(change / np.sqrt(8), 1.0))
-        moved.append((shift + radii * angle).max(axis=1))
-        turned.append(angle.max(axis=1))
-    return np.concatenate(moved), np.concatenate(turned)
-
-
-def _radii(cell: Cell) -> Floats:
-    """Return how far each link's farthest corner is from its origin, (links,) (m)."""
-    radii: list[float] = []
-    for model in cell.models.values():
-        farthest = [0.0] * len(model.kinematics.links)
-        for hull in model.hulls:
-            reach = float(np.linalg.norm(hull.corners, axis=1).max())
-            farthest[hull.link] = max(farthest[hull.link], reach)
-        radii += farthest
-    return np.array(radii)
+    if joint_limits or too_fast:
+        return found
+    checker = cell.checker()
+    seen = look_along(cell, checker, curve, step, turn)
+    collisions = _collisions(checker, seen.overlaps, curve)
+    return replace(
+        found,
+        moments=seen.moments,
+        collisions=collisions,
+        clearance=None if collisions else _clearance(cell, curve, seen.sparse),
+    )
 
 
 # -- collisions --------------------------------------------------------------------------------
 
 
-def _collisions(checker: Checker, moments: Floats, states: Floats) -> tuple[Nearest, ...]:
+def _collisions(checker: Checker, moments: Floats, curve: Curve) -> tuple[Nearest, ...]:
+    """Return the deepest overlap of each two bodies, the deepest first, of some of the moments."""
     worst: dict[tuple[str, str], Nearest] = {}
-    for first in range(0, len(moments), CHUNK):
-        chunk, whens = states[first : first + CHUNK], moments[first : first + CHUNK]
-        for i in np.flatnonzero(~checker.free(chunk, whens)).tolist():
-            contact = checker.contact(chunk[i], float(whens[i]))
-            if contact is None:
-                continue
-            near = Nearest(contact.names, contact.distance, float(whens[i]), contact.points)
-            known = worst.get(near.names)
-            if known is None or near.distance < known.distance:
-                worst[near.names] = near
+    for when in moments[:: len(moments) // MEASURED + 1].tolist():
+        contact = checker.contact(curve.at(np.array([when]))[0], when)
+        if contact is None:
+            continue
+        near = Nearest(contact.names, contact.distance, when, contact.points)
+        known = worst.get(near.names)
+        if known is None or near.distance < known.distance:
+            worst[near.names] = near
     return tuple(sorted(worst.values(), key=lambda near: near.distance))
 
 
-def _clearance(cell: Cell, curve: _Curve) -> Nearest | None:
-    """Return the nearest approach of different bodies: at the knots, then around the least."""
+def _clearance(cell: Cell, curve: Curve, moments: Floats) -> Nearest | None:
+    """Return the nearest approach of different bodies: at some moments, then around the least."""
     solids, whole = cell.solids, cell.checker()
     apart = [solids[a].owner != solids[b].owner for a, b in whole.pairs.tolist()]
     kept = whole.pairs[np.array(apart, bool)]
     checker = Checker(cell, kept, np.zeros(len(kept)))
     if not len(checker.pairs):
         return None
-    moments = curve.times
-    distances = checker.distance(curve.at(moments), moments)
+    looked, distances = moments, checker.distance(curve.at(moments), moments)
     for i in np.argsort(distances, kind="stable")[:REACHES].tolist():
-        around = moments[max(i - 1, 0)], moments[min(i + 1, len(curve.times) - 1)]
+        around = moments[max(i - 1, 0)], moments[min(i + 1, len(moments) - 1)]
         more = np.linspace(*around, 21)
-        moments = np.concatenate([moments, more])
+        looked = np.concatenate([looked, more])
         distances = np.concatenate([distances, checker.distance(curve.at(more), more)])
-    when = float(moments[np.argmin(distances)])
+    when = float(looked[np.argmin(distances)])
     contact = checker.nearest(curve.at(np.array([when]))[0], when)
     if contact is None:
         return None
@@ -252,14 +206,14 @@ def _joints(cell: Cell) -> list[str]:
     return [f"{name}.{joint}" for name, p in cell.layout.items() for joint in p.robot.joints]
 
 
-def _beyond_limits(cell: Cell, moments: Floats, states: Floats) -> list[str]:
+def _beyond_limits(cell: Cell, start: Floats, moments: Floats, places: Floats) -> list[str]:
     """Say which joints leave their limits, other than those that begin beyond them."""
-    low = np.minimum(cell.limits[:, 0], states[0]) - BEYOND
-    high = np.maximum(cell.limits[:, 1], states[0]) + BEYOND
-    excess = np.maximum(low - states, states - high)
+    low = np.minimum(cell.limits[:, 0], start) - BEYOND
+    high = np.maximum(cell.limits[:, 1], start) + BEYOND
+    excess = np.maximum(low - places, places - high)
     names = _joints(cell)
     return [
-        f"{names[j]} is {excess[i, j]:.3g} beyond its limit at {moments[i]:.2f} s"
+        f"{names[j]} is {excess[i, j]:.3g} beyond its limit at {moments[i, j]:.2f} s"
         for j in np.flatnonzero(excess.max(axis=0) > 0).tolist()
         for i in [int(np.argmax(excess[:, j]))]
     ]
@@ -271,29 +225,36 @@ def _fastest(layout: Layout, given: Mapping[str, Floats]) -> Mapping[str, Floats
     return {**timing.largest_velocities(layout, "pd_joint_pos"), **given}
 
 
-def _speeds(cell: Cell, curve: _Curve, largest: Mapping[str, Floats]) -> tuple[float, list[str]]:
-    middles = (curve.times[1:] + curve.times[:-1]) / 2
-    moments = np.concatenate([curve.times, middles])
+def _speeds(
+    cell: Cell, moments: Floats, speeds: Floats, largest: Mapping[str, Floats]
+) -> tuple[float, list[str]]:
     limits = np.concatenate([largest[name] for name in cell.robots])
-    return _shares(cell, "velocity", moments, np.abs(curve.speeds(moments)) / limits)
+    return _shares(cell, "velocity", moments, np.abs(speeds) / limits)
 
 
 def _accelerations(
-    cell: Cell, curve: _Curve, largest: Mapping[str, Floats]
+    cell: Cell, curve: Curve, largest: Mapping[str, Floats]
 ) -> tuple[float | None, list[str]]:
-    """Compare the mean acceleration between each two knots with the limits."""
+    """Compare mean accelerations with the limits: those between two knots, or at their ends.
+
+    Within a piece accelerations change evenly, so that they are largest where it begins or ends.
+    """
     if not largest:
         return None, []
     unlimited = {name: np.full(p.robot.dof, np.inf) for name, p in cell.layout.items()}
     limits = np.concatenate(list({**unlimited, **largest}.values()))
-    rates = np.diff(curve.velocities, axis=0) / np.diff(curve.times)[:, None]
-    return _shares(cell, "acceleration", curve.times, np.abs(rates) / limits)
+    begin, end = curve.times[:-1], curve.times[1:]
+    starts = np.concatenate([begin, np.maximum(begin, end - timing.STEP)])
+    ends = np.concatenate([np.minimum(end, begin + timing.STEP), end])
+    rates = (curve.speeds(ends) - curve.speeds(starts)) / (ends - starts)[:, None]
+    moments = np.broadcast_to(starts[:, None], rates.shape)
+    return _shares(cell, "acceleration", moments, np.abs(rates) / limits)
 
 
 def _shares(cell: Cell, what: str, moments: Floats, shares: Floats) -> tuple[float, list[str]]:
     names = _joints(cell)
     found = [
-        f"{names[j]} has {shares[i, j]:.0%} of its largest {what} at {moments[i]:.2f} s"
+        f"{names[j]} has {shares[i, j]:.0%} of its largest {what} at {moments[i, j]:.2f} s"
         for j in np.flatnonzero(shares.max(axis=0) > 1 + TOLERANCE).tolist()
         for i in [int(np.argmax(shares[:, j]))]
     ]

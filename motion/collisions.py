@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import count
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -205,6 +206,32 @@ class Checker:
     ) -> int:
         """Return into how many steps `edge_free` cuts a way; see there."""
         return self._travel.steps(start, end, resolution, times)
+
+    def within(
+        self, qpos: ArrayLike, times: ArrayLike | None, reach: Floats
+    ) -> Iterator[tuple[Candidates, Floats]]:
+        """Yield, for some states at a time, pairs of solids and how far they are apart (m).
+
+        Those are all pairs that could touch if each part moved from where it is by its reach, and
+        some more; -1 stands for pairs that overlap.
+
+        Args:
+            qpos: Coordinates, (n, D) (rad, m).
+            times: Where obstacles that move are, (n,) (s); None is 0.
+            reach: Of each part, (n, parts) (m).
+
+        Raises:
+            LayoutError: If a shape is wrong, or a number not finite.
+        """
+        rows = list(self._sieve.chains.rows)
+        for first, (states, moments) in zip(
+            count(0, MOST_STATES), _batches(*self._states(qpos, times)), strict=False
+        ):
+            places = self._places(states, moments)
+            farthest = reach[first : first + MOST_STATES, rows].max(axis=0)
+            found = self._sieve.candidates(places, more=farthest[:, None] + farthest)
+            gaps = self._measure.distances(places, found)
+            yield found._replace(states=found.states + first), gaps
 
     def candidates(self, qpos: ArrayLike, times: ArrayLike | None = None) -> Candidates:
         """Return the pairs of solids that bounds alone do not show to be far enough apart.

@@ -41,6 +41,30 @@ def hermite_slopes(knots: Floats, values: Floats, slopes: Floats, times: ArrayLi
     return np.where(inside[..., None], within, 0.0)
 
 
+def hermite_extremes(knots: Floats, values: Floats, slopes: Floats) -> tuple[Floats, ...]:
+    """Return where the same curves go farthest, and where they are fastest.
+
+    Returns:
+        Times (s), values there and derivatives there (per s), each (k, n): of all knots, and
+        within each piece of every point at which a curve turns back or its slope does.
+    """
+    step = np.diff(knots)[:, None]
+    rise, leave, arrive = np.diff(values, axis=0), slopes[:-1] * step, slopes[1:] * step
+    bend, twist = 3.0 * rise - 2.0 * leave - arrive, leave + arrive - 2.0 * rise
+    root = np.sqrt(np.maximum(bend * bend - 3.0 * twist * leave, 0.0))
+    sum_ = -(bend + np.copysign(root, bend))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        shares = np.stack([sum_ / (3.0 * twist), leave / sum_, -bend / (3.0 * twist)])
+        s = np.clip(np.nan_to_num(shares, nan=0.0), 0.0, 1.0)
+        inner = (leave + s * (2.0 * bend + 3.0 * s * twist)) / step
+    found = (knots[:-1, None] + s * step, values[:-1] + s * (leave + s * (bend + s * twist)), inner)
+    ends = (np.broadcast_to(knots[:, None], values.shape), values, slopes)
+    return tuple(
+        np.concatenate([at, more.reshape(-1, values.shape[1])])
+        for at, more in zip(ends, found, strict=True)
+    )
+
+
 def hermite_bends(knots: Floats, values: Floats, slopes: Floats) -> Floats:
     """Return the second derivatives at both ends of each piece, (T - 1, 2, n) (per s²)."""
     step = np.diff(knots)[:, None]

@@ -106,6 +106,27 @@ class Measure:
                 return None
         return gaps
 
+    def distances(self, places: Floats, candidates: Candidates) -> Floats:
+        """Return how far candidates are apart, (k,) (m); -1 for those that overlap.
+
+        Args:
+            places: Poses of the parts, (rows, n, 4, 4).
+            candidates: Pairs of solids.
+        """
+        import fcl
+
+        gaps, request = np.empty(len(candidates.states)), fcl.DistanceRequest()
+        asked = fcl.CollisionRequest()
+        turns, shifts = self._beside(places, candidates)
+        for i, (a, b) in enumerate(candidates.pairs.tolist()):
+            one, other = self._stay[a], self._moved[b]
+            other.setRotation(turns[i])
+            other.setTranslation(shifts[i])
+            gaps[i] = max(fcl.distance(one, other, request, fcl.DistanceResult()), 0.0)
+            if gaps[i] < TOUCHING and fcl.collide(one, other, asked, fcl.CollisionResult()):
+                gaps[i] = -1.0
+        return gaps
+
     def update(
         self,
         places: Floats,

@@ -48,8 +48,10 @@ class Track:
                 f"a track has times of shape {times.shape} and poses of shape {poses.shape}; it"
                 " takes (T,) and (T, 4, 4)"
             )
-        if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
-            raise LayoutError("the times of a track must be finite and increase (s)")
+        if not _meant(times) or (np.diff(times) <= 0).any():
+            raise LayoutError(
+                f"the times of a track must increase and be finite, {FAR:g} s at most"
+            )
         for pose in poses:
             _checked_pose("a pose of a track", pose)
         times.setflags(write=False)
@@ -111,10 +113,10 @@ class Obstacle:
             )
         shapes = tuple(_array(f"a shape of obstacle {self.name!r}", s) for s in self.shapes)
         for corners in shapes:
-            if corners.ndim != 2 or corners.shape[1] != 3 or not np.isfinite(corners).all():
+            if corners.ndim != 2 or corners.shape[1] != 3 or not _meant(corners):
                 raise LayoutError(
                     f"a shape of obstacle {self.name!r} is {shown(corners.tolist())}; it takes the"
-                    " corners of a convex body, (n, 3) finite numbers (m)"
+                    f" corners of a convex body, (n, 3) finite numbers, {FAR:g} m at most"
                 )
         object.__setattr__(self, "shapes", shapes)
         if not isinstance(self.pose, Track):
@@ -316,14 +318,21 @@ def _array(what: str, numbers: Any) -> Floats:
         raise LayoutError(f"{what}: {shown(numbers)} are no numbers") from None
 
 
+def _meant(numbers: Floats) -> bool:
+    """Tell whether all numbers are finite and no farther from 0 than `FAR`."""
+    return bool((np.abs(numbers) <= FAR).all())
+
+
 def _checked_pose(what: str, pose: NDArray[Any]) -> None:
     """Refuse what is no pose.
 
     Raises:
         LayoutError: If it is none.
     """
-    if pose.shape != (4, 4) or not np.isfinite(pose).all():
-        raise LayoutError(f"{what} is {shown(pose.tolist())}; it takes 4 x 4 finite numbers")
+    if pose.shape != (4, 4) or not _meant(pose):
+        raise LayoutError(
+            f"{what} is {shown(pose.tolist())}; it takes 4 x 4 finite numbers, {FAR:g} at most"
+        )
     turn = pose[:3, :3]
     if (pose[3] != _STILL[3]).any() or np.abs(turn @ turn.T - np.eye(3)).max() > _TURN_TOLERANCE:
         raise LayoutError(

@@ -434,10 +434,13 @@ def _sides(solid: Solid) -> Floats | None:
 
 @lru_cache(maxsize=256)
 def _sides_of(hull: Hull, offset: bytes) -> Floats | None:
-    from scipy.spatial import ConvexHull
+    from scipy.spatial import ConvexHull, QhullError
 
     corners = transform(np.frombuffer(offset).reshape(4, 4), hull.corners)
-    found: Any = ConvexHull(corners)
+    try:
+        found: Any = ConvexHull(corners)
+    except QhullError:  # too small for how far from the origin it is
+        return None
     normals = np.unique(np.round(found.equations[:, :3], 9), axis=0)
     if len(normals) > MOST_SIDES:
         return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,26 @@ from motion.bodies import Bodies
 from motion.obstacles import Track
 from robots import LayoutError
 from robots.common.bounds import FAR, checked_number
+
+
+class Ways(NamedTuple):
+    """Ways of all coordinates, straight or not.
+
+    Attributes:
+        starts: When each begins, (n,) (s).
+        ends: When each ends, (n,) (s).
+        lengths: How far each coordinate goes at most, back and forth, (n, D) (rad, m).
+        out: How far from 0 each gets at most, (n, D) (rad, m).
+    """
+
+    starts: Floats
+    ends: Floats
+    lengths: Floats
+    out: Floats
+
+    def only(self, which: NDArray[Any]) -> Ways:
+        """Return some of them."""
+        return Ways(*(column[which] for column in self))
 
 
 class Travel:
@@ -93,6 +114,41 @@ class Travel:
             changes[np.ix_(parts, parts)] -= both
         return changes
 
+    def along(self, ways: Ways) -> tuple[Floats, Floats]:
+        """Return how far any point of each part travels, and how far the part turns, at most.
+
+        Returns:
+            Both for each way, (n, parts) (m) and (rad).
+        """
+        moved, turned = ways.lengths @ self._ways.T, ways.lengths @ self._turns.T
+        for i, coordinate in enumerate(self._sliding.tolist()):
+            out = ways.out[:, coordinate] + self._stretch[coordinate]
+            moved += out[:, None] * (ways.lengths @ self._slides[..., i].T)
+        for part, track in self._tracks.items():
+            moved[:, part], turned[:, part] = track.between(ways.starts, ways.ends)
+        return moved, turned
+
+    def nearing(self, ways: Ways, moved: Floats, parts: NDArray[np.intp]) -> Floats:
+        """Return how much nearer to each other two parts come at most, a pair on each way (m).
+
+        What moves both of them does not count.
+
+        Args:
+            ways: The ways.
+            moved: How far both travel, as `along` says, (n, 2) (m).
+            parts: Their indices, (n, 2).
+        """
+        changes = moved.sum(axis=1)
+        out = ways.out[:, self._sliding] + self._stretch[self._sliding]
+        for own, columns, common in self._common:
+            pairs = np.flatnonzero(np.isin(parts, own).all(axis=1))
+            one, other = np.searchsorted(own, parts[pairs]).T
+            for part in parts[pairs].T:
+                slides = np.einsum("njs,ns->nj", self._slides[part, columns], out[pairs])
+                shares = (self._ways[part, columns] + slides) * ways.lengths[pairs, columns]
+                changes[pairs] -= (common[one, other] * shares).sum(axis=1)
+        return changes
+
     def _shares(self, start: Floats, end: Floats) -> Floats:
         """Return how far each coordinate takes the points of each part at most, (parts, D) (m)."""
         out = np.maximum(np.abs(start), np.abs(end)) + self._stretch
@@ -158,6 +214,14 @@ class _Way:
         ways = steps + radius * turns
         sums = (np.concatenate([[0.0], np.cumsum(values)]) for values in (ways, turns))
         return cls(track.times, *sums)
+
+    def between(self, starts: Floats, ends: Floats) -> tuple[Floats, Floats]:
+        """Return how far it leads (m) and turns (rad) from some times to others, both (n,)."""
+        way, turn = (
+            np.interp(ends, self._times, sums) - np.interp(starts, self._times, sums)
+            for sums in (self._ways, self._turns)
+        )
+        return way, turn
 
     def fastest(self, start: float, end: float) -> tuple[float, float]:
         """Return how far it would lead (m) and turn (rad) between two times at full speed.

@@ -226,7 +226,7 @@ def make(
     Raises:
         UnknownNameError: If the task, a place, a robot or a field is unknown.
         TaskError: If the task cannot be made like that.
-        LayoutError: If the robots of another layout collide, and ``check_layout`` is not False.
+        LayoutError: If the robots of the layout collide, and ``check_layout`` is not False.
         AssetError: If robot files cannot be found.
     """
     cls = get_task_class(task_id)

@@ -18,20 +18,25 @@ MOVE_STEP = 0.01  # m
 SIDEWAYS = np.array([0.0, 1.0, 0.0])  # where to move a robot that stands in another one
 
 
-def to_stand_apart(layout: Arrangement, one: Postures, other: Postures) -> str:
-    """Say how far apart two robots are clear of each other, found by trying."""
+def to_stand_apart(layout: Arrangement, one: Postures, other: Postures) -> tuple[str, float | None]:
+    """Say how far apart two robots are clear of each other, found by trying.
+
+    Returns:
+        The advice, and how much farther apart that is (m); None if none was found.
+    """
     moves = [
         (move, now, direction)
         for direction, way, now in _ways(layout, one.name, other.name)
         if (move := _clear_move(one, other, way)) is not None
     ]
     if not moves:
-        return f"even {FARTHEST_MOVE:g} m farther apart they collide; use another keyframe"
+        return f"even {FARTHEST_MOVE:g} m farther apart they collide; use another keyframe", None
     move, now, direction = min(moves)
     return (
         f"stand {one.name} and {other.name} {move:.3f} m farther apart{direction}"
         f" ({now + move:.3f} m between their bases instead of {now:.3f} m), which leaves"
-        f" {length_text(NARROW)} or more"
+        f" {length_text(NARROW)} or more",
+        move,
     )
 
 

@@ -233,6 +233,11 @@ class _Check:
     def _collision(self, one: Postures, other: Postures, overlaps: list[Approach]) -> Finding:
         pairs, between = _worst(overlaps), (one.name, other.name)
         at_table = other.name in self._surfaces
+        advice, farther = (
+            (to_leave_the_table(one.name, self._layout[one.name], overlaps[0]), None)
+            if at_table
+            else to_stand_apart(self._layout, one, other)
+        )
         return Finding(
             "table" if at_table else "collision",
             True,
@@ -242,9 +247,8 @@ class _Check:
             "m",
             f"{one.name} and {other.name} collide {self._when(overlaps)}:"
             f" {links_text(pairs, between, table=at_table)}",
-            to_leave_the_table(one.name, self._layout[one.name], overlaps[0])
-            if at_table
-            else to_stand_apart(self._layout, one, other),
+            advice,
+            farther,
         )
 
     def _narrow(self, one: Postures, other: Postures, near: Approach) -> Finding:
@@ -258,7 +262,7 @@ class _Check:
             "m",
             f"{one.name}.{first} comes within {length_text(near.distance)} of"
             f" {other.name}.{second}",
-            to_stand_apart(self._layout, one, other),
+            *to_stand_apart(self._layout, one, other),
         )
 
     def _when(self, overlaps: list[Approach]) -> str:

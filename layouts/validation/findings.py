@@ -44,6 +44,8 @@ class Finding:
         unit: ``m`` or ``rad``.
         what: What was found, in a sentence.
         advice: What to change, in a sentence.
+        farther: How much farther apart the two robots have to stand (m); None if that does not
+            help, or it is not about two robots.
     """
 
     kind: str
@@ -54,6 +56,7 @@ class Finding:
     unit: str
     what: str
     advice: str
+    farther: float | None = None
 
     def __str__(self) -> str:
         """Return what was found and what to change, on two lines."""

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 from layouts import Layout
 from robots import LayoutError, MissingPackageError
+from tasks.engine.declaration import Declaration
 
 Rectangle = tuple[float, float, float, float]
 
@@ -39,6 +40,11 @@ def refuse_collisions(layout: Layout, table: Rectangle | None = None) -> None:
             f"the robots of this layout collide:\n{collisions}\n"
             "check_layout=False builds it all the same; layout.validate() gives the details"
         )
+
+
+def is_tested(cls: type[Declaration], layout: Layout) -> bool:
+    """Tell whether a layout is the own one of a task of this library, which its tests check."""
+    return cls.__module__.startswith("tasks.") and layout == cls.layout
 
 
 @lru_cache(maxsize=256)

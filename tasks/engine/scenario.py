@@ -61,8 +61,8 @@ class Scenario:
             them.
         randomization: What varies from episode to episode; None for nothing. See
             `tasks.Randomization`.
-        check_layout: Whether to refuse a layout whose robots collide; the task's own layout is
-            never checked.
+        check_layout: Whether to refuse a layout whose robots collide, be it another one or the
+            task's own; those of this library's tasks are checked by its tests.
     """
 
     layout: Layout

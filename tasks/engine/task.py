@@ -29,7 +29,7 @@ from tasks.engine.declaration import Declaration, Info
 from tasks.engine.declared import check_declaration
 from tasks.engine.display import task_html, task_text
 from tasks.engine.finite import NotFinite, refuse_observation, refuse_reward, refuse_state
-from tasks.engine.layout_check import refuse_collisions
+from tasks.engine.layout_check import is_tested, refuse_collisions
 from tasks.engine.memory import Memory
 from tasks.engine.observation import Observer, read_mode, space_of
 from tasks.engine.remade import Remade
@@ -92,14 +92,14 @@ class MultiRobotTask(Declaration, Varied, Remade):
         Raises:
             TaskError: If the scenario asks for what the task does not offer.
             SimulationError: If a control step is no whole number of physics steps.
-            LayoutError: If the robots of a layout other than the task's own collide.
+            LayoutError: If the robots of the layout collide.
             AssetError: If robot files cannot be found.
         """
         own = type(self)
         check_declaration(own)
         scenario.check(self.reward_modes)
         layout = own.built_layout(scenario)
-        if scenario.check_layout and scenario.layout != own.layout:
+        if scenario.check_layout and not is_tested(own, scenario.layout):
             refuse_collisions(scenario.layout, self.table.outline(scenario.layout))
         self.scenario = scenario
         self.layout = layout

@@ -14,7 +14,7 @@ import numpy as np
 
 from tests.faults.arguments_checkers_faults import NO_POINTS
 from tests.faults.arguments_layouts_faults import WRONG_ROBOTS
-from tests.faults.fault import Fault
+from tests.faults.fault import GOES_ON, Fault
 
 AREA = "motion"
 NAN, INF = math.nan, math.inf
@@ -110,6 +110,17 @@ def faults() -> Iterator[Fault]:
         for value in values:
             yield _fault(f"search({name}={_text(value)})", partial(_search, {name: value}))
 
+    for name, change in WRONG_NUMBERS.items():
+        yield Fault("saved motions", name, partial(_load, partial(_changed, change)))
+    for what, change in {
+        "a joint thrown about by 1e5 rad/s": _thrown,
+        "a motion that swings 10 rad between any two knots": _swinging,
+    }.items():
+        yield Fault("certificates", what, partial(_certified, change), GOES_ON)
+    yield Fault("certificates", "a step of a nanometre", partial(_stepped, 1e-9))
+    yield Fault("certificates", "an obstacle that travels 1e6 m in a second", _long)
+    yield Fault("certificates", "an obstacle of 2,001 parts", _crowded)
+
 
 def _fault(what: str, run: Callable[[Path], Any]) -> Fault:
     return Fault(AREA, what, run)
@@ -203,6 +214,80 @@ def _load(spoil: Callable[[str], str | bytes], folder: Path) -> None:
     spoilt = spoil(file.read_text())
     file.write_bytes(spoilt if isinstance(spoilt, bytes) else spoilt.encode())
     Motion.load(file)
+
+
+def _changed(change: Callable[[dict[str, Any]], None], text: str) -> str:
+    document = json.loads(text)
+    change(document)
+    return json.dumps(document)
+
+
+def _with_cube(**changed: Any) -> Callable[[dict[str, Any]], None]:
+    shape = [[x, y, z] for x in (0.0, 0.1) for y in (0.0, 0.1) for z in (0.0, 0.1)]
+    cube = {"name": "cube", "shapes": [shape], "pose": np.eye(4).tolist(), **changed}
+    return lambda document: document["obstacles"].append(cube)
+
+
+def _far(number: float) -> list[list[float]]:
+    pose = np.eye(4)
+    pose[0, 3] = number
+    return pose.tolist()
+
+
+WRONG_NUMBERS: dict[str, Callable[[dict[str, Any]], None]] = {
+    "times beyond a million seconds": lambda m: m.update(times=[0.0, *m["times"][1:-1], 2e6]),
+    "one position of 1e7": lambda m: m["positions"]["left"][3].__setitem__(0, 1e7),
+    "one velocity of 1e308": lambda m: m["velocities"]["left"][3].__setitem__(0, 1e308),
+    "a largest velocity below 0": lambda m: m["largest_velocities"].update(left=[-1.0] * 9),
+    "an obstacle of 1e300 m": _with_cube(shapes=[[[0, 0, 0], [1e300, 0, 0], [0, 1, 0], [0, 0, 1]]]),
+    "an obstacle 1e300 m away": _with_cube(pose=_far(1e300)),
+    "an obstacle that travels 1e300 m": _with_cube(
+        track={"times": [0.0, 1.0], "poses": [_far(0.0), _far(1e300)]}
+    ),
+}
+
+
+def _thrown(document: dict[str, Any]) -> None:
+    document["velocities"]["left"][3][0] = 1e5
+
+
+def _swinging(document: dict[str, Any]) -> None:
+    for i, row in enumerate(document["positions"]["left"]):
+        row[0] = (-1) ** i * 10.0
+
+
+def _certified(change: Callable[[dict[str, Any]], None], folder: Path) -> str:
+    from motion import Motion
+
+    file = folder / "motion.json"
+    _motion().save(file)
+    file.write_text(_changed(change, file.read_text()))
+    certificate = Motion.load(file).certify()
+    assert not certificate.ok
+    assert certificate.joint_limits or certificate.too_fast
+    return str(certificate).splitlines()[0]
+
+
+def _stepped(step: float, folder: Path) -> None:
+    _motion().certify(step=step)
+
+
+def _long(folder: Path) -> None:
+    from dataclasses import replace
+
+    from motion.obstacles import Track, box
+
+    track = Track(np.array([0.0, 1.0]), np.array([_far(0.0), _far(1e6)]))
+    replace(_motion(), obstacles=(box("comet", (0.1, 0.1, 0.1)).moved(track),)).certify()
+
+
+def _crowded(folder: Path) -> None:
+    from dataclasses import replace
+
+    from motion.obstacles import Obstacle, box
+
+    crate = Obstacle("crate", box("crate", (0.1, 0.1, 0.1)).shapes * 2001)
+    replace(_motion(), obstacles=(crate,)).certify()
 
 
 def _search(given: dict[str, Any], folder: Path) -> None:

@@ -2,12 +2,16 @@
 
 import itertools
 import random
+import sys
 from collections.abc import Callable, Sequence
 
 import pytest
 
-from layouts import Layout, around_table, grid, ring, side_by_side
+from layouts import Layout, around_table, face_to_face, grid, ring, side_by_side
+from layouts.distances import apart
+from robots import LayoutError, RobotDescriptor, RobotRegistry
 from tasks.originals.relay import find_zones
+from tests.layouts import small_robots
 
 CLEAR = 0.05  # m, at the keyframes with joint noise
 # What two panda_wristcam that look at each other have at native's distance.
@@ -73,3 +77,68 @@ def test_any_two_and_three_keep_clear(way, first):
 @pytest.mark.parametrize("mix", [*itertools.product(("panda", "koch", "fetch"), repeat=3)])
 def test_in_a_ring_a_relay_finds_a_place_between_any_two(mix):
     assert len(find_zones(ring({f"arm_{i}": robot for i, robot in enumerate(mix)}))) == 3
+
+
+def wide(folder, width=2.4) -> RobotDescriptor:
+    """A small robot whose body is wider than its reach is long."""
+    plate = small_robots.link("top", f'<box size="{width} {width} 0.1"/>')
+    text = small_robots.TURNTABLE.replace(small_robots.link("top"), plate)
+    assert plate in text
+    return small_robots.robot(folder, text, ["turn"])
+
+
+@pytest.mark.parametrize("way", [*WAYS, "face"])
+def test_bodies_that_are_larger_than_their_reach_stand_farther_apart(way, tmp_path):
+    robot = wide(tmp_path)
+    ways = {**WAYS, "face": lambda robots: face_to_face(robots, spacing="auto")}
+    layout = ways[way]({"left": robot, "right": "panda"})
+    assert layout.validate(workspaces=False).ok
+    (x, y, _), (u, v, _) = (place.base_position for place in layout.values())
+    assert 0 < (x - u) ** 2 + (y - v) ** 2 < 3.0**2
+
+
+def test_the_distance_is_that_of_the_finding(tmp_path):
+    robots = {"left": wide(tmp_path), "right": "panda"}
+    reach = apart(robots["left"], RobotRegistry.load("panda"))
+    by_reach = side_by_side(robots, spacing=reach)
+    (finding,) = [f for f in by_reach.validate(workspaces=False).findings if f.serious]
+    assert finding.farther is not None
+    assert f"{finding.farther:.3f} m farther apart" in finding.advice
+    layout = side_by_side(robots, spacing="auto")
+    left, right = (place.base_position[1] for place in layout.values())
+    assert right - left == pytest.approx(reach + finding.farther, abs=1e-12)
+
+
+def test_where_no_distance_helps_it_says_why(tmp_path):
+    robots = {"left": wide(tmp_path, 9.0), "right": "panda"}
+    with pytest.raises(
+        LayoutError, match=r"no distance keeps these robots apart(.|\n)*left and right"
+    ):
+        side_by_side(robots, spacing="auto")
+
+
+def test_a_robot_that_touches_itself_is_refused(tmp_path):
+    folded = small_robots.robot(
+        tmp_path, small_robots.FOLDING, ["shoulder", "elbow"], [0.0, 3.1], "lower"
+    )
+    with pytest.raises(
+        LayoutError, match=r"no distance makes this layout sound(.|\n)*touches itself"
+    ):
+        side_by_side({"left": folded, "right": "panda"}, spacing="auto")
+
+
+def test_robots_of_the_catalogue_cost_no_check(monkeypatch):
+    monkeypatch.setattr(Layout, "validate", None)
+    assert ring({"a": "panda", "b": "koch"}) == ring({"a": "panda", "b": "koch"})
+
+
+def test_without_fcl_the_distance_is_that_of_reach(tmp_path, monkeypatch):
+    robots = {"left": wide(tmp_path), "right": "panda"}
+    monkeypatch.setitem(sys.modules, "fcl", None)
+    reach = apart(robots["left"], RobotRegistry.load("panda"))
+    assert side_by_side(robots, spacing="auto") == side_by_side(robots, spacing=reach)
+
+
+def test_hands_that_met_stand_clear():
+    two = {"a": "allegro_hand_right", "b": "allegro_hand_left"}
+    assert side_by_side(two, spacing="auto").validate(workspaces=False).ok

@@ -80,7 +80,10 @@ def test_a_motion_cannot_be_changed_and_pickles():
         ),
         ({"positions": {"left": np.zeros((21, 9))}}, "positions lacks right"),
         ({"velocities": 3.0}, "takes a mapping"),
-        ({"velocities": {n: np.full((21, 9), np.nan) for n in ("left", "right")}}, "not finite"),
+        ({"velocities": {n: np.full((21, 9), np.nan) for n in ("left", "right")}}, "holds nan"),
+        ({"times": np.linspace(0.0, 2e6, 21)}, "1e.06 s at most"),
+        ({"velocities": {n: np.full((21, 9), 2e6) for n in ("left", "right")}}, "holds 2e.06"),
+        ({"largest_velocities": {"left": -np.ones(9)}}, "must be > 0"),
         ({"largest_velocities": {"left": np.ones(3)}}, r"\(3,\); it must be \(9,\)"),
     ],
 )

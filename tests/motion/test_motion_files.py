@@ -17,6 +17,9 @@ from robots.common.errors import UnwritableFileError
 from tests.experts.free_motions import swing
 from tests.motion.motions import LAYOUT, busy_motion
 
+CUBE = {"name": "cube", "shapes": [[[0.0, 0.0, 1.0]]], "pose": np.eye(4).tolist()}
+FAR_AWAY = [[1.0, 0.0, 0.0, 1e300], *np.eye(4).tolist()[1:]]
+
 
 def alike(one, other) -> bool:
     """Tell whether two values, and all that is in them, are the same to the last bit."""
@@ -51,7 +54,7 @@ def test_a_motion_comes_back_as_it_was(file):
         ({"positons": {}}, "unknown key of a motion 'positons'. Did you mean 'positions'"),
         ({"times": None}, "times is None; it must be numbers"),
         ({"times": [0.0, "1"]}, "times is .* it must be numbers"),
-        ({"times": [1.0, 0.0]}, "times must be finite, begin with 0 and increase"),
+        ({"times": [1.0, 0.0]}, "times must begin with 0, increase, and be finite"),
         ({"positions": {"left": [[0.0], [1.0, 2.0]]}}, "positions of left is .* rows of one"),
         ({"positions": {"left": [[0.0]]}}, "positions lacks right"),
         ({"velocities": [1.0]}, "velocities is .* it must be an object"),
@@ -62,6 +65,8 @@ def test_a_motion_comes_back_as_it_was(file):
         ({"obstacles": [{"name": 3, "shapes": []}]}, "pose of an obstacle is None"),
         ({"obstacles": [{"name": "a", "shapes": [[1.0]]}]}, "list of corners, each x, y, z"),
         ({"obstacles": [{"name": "a", "shapes": [], "track": {}}]}, "times of a track is None"),
+        ({"obstacles": [{**CUBE, "shapes": [[[0.0, 0.0, 1e300]]]}]}, "finite numbers, 1e.06 m at"),
+        ({"obstacles": [{**CUBE, "pose": FAR_AWAY}]}, "finite numbers, 1e.06 at most"),
         ({"held": [{"place": "left"}]}, "an obstacle is None"),
         ({"table": [1.0]}, "table is .* it must be 4 numbers"),
         ({"clearance": -1}, "clearance is -1"),

@@ -57,7 +57,8 @@ def test_nothing_is_left_of_a_picture_that_cannot_be_made(motion, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_what_is_drawn_is_what_the_certificate_says(motion):
+def test_what_is_drawn_is_what_the_certificate_says():
+    motion = swing(face_to_face({"left": "panda", "right": "panda"}, spacing=1.4), seconds=0.8)
     scenes, certificate = Scenes(motion), motion.certify()
     found = scenes.distances(np.linspace(0, motion.duration, 81))
     assert certificate.clearance is not None

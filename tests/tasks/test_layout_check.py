@@ -9,6 +9,7 @@ import tasks
 from layouts import Layout, Placement, around_table, face_to_face, side_by_side
 from robots import LayoutError, RobotRegistry, TaskError
 from tasks.engine.layout_check import refuse_collisions
+from tests.experts.free_motions import FreeRobots
 
 TWO = "TwoRobotPickCube-v1"
 PANDAS = {"left": "panda_wristcam", "right": "panda_wristcam"}
@@ -46,7 +47,20 @@ def test_other_robots_at_the_same_places_are_checked_too():
         tasks.make(TWO, layout=crowded(), robots={"right": "panda_stick"})
 
 
-def test_the_tasks_own_layout_costs_nothing(monkeypatch):
+class Crowded(FreeRobots):
+    """A task of a user's, whose arms stand 8 cm inside each other."""
+
+    layout = face_to_face(PANDAS, spacing=1.25)
+
+
+def test_a_users_own_layout_is_checked_as_another_one_is():
+    with pytest.raises(LayoutError, match=r"left and right collide(.|\n)*m farther apart"):
+        Crowded(Crowded.scenario)
+    Crowded(replace(Crowded.scenario, check_layout=False)).close()
+    Crowded(replace(Crowded.scenario, layout=FreeRobots.layout)).close()
+
+
+def test_the_own_layout_of_a_task_of_this_library_costs_nothing(monkeypatch):
     def fail(layout, table):
         raise AssertionError("checked")
 
@@ -77,7 +91,8 @@ def test_a_choice_that_is_none_is_refused():
 
 @pytest.mark.parametrize("task_id", tasks.list_tasks())
 def test_every_task_has_a_layout_that_passes(task_id):
-    refuse_collisions(tasks.get_task_class(task_id).layout)
+    task = tasks.get_task_class(task_id)
+    refuse_collisions(task.layout, task.table.outline(task.layout))
 
 
 def test_a_robot_in_a_table_of_its_layout_is_refused():
