@@ -26,15 +26,21 @@ def imported(word: str, what: str, error: type[RobotLayoutsError], hint: str = "
     more = f". {hint}" if hint else ""
     try:
         found: Any = import_module(module)
+        for part in attribute.split("."):
+            if not hasattr(found, part):
+                raise error(f"no {what} {word!r}: {_lacking(found, module, attribute, part, more)}")
+            found = getattr(found, part)
+    except RobotLayoutsError:
+        raise
     except (Exception, SystemExit) as cause:  # whatever the user's own code does
         raise error(f"no {what} {word!r}: {reason(cause)}{more}") from cause
-    for part in attribute.split("."):
-        if not hasattr(found, part):
-            words = f"no {what} {word!r}: module {module!r} has no attribute {attribute!r}"
-            if (package := module.partition(".")[0]) in ROOMS:
-                more = f"; {package!r} is a package of this library: rename a module of yours"
-            elif match := closest_match(part, dir(found)):
-                more = f". Did you mean {match!r}?"
-            raise error(words + more)
-        found = getattr(found, part)
     return found
+
+
+def _lacking(found: Any, module: str, attribute: str, part: str, more: str) -> str:
+    """Say that a module has no such attribute, and why that may be."""
+    if (package := module.partition(".")[0]) in ROOMS:
+        more = f"; {package!r} is a package of this library: rename a module of yours"
+    elif match := closest_match(part, dir(found)):
+        more = f". Did you mean {match!r}?"
+    return f"module {module!r} has no attribute {attribute!r}{more}"

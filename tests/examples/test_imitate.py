@@ -156,6 +156,7 @@ def seen_in(task):
     return observation
 
 
+@pytest.mark.long
 def test_the_policy_looks_again_after_the_actions_it_plays(example, learned):
     policy = example.ClonedPolicy.load(learned / "policy.pt")
     still = seen_in(TASK)
@@ -187,6 +188,7 @@ def test_a_cube_looks_the_same_after_a_quarter_turn(example):
     assert not torch.allclose(turned(np.pi / 8), before, atol=1e-2)
 
 
+@pytest.mark.long
 def test_a_folder_of_another_recipe_is_refused(example, learned, recording, capsys):
     words = [*WORDS, "--steps", "61", "--recording", str(recording), "--out", str(learned)]
     assert example.main(words) == 1

@@ -63,6 +63,7 @@ def test_another_run_has_the_same_weights(example, learned, tmp_path):
     assert (tmp_path / "policy.pt").read_bytes() == (learned / "policy.pt").read_bytes()
 
 
+@pytest.mark.long
 def test_what_it_learned_from_is_what_it_gets_when_it_plays(example, learned):
     policy = example.SeeingPolicy.load(learned / "policy.pt")
     training = policy.training(policy.recipe, learned / "recording", 0, learned)

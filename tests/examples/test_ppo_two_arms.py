@@ -72,6 +72,7 @@ def test_a_run_leaves_checkpoints_and_its_curve(ppo, tmp_path, capsys):
     assert "0% of 1 test episodes succeed" in printed.out
 
 
+@pytest.mark.long
 def test_it_learns_from_one_checkpoint_to_the_next(ppo, tmp_path):
     ppo.run([*WORDS, "--workers", "0", "--out", str(tmp_path)])
     states = [state(tmp_path / name)["policy"] for name in CHECKPOINTS]
@@ -106,6 +107,7 @@ def test_every_checkpoint_has_worlds_of_its_own(ppo, tmp_path):
     assert seeds == [10_300_000, 10_300_001, 10_300_002, 10_300_003]
 
 
+@pytest.mark.long
 def test_other_seeds_give_other_weights(ppo, tmp_path):
     words = ["--steps", "200", *WORDS[2:], "--workers", "0", "--out"]
     for seed in ("0", "1"):

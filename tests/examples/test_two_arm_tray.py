@@ -32,6 +32,7 @@ def test_it_holds_no_outputs():
     assert all(not cell["outputs"] and cell["execution_count"] is None for cell in code)
 
 
+@pytest.mark.long
 def test_its_cells_run_one_after_the_other(monkeypatch, tmp_path):
     """As in a notebook: what they define is in a ``__main__`` that comes from no file."""
     main = ModuleType("__main__")
@@ -82,6 +83,7 @@ def test_a_notebook_runs_it_from_the_first_to_the_last_cell(tmp_path):
     assert "is defined in this notebook or interactive session" in shown["text/plain"]
 
 
+@pytest.mark.long
 @pytest.mark.example_robots
 @pytest.mark.parametrize(
     ("robot", "seeds"),

@@ -8,6 +8,7 @@ import tasks
 from experts import find_expert, list_experts
 from experts.rehearsal import rehearsed
 from parity.compare.native_env import make_native, native_action
+from tests.quick import quick_cases
 from tests.rollouts.expert_plays import REBUILT, episode, plan, same_episodes, seeds, task
 
 pytestmark = pytest.mark.xdist_group("experts")  # they share plans
@@ -29,9 +30,10 @@ FAILURES_OF_10 = {"PickCubeSO100-v1": 2}  # 0 of the others
 EXPERTS = list_experts()
 CLONED = [name for name in EXPERTS if name in tasks.list_clones()]
 EPISODES = [(name, seed) for name in EXPERTS for seed in seeds(name)]
+FIRST = [(name, seeds(name)[0]) for name in EXPERTS]
 
 
-@pytest.mark.parametrize(("name", "seed"), EPISODES)
+@pytest.mark.parametrize(("name", "seed"), quick_cases(EPISODES, FIRST))
 def test_it_solves_its_task_in_time(name: str, seed: int):
     actions = plan(name, seed)
     assert actions.dtype == np.float32
@@ -43,7 +45,7 @@ def test_it_solves_its_task_in_time(name: str, seed: int):
     assert not success[:-1].any()
 
 
-@pytest.mark.parametrize(("name", "seed"), EPISODES)
+@pytest.mark.parametrize(("name", "seed"), quick_cases(EPISODES, FIRST))
 def test_its_rehearsal_is_what_its_actions_do_again(name: str, seed: int):
     """So an episode that was rehearsed need not be played once more to be recorded."""
     happened = rehearsed(task(name), seed, plan(name, seed))
@@ -80,7 +82,7 @@ def test_the_same_actions_do_the_same_in_native(name: str):
     assert len(failed) <= FAILURES_OF_10.get(name, 0), f"failed: {failed}"
 
 
-@pytest.mark.parametrize("name", CLONED)
+@pytest.mark.parametrize("name", quick_cases(CLONED))
 def test_it_repeats_itself_and_leaves_the_task_alone(name: str):
     env, seed = tasks.make(name), seeds(name)[-1]
     env.reset(seed=11)

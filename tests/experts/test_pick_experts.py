@@ -48,6 +48,7 @@ def test_a_cube_out_of_reach_is_an_error():
         find_expert("StackCube-v1")(env, 0)
 
 
+@pytest.mark.long
 def test_arms_from_one_side_make_room_for_each_other():
     """Both come from behind the cubes; the one that waits would stand where the other one goes."""
     at = {"left": ((-0.225, -0.556, 0.0), 0.08), "right": ((-0.446, 0.194, 0.0), 0.44)}

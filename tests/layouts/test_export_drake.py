@@ -61,6 +61,7 @@ def urdf_of(model: dict) -> Path:
     return Path(urlparse(model["file"]).path)
 
 
+@pytest.mark.long
 def test_links_are_where_the_robots_own_urdfs_put_them(cell, exported):
     models, welds = read(exported)
     assert list(models) == list(cell)

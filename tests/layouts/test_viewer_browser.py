@@ -73,6 +73,7 @@ def test_robots_are_shown_moved_and_checked(tmp_path):
         assert rest == "ended\n"
 
 
+@pytest.mark.long
 def test_a_saved_page_shows_the_robots_and_asks_for_nothing(tmp_path):
     file = tmp_path / "cell.html"
     words = ["face_to_face", "left=so100", "right=so100", "--spacing", "0.5"]  # quickly drawn

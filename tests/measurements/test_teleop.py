@@ -45,6 +45,7 @@ def test_more_drags_than_the_page_remembers_are_refused(capsys):
     assert "the page remembers 200 drags; 201 are too many" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_command_without_a_page_says_why():
     with (
         pytest.raises(ViewerError, match=r"teleop NoTask-v1` serves no page: .*NoTask-v1"),

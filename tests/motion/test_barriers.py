@@ -47,6 +47,7 @@ def floor_with_a_slot(width):
     return [box(name, size, (0.0, y, -0.45)) for name, y in sides.items()]
 
 
+@pytest.mark.long
 def test_a_goal_beyond_the_floor_is_cut_off():
     cell = Cell(raised(), table=TABLE)
     assert cell.checker().free(behind(cell)[None])[0]

@@ -100,6 +100,7 @@ def test_a_package_that_hides_ours_is_named(tmp_path):
 
 
 class TestNew:
+    @pytest.mark.long
     def test_task_writes_files_that_run(self, tmp_path, capsys):
         words = ["new", "task", "two_arm_reach", "--out", str(tmp_path), "--robots"]
         assert main([*words, "left=panda", "right=so100"]) == 0
@@ -192,7 +193,15 @@ class TestNew:
         assert main(words) == 0
         source = ast.parse((folder / "reach.py").read_text())
         texts = [node.value for node in ast.walk(source) if isinstance(node, ast.Constant)]
-        assert f"{folder}/arm.urdf" in texts
+        assert "arm.urdf" in texts  # beside the file
+
+    def test_task_of_a_urdf_whose_own_name_has_a_quote(self, tmp_path):
+        (tmp_path / """a"b'c.urdf""").write_text(toy())
+        words = ["new", "task", "Reach", "--out", str(tmp_path), "--robots"]
+        assert main([*words, f"""arm={tmp_path}/a"b'c.urdf"""]) == 0
+        source = ast.parse((tmp_path / "reach.py").read_text())
+        texts = [node.value for node in ast.walk(source) if isinstance(node, ast.Constant)]
+        assert """a"b'c.urdf""" in texts
 
     def pytest(self, folder) -> subprocess.CompletedProcess[str]:
         return subprocess.run(

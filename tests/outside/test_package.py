@@ -52,6 +52,7 @@ def test_every_command_takes_a_module_and_an_id(recorded):
     assert list((lab / "set").iterdir())
 
 
+@pytest.mark.long
 def test_a_recording_does_not_choose_which_code_runs(recorded):
     lab, _ = recorded
     (code, *codes), printed = run(lab, "replay data", f"replay data --task {TRAY}", "replay data")
@@ -61,6 +62,7 @@ def test_a_recording_does_not_choose_which_code_runs(recorded):
     assert codes == [0, 0]  # once it is named, this process knows it
 
 
+@pytest.mark.long
 def test_an_installed_package_needs_no_module(recorded, tmp_path):
     lab, _ = recorded
     there = make_folder(tmp_path)

@@ -199,6 +199,7 @@ def test_help(capsys):
     assert "Exit code: 0 if every difference is exactly zero" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_without_mani_skill():
     """As on a machine without it: every attempt to import it fails."""
     done = run_alone("import sys; sys.modules['mani_skill'] = None\n" + COMPARE)

@@ -69,6 +69,7 @@ def expect_honest(task_id: str) -> None:
 class TestDrawing:
     pytestmark = [*NATIVE, pytest.mark.usefixtures("renderer")]
 
+    @pytest.mark.long
     @pytest.mark.parametrize("task_id", ["TwoRobotPickCube-v1", "DrawTriangle-v1"])
     def test_what_is_drawn_is_what_native_shows(self, task_id):
         expect_honest(task_id)
@@ -91,11 +92,13 @@ class TestDrawing:
         assert any(delta.any() for delta in seen)
         assert not difference(scene.draw(found), scene.draw(found)).any(), "drawing is not exact"
 
+    @pytest.mark.long
     def test_a_dot_that_was_drawn_is_seen(self):
         scene, found = after_reset("DrawTriangle-v1")
         raised = changed(found, "object pose", "dot_7", 2, 0.05)
         assert difference(scene.draw(found), scene.draw(raised)).any()
 
+    @pytest.mark.long
     def test_a_picture_of_another_moment_is_noticed(self):
         class Forgetful(NativeScene):
             def draw(self, snapshot):

@@ -52,6 +52,7 @@ def panels(clip: Path) -> np.ndarray:
 class TestRendering:
     pytestmark = [*NATIVE, pytest.mark.usefixtures("renderer")]
 
+    @pytest.mark.long
     def test_a_clip_of_equal_sides(self, tmp_path, capsys):
         demo = recorded(tmp_path / "wild.npz")
         code = run(

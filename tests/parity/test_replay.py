@@ -99,6 +99,7 @@ def expect_same_states(one: Path, other: Path) -> None:
 class TestNative:
     pytestmark = NATIVE
 
+    @pytest.mark.long
     @pytest.mark.parametrize("mode", [MODES[0], pytest.param(MODES[1], marks=pytest.mark.long)])
     def test_natives_own_tool_plays_our_files(self, tmp_path, mode):
         path = recorded_here(tmp_path, "PickCube-v1", mode)

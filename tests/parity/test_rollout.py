@@ -126,6 +126,7 @@ class TestRolling:
         assert about["control_mode"] == "pd_joint_pos"
         np.testing.assert_allclose(found["arm.qpos"][-1][:7], rest[:7], atol=0.05)
 
+    @pytest.mark.long
     def test_native_is_filmed(self, file, tmp_path, renderer):
         imageio = pytest.importorskip("imageio.v2")
         assert roll_out(file, tmp_path, "--seed", "2") == 0

@@ -9,6 +9,7 @@ import tasks
 from parity.compare.episodes import random_episodes
 from simulation import PhysicsSettings, World
 from tests.native import NATIVE, TASKS, against_native
+from tests.quick import quick_cases
 
 pytestmark = NATIVE
 
@@ -42,7 +43,7 @@ OTHER_MUTANTS = {
 }
 
 
-@pytest.mark.parametrize("task_id", TASKS)
+@pytest.mark.parametrize("task_id", quick_cases(TASKS))
 def test_one_wrong_number(task_id: str, monkeypatch: pytest.MonkeyPatch):
     mutate, fields = OTHER_MUTANTS.get(task_id, (make_bodies_heavier, {}))
     mutate(monkeypatch)

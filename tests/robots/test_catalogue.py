@@ -144,11 +144,11 @@ def test_some_robots_cannot_be_drawn():
     )
 
 
-def test_a_robot_is_at_most_sixty_lines():
+def test_a_robot_is_at_most_seventy_lines():
     for name in ROBOTS:
         module = Path(str(importlib.import_module(f"robots.catalogue.{name}").__file__))
         lines = module.read_text(encoding="utf-8").splitlines()
-        assert len(lines) <= 60, (name, len(lines))
+        assert len(lines) <= 70, (name, len(lines))
 
 
 def test_the_numbers_name_their_source(robot):

@@ -115,6 +115,7 @@ def test_one_server_error_is_retried(hub: HubServer, store, physics):
     assert_all_verified(store, physics)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("code", "reason"),
     [
@@ -143,6 +144,7 @@ def test_a_truncated_body_is_resumed(hub: HubServer, store, physics):
     assert_all_verified(store, physics)
 
 
+@pytest.mark.long
 def test_a_slow_download_that_goes_on_is_not_given_up(hub: HubServer, store):
     large = next(file for file in PANDA.files if file.path.endswith("visual/link0.glb"))
     hub.files[f"{large.origin.hub_folder}/{large.path}"] = contents(large)
@@ -245,6 +247,7 @@ def test_a_file_wrong_twice_is_refused_by_name(hub: HubServer, store, physics, c
     assert not store.path(store.unusable(physics)[0]).exists()
 
 
+@pytest.mark.long
 def test_a_hub_that_never_answers_is_waited_for_once(store, physics, monkeypatch):
     with socket.create_server(("127.0.0.1", 0), backlog=64) as black_hole:
         monkeypatch.setenv("HF_ENDPOINT", f"http://127.0.0.1:{black_hole.getsockname()[1]}")

@@ -53,6 +53,7 @@ def test_what_a_portable_process_begins_is_portable():
     assert python(spawned, *BEGIN) == "True True True"
 
 
+@pytest.mark.long
 def test_libraries_take_the_versions_that_run_everywhere():
     code = (
         "import torch; from numpy._core import _multiarray_umath as m;"

@@ -92,6 +92,7 @@ def robomimic(recording, seen, tmp_path_factory) -> Path:
     return out
 
 
+@pytest.mark.long
 @drawn
 def test_arrays_of_robomimic_are_what_the_environment_sees(seen, robomimic):
     with h5py.File(robomimic / "image.hdf5") as file:

@@ -283,6 +283,7 @@ def test_a_worker_that_is_killed(tmp_path):
     assert same_files(tmp_path / FILE, recorded_directly(tmp_path / "direct" / FILE, range(60)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "how", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)]
 )

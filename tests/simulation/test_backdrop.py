@@ -12,6 +12,7 @@ from simulation.cameras import TEXTURES
 from simulation.rendering.pictures import vulkan_problem
 from simulation.sapien3.backend import worlds_below
 from simulation.sapien3.studio import Studio
+from tests.quick import quick_cases
 
 CAMERAS = {
     "front": Camera((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1), "front", 61, 47),
@@ -75,7 +76,9 @@ def whole_pictures(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 @pytest.mark.parametrize(
     "task_id",
-    ["PickCube-v1", "PushT-v1", "PickCubeSO100-v1", "TwoRobotStackCube-v1", "DrawTriangle-v1"],
+    quick_cases(
+        ["PickCube-v1", "PushT-v1", "PickCubeSO100-v1", "TwoRobotStackCube-v1", "DrawTriangle-v1"]
+    ),
 )
 def test_a_picture_of_parts_is_that_of_the_whole(task_id: str):
     with closing(tasks.make(task_id, render_mode="rgb_array")) as env:

@@ -238,6 +238,7 @@ def test_gymnasium_takes_images():
     env.close()
 
 
+@pytest.mark.long
 @drawing
 @pytest.mark.parametrize("num_workers", [0, 1])
 def test_a_vector_gives_the_same_images(num_workers: int):

@@ -14,6 +14,7 @@ from tasks.episode import Episode, play
 from tests.catalogue import every_robot
 from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, complaints, pair
+from tests.quick import quick_cases
 
 MODE = "pd_joint_pos"
 SOME_TASKS = ("PickCube-v1", "PickCubeSO100-v1", "PushT-v1", "TwoRobotPickCube-v1")
@@ -45,12 +46,12 @@ def expect_native(task_id, history, episodes):
 class TestNative:
     pytestmark = NATIVE
 
-    @pytest.mark.parametrize("history", HISTORIES)
-    @pytest.mark.parametrize("task_id", SOME_TASKS)
+    @pytest.mark.parametrize("history", quick_cases(HISTORIES, ["reused"]))
+    @pytest.mark.parametrize("task_id", quick_cases(SOME_TASKS))
     def test_random_and_over_range_positions(self, task_id, history):
         expect_native(task_id, history, over_range_episodes(task_id, 40))
 
-    @pytest.mark.parametrize("task_id", SOME_TASKS)
+    @pytest.mark.parametrize("task_id", quick_cases(SOME_TASKS))
     def test_scripted_contact(self, task_id):
         contacts = expect_native(task_id, "reused", [touching(task_id, seed) for seed in SEEDS])
         assert contacts >= 10, "hardly anything was touched"

@@ -29,6 +29,7 @@ from tasks.episode import Episode, play
 from tasks.registry import make_scenario
 from tests.motions import touching_episode
 from tests.native import NATIVE, complaints, pair
+from tests.quick import quick_cases
 from tests.squares import farthest_off
 
 OTHERS = CONTROL_MODES[2:]
@@ -63,7 +64,7 @@ def expect_native(task_id, mode, history, steps):
 class TestNative:
     pytestmark = NATIVE
 
-    @pytest.mark.parametrize(("task_id", "mode"), SAMPLE)
+    @pytest.mark.parametrize(("task_id", "mode"), quick_cases(SAMPLE, SAMPLE[:1]))
     def test_a_sample(self, task_id, mode):
         expect_native(task_id, mode, "fresh", 20)
         native, ours = pair(task_id, control_mode=mode)

@@ -7,16 +7,19 @@ from parity.compare.episodes import random_episodes
 from parity.compare.lockstep import HISTORIES
 from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, complaints, pair
+from tests.quick import quick_cases
 
 pytestmark = NATIVE
 
 # The second begins in a world that has a past; the others in one that is rebuilt.
 SEEDS = {"reused": (1, 2), "fresh": (1,)}
+REUSED = quick_cases(HISTORIES, ["reused"])
 
 
 def other_modes():
     """Every task with each of its reward modes but the first, which other tests use."""
-    return [(t, mode) for t in TASKS for mode in tasks.get_task_class(t).reward_modes[1:]]
+    modes = [(t, mode) for t in TASKS for mode in tasks.get_task_class(t).reward_modes[1:]]
+    return quick_cases(modes, [(t, "dense") for t in TASKS])
 
 
 def has_movable_bodies(task_id):
@@ -24,7 +27,7 @@ def has_movable_bodies(task_id):
     return any(body.kind == "dynamic" for body in world.bodies.values())
 
 
-@pytest.mark.parametrize("history", HISTORIES)
+@pytest.mark.parametrize("history", REUSED)
 @pytest.mark.parametrize("task_id", TASKS)
 def test_random_and_over_range_actions(task_id, history):
     both = pair(task_id)
@@ -47,7 +50,7 @@ def test_reward_modes_are_natives():
         assert tasks.get_task_class(task_id).reward_modes == tuple(modes)
 
 
-@pytest.mark.parametrize("history", HISTORIES)
+@pytest.mark.parametrize("history", REUSED)
 @pytest.mark.parametrize("task_id", TASKS)
 def test_scripted_contact(task_id, history):
     episodes = [touching_episode(task_id, seed) for seed in SEEDS[history]]

@@ -165,7 +165,7 @@ def test_a_worker_finds_the_libraries_loaded_and_everything_else_as_it_is_now(
 def test_a_program_that_is_read_from_standard_input_may_have_workers(monkeypatch):
     main = sys.modules["__main__"]
     monkeypatch.setattr(main, "__spec__", None)
-    monkeypatch.setattr(main, "__file__", "<stdin>")
+    monkeypatch.setattr(main, "__file__", "<stdin>", raising=False)
     in_worker(look_around)
 
 

@@ -293,6 +293,7 @@ def test_pictures():
     assert (pictures[0] != pictures[1]).any()
 
 
+@pytest.mark.long
 @NATIVE[0]
 @NATIVE[1]
 @NATIVE[2]

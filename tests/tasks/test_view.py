@@ -81,6 +81,7 @@ def test_an_unknown_task_is_told(capsys):
     assert "Did you mean 'PickCube-v1'?" in capsys.readouterr().err
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "task_ids",
     [
