@@ -40,7 +40,7 @@ test-all: $(VENV)/.test
 # However it hangs, a fault fails after so many seconds.
 faults: $(VENV)/.test
 	OMP_NUM_THREADS=1 $(RUN) -m pytest -n auto --maxprocesses 8 -m fault --timeout 180 \
-		--write-faults docs/faults.md tests/faults $(ARGS)
+		--write-faults docs/faults.md --list-faults runs/faults.md tests/faults $(ARGS)
 
 check: $(VENV)/.check
 	$(RUN) -m ruff check .

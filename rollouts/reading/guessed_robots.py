@@ -8,7 +8,14 @@ from dataclasses import fields
 from pathlib import Path
 
 from layouts import Layout
-from robots import LocalMjcf, LocalUrdf, RobotDescriptor, RobotRegistry, UnreadableFileError
+from robots import (
+    LocalMjcf,
+    LocalUrdf,
+    NativeAgent,
+    RobotDescriptor,
+    RobotRegistry,
+    UnreadableFileError,
+)
 from robots.common.files import read_regular
 from robots.mjcf.locator import is_mjcf
 from robots.urdf.cleaning.cleaning import is_template
@@ -17,6 +24,8 @@ from rollouts.reading import json_fields
 from rollouts.reading.json_fields import TEXT, by_name, maybe
 from rollouts.reading.summary import TrajectoryError
 
+# Fields that digests of 0.2.0 lack, with their defaults.
+NEWER_FIELDS = {"no_floor_contact": (), "native_agent": NativeAgent()}
 GUESSED = maybe(by_name(json_fields.fields({"urdf": TEXT, "sha256": TEXT, "descriptor": TEXT})))
 
 
@@ -98,7 +107,13 @@ def _checksum(path: Path) -> str:
 
 
 def descriptor_digest(robot: RobotDescriptor) -> str:
-    """Return a SHA-256, in hex, over all fields of a descriptor but where its files are."""
+    """Return a SHA-256, in hex, over all fields of a descriptor but where its files are.
+
+    `NEWER_FIELDS` count where they differ from their defaults, so that older digests stay.
+    """
     values = {f.name: getattr(robot, f.name) for f in fields(robot) if f.name != "urdf"}
+    for name, default in NEWER_FIELDS.items():
+        if values[name] == default:
+            del values[name]
     values["keyframes"] = dict(robot.keyframes)
     return hashlib.sha256(repr(values).encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""``--write-faults FILE``: the list of all faults tried, as a page."""
+"""``--write-faults FILE`` counts the faults tried, as a page; ``--list-faults FILE`` lists them."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ import pytest
 ROOT = Path(__file__).parents[2]
 SHOWN = 240  # characters of a message
 
+Tried = dict[str, list[tuple[str, str, str, bool]]]
+"""Area → what was tried, what is promised, what happened, and whether that is kept."""
+
 HEADING = """\
 # Faults
 
@@ -19,18 +22,20 @@ What was tried to break the library, what it promises then, and what happens. Wr
 `make faults`, which tries all of it again: hostile files, wrong arguments, processes killed or
 stopped, disks and networks that fail. "One clear error" means a `RobotLayoutsError` that says what
 is wrong; "goes on" means that results are the same as without the fault, or that nothing was lost.
+It also lists each of them, with what happens, in `runs/faults.md`.
 """
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--write-faults", metavar="FILE", help="write the list of faults to a page")
+    parser.addoption("--write-faults", metavar="FILE", help="write how many were tried to a page")
+    parser.addoption("--list-faults", metavar="FILE", help="write the list of faults to a page")
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    path = terminalreporter.config.getoption("write_faults", None)
-    if not path:
+    counts, everything = map(terminalreporter.config.getoption, ("write_faults", "list_faults"))
+    if not counts and not everything:
         return
-    tried: dict[str, list[tuple[str, str, str, bool]]] = defaultdict(list)
+    tried: Tried = defaultdict(list)
     for outcome in ("passed", "failed"):
         for report in terminalreporter.stats.get(outcome, []):
             said = dict(report.user_properties)
@@ -38,18 +43,26 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
                 area, what, promise = said["fault"]
                 happened = said.get("happened", _last_line(report))
                 tried[area].append((what, promise, happened, outcome == "passed"))
-    Path(path).write_text(_page(tried), encoding="utf-8")
-    count = sum(map(len, tried.values()))
-    kept = sum(ok for rows in tried.values() for *_, ok in rows)
-    terminalreporter.write_line(f"{count} faults tried, {kept} promises kept: {path}")
+    for path, page in ((counts, _totals(tried)), (everything, f"{_totals(tried)}{_list(tried)}")):
+        if path:
+            Path(path).parent.mkdir(parents=True, exist_ok=True)
+            Path(path).write_text(page, encoding="utf-8")
+            terminalreporter.write_line(f"faults: {path}")
+    broken = sum(not ok for rows in tried.values() for *_, ok in rows)
+    terminalreporter.write_line(f"{sum(map(len, tried.values()))} faults, {broken} broken promises")
 
 
-def _page(tried: dict[str, list[tuple[str, str, str, bool]]]) -> str:
+def _totals(tried: Tried) -> str:
     lines = [HEADING, "| area | tried | promises kept |", "| --- | ---: | ---: |"]
     for area, rows in sorted(tried.items()):
         lines.append(f"| {area} | {len(rows)} | {sum(ok for *_, ok in rows)} |")
     everything = [row for rows in tried.values() for row in rows]
     lines.append(f"| **all** | {len(everything)} | {sum(ok for *_, ok in everything)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _list(tried: Tried) -> str:
+    lines = list[str]()
     for area, rows in sorted(tried.items()):
         lines += ["", f"## {area[:1].upper()}{area[1:]}", ""]
         lines += ["| tried | promised | what happens |", "| --- | --- | --- |"]

@@ -1,6 +1,6 @@
 """Whatever goes wrong ends in one clear error, or in nothing at all.
 
-``make faults`` tries all of them, which takes minutes, and writes the list to ``docs/faults.md``.
+``make faults`` tries all of them, which takes minutes, and lists them in ``runs/faults.md``.
 """
 
 import pytest

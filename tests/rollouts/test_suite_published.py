@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from experts import find_expert
+from robots import RobotRegistry
+from rollouts.reading.guessed_robots import descriptor_digest
 from rollouts.receipts import Receipt
 from rollouts.receipts.sources import describe_expert, describe_task
 from rollouts.suite.files import load_suite
@@ -39,6 +41,8 @@ def test_it_was_played_by_the_code_that_is_here(path):
     task = get_task_class(receipt.task["id"])
     assert receipt.task == describe_task(task)
     assert receipt.policy == describe_expert(find_expert(task.task_id))
+    for place in receipt.making["layout"].values():
+        assert place["descriptor"] == descriptor_digest(RobotRegistry.load(place["robot"]))
 
 
 @pytest.mark.long
