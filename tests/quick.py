@@ -12,5 +12,10 @@ FEW_TASKS = ("DrawTriangle-v1", "PickCube-v1", "PushT-v1", "Relay-v1", "TwoRobot
 
 
 def quick_cases(values: Iterable[Any], quick: Collection[Any] = FEW_TASKS) -> list[Any]:
-    """Return parameters, those that are not quick marked as long."""
-    return [v if v in quick else pytest.param(v, marks=pytest.mark.long) for v in values]
+    """Return parameters, or tuples of some, those that are not quick marked as long."""
+    return [value if value in quick else _long(value) for value in values]
+
+
+def _long(value: Any) -> Any:
+    several = value if isinstance(value, tuple) else (value,)
+    return pytest.param(*several, marks=pytest.mark.long)

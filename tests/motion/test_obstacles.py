@@ -89,7 +89,7 @@ def test_a_track_stands_still_beyond_its_ends():
         (lambda: Obstacle("o", (FLAT,), np.eye(3)), "4 x 4 finite numbers"),
         (lambda: Obstacle("o", (FLAT,), np.diag([2.0, 1, 1, 1])), "a rotation matrix"),
         (lambda: Obstacle("o", (FLAT,), np.diag([-1.0, 1, 1, 1])), "mirrors"),
-        (lambda: Track(np.zeros(2), np.tile(np.eye(4), (2, 1, 1))), "finite and increase"),
+        (lambda: Track(np.zeros(2), np.tile(np.eye(4), (2, 1, 1))), "increase and be finite"),
         (lambda: Track(np.zeros(2), np.eye(4)[None]), r"\(T,\) and \(T, 4, 4\)"),
         (
             lambda: Held("left", box("b", (1, 1, 1)).moved(Track(np.zeros(1), np.eye(4)[None]))),

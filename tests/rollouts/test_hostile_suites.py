@@ -85,7 +85,8 @@ def test_no_task_is_imported_because_a_suite_says_who_plays_it(folder):
     ],
 )
 def test_no_robot_is_imported_or_read_because_a_suite_names_it(folder, layout):
-    template = """<robot xmlns:xacro="http://ros.org/wiki/xacro" name="${open('ran', 'w')}"/>"""
+    template = """<robot xmlns:xacro="http://ros.org/wiki/xacro" name="arm">
+        <xacro:if value="1"><link name="${open('ran', 'w')}"/></xacro:if></robot>"""
     (folder / "arm.xacro").write_text(template)
     (folder / "cell.yaml").write_text("version: 1\nrobots: {arm: {robot: 'strange:ROBOT'}}")
     with pytest.raises(TaskError, match="and a file chooses no code that runs"):
