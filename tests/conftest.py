@@ -68,8 +68,8 @@ def optional_problem() -> str | None:
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """Two processes more than there are cores, because tests also wait: for deadlines, say."""
-    return len(os.sched_getaffinity(0)) + 2
+    """One process more than there are cores, because tests also wait: for deadlines, say."""
+    return len(os.sched_getaffinity(0)) + 1
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

@@ -26,6 +26,8 @@ EXAMPLE = ROOT / "examples" / "imitate.py"
 TASK, MODE = "PushCube-v1", "pd_joint_pos"
 WORDS = [TASK, "--episodes", "2", "--steps", "60", "--examined", "1", "--tests", "2"]
 
+pytestmark = pytest.mark.long  # they record and learn
+
 
 @pytest.fixture(scope="module")
 def example():
@@ -62,7 +64,6 @@ def expect_equal(found, expected):
         assert torch.equal(found[name], values), name
 
 
-@pytest.mark.long
 def test_it_records_learns_and_leaves_its_files(example, learned, tmp_path, capsys):
     assert example.main([*WORDS, "--workers", "0", "--out", str(tmp_path)]) in (0, 1)
     names = {"learning_curve.json", "learning_curve.png", "policy.pt"}
@@ -77,7 +78,6 @@ def test_it_records_learns_and_leaves_its_files(example, learned, tmp_path, caps
     assert (tmp_path / "policy.pt").read_bytes() == (learned / "policy.pt").read_bytes()
 
 
-@pytest.mark.long
 def test_another_seed_makes_other_weights(example, learned, recording, tmp_path):
     words = [*WORDS, "--seed", "1", "--recording", str(recording), "--out", str(tmp_path)]
     example.main(words)
@@ -86,7 +86,6 @@ def test_another_seed_makes_other_weights(example, learned, recording, tmp_path)
     assert torch.equal(found["linear.weight"], other["linear.weight"])
 
 
-@pytest.mark.long
 def test_a_killed_run_goes_on_to_the_same_weights(example, learned, recording, tmp_path):
     words = [*WORDS, "--recording", str(recording), "--out", str(tmp_path)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -138,7 +137,6 @@ def test_chunks_hold_the_last_action(example):
     assert chunks.tolist() == [[0, 1, 2, 3], [2, 3, 4, 5], [4, 5, 4, 5]]
 
 
-@pytest.mark.long
 def test_the_policy_plays_alike_alone_and_beside_others(example, learned):
     policy = example.ClonedPolicy.load(learned / "policy.pt")
     how = {"control_mode": MODE, "obs_mode": "state_dict", "workers": 0}
@@ -156,7 +154,6 @@ def seen_in(task):
     return observation
 
 
-@pytest.mark.long
 def test_the_policy_looks_again_after_the_actions_it_plays(example, learned):
     policy = example.ClonedPolicy.load(learned / "policy.pt")
     still = seen_in(TASK)
@@ -188,7 +185,6 @@ def test_a_cube_looks_the_same_after_a_quarter_turn(example):
     assert not torch.allclose(turned(np.pi / 8), before, atol=1e-2)
 
 
-@pytest.mark.long
 def test_a_folder_of_another_recipe_is_refused(example, learned, recording, capsys):
     words = [*WORDS, "--steps", "61", "--recording", str(recording), "--out", str(learned)]
     assert example.main(words) == 1

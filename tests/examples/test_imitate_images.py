@@ -23,6 +23,8 @@ __all__ = ["examples"]
 TASK = "PushCube-v1"
 WORDS = [TASK, "--episodes", "2", "--steps", "25", "--examined", "1", "--tests", "1"]
 
+pytestmark = pytest.mark.long  # they record and learn
+
 
 @pytest.fixture
 def example(examples, renderer):
@@ -47,7 +49,6 @@ def learned(example, kept):
     return kept
 
 
-@pytest.mark.long
 def test_it_records_draws_learns_and_leaves_its_files(learned):
     names = {"learning_curve.json", "learning_curve.png", "policy.pt", "recording", "pictures"}
     assert {path.name for path in learned.iterdir()} == names
@@ -56,14 +57,12 @@ def test_it_records_draws_learns_and_leaves_its_files(learned):
     assert curve[-1]["error"] < curve[0]["error"]
 
 
-@pytest.mark.long
 def test_another_run_has_the_same_weights(example, learned, tmp_path):
     words = [*WORDS, "--recording", str(learned / "recording"), "--workers", "2"]
     finish(start("imitate_images", tmp_path, *words))
     assert (tmp_path / "policy.pt").read_bytes() == (learned / "policy.pt").read_bytes()
 
 
-@pytest.mark.long
 def test_what_it_learned_from_is_what_it_gets_when_it_plays(example, learned):
     policy = example.SeeingPolicy.load(learned / "policy.pt")
     training = policy.training(policy.recipe, learned / "recording", 0, learned)
@@ -138,7 +137,6 @@ def test_pictures_may_be_of_any_size(example, size):
     assert eye(pictures).shape == (2, example.SEEN)
 
 
-@pytest.mark.long
 def test_the_policy_plays_alike_alone_and_beside_others(example, learned):
     policy = example.SeeingPolicy.load(learned / "policy.pt")
     alone = evaluate(policy, TASK, range(50, 52), workers=0, **policy.making)

@@ -33,7 +33,7 @@ def native():
 
 @pytest.mark.native
 @pytest.mark.filterwarnings("ignore:__array_wrap__:DeprecationWarning")  # mani_skill's own
-@pytest.mark.parametrize("seed", quick_cases(SEEDS, [0, 1]))
+@pytest.mark.parametrize("seed", quick_cases(SEEDS, [0]))
 def test_the_same_actions_succeed_in_native(native, seed):
     native.reset(seed=seed, options={"reconfigure": True})
     for action in plan(seed):
@@ -61,6 +61,7 @@ def test_the_plan_does_not_depend_on_modes(mode):
     np.testing.assert_array_equal(find_expert(TASK)(env, 2), plan(2))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("spacing", [1.4, 1.6])
 def test_other_layouts_are_planned_for(spacing):
     layout = face_to_face({"left": "panda", "right": "panda_wristcam"}, spacing=spacing)
@@ -68,6 +69,7 @@ def test_other_layouts_are_planned_for(spacing):
     assert play(env, 0, find_expert(TASK)(env, 0)).solved
 
 
+@pytest.mark.long
 def test_arms_too_far_apart_are_an_error():
     env = tasks.make(
         TASK, layout=face_to_face(dict.fromkeys(("left", "right"), "panda"), spacing=4)

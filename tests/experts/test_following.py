@@ -51,6 +51,7 @@ def test_control_modes_are_mixed_and_the_same_actions_do_the_same():
         assert np.array_equal(rows, end[name])
 
 
+@pytest.mark.long
 @pytest.mark.example_robots
 @pytest.mark.parametrize("mode", TCPS)
 def test_arms_of_six_joints_stay_on_their_way_by_their_tcps(mode):

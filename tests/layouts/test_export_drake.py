@@ -83,7 +83,7 @@ def test_links_are_where_the_robots_own_urdfs_put_them(cell, exported):
     assert compared == DRAWS * 50
 
 
-@pytest.mark.parametrize("robot", every_robot())
+@pytest.mark.parametrize("robot", every_robot(quick=("fetch", "panda", "so100")))
 def test_links_of_any_robot_that_hangs_are_there(robot, tmp_path):
     layout = hung(robot)
     models, welds = read(layout.to_drake(tmp_path / "cell.dmd.yaml", visuals=False))
@@ -99,6 +99,7 @@ def test_links_of_any_robot_that_hangs_are_there(robot, tmp_path):
             np.testing.assert_allclose(found, pose, rtol=0, atol=1e-9)
 
 
+@pytest.mark.long
 def test_robots_start_at_their_keyframes(cell, exported):
     models, _ = read(exported)
     for name, placement in cell.items():

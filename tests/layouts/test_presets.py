@@ -45,8 +45,6 @@ mixed = some_of(RobotRegistry.names())
 # A hand at a table may begin inside it, which no distance mends.
 ARMS = [name for name in RobotRegistry.names() if RobotRegistry.load(name).reach > 0.3]
 mixed_arms = some_of(ARMS)
-    [name for name in RobotRegistry.names() if RobotRegistry.load(name).reach > 0.3]
-)
 PANDA = RobotRegistry.load("panda")
 # Robots of any size, from a toy to a crane.
 sized = st.lists(st.floats(0.1, 10.0), min_size=1, max_size=9).map(

@@ -40,6 +40,7 @@ class TestResult:
         assert list(pair) == list(PAIR)
         assert reached(pair, CUBE) == {("cube", "left"), ("cube", "right")}
 
+    @pytest.mark.long
     def test_robots_are_clear_of_each_other(self, pair):
         (clearance,) = pair.validate(workspaces=False).clearances
         assert clearance.noisy_distance >= QUICK["clearance"]

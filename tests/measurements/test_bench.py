@@ -143,6 +143,7 @@ class TestWhatIsTimed:
         layout = crowd(3, ("panda", "so100"))
         assert [place.robot.name for place in layout.values()] == ["panda", "so100", "panda"]
 
+    @pytest.mark.long
     def test_physics_processes_end_with_their_block_and_say_when_one_died(self):
         with (
             processes.vector("PickCube-v1", 2, 0) as env,

@@ -61,6 +61,7 @@ class TestComparing:
         assert "Bitwise equal: 2 episodes, 10 steps; success in native 0, here 0" in printed
         expect_equal_document(json.loads(json_file.read_text()))
 
+    @pytest.mark.long
     def test_every_way_of_playing_is_a_row(self, capsys, tmp_path):
         json_file = tmp_path / "result.json"
         code = run(

@@ -148,6 +148,7 @@ def test_another_reward_mode():
     assert quantities(result) == {"reward"}
 
 
+@pytest.mark.long
 def test_one_environment_of_a_batch(monkeypatch):
     """A mistake in one environment is found, and not laid at its neighbours' door."""
     both = pair("PickCube-v1", num_envs=8)

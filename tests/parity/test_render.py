@@ -89,6 +89,7 @@ class TestRendering:
         expect_equal(found)
         assert (found["seed"], found["source"]) == (41, "planned/trajectory episode 1")
 
+    @pytest.mark.long
     def test_a_clip_of_sides_that_differ(self, tmp_path):
         """Our side begins the episode of another seed: every frame differs, and it is told."""
         ours = OtherSeed(tasks.make("PickCube-v1"))

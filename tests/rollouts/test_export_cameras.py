@@ -111,6 +111,7 @@ def test_arrays_of_robomimic_are_what_the_environment_sees(seen, robomimic):
     assert len({moment["left.hand_camera rgb"].tobytes() for moment in seen[0]}) == 3  # it moves
 
 
+@pytest.mark.long
 @drawn
 def test_images_of_lerobot_are_what_the_environment_sees(recording, seen, tmp_path):
     names = ["left.hand_camera", "base_camera"]
@@ -184,6 +185,7 @@ def test_where_no_replay_ends_pictures_are_of_the_recorded_states(tmp_path):
         np.testing.assert_array_equal(view.images["rgb"], picture)
 
 
+@pytest.mark.long
 @drawn
 def test_worlds_that_vary_are_drawn_as_they_were(tmp_path):
     varied = Randomization(

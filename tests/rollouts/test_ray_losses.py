@@ -54,6 +54,7 @@ def test_a_cluster_that_refuses(host):
         next(RayExecutor(f"{host}:1").run(Play(), [0]))
 
 
+@pytest.mark.long
 def test_a_port_that_is_silent(monkeypatch):
     monkeypatch.setattr(rollouts.playing.ray_cluster, "_JOIN_SECONDS", 3.0)
     with socket.create_server(("127.0.0.77", 0)) as silent:
