@@ -46,8 +46,8 @@ def markdown(seen: Mapping[str, Any]) -> Iterator[str]:
     yield ""
     yield "Receipts of the test episodes, which name the weights by their checksums, are in"
     yield "`docs/receipts/imitation` of the repository; equal commands make equal weights on a"
-    yield "processor of the same kind, so whoever learns again can verify them, and is told in which files"
-    yield "the example has changed since."
+    yield "processor of the same kind, so whoever learns again can verify them, and is told what"
+    yield "has changed in the example since."
 
 
 def _cells(run: Mapping[str, Any]) -> Iterator[str]:

@@ -31,6 +31,7 @@ def native():
     env.close()
 
 
+@pytest.mark.long
 @pytest.mark.native
 @pytest.mark.filterwarnings("ignore:__array_wrap__:DeprecationWarning")  # mani_skill's own
 @pytest.mark.parametrize("seed", quick_cases(SEEDS, [0]))
@@ -55,6 +56,7 @@ def test_the_cube_changes_hands_in_the_air():
     assert min(both) > 0.1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", ["sparse", "dense"])
 def test_the_plan_does_not_depend_on_modes(mode):
     env = tasks.make(TASK, num_envs=3, reward_mode=mode, obs_mode="none")
@@ -78,6 +80,7 @@ def test_arms_too_far_apart_are_an_error():
         find_expert(TASK)(env, 0)
 
 
+@pytest.mark.long
 def test_an_arm_without_fingers_is_an_error():
     env = tasks.make(TASK, robots={"right": "panda_stick"})
     with pytest.raises(TaskError, match="'right' is a panda_stick, which has none"):

@@ -73,6 +73,7 @@ class TestResult:
 
 
 class TestWhoReaches:
+    @pytest.mark.long
     def test_a_pose_of_one_robot(self):
         targets = {"cube": (0.4, 0.0, 0.1, 0.0, 1.0, 0.0, 0.0)}
         assert reached(search(PANDA, targets, **QUICK), targets) == {("cube", "arm")}
@@ -97,6 +98,7 @@ class TestWhoReaches:
             ("d", (left, right, "arm")),
         ]
 
+    @pytest.mark.long
     def test_robots_without_targets_stand_about_the_origin(self):
         layout = search(PAIR, **QUICK)
         places = np.array([placement.base_position for placement in layout.values()])
@@ -111,6 +113,7 @@ class TestWhoReaches:
 class TestOutOfReach:
     FAR = {**CUBE, "moon": (0.0, 0.0, 3.0)}
 
+    @pytest.mark.long
     def test_it_is_named_with_what_is_missing(self):
         with pytest.raises(
             LayoutError, match=r"wherever it stands: moon: arm stays 1\.\d\d m away"
@@ -133,6 +136,7 @@ class TestOutOfReach:
         with pytest.raises(LayoutError, match="from which all targets are reached.*: arm stays"):
             search(PANDA, self.APART, **QUICK)
 
+    @pytest.mark.long
     def test_one_of_two_is_better_than_none(self):
         layout = search(PANDA, self.APART, partial=True, **QUICK)
         reaches = layout.validate(targets=self.APART, workspaces=False).reaches
@@ -152,6 +156,7 @@ class TestGround:
         assert {placement.position[0] for placement in layout.values()} == {0.1}  # from the edge
         assert layout.frames == table(1.2, 0.8)
 
+    @pytest.mark.long
     def test_a_ceiling(self):
         layout = search(PANDA, CUBE, around={"roof": ceiling(1.1)}, **QUICK)
         assert reached(layout, CUBE)

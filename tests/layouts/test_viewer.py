@@ -37,6 +37,7 @@ def make_cell(moments: int = 0) -> Cell:
     return Cell("arm", layout, {"ball": ball}, motion)
 
 
+@pytest.mark.long
 def test_the_page_is_served_to_this_machine_alone_until_ctrl_c():
     with served("layouts", "view", *ARM, "--port", "0") as view:
         assert "Ctrl-C ends it" in view.lines[-1]
@@ -48,6 +49,7 @@ def test_the_page_is_served_to_this_machine_alone_until_ctrl_c():
         assert view.interrupt() == (0, "ended\n")
 
 
+@pytest.mark.long
 def test_the_network_sees_it_only_if_asked():
     with served("layouts", "view", *ARM, "--port", "0", "--host", "0.0.0.0") as view:
         port = urlsplit(view.url).port

@@ -43,6 +43,7 @@ COMPARE = (
 )
 
 
+@pytest.mark.long
 class TestComparing:
     pytestmark = NATIVE
 

@@ -189,6 +189,7 @@ WIDTHS = "[document.scrollingElement.scrollWidth, innerWidth]"
 PLAYING = "v => v.readyState >= 2 && v.videoWidth > 0 && !v.paused && v.currentTime > 0.3"
 
 
+@pytest.mark.long
 class TestInABrowser:
     pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("page")]  # they share one browser
 
@@ -461,6 +462,7 @@ def contrast(first: tuple[float, ...], second: tuple[float, ...]) -> float:
 
 
 class TestSize:
+    @pytest.mark.long
     def test_clips_are_made_to_fit(self, tmp_path, capsys):
         runs = write_runs(tmp_path / "runs", entries(), frames=40, noise=True)
         large, small = tmp_path / "large.html", tmp_path / "small.html"

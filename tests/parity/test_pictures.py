@@ -66,6 +66,7 @@ def expect_honest(task_id: str) -> None:
     assert not difference(scene.draw(playback.native[6]), scene.draw(playback.ours[6])).any()
 
 
+@pytest.mark.long
 class TestDrawing:
     pytestmark = [*NATIVE, pytest.mark.usefixtures("renderer")]
 

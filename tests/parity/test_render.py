@@ -49,6 +49,7 @@ def panels(clip: Path) -> np.ndarray:
     return np.stack([frames[:, :, left : left + SIZE] for left in (0, SIZE + 16, 2 * SIZE + 32)], 1)
 
 
+@pytest.mark.long
 class TestRendering:
     pytestmark = [*NATIVE, pytest.mark.usefixtures("renderer")]
 

@@ -96,6 +96,7 @@ def expect_same_states(one: Path, other: Path) -> None:
                     np.testing.assert_array_equal(rows, natives.states[kind][name])
 
 
+@pytest.mark.long
 class TestNative:
     pytestmark = NATIVE
 

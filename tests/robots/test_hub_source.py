@@ -154,6 +154,7 @@ def test_a_slow_download_that_goes_on_is_not_given_up(hub: HubServer, store):
     assert len(hub.downloads()) == 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fault", [endless, inflated])
 def test_a_body_without_end_is_read_no_further_than_the_manifest_says(
     hub: HubServer, store, physics, fault
@@ -174,6 +175,7 @@ def test_a_body_whose_length_is_not_said_arrives(hub: HubServer, store, physics,
     assert_all_verified(store, physics)
 
 
+@pytest.mark.long
 def test_a_download_that_drips_is_given_up(hub: HubServer, store):
     large = next(file for file in PANDA.files if file.path.endswith("visual/link0.glb"))
     hub.files[f"{large.origin.hub_folder}/{large.path}"] = contents(large)

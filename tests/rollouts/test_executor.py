@@ -179,6 +179,7 @@ def test_errors_come_home_whole():
 # -- deadlines -----------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_an_episode_that_hangs_is_played_again(tmp_path):
     executor = ProcessExecutor(2, episode_timeout=1.5)
     events = list(executor.run(Play(tmp_path, hangs_at=1), range(6)))
@@ -227,6 +228,7 @@ def test_a_word_shows_that_an_episode_goes_on():
     assert squares(events) == {2: 4}
 
 
+@pytest.mark.long
 def test_long_silence_is_said(monkeypatch):
     monkeypatch.setattr(rollouts.playing.dispatch, "QUIET_SECONDS", 1.0)
     said = [event.note for event in run(Play(lasts=2.5), [3]) if event.note]

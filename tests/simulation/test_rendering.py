@@ -51,6 +51,7 @@ def test_the_cube_is_seen_where_it_is(drawn):
     assert columns[1] > 312
 
 
+@pytest.mark.long
 def test_another_camera_adds_no_light(drawn):
     drawn.reset(seed=3)
     first = drawn.render()
@@ -76,6 +77,7 @@ def test_what_others_set_for_their_cameras_does_not_matter(drawn):
     np.testing.assert_array_equal(drawn.render(), first)
 
 
+@pytest.mark.long
 def test_physics_is_the_same_with_and_without_pictures(drawn):
     plain = tasks.make(TASK, num_envs=2)
     actions = np.random.default_rng(0).uniform(-1, 1, (30, 2, 16)).astype(np.float32)
