@@ -235,7 +235,7 @@ _FIELDS: dict[Place, Any] = {
 
 # Every kind of value, in one field that has it, with what is nearly one.
 _KINDS: dict[str, tuple[Place, tuple[Any, ...]]] = {
-    "a SHA-256": ((*_EPISODE, "states"), ("", HEX.upper(), HEX[:-1], f"{HEX}0", f" {HEX[1:]}")),
+    "a SHA-256": ((*_EPISODE, "states"), ("", HEX.upper(), HEX[:-1], f"0{HEX}", f" {HEX[1:]}")),
     "a seed": ((*_EPISODE, "seed"), (-1, 2**32, 0.0, float("inf"))),
     "a number": ((*_EPISODE, "total"), (float("nan"), float("inf"), [1.0])),
     "a name": (("policy", "name"), ("", "x" * 201, 5, ["a:b"])),

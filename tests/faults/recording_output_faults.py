@@ -30,7 +30,7 @@ def faults() -> Iterator[Fault]:
             lambda folder, r=redirection: _record(folder, r),
             GOES_ON,
         )
-    for words in ("replay {h5}", "export {h5} --format robomimic --out {out}"):
+    for words in ("replay {h5}", "export {h5} --format robomimic --include-failures --out {out}"):
         for redirection in ("2>&-", "| true"):
             yield Fault(
                 AREA,

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.toy_robots import (
-    BOX,
     INERTIAL,
     LIMIT,
     joint,
@@ -135,7 +134,6 @@ _CHANGES = (
 _SHAPES = {
     "without a shape": "",
     "of unknown shape": '<cone radius="1" length="1"/>',
-    "of two shapes": BOX + '<sphere radius="0.1"/>',
     "box without size": "<box/>",
     "sphere without radius": "<sphere/>",
     "cylinder without radius": '<cylinder length="1"/>',
