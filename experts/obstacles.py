@@ -9,7 +9,7 @@ import numpy as np
 
 from experts.script import Pose, Scene
 from kinematics.rotations import Floats, pose_matrix, transform
-from motion.obstacles import Obstacle, box, cylinder, mesh, sphere
+from motion.model.obstacles import Obstacle, box, cylinder, mesh, sphere
 from simulation.shapes import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
 from simulation.world import Body
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import warnings
 
 from layouts import Layout
-from motion.cell import cell_of
-from motion.collisions import Checker
+from motion.collision.cell import cell_of
+from motion.collision.checker import Checker
 from robots.bodies.hulls import require_packages
 from robots.common.errors import MissingPackageError
 from simulation.parts import Part

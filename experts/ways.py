@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from experts.obstacles import obstacles
 from experts.script import Scene
 from kinematics.rotations import Floats
-from motion.cell import Cell
-from motion.collisions import Checker, Contact
-from motion.obstacles import Held, Obstacle
-from motion.search import connect, import_ompl
-from motion.shorten import shortened
-from motion.spaces import Progress, Resolution, Space
+from motion.collision.cell import Cell
+from motion.collision.checker import Checker, Contact
+from motion.model.obstacles import Held, Obstacle
+from motion.planning.rrt_connect import connect, import_ompl
+from motion.planning.shortcuts import shortened
+from motion.planning.space import Progress, Resolution, Space
 from robots.bodies.hulls import require_packages
 from robots.common.errors import MissingPackageError, NoPlanError
 from tasks import MultiRobotTask

@@ -5,9 +5,9 @@ from kinematics.own_rooms import expect_own
 expect_own("robots", "layouts")
 
 from motion.certificate import Certificate, Nearest
-from motion.goals import Goal, RegionGoal, TcpGoal
 from motion.motion import Motion
-from motion.planning import plan
+from motion.planning.goals import Goal, RegionGoal, TcpGoal
+from motion.planning.plan import plan
 from robots.common.errors import MotionError, NoPlanError
 
 __all__ = [

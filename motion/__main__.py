@@ -8,10 +8,10 @@ from typing import TypeVar
 
 from layouts.__main__ import add_layout_words, chosen_layout
 from layouts.view_command import add_page_options, show
-from motion.goals import Goal, TcpGoal
+from motion.model.obstacles import Obstacle, box
 from motion.motion import Motion
-from motion.obstacles import Obstacle, box
-from motion.planning import plan
+from motion.planning.goals import Goal, TcpGoal
+from motion.planning.plan import plan
 from robots.common.commands import FAILED, start
 from robots.common.console import add_command, main_of
 from robots.common.errors import MotionError
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_plan(add_command(commands, "plan", "find a motion of a layout's robots to their goals"))
     check = add_command(commands, "certify", "check a motion once more, densely and exactly")
     check.set_defaults(call=_certify)
-    view = add_command(commands, "show", "look at a motion in a browser, with a timeline")
+    view = add_command(commands, "show", "show a motion in a browser, with a timeline")
     add_page_options(view)
     view.set_defaults(call=_show)
     draw = add_command(commands, "draw", "save a picture of a motion, still or moving")
@@ -139,7 +139,7 @@ def _certify(options: argparse.Namespace) -> int:
 
 
 def _show(options: argparse.Namespace) -> int:
-    from motion.page import motion_cell
+    from motion.output.page import motion_cell
 
     motion = Motion.load(options.file)
     return show(lambda: motion_cell(motion, options.file), options)
@@ -170,7 +170,7 @@ def _named(
     """Yield names and what is said of them, out of words ``name=…``.
 
     Raises:
-        MotionError: If a word is none such, or a name is given twice.
+        MotionError: If a word does not have that form, or a name is given twice.
     """
     seen: set[str] = set()
     for word in words:

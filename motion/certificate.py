@@ -12,11 +12,11 @@ from kinematics.rotations import Floats
 from layouts import Layout
 from layouts.validation.arguments import Rectangle
 from layouts.validation.findings import length_text
-from motion import timing
-from motion.cell import Cell, cell_of
-from motion.collisions import Checker
-from motion.continuous import Curve, look_along
-from motion.curves import hermite_extremes
+from motion.collision.cell import Cell, cell_of
+from motion.collision.checker import Checker
+from motion.collision.continuous import Curve, check_along
+from motion.model.hermite import hermite_extremes
+from motion.timing import velocities
 from robots.common.bounds import FAR, checked_number
 from robots.common.errors import MotionError
 
@@ -151,7 +151,7 @@ def certify(
     if joint_limits or too_fast:
         return found
     checker = cell.checker()
-    seen = look_along(cell, checker, curve, step, turn)
+    seen = check_along(cell, checker, curve, step, turn)
     collisions = _collisions(checker, seen.overlaps, curve)
     return replace(
         found,
@@ -222,7 +222,7 @@ def _beyond_limits(cell: Cell, start: Floats, moments: Floats, places: Floats) -
 def _fastest(layout: Layout, given: Mapping[str, Floats]) -> Mapping[str, Floats]:
     if set(given) == set(layout):
         return given
-    return {**timing.largest_velocities(layout, "pd_joint_pos"), **given}
+    return {**velocities.largest_velocities(layout, "pd_joint_pos"), **given}
 
 
 def _speeds(
@@ -244,8 +244,8 @@ def _accelerations(
     unlimited = {name: np.full(p.robot.dof, np.inf) for name, p in cell.layout.items()}
     limits = np.concatenate(list({**unlimited, **largest}.values()))
     begin, end = curve.times[:-1], curve.times[1:]
-    starts = np.concatenate([begin, np.maximum(begin, end - timing.STEP)])
-    ends = np.concatenate([np.minimum(end, begin + timing.STEP), end])
+    starts = np.concatenate([begin, np.maximum(begin, end - velocities.STEP)])
+    ends = np.concatenate([np.minimum(end, begin + velocities.STEP), end])
     rates = (curve.speeds(ends) - curve.speeds(starts)) / (ends - starts)[:, None]
     moments = np.broadcast_to(starts[:, None], rates.shape)
     return _shares(cell, "acceleration", moments, np.abs(rates) / limits)

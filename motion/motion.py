@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from kinematics.rotations import Floats
 from layouts import Layout
-from motion.curves import hermite, hermite_slopes
+from motion.model.hermite import hermite, hermite_slopes
 from robots.common.bounds import FAR, checked_number, shown
 from robots.common.errors import MotionError, UnknownNameError
 
@@ -141,7 +141,7 @@ class Motion:
         Joint limits and limits of velocity and acceleration are checked first. If a joint is beyond
         its limits or too fast, the certificate says so and ends there. Then come collisions of all
         robots with each other, with themselves, with tables and with obstacles, also those that
-        move. Between two moments that are looked at no point of any body moves farther than
+        move. Between two moments that are checked no point of any body moves farther than
         ``step``, no body turns farther than ``turn``, and no two come nearer to each other than
         they are apart, or by more than 0.01 mm. Measured is the least clearance, with who and when.
 
@@ -231,7 +231,7 @@ class Motion:
             MotionError: If the ending names no supported format.
             UnwritableFileError: If it cannot be written (also an ``OSError``).
         """
-        from motion.pictures import save_picture
+        from motion.output.pictures import save_picture
 
         return save_picture(self, path)
 
@@ -249,7 +249,7 @@ class Motion:
             MotionError: If the path ends otherwise.
             UnwritableFileError: If it cannot be written (also an ``OSError``).
         """
-        from motion.files import save_motion
+        from motion.output.files import save_motion
 
         return save_motion(self, path)
 
@@ -261,7 +261,7 @@ class Motion:
             MotionError: If the file cannot be read, is damaged, or its robots are not as here; the
                 message names the file.
         """
-        from motion.files import load_motion
+        from motion.output.files import load_motion
 
         return load_motion(path, cls)
 
@@ -279,7 +279,7 @@ class Motion:
             MotionError: If the frequency makes no sense.
             UnwritableFileError: If a file is there already, or cannot be written.
         """
-        from motion.exporting import to_csv
+        from motion.output.export import to_csv
 
         return to_csv(self, folder, frequency)
 
@@ -301,7 +301,7 @@ class Motion:
             MotionError: If the frequency makes no sense.
             UnwritableFileError: If a file is there already, or cannot be written.
         """
-        from motion.exporting import to_ros2
+        from motion.output.export import to_ros2
 
         return to_ros2(self, folder, frequency)
 
@@ -339,7 +339,7 @@ def _expect_times(times: Floats) -> None:
 
 
 def _worst(array: Floats) -> str:
-    """Return the number that is farthest from 0, or one that is none, as text."""
+    """Return the number farthest from 0, or one that is not finite, as text."""
     return f"{array.flat[np.argmax(np.nan_to_num(np.abs(array), nan=np.inf))]:g}"
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from measurements.robots.record import versions_of
-from motion.barriers import CUT_OFF
+from motion.planning.infeasibility import CUT_OFF
 
 CLEARANCE = 0.02  # m; how far robots are asked to stay apart
 PATIENCE = {2: 5.0, 3: 5.0, 4: 5.0}  # s of processor time within which a plan counts as solved

@@ -10,9 +10,9 @@ import numpy as np
 from kinematics.rotations import Floats
 from layouts import Layout, face_to_face, grid, ring, side_by_side
 from layouts.validation.arguments import Rectangle
-from motion.cell import Cell
-from motion.collisions import Checker
-from motion.goals import arm_joints
+from motion.collision.cell import Cell
+from motion.collision.checker import Checker
+from motion.planning.goals import arm_joints
 from robots import RobotDescriptor, RobotLayoutsError, RobotRegistry
 
 LARGE = (

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from kinematics.rotations import Floats
 from layouts import Layout, Placement, ring
-from motion.bodies import WORLD
-from motion.cell import Cell
-from motion.chains import Chains
-from motion.obstacles import box
+from motion.collision.cell import Cell
+from motion.model.bodies import WORLD
+from motion.model.link_poses import LinkPoses
+from motion.model.obstacles import box
 
 BATCHES = (1, 16, 64)
 DEFAULT, FINE = (0.01, 0.05), (0.001, np.pi / 360)  # of edges (m, rad)
@@ -167,7 +167,7 @@ class FclAlone:
         import fcl
 
         self.inside = 0.0
-        self._solids, self._chains = cell.solids, Chains(cell, range(len(cell.parts)))
+        self._solids, self._chains = cell.solids, LinkPoses(cell, range(len(cell.parts)))
         self._bodies = [fcl.CollisionObject(solid.hull.geometry) for solid in cell.solids]
         self._own = [
             (self._bodies[a], self._bodies[b])

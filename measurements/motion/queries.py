@@ -35,10 +35,10 @@ from measurements.motion.execution import Stage
 from measurements.motion.random_goals import goals_at, in_collision, out_of_reach
 from measurements.robots.sources import PACKAGES
 from motion import Motion, NoPlanError, plan
-from motion.cell import Cell
-from motion.goals import Goal
-from motion.search import import_ompl
-from motion.timing import import_toppra
+from motion.collision.cell import Cell
+from motion.planning.goals import Goal
+from motion.planning.rrt_connect import import_ompl
+from motion.timing.velocities import import_toppra
 from robots import RobotLayoutsError
 from robots.common.writing import write_whole
 from rollouts.progress import LiveLine

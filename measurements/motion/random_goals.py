@@ -6,8 +6,8 @@ import numpy as np
 
 from kinematics.rotations import Floats, quaternion_of
 from motion import TcpGoal
-from motion.cell import Cell
-from motion.goals import Goal, arm_joints
+from motion.collision.cell import Cell
+from motion.planning.goals import Goal, arm_joints
 from robots.urdf.tcp import find_tcp
 
 BEYOND = 1.5  # of an arm's reach: where nothing gets

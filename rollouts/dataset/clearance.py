@@ -97,8 +97,8 @@ class _Meter:
 
 def _between_robots(layout: Layout) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
     """Return what gives the least distance of links of different robots, (n, D) → (n,) (m)."""
-    from motion.cell import Cell
-    from motion.collisions import Checker
+    from motion.collision.cell import Cell
+    from motion.collision.checker import Checker
 
     cell = Cell(layout)
     movers = np.array([solid.mover for solid in cell.solids])[cell.counted_pairs]

@@ -9,8 +9,8 @@ import pytest
 
 from experts import Follower, follow
 from layouts import face_to_face
+from motion.model.obstacles import Held, box
 from motion.motion import Motion
-from motion.obstacles import Held, box
 from robots import CONTROL_MODES, TaskError, UnknownNameError
 from tests.experts.free_motions import FreeRobots, free_robots, swing
 

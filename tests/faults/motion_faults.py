@@ -158,28 +158,28 @@ def _goal(name: str, *given: Any) -> None:
 
 
 def _make(name: str, *given: Any) -> None:
-    from motion import obstacles
+    from motion.model import obstacles
 
     getattr(obstacles, name)("wall", *given[:-1])
 
 
 def _called(name: Any, folder: Path) -> None:
-    from motion.cell import Cell
-    from motion.obstacles import box
+    from motion.collision.cell import Cell
+    from motion.model.obstacles import box
 
     Cell(_cell(), [box(name, (0.1, 0.1, 0.1))])
 
 
 def _obstacle(given: dict[str, Any], folder: Path) -> None:
-    from motion.cell import Cell
-    from motion.obstacles import Obstacle, box
+    from motion.collision.cell import Cell
+    from motion.model.obstacles import Obstacle, box
 
     shapes = box("wall", (0.1, 0.1, 0.1)).shapes
     Cell(_cell(), [Obstacle(**{"name": "wall", "shapes": shapes, **given})])
 
 
 def _track(times: Any, poses: Any, folder: Path) -> None:
-    from motion.obstacles import Track
+    from motion.model.obstacles import Track
 
     Track(times, poses)
 
@@ -275,7 +275,7 @@ def _stepped(step: float, folder: Path) -> None:
 def _long(folder: Path) -> None:
     from dataclasses import replace
 
-    from motion.obstacles import Track, box
+    from motion.model.obstacles import Track, box
 
     track = Track(np.array([0.0, 1.0]), np.array([_far(0.0), _far(1e6)]))
     replace(_motion(), obstacles=(box("comet", (0.1, 0.1, 0.1)).moved(track),)).certify()
@@ -284,7 +284,7 @@ def _long(folder: Path) -> None:
 def _crowded(folder: Path) -> None:
     from dataclasses import replace
 
-    from motion.obstacles import Obstacle, box
+    from motion.model.obstacles import Obstacle, box
 
     crate = Obstacle("crate", box("crate", (0.1, 0.1, 0.1)).shapes * 2001)
     replace(_motion(), obstacles=(crate,)).certify()

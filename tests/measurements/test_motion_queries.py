@@ -15,7 +15,7 @@ from measurements.motion.arms import arms_in
 from measurements.motion.cells import FLOOR, LARGE_REACH, RandomPostures, random_cell
 from measurements.motion.execution import Stage
 from motion import Motion
-from motion.cell import Cell
+from motion.collision.cell import Cell
 from robots import RobotRegistry
 from tests.three_links import arm, save
 

@@ -7,10 +7,10 @@ import numpy as np
 
 from kinematics.rotations import Floats, pose_matrix
 from layouts import Layout, Placement, ring
-from motion.bodies import Bodies
-from motion.cell import Cell
-from motion.collisions import Checker
-from motion.obstacles import Track, box, cylinder, sphere
+from motion.collision.cell import Cell
+from motion.collision.checker import Checker
+from motion.model.bodies import Bodies
+from motion.model.obstacles import Track, box, cylinder, sphere
 from robots import RobotDescriptor
 from tests import three_links
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from layouts import face_to_face
 from motion import Motion
-from motion.obstacles import Held, Track, box, sphere
+from motion.model.obstacles import Held, Track, box, sphere
 from tests.experts.free_motions import swing
 
 LAYOUT = face_to_face({"left": "panda", "right": "so100"}, spacing=0.9)

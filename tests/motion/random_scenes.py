@@ -12,8 +12,8 @@ import numpy as np
 from kinematics.rotations import pose_matrix
 from layouts import Layout, Placement
 from motion import Motion
-from motion.cell import Cell
-from motion.obstacles import Held, Obstacle, Track, box
+from motion.collision.cell import Cell
+from motion.model.obstacles import Held, Obstacle, Track, box
 from robots import RobotDescriptor
 from tests import three_links
 from tests.layouts.small_robots import joint, link, robot, urdf

@@ -7,14 +7,14 @@ import pytest
 
 from layouts import Layout, Placement
 from motion import NoPlanError, plan
-from motion.barriers import Barriers
-from motion.cell import Cell
-from motion.clearances import Keeping
-from motion.goals import Target
-from motion.obstacles import Track, box
-from motion.query import Query
-from motion.spaces import Progress
-from motion.traffic import Traffic
+from motion.collision.cell import Cell
+from motion.collision.clearances import Clearances
+from motion.model.obstacles import Track, box
+from motion.planning.goals import Target
+from motion.planning.infeasibility import InfeasibilityProofs
+from motion.planning.query import Query
+from motion.planning.space import Progress
+from motion.timing.trajectories import CellTrajectory
 
 PAN, LIFT = range(2)
 TABLE = (-2.0, -2.0, 2.0, 2.0)
@@ -33,11 +33,11 @@ def behind(cell):
     return goal
 
 
-def barrier(cell, start=None, goal=None, moving=6):
-    keeping = Keeping(cell, ["arm"], 0.01)
+def proof(cell, start=None, goal=None, moving=6):
+    clearances = Clearances(cell, ["arm"], 0.01)
     start = cell.start if start is None else start
-    barriers = Barriers(cell, keeping.standing, start, np.arange(moving))
-    return barriers.before(behind(cell) if goal is None else goal)
+    proofs = InfeasibilityProofs(cell, clearances.standing, start, np.arange(moving))
+    return proofs.before(behind(cell) if goal is None else goal)
 
 
 def floor_with_a_slot(width):
@@ -62,7 +62,7 @@ def test_a_goal_beyond_the_floor_is_cut_off():
 
 def test_everything_collides_at_a_barrier():
     cell = Cell(raised(), floor_with_a_slot(0.1))
-    found = barrier(cell)
+    found = proof(cell)
     low, high = np.clip(cell.limits, -np.pi, np.pi).T
     states = np.random.default_rng(0).uniform(low, high, (300, cell.size))
     states[:, LIFT] = found.value
@@ -74,7 +74,7 @@ def test_a_slot_that_few_postures_fit_through_is_a_way(pan):
     cell = Cell(raised(yaw=-0.3), floor_with_a_slot(0.2))
     start = cell.start.copy()
     start[PAN] = pan
-    assert barrier(cell, start) is None
+    assert proof(cell, start) is None
 
 
 def test_what_another_joint_can_avoid_is_no_barrier():
@@ -84,15 +84,15 @@ def test_what_another_joint_can_avoid_is_no_barrier():
     across = np.linspace(start, goal, 50)
     assert cell.checker().free(across[[0, -1]]).all()
     assert not cell.checker().free(across).all()
-    assert barrier(cell, start, goal) is None
+    assert proof(cell, start, goal) is None
 
 
 def test_what_moves_away_is_no_barrier():
     poses = np.tile(np.eye(4), (2, 1, 1))
     poses[:, 2, 3] = -0.45, -3.0
     lift = box("lift", (4.0, 4.0, 0.9)).moved(Track(np.array([0.0, 2.0]), poses))
-    assert barrier(Cell(raised(), [lift])) is None
-    assert barrier(Cell(raised(), [box("floor", (4.0, 4.0, 0.9), (0.0, 0.0, -0.45))])) is not None
+    assert proof(Cell(raised(), [lift])) is None
+    assert proof(Cell(raised(), [box("floor", (4.0, 4.0, 0.9), (0.0, 0.0, -0.45))])) is not None
 
 
 def test_postures_that_are_cut_off_are_left_out():
@@ -112,8 +112,8 @@ def asked(cell, candidates, others):
         cell,
         cell.start,
         (target,),
-        Traffic(cell, cell.start),
-        Keeping(cell, ["arm"], 0.01),
+        CellTrajectory(cell, cell.start),
+        Clearances(cell, ["arm"], 0.01),
         np.ones(cell.size),
         0.01,
         0,

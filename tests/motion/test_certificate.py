@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from motion import Motion, plan
-from motion.cell import Cell
-from motion.obstacles import box
+from motion.collision.cell import Cell
+from motion.model.obstacles import box
 from tests.motion.two_pandas import aside, cell, in_the_middle, turned
 
 

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 
 from layouts import Layout, Placement
-from motion.cell import Cell
-from motion.chains import Chains
+from motion.collision.cell import Cell
+from motion.model.link_poses import LinkPoses
 from tests.catalogue import every_robot
 from tests.layouts.cells import mixed_cell
 from tests.motion import cells
 
 
-def differences(cell: Cell, chains: Chains, qpos: np.ndarray) -> dict[str, float]:
-    places, links = chains.places(qpos), cell.poses(qpos)
+def differences(cell: Cell, link_poses: LinkPoses, qpos: np.ndarray) -> dict[str, float]:
+    places, links = link_poses.places(qpos), cell.poses(qpos)
     names = {
         row: (part.robot, cell.models[part.robot].kinematics.links[part.link])
-        for i, row in chains.rows.items()
+        for i, row in link_poses.rows.items()
         if (part := cell.parts[i]).robot
     }
     return {
@@ -28,7 +28,7 @@ def differences(cell: Cell, chains: Chains, qpos: np.ndarray) -> dict[str, float
 def test_parts_of_every_robot_are_where_its_tree_has_them(robot):
     cell = Cell(Layout({"arm": Placement(robot, (0.3, -0.2, 0.1), rpy=(0.1, 0.2, 0.3))}))
     qpos, _ = cells.states(cell, 6)
-    found = differences(cell, Chains(cell, range(len(cell.parts))), qpos)
+    found = differences(cell, LinkPoses(cell, range(len(cell.parts))), qpos)
     assert len(found) == len(cell.parts) - 1
     assert max(found.values(), default=0.0) < 1e-12
 
@@ -36,14 +36,14 @@ def test_parts_of_every_robot_are_where_its_tree_has_them(robot):
 def test_parts_of_several_robots_are_there_at_once():
     cell = Cell(mixed_cell())
     qpos, _ = cells.states(cell, 5)
-    assert max(differences(cell, Chains(cell, range(len(cell.parts))), qpos).values()) < 1e-12
+    assert max(differences(cell, LinkPoses(cell, range(len(cell.parts))), qpos).values()) < 1e-12
 
 
 def test_only_what_is_asked_for_and_what_carries_it_is_computed():
     cell = Cell(mixed_cell())
     qpos, _ = cells.states(cell, 3)
     wanted = next(i for i, part in enumerate(cell.parts) if part.robot == "up" and part.parent > 0)
-    chains = Chains(cell, [wanted])
-    assert list(chains.rows) == [0, cell.parts[wanted].parent, wanted]
-    assert max(differences(cell, chains, qpos).values()) < 1e-12
-    assert Chains(cell, []).places(qpos).shape == (1, 3, 4, 4)
+    link_poses = LinkPoses(cell, [wanted])
+    assert list(link_poses.rows) == [0, cell.parts[wanted].parent, wanted]
+    assert max(differences(cell, link_poses, qpos).values()) < 1e-12
+    assert LinkPoses(cell, []).places(qpos).shape == (1, 3, 4, 4)

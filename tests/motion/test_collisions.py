@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 
 from layouts import Layout, Placement, face_to_face
 from layouts.validation.collisions import FAR
-from motion.bodies import WORLD
-from motion.cell import Cell
-from motion.collisions import Checker
-from motion.obstacles import Track, box
-from motion.travel import Travel
+from motion.collision.cell import Cell
+from motion.collision.checker import Checker
+from motion.collision.travel import TravelBounds
+from motion.model.bodies import WORLD
+from motion.model.obstacles import Track, box
 from robots import LayoutError, UnknownNameError
 from tests.layouts.small_robots import joint, link, robot, urdf
 from tests.motion import cells
@@ -227,7 +227,7 @@ def an_edge(cell, seed):
 @settings(max_examples=12)
 def test_no_corner_travels_farther_than_the_resolution(crowd, drive, name, seed, way):
     cell, a, b = an_edge({"crowd": crowd, "drive": drive}[name], seed)
-    steps = Travel(cell).steps(a, b, (way, 0.1))
+    steps = TravelBounds(cell).steps(a, b, (way, 0.1))
     shares = np.linspace(0.0, 1.0, steps + 1)[-12:, None]
     poses = cells.solid_poses(cell, a + shares * (b - a), np.zeros(len(shares)))
     for i, solid in enumerate(cell.solids):
@@ -241,7 +241,7 @@ def test_no_corner_travels_farther_than_the_resolution(crowd, drive, name, seed,
 def test_no_distance_changes_more_than_its_bound(crowd, drive, name, seed):
     cell, a, b = an_edge({"crowd": crowd, "drive": drive}[name], seed)
     times = (0.5, 2.5)
-    most = Travel(cell).between(a, b, times)
+    most = TravelBounds(cell).between(a, b, times)
     shares = np.linspace(0.0, 1.0, 5)[:, None]
     moments = times[0] + shares[:, 0] * (times[1] - times[0])
     poses = cells.solid_poses(cell, a + shares * (b - a), moments)
@@ -270,14 +270,14 @@ def test_what_slides_out_travels_farther_when_it_is_turned(tmp_path):
     cell = Cell(Layout({"one": Placement(robot(tmp_path, text, ["turn", "slide"]))}))
     for out, least in ((0.0, 0.05), (3.0, 3.0)):
         ends = np.array([[0.0, out], [1.0, out]])
-        assert least <= Travel(cell).steps(*ends, (0.001, 10.0)) / 1000 <= least + 0.1
-        assert least <= Travel(cell).between(*ends)[WORLD].max() <= least + 0.1
+        assert least <= TravelBounds(cell).steps(*ends, (0.001, 10.0)) / 1000 <= least + 0.1
+        assert least <= TravelBounds(cell).between(*ends)[WORLD].max() <= least + 0.1
 
 
 def test_what_moves_both_of_two_links_brings_them_no_nearer(crowd):
     turned = crowd.start.copy()
     turned[crowd.slices["left"].start] += 0.5
-    between = Travel(crowd).between(crowd.start, turned)
+    between = TravelBounds(crowd).between(crowd.start, turned)
     own = [i for i, part in enumerate(crowd.parts) if part.robot == "left"]
     assert (between[np.ix_(own, own)] == 0.0).all()
     assert (between[own[0], WORLD], between[WORLD, own[-1]]) > (0.0, 0.3)

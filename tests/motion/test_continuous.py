@@ -8,8 +8,8 @@ import pytest
 from kinematics.rotations import rotation_about
 from layouts import single
 from motion import Motion, MotionError
-from motion.cell import Cell
-from motion.obstacles import Obstacle, Track, box
+from motion.collision.cell import Cell
+from motion.model.obstacles import Obstacle, Track, box
 from robots import LayoutError
 from tests import three_links
 from tests.layouts.small_robots import robot

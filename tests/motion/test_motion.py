@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from motion import Motion, MotionError
-from motion.curves import hermite, hermite_bends, hermite_slopes
+from motion.model.hermite import hermite, hermite_bends, hermite_slopes
 from robots import UnknownNameError
 from tests.motion.two_pandas import cell
 

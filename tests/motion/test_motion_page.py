@@ -9,7 +9,7 @@ import pytest
 
 from layouts import face_to_face
 from measurements.browser import served
-from motion.page import motion_cell
+from motion.output.page import motion_cell
 from tests.experts.free_motions import swing
 from tests.motion.motions import LAYOUT, busy_motion
 from tests.pages import browser_page, changed, coloured, settled
@@ -52,9 +52,9 @@ def test_a_motion_is_scrubbed_and_played(tmp_path):
         timeline.press("End")
         page.get_by_text("step 30 of 30, 1.00 s").wait_for()
         end = settled(page, lambda now: changed(now, start) > 500)
-        page.get_by_role("checkbox", name="Ways").click()
+        page.get_by_role("checkbox", name="Intervals").click()
         settled(page, lambda now: coloured(now, BLUE) < coloured(end, BLUE) / 2)
-        page.get_by_role("checkbox", name="Ways").click()
+        page.get_by_role("checkbox", name="Intervals").click()
         page.get_by_label("Play").click()
         page.get_by_text("step 30 of 30, 1.00 s").wait_for(state="hidden")
         at = urlsplit(view.url).netloc

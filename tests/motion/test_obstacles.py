@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kinematics.rotations import pose_matrix, quaternion_about, rotation_vector
-from motion.obstacles import Held, Obstacle, Track, box, cylinder, mesh, sphere
+from motion.model.obstacles import Held, Obstacle, Track, box, cylinder, mesh, sphere
 from robots import LayoutError
 
 FLAT = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 1.0, 0.0)])

@@ -5,8 +5,8 @@ import pytest
 
 from layouts import Layout, single
 from motion import MotionError
-from motion.paths import Path, way, without_straight_points
-from motion.timing import largest_accelerations, largest_velocities, timed
+from motion.timing.paths import Path, way, without_straight_points
+from motion.timing.velocities import largest_accelerations, largest_velocities, timed
 from tests.motion.two_pandas import cell
 
 SPEEDS = np.array([1.0, 2.0, 0.5])

@@ -9,8 +9,8 @@ import pytest
 from layouts import Placement, single
 from layouts.layout import Layout
 from motion import MotionError, NoPlanError, RegionGoal, TcpGoal, plan
-from motion.cell import Cell
-from motion.obstacles import Track, box
+from motion.collision.cell import Cell
+from motion.model.obstacles import Track, box
 from robots import UnknownNameError
 from robots.urdf.tcp import find_tcp
 from tests.fresh_process import in_fresh_process

@@ -1,0 +1,1 @@
+"""What a motion moves in: bodies, obstacles, the poses of links, curves through knots."""

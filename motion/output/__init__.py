@@ -1,0 +1,1 @@
+"""Motions as files, tables, pictures and pages."""

@@ -1,0 +1,1 @@
+"""Paths, how fast they may be followed, and trajectories of all coordinates."""

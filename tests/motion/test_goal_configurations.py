@@ -1,0 +1,64 @@
+"""Goals that take a longer search: postures that are not met with at first."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from layouts import single
+from motion import NoPlanError, TcpGoal, plan
+from motion.collision.cell import Cell
+from motion.collision.clearances import Clearances
+from motion.model.obstacles import box
+from motion.planning.goal_configurations import choices, find_goal_configurations
+from motion.planning.goals import Target, read_targets
+from tests.motion.two_pandas import aside, cell, in_the_middle
+
+HARD = TcpGoal((-0.465, -0.112, 0.763), (0.46803, 0.79404, 0.09321, 0.37802))
+
+
+def test_a_goal_that_no_first_start_leads_to_is_reached():
+    motion = plan(single({"arm": "ur5_gripper"}), goals={"arm": HARD})
+    assert motion.certify().ok
+    assert motion.moving == ("arm",)
+
+
+def meeting(whole, *, others):
+    """Both arms in the middle, the right one somewhere else after a longer search."""
+    start = np.concatenate(list(aside().values()))
+    places = {"left": in_the_middle(), "right": in_the_middle()}
+    left, right = read_targets(whole, places, start)
+    return left, Target("right", "right", right.moving, right.candidates, "", lambda: others), start
+
+
+def test_postures_of_a_longer_search_let_goals_agree():
+    whole = Cell(cell())
+    elsewhere = np.array([aside()["right"][:7]])
+    left, right, start = meeting(whole, others=elsewhere)
+    (end,) = find_goal_configurations(
+        [left, right], Clearances(whole, whole.robots, 0.01), start, 0.0
+    )
+    assert np.array_equal(end[right.moving], elsewhere[0])
+    assert any(np.array_equal(end[left.moving], posture) for posture in left.candidates)
+
+
+def test_goals_that_exclude_each_other_are_named():
+    whole = Cell(cell())
+    left, right, start = meeting(whole, others=np.empty((0, 7)))
+    with pytest.raises(NoPlanError, match="goals of left and right exclude each other"):
+        find_goal_configurations([left, right], Clearances(whole, whole.robots, 0.01), start, 0.0)
+
+
+def test_an_obstacle_is_avoided_by_a_posture_of_a_longer_search():
+    block = box("block", (0.3, 0.3, 0.3), (0.0, 0.0, 0.3))
+    whole = Cell(cell(), [block])
+    elsewhere = np.array([aside()["right"][:7]])
+    _, right, start = meeting(whole, others=elsewhere)
+    (end,) = find_goal_configurations([right], Clearances(whole, ["right"], 0.01), start, 0.0)
+    assert np.array_equal(end[right.moving], elsewhere[0])
+
+
+def test_choices_come_by_their_sum():
+    counts = [3, 1, 2, 4]
+    known = sorted(product(*map(range, counts)), key=lambda choice: (sum(choice), choice))
+    assert list(choices(counts)) == known
