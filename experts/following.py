@@ -19,7 +19,7 @@ from robots.action_split import is_gripper
 from robots.urdf.tcp import find_tcp
 from simulation import State
 from simulation.backend import Overlap
-from simulation.overlaps import between_robots, deepest
+from simulation.checks.overlaps import between_robots, deepest
 from tasks import MultiRobotTask
 from tasks.driving import driven_groups
 
@@ -215,7 +215,7 @@ def follow(
         watch()
         planned.append(follower.joints(follower.time))
         came.append(task.simulation.read().joint_positions[0].astype(float))
-        for overlap in between_robots(task.simulation.overlaps(0)):
+        for overlap in between_robots(task.simulation.backend.overlaps(0)):
             pair = str(overlap.one), str(overlap.other)
             contacts[pair] = max(overlap, contacts.get(pair, overlap), key=lambda o: o.depth)
         steps += not follower.ended

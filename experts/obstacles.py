@@ -10,7 +10,7 @@ import numpy as np
 from experts.script import Pose, Scene
 from kinematics.rotations import Floats, pose_matrix, transform
 from motion.model.obstacles import Obstacle, box, cylinder, mesh, sphere
-from simulation.shapes import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
+from simulation.scene.shapes import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
 from simulation.world import Body
 
 HALF_SPACE = 20.0  # m; edges of the box that stands for what is below a plane

@@ -15,7 +15,7 @@ from experts.ways import NoWayError, Ways
 from kinematics.rotations import Floats, inverse, rotate
 from kinematics.solve import by_way
 from layouts import Layout
-from simulation.overlaps import RobotsAlone
+from simulation.checks.overlaps import RobotsAlone
 from tasks import MultiRobotTask
 
 PATIENCE = 40  # control steps without progress after which an arm counts as blocked
@@ -58,7 +58,7 @@ class Player:
             self._kinematics = pose_solver(task, robot)
             self._posture = _Posture(alone, task.layout, robot)
         if any(waypoint.at is not None for waypoint in waypoints):
-            self._reach = task.simulation.point_reach(robot)
+            self._reach = task.simulation.backend.point_reach(robot)
             self._base = scene.base(robot)
         self._goal = self._driver.arm(scene.qpos(robot))
         self._gripper = OPEN

@@ -16,7 +16,7 @@ from experts.script import Scene, Script
 from experts.touching import ArmWatch
 from experts.ways import Ways, without_planner
 from robots import TaskError, UnknownNameError
-from simulation.overlaps import RobotsAlone
+from simulation.checks.overlaps import RobotsAlone
 from tasks import MultiRobotTask
 from tasks.episode import REBUILT, EpisodeTape, PlayedEpisode, take_step
 

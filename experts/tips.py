@@ -89,8 +89,8 @@ def pose_solver(task: MultiRobotTask, robot: str) -> PoseSolver | TipSolver:
     descriptor = task.layout.arm(robot).robot
     turned = gripper_turn(descriptor)
     if turned is None:
-        return task.simulation.inverse_kinematics(robot)
-    return TipSolver(descriptor, task.simulation.point_reach(robot), turned)
+        return task.simulation.backend.inverse_kinematics(robot)
+    return TipSolver(descriptor, task.simulation.backend.point_reach(robot), turned)
 
 
 @lru_cache(maxsize=64)

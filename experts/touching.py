@@ -9,7 +9,7 @@ from motion.collision.cell import cell_of
 from motion.collision.checker import Checker
 from robots.bodies.hulls import require_packages
 from robots.common.errors import MissingPackageError
-from simulation.parts import Part
+from simulation.scene.parts import Part
 from tasks import MultiRobotTask
 
 _UNSEEN = (
@@ -48,11 +48,11 @@ class ArmWatch:
                     raise
                 self._measures = False
                 warnings.warn(_UNSEEN, RuntimeWarning, stacklevel=2)
-        task.simulation.watch_arms()
+        task.simulation.backend.watch_arms()
 
     def touching(self) -> list[tuple[Part, Part]]:
         """Return which links of different arms touch, or have touched since it was last asked."""
-        found = self._task.simulation.arms_touching(0)
+        found = self._task.simulation.backend.arms_touching(0)
         return [*found, *self._overlapping()] if self._measures else found
 
     def _overlapping(self) -> list[tuple[Part, Part]]:

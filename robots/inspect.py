@@ -28,7 +28,7 @@ from robots.urdf.summary import read_cleaned, read_urdf
 from robots.urdf.tcp import find_tcp
 from robots.urdf.tree import kinematic_tree
 
-TRY_COMMAND = "simulation.try_command"  # with run(robots)
+TRY_COMMAND = "simulation.checks.try_command"  # with run(robots)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -26,7 +26,7 @@ _TEST = '''"""Tests whether {name} stands and moves as it should; run it with py
 
 from layouts import single
 from robots import RobotRegistry
-from simulation.trial import try_robot
+from simulation.checks.trial import try_robot
 from {module} import {constant}
 
 

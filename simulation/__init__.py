@@ -8,10 +8,10 @@ from kinematics.own_rooms import expect_own
 
 expect_own("robots", "layouts")
 
-from simulation.cameras import Camera
 from simulation.physics import SAPIEN_DEFAULTS, Friction, PhysicsSettings
-from simulation.scene import build_scene
-from simulation.shapes import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
+from simulation.sapien3.plain_scene import build_scene
+from simulation.scene.cameras import Camera
+from simulation.scene.shapes import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
 from simulation.simulation import Simulation
 from simulation.state import State
 from simulation.tabletop import add_table

@@ -1,46 +1,33 @@
 """The seam between this library and a simulator: what a backend has to do, in batched verbs.
 
 Everything above it (`Simulation`, `State`, `World`, tasks) is plain data and arithmetic; what a
-simulator calls its scenes, bodies and joints is known only below, today in `simulation.sapien3`.
+simulator calls its scenes, bodies and joints is known only below, in a folder of its own such as
+`simulation.sapien3`. `SIMULATORS` names them.
 
 Conventions, whatever the simulator's own are: joints in the order of each robot's descriptor, the
 robots in that of the layout; poses as position (m) and quaternion (wxyz) in the world frame; the
 first axis of a row-wise argument counts the entries of ``env_ids``, that of a result is named with
 it. Arrays are float32, NumPy's of today's backend.
 
-How a GPU simulation stands behind it: every result is one tensor per quantity for all N worlds, as
-such simulations keep them, and none of the verbs is called once per world.
-
-- `build` is called with all worlds at first. They describe the same bodies in the same order, so a
-  frame's number is its row in the pose tensor. Later calls name the worlds that are built anew.
-- `place` gets what a reset placed in every world at once; it scatters rows into pose tensors and
-  applies them.
-- `drive` writes the tensor of drive targets and `step` advances. Worlds that are not in ``env_ids``
-  are to stand still; a simulation that can only advance all of them saves and restores theirs.
-- Tasks compute with NumPy's arrays and torch's tensors alike, so tensors may be returned as they
-  are. What lies between still takes NumPy's and is to learn of tensors then, none of it in a task:
-  `simulation.controller`, `simulation.grasps`, `simulation.rotations`, and `State` where it reduces
-  (`is_static`, `gripper_opening`) or picks rows of poses.
-- `read` returns what nearly every task reads: poses and joints. `velocities` and `forces` are read
-  only if asked for. Their arguments are *declared on first use*: a state asks for all velocities
-  and pairs that were ever asked for, always as the same tuple until another one joins, and the
-  first reset asks for what a task looks at. So a contact query is made once for each new tuple and
-  read once per step, in the order of the tuple.
+`velocities` and `forces` are read only if asked for, and what a state asks for is always the same
+tuple until another quantity joins, so a backend prepares a query once for each tuple.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pkgutil import resolve_name
 from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simulation.cameras import AnyCamera, View
+from robots import UnknownNameError
 from simulation.maths import Flags, Floats
-from simulation.parts import Part as Part
-from simulation.variation import Variation
+from simulation.scene.cameras import AnyCamera, View
+from simulation.scene.parts import Part as Part
+from simulation.scene.variation import Variation
 from simulation.world import Placements, World
 
 Rows = Mapping[str, Floats]
@@ -192,6 +179,21 @@ class PointSolver(Protocol):
         ...
 
 
+SIMULATORS = {"sapien3": "simulation.sapien3.backend:SapienBackend"}
+"""Where each simulator's backend is, by the name that ``simulator=`` takes."""
+
+
+def open_backend(simulator: str) -> Backend:
+    """Return a simulator's backend, without worlds.
+
+    Raises:
+        UnknownNameError: If there is no such simulator.
+    """
+    if simulator not in SIMULATORS:
+        raise UnknownNameError("simulator", simulator, SIMULATORS)
+    return resolve_name(SIMULATORS[simulator])()
+
+
 class Backend(Protocol):
     """N worlds of one layout in a simulator."""
 
@@ -272,7 +274,7 @@ class Backend(Protocol):
         Args:
             env: Which world.
             cameras: Camera by name.
-            textures: What to tell of each pixel, some of `simulation.cameras.TEXTURES`.
+            textures: What to tell of each pixel, some of `simulation.scene.cameras.TEXTURES`.
             markers: Whether bodies that are there for people only are seen.
 
         Returns:

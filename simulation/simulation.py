@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,16 +11,15 @@ from numpy.typing import NDArray
 from layouts import Layout
 from robots import RobotDescriptor, SimulationError
 from robots.descriptor import IDENTITY, Quaternion
-from simulation.backend import Backend, Overlap, Part, PointSolver, PoseSolver, Rows
-from simulation.cameras import AnyCamera, View
+from simulation.backend import Backend, Rows, open_backend
+from simulation.control.joint_positions import JointPositionController
 from simulation.control.modes import ModeController
-from simulation.controller import JointPositionController
-from simulation.maths import Array, Flags, Floats
+from simulation.maths import Array, Floats
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, substeps
 from simulation.readout import Moment, ReadoutIndex
-from simulation.sapien3.backend import SapienBackend
+from simulation.scene.cameras import AnyCamera, View
+from simulation.scene.variation import Variation
 from simulation.state import State
-from simulation.variation import Variation
 from simulation.world import Placements, World
 
 
@@ -33,6 +31,7 @@ class Simulation:
         num_envs: Number of worlds N.
         worlds: What each of them holds.
         substeps: Physics steps per control step.
+        backend: What simulates them; asked directly for contacts, overlaps, extents and solvers.
         index: Where each frame and joint stands in a read-out.
         drive_targets: What the joints were last driven to, robots in layout order, joints in the
             descriptors', (N, dof) (rad, m).
@@ -50,7 +49,7 @@ class Simulation:
         control_frequency: float = 20.0,
         visuals: bool = False,
         links_pass: bool = False,
-        backend: Callable[[], Backend] = SapienBackend,
+        simulator: str = "sapien3",
     ) -> None:
         """Build the worlds.
 
@@ -62,10 +61,11 @@ class Simulation:
             control_frequency: Control steps per second (Hz).
             visuals: Whether to build what pictures need.
             links_pass: See `simulation.World`.
-            backend: Makes what simulates them.
+            simulator: What simulates them, one of `simulation.backend.SIMULATORS`.
 
         Raises:
             SimulationError: If a control step is not a whole number of physics steps.
+            UnknownNameError: If there is no such simulator.
             AssetError: If robot files cannot be found.
         """
         self.substeps = substeps(physics or SAPIEN_DEFAULTS, control_frequency)
@@ -73,8 +73,8 @@ class Simulation:
         self._everywhere: Sequence[int] = range(num_envs)
         self._physics, self._visuals = physics, visuals
         self.links_pass = links_pass
-        self._backend = backend()
-        self._moment = Moment(self._backend)
+        self.backend: Backend = open_backend(simulator)
+        self._moment = Moment(self.backend)
         self._latest: State | None = None  # of this moment, if control modes look at it
         self._placements = Placements()
         self._controller = JointPositionController(layout)
@@ -113,7 +113,7 @@ class Simulation:
             joint_positions: Joint positions before the step, shape (N, dof) (rad, m).
             env_ids: Which worlds; all if None. The others stand still.
         """
-        self._backend.step(self._drive(action, joint_positions, env_ids), self.substeps)
+        self.backend.step(self._drive(action, joint_positions, env_ids), self.substeps)
 
     def rest(self, state: State, env_ids: Sequence[int]) -> None:
         """Drive all joints of worlds to where they are, until a step drives them elsewhere.
@@ -123,13 +123,13 @@ class Simulation:
             env_ids: Which worlds.
         """
         self.drive_targets[env_ids] = state.joint_positions[env_ids]
-        self._backend.drive(self.drive_targets, env_ids)
-        self._backend.drive_velocities(np.zeros_like(self.drive_targets), env_ids)
+        self.backend.drive(self.drive_targets, env_ids)
+        self.backend.drive_velocities(np.zeros_like(self.drive_targets), env_ids)
 
     def coast(self, env_ids: Sequence[int]) -> None:
         """Advance worlds by one control step without driving them anew."""
         self._change()
-        self._backend.step(env_ids, self.substeps)
+        self.backend.step(env_ids, self.substeps)
 
     def timed_step(
         self, action: NDArray[np.float32], clock: Callable[[], float] = perf_counter
@@ -144,19 +144,19 @@ class Simulation:
         """
         moving = self._drive(action, self.read().joint_positions, None)
         start = clock()
-        self._backend.step(moving, self.substeps)
+        self.backend.step(moving, self.substeps)
         return clock() - start
 
     def clear(self, env_ids: Sequence[int]) -> None:
         """Begin a reset of some worlds: everything rests, and anchored bodies are put back."""
         self._change()
         self._fresh.update(env_ids)
-        self._backend.clear(env_ids)
+        self.backend.clear(env_ids)
 
     def vary(self, variations: Mapping[int, Variation]) -> None:
         """Let worlds differ from what was built; see `simulation.backend.Backend.vary`."""
         self._change()
-        self._backend.vary(variations)
+        self.backend.vary(variations)
 
     def hold(self, state: State) -> None:
         """End a reset: targets that control modes remember are where the robots are now."""
@@ -199,13 +199,13 @@ class Simulation:
     def write(self, env_ids: Sequence[int], bodies: Rows, robots: Rows) -> None:
         """Put worlds into a state; see `simulation.backend.Backend.write`."""
         self._change()
-        self._backend.write(env_ids, bodies, robots)
+        self.backend.write(env_ids, bodies, robots)
 
     def read(self) -> State:
         """Return what all worlds look like now."""
         if self._placements:
             self._change()
-        state = State(self._backend.read(), self.index, self._moment)
+        state = State(self.backend.read(), self.index, self._moment)
         if self.modes is not None:
             self._latest = state
         return state
@@ -226,65 +226,7 @@ class Simulation:
         """Begin to draw what cameras see now; see `simulation.backend.Backend.look`."""
         if self._placements:
             self._change()
-        return self._backend.look(env, cameras, textures, markers=markers)
-
-    def inverse_kinematics(self, robot: str) -> PoseSolver:
-        """Return a solver for poses of a robot's TCP, where it stands in the first environment.
-
-        Raises:
-            UnknownNameError: If the layout has no such robot.
-            SimulationError: If the robot's TCP is not a link but a mean of several.
-        """
-        return self._backend.inverse_kinematics(robot)
-
-    def point_reach(self, robot: str) -> PointSolver:
-        """Return a solver for points of a robot's TCP link, likewise.
-
-        Raises:
-            UnknownNameError: If the layout has no such robot.
-        """
-        return self._backend.point_reach(robot)
-
-    def contact_counts(self) -> NDArray[np.int64]:
-        """Return how many pairs of bodies touch or are about to, (N,)."""
-        return self._backend.contact_counts()
-
-    def overlaps(self, env: int) -> list[Overlap]:
-        """Return which parts of a world were inside each other in the last step of physics."""
-        return self._backend.overlaps(env)
-
-    def watch_arms(self) -> None:
-        """Look from now on, in every step of physics, at which arms touch each other.
-
-        Arms are robots, or limbs of one robot.
-        """
-        self._backend.watch_arms()
-
-    def arms_touching(self, env: int) -> list[tuple[Part, Part]]:
-        """Return which links of different arms touched in a world.
-
-        It tells of all steps of physics since it was last asked, or the world was built.
-
-        Raises:
-            SimulationError: If nobody looks at that; see `watch_arms`.
-        """
-        return self._backend.arms_touching(env)
-
-    def touching(self) -> Flags:
-        """Tell where a robot pressed on a movable object in the last step of physics, (N,)."""
-        return self._backend.touching()
-
-    def extents(self, env: int) -> dict[Part, Floats]:
-        """Return the box around what collides; see `simulation.backend.Backend.extents`."""
-        return self._backend.extents(env)
-
-    def collision_shapes(self, env: int, body: str) -> list[tuple[Any, ...]]:
-        """Return the kind, pose and sizes of what a body collides with, as it was built.
-
-        Raises:
-            UnknownNameError: If there is no such body.
-        """
-        return self._backend.collision_shapes(env, self.worlds[env].body(body).name)
+        return self.backend.look(env, cameras, textures, markers=markers)
 
     # -- inside ------------------------------------------------------------------------------
 
@@ -301,7 +243,7 @@ class Simulation:
         else:
             moving = list(env_ids)
             self.drive_targets[moving] = targets[moving]
-        self._backend.drive(targets, moving)
+        self.backend.drive(targets, moving)
         return moving
 
     def _drive_modes(
@@ -319,19 +261,19 @@ class Simulation:
             self.drive_targets = targets
         else:
             self.drive_targets[moving] = targets[moving]
-        self._backend.drive(targets, moving)
+        self.backend.drive(targets, moving)
         if velocities is not None:
-            self._backend.drive_velocities(velocities, moving)
+            self.backend.drive_velocities(velocities, moving)
         return moving
 
     def _change(self) -> None:
         """Place what is to be placed, and let states that were read be past."""
         if self._placements:
-            self._backend.place(self._placements)
+            self.backend.place(self._placements)
             self._placements.bodies.clear()
             self._placements.robots.clear()
         self._moment.past = True
-        self._moment = Moment(self._backend)
+        self._moment = Moment(self.backend)
         self._latest = None
 
     def _describe(self, index: int, build: Callable[[World, int], None]) -> World:
@@ -350,12 +292,12 @@ class Simulation:
         fresh = {i: self._describe(i, build) for i in env_ids}
         self._placements.forget(env_ids)
         _expect_alike({**dict(enumerate(self.worlds)), **fresh})
-        built = self._backend.build(fresh)
+        built = self.backend.build(fresh)
         self.worlds = [fresh.get(i) or self.worlds[i] for i in self._everywhere]
         self.index = ReadoutIndex(self.layout, built)
         self._fresh.update(env_ids)
         if self.modes is not None:
-            self.modes.build(self._backend, self.index)
+            self.modes.build(self.backend, self.index)
         self._change()
 
 

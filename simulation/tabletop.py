@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import cos, pi, sin
 
 from robots.assets import scenery
-from simulation.shapes import Box, Floor, Mesh, Plane, Shape
+from simulation.scene.shapes import Box, Floor, Mesh, Plane, Shape
 from simulation.world import World
 
 # mani_skill 3.0.1, utils/scene_builder/table/scene_builder.py (m)

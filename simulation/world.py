@@ -15,7 +15,7 @@ from robots import SimulationError, UnknownNameError
 from robots.common.bounds import checked_choice, shown
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
-from simulation.shapes import Shape, scaled
+from simulation.scene.shapes import Shape, scaled
 
 BodyKind = Literal["dynamic", "kinematic", "static"]
 _KINDS = get_args(BodyKind)

@@ -18,7 +18,7 @@ from rich.table import Table
 from layouts import Layout
 from robots import TaskError
 from simulation import Camera
-from simulation.cameras import RobotCamera
+from simulation.scene.cameras import RobotCamera
 from tasks.engine.cameras import cameras_of
 from tasks.engine.task import MultiRobotTask
 from tasks.registry import full_name, get_task_class, make, origin, other_names

@@ -92,7 +92,7 @@ class TcpNumbers:
         assert driven.arm is not None
         self._driven, self._task, self._arm = driven, task, driven.arm
         self._robot = task.layout.arm(driven.arm).robot
-        self._forward = task.simulation.point_reach(driven.arm).forward
+        self._forward = task.simulation.backend.point_reach(driven.arm).forward
 
     def towards(self, pose: Floats, state: State) -> tuple[Floats, bool]:
         """Return the numbers, and whether none had to be cut to be within bounds.

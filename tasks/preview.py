@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from robots import MissingPackageError, TaskError, UnknownNameError
 from robots.common.bounds import checked_whole
 from robots.common.writing import written_whole
-from simulation.cameras import AnyCamera, Camera, RobotCamera, camera_name
 from simulation.rendering.pictures import FIELD_OF_VIEW
+from simulation.scene.cameras import AnyCamera, Camera, RobotCamera, camera_name
 from tasks.engine.cameras import cameras_of, resized
 from tasks.engine.task import MultiRobotTask
 

@@ -19,7 +19,7 @@ from simulation import (
     World,
     add_table,
 )
-from simulation.shapes import POLISHED, Color, Finish, linear
+from simulation.scene.shapes import POLISHED, Color, Finish, linear
 from simulation.state import once_per_state
 from tasks.engine.declaration import Info
 from tasks.engine.scenario import Scenario

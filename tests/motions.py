@@ -12,7 +12,7 @@ import numpy as np
 
 import tasks
 from simulation.sapien3.backend import worlds_below
-from simulation.sapien3.inverse_kinematics import InverseKinematics
+from simulation.sapien3.kinematics.inverse_kinematics import InverseKinematics
 from tasks.episode import Episode
 
 OPEN, CLOSED = 1.0, -1.0

@@ -111,7 +111,7 @@ def pick_small_cube(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
     def attempts(rehearsal: Rehearsal) -> Iterator[Attempt]:
         for style in STYLES:
             scene = rehearsal.begin(seed)
-            reach = rehearsal.task.simulation.point_reach(ARM)
+            reach = rehearsal.task.simulation.backend.point_reach(ARM)
             yield rehearsal.play(_Pick(style, reach, scene).script())
 
     return search(task, seed, attempts)

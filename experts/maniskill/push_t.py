@@ -68,7 +68,7 @@ class _Pusher:
     def __init__(self, rehearsal: Rehearsal, scene: Scene, random: np.random.Generator) -> None:
         self._rehearsal, self._scene = rehearsal, scene
         self._task = task = rehearsal.task
-        self._kinematics = task.simulation.inverse_kinematics(ARM)
+        self._kinematics = task.simulation.backend.inverse_kinematics(ARM)
         self._driver = ArmDriver(task.layout.arm(ARM).robot)
         self._base = scene.base(ARM)
         self._contacts = contacts()

@@ -70,7 +70,7 @@ def roll(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
 
 def _shots(rehearsal: Rehearsal, seed: int) -> Iterator[Attempt]:
     """Shoot in every style, a few times each, the aim corrected by where the ball went."""
-    kinematics = rehearsal.task.simulation.inverse_kinematics(ARM)
+    kinematics = rehearsal.task.simulation.backend.inverse_kinematics(ARM)
     for style in STYLES:
         aim, correction, last_error = 0.0, CORRECTION, 0.0
         for _ in range(SHOTS):

@@ -86,7 +86,7 @@ class Pile(_NothingToDo):
 
     def touching(self) -> int:
         """Return how many pairs of bodies touch or are about to, in the first environment."""
-        return int(self.simulation.contact_counts()[0])
+        return int(self.simulation.backend.contact_counts()[0])
 
 
 def crowd(count: int, kinds: Sequence[str]) -> Layout:

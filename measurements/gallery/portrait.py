@@ -10,16 +10,16 @@ from kinematics.quaternions import multiplied, normalised, yaw_quaternion
 from layouts import Layout, Placement
 from measurements.gallery.camera import TEXTURES, Floats, Lens, Picture, shrunk
 from robots import RobotDescriptor
-from simulation.cameras import View
-from simulation.overlaps import empty, stand
+from simulation.checks.overlaps import empty, stand
+from simulation.scene.cameras import View
 from simulation.simulation import Simulation
 
 SIZE = 320  # pixels along each side
 SAMPLES = 3  # pixels that are drawn for one, along each side
 BRIGHTENED = 0.8  # exponent of what is drawn, so that black robots have a shape
 
-# The lamps of `simulation.sapien3.studio` shine from behind this camera, a bit from the right;
-# the robot faces to the right, towards the viewer.
+# SAPIEN's lamps (`simulation.sapien3.pictures.studio`) shine from behind this camera, a bit from
+# the right; the robot faces to the right, towards the viewer.
 LENS, FACING = Lens(radians(-168), radians(18), radians(24)), radians(-120)
 FARTHEST = 14.0  # m; from there, every robot is in the picture
 LOOKS, COARSE = 3, 256  # to find where the camera is to be, and their size (pixels)

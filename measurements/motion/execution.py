@@ -21,7 +21,7 @@ class Stage:
         self._task = FreeRobots(
             replace(scenario, layout=layout, control_mode=control_mode, check_layout=False)
         )
-        self._task.simulation.watch_arms()
+        self._task.simulation.backend.watch_arms()
 
     def close(self) -> None:
         """Take the world down."""
@@ -37,7 +37,7 @@ class Stage:
         task.reset(0)
 
         def watch() -> None:
-            pairs = task.simulation.arms_touching(0)
+            pairs = task.simulation.backend.arms_touching(0)
             touching.update(dict.fromkeys(f"{one}, {other}" for one, other in pairs))
 
         watch()

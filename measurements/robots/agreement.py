@@ -19,7 +19,7 @@ from robots import RobotDescriptor
 from robots.bodies.hulls import RobotModel, load_model
 from robots.bodies.overlaps import overlapping
 from simulation import PhysicsSettings
-from simulation.overlaps import empty, stand
+from simulation.checks.overlaps import empty, stand
 from simulation.simulation import Simulation
 
 POSTURES = 200  # random ones
@@ -80,7 +80,7 @@ def _in_physics(robot: RobotDescriptor, drawn: Floats) -> Iterator[dict[LinkPair
         simulation.worlds[0].stand(_NAME, qpos)
         simulation.touched()
         simulation.step(still, simulation.read().joint_positions)
-        overlaps = simulation.overlaps(0)
+        overlaps = simulation.backend.overlaps(0)
         yield {frozenset((lap.one.name, lap.other.name)): lap.depth for lap in overlaps}
 
 

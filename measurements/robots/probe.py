@@ -22,7 +22,7 @@ from robots import RobotDescriptor, RobotLayoutsError
 from robots.from_urdf import guess_descriptor
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
-from simulation.trial import NumberTrial, tcp_error, try_robot
+from simulation.checks.trial import NumberTrial, tcp_error, try_robot
 
 STEPS = 500
 NEIGHBOUR = "panda"

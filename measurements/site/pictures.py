@@ -20,7 +20,7 @@ from robots import RecordingError
 from robots.common.commands import exit_code, start
 from robots.common.writing import written_whole
 from rollouts.progress import LiveLine
-from simulation.cameras import Camera
+from simulation.scene.cameras import Camera
 from tasks.episode import play
 
 FOLDER = Path("docs/images")

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots import TaskError, UnknownNameError
-from simulation.cameras import AnyCamera, RobotCamera
 from simulation.rendering.pictures import SIZE
+from simulation.scene.cameras import AnyCamera, RobotCamera
 from tasks import MultiRobotTask
 from tasks.engine.cameras import Size, by_place, cameras_of, expect_apart, resized
 from tasks.engine.columns import OVERVIEW, Viewpoint, overview

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from layouts import Layout
 from robots import JointGroup
 from simulation.backend import Backend
+from simulation.control.joint_positions import JointPositionController
 from simulation.control.tcp import Tool, ToolControl
-from simulation.controller import JointPositionController
 from simulation.maths import Floats, cos, sin
 from simulation.readout import ReadoutIndex
 from simulation.state import State

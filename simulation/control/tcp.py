@@ -3,18 +3,102 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from kinematics.quaternions import multiplied
+from kinematics.quaternions import inverted, multiplied
 from robots import JointGroup
 from simulation.backend import Backend, PoseFollower
-from simulation.control import poses
-from simulation.control.poses import Row
-from simulation.maths import Floats
+from simulation.maths import Floats, cos, norm, sin, sqrt
 from simulation.readout import ReadoutIndex
 from simulation.state import State
+
+Number = np.float32
+Row = tuple[Number, ...]
+
+_ONE, _TWO = np.float32(1), np.float32(2)
+_NOTHING = np.float32(0)
+_LEAST_ROOT = np.float32(0.1)
+
+
+def row(numbers: Iterable[Any]) -> Row:
+    """Return numbers of a float32 array one by one."""
+    return tuple(numbers)
+
+
+def upright(quaternion: Row) -> Row:
+    """Return a quaternion with w ≥ 0."""
+    w, x, y, z = quaternion
+    return (-w, -x, -y, -z) if w < _NOTHING else quaternion
+
+
+def turned(quaternion: Row, point: Row) -> Row:
+    """Return a point, three numbers, turned by a quaternion."""
+    return multiplied(multiplied(quaternion, (_NOTHING, *point)), inverted(quaternion))[1:]
+
+
+def added(one: Row, other: Row) -> Row:
+    """Return the sum of two points."""
+    return one[0] + other[0], one[1] + other[1], one[2] + other[2]
+
+
+def inverse(pose: Row) -> Row:
+    """Return the inverse of a pose."""
+    x, y, z, *quaternion = pose
+    back = inverted((*quaternion,))
+    return *turned(back, (-x, -y, -z)), *back
+
+
+def combined(first: Row, second: Row) -> Row:
+    """Return ``first · second``: the pose ``second`` of what is seen from ``first``."""
+    place = added(first[:3], turned(first[3:], second[:3]))
+    return *place, *upright(multiplied(first[3:], second[3:]))
+
+
+def rotation(angles: Floats) -> Row:
+    """Return the quaternion, w ≥ 0, of turns about x, then the new y, then the new z, (3,)."""
+    cx, cy, cz = cos(angles)
+    sx, sy, sz = sin(angles)
+    both, other = sx * sy, cx * sy
+    return quaternion(
+        (cy * cz, -cy * sz, sy),
+        (both * cz + cx * sz, both * -sz + cx * cz, -sx * cy),
+        (-other * cz + sx * sz, -other * -sz + sx * cz, cx * cy),
+    )
+
+
+def quaternion(first: Row, second: Row, third: Row) -> Row:
+    """Return the quaternion, w ≥ 0, of the three rows of a rotation matrix.
+
+    Of the four ways to read it off, the one that divides by the largest number.
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = first, second, third
+    squares = np.array(
+        [
+            _ONE + xx + yy + zz,
+            _ONE + xx - yy - zz,
+            _ONE - xx + yy - zz,
+            _ONE - xx - yy + zz,
+        ]
+    )
+    roots = sqrt(np.maximum(squares, _NOTHING))
+    largest = int(roots.argmax())
+    root = roots[largest]
+    found = (
+        (root * root, zy - yz, xz - zx, yx - xy),
+        (zy - yz, root * root, yx + xy, xz + zx),
+        (xz - zx, yx + xy, root * root, zy + yz),
+        (yx - xy, zx + xz, zy + yz, root * root),
+    )[largest]
+    divisor = _TWO * max(root, _LEAST_ROOT)
+    return upright(tuple(number / divisor for number in found))
+
+
+def clipped_turn(angles: Floats) -> Floats:
+    """Return angles, (3,), scaled down to a norm of 1 if theirs is above."""
+    length = norm(angles[None])[0]
+    return angles * (_ONE / length) if length > _ONE else angles
 
 
 class Tool(NamedTuple):
@@ -104,23 +188,23 @@ class ToolControl:
 
     def _wanted(self, action: Floats, scaled: Floats, state: State, env: int) -> Row:
         """Return where the TCP is to be, in its root link's frame."""
-        group, place = self.tool.group, poses.row(scaled[self._place])
+        group, place = self.tool.group, row(scaled[self._place])
         turn = self._turn(action) if group.asks.turn else None
         if not group.delta:
             assert turn is not None
             return *place, *turn
-        before = poses.row(self.targets[env]) if group.target else self._now(state, env)
+        before = row(self.targets[env]) if group.target else self._now(state, env)
         spot, way = before[:3], before[3:]
-        moved = place if self._by_root else poses.turned(way, place)
+        moved = place if self._by_root else turned(way, place)
         if turn is not None:
             way = multiplied(turn, way) if self._turns_by_root else multiplied(way, turn)
-        return *poses.added(spot, moved), *poses.upright(way)
+        return *added(spot, moved), *upright(way)
 
     def _turn(self, action: Floats) -> Row:
         angles = action[self._angles]
         if self.tool.group.normalised:
-            angles = poses.clipped_turn(angles) * self._turn_scale
-        return poses.rotation(angles)
+            angles = clipped_turn(angles) * self._turn_scale
+        return rotation(angles)
 
     def _now(self, state: State, env: int) -> Row:
         """Return where the TCP is, in its root link's frame."""
@@ -129,14 +213,14 @@ class ToolControl:
         if key not in self._roots:  # roots seldom move
             if len(self._roots) > state.num_envs:
                 self._roots.clear()
-            self._roots[key] = poses.inverse(poses.row(root))
-        return poses.combined(self._roots[key], poses.row(state.all_poses[self._tcp_frame, env]))
+            self._roots[key] = inverse(row(root))
+        return combined(self._roots[key], row(state.all_poses[self._tcp_frame, env]))
 
     def _of_link(self, wanted: Row, state: State, env: int) -> Row:
         """Return where the link that orients the TCP is, if the TCP is where it is wanted."""
         if self._tcp_frame == self._link_frame:
             return wanted
         tcp, link = (
-            poses.row(state.all_poses[frame, env]) for frame in (self._tcp_frame, self._link_frame)
+            row(state.all_poses[frame, env]) for frame in (self._tcp_frame, self._link_frame)
         )
-        return poses.combined(wanted, poses.combined(poses.inverse(tcp), link))
+        return combined(wanted, combined(inverse(tcp), link))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from robots import SimulationError
 from robots.descriptor import Vector3
-from simulation.cameras import AnyCamera, Camera, RobotCamera, Texture, View
+from simulation.scene.cameras import AnyCamera, Camera, RobotCamera, Texture, View
 from simulation.simulation import Simulation
 
 SIZE = 512  # pixels along each side of a picture for people
@@ -71,7 +71,7 @@ class Observers:
         Args:
             simulation: Worlds that were built with visuals.
             cameras: Camera by its name in observations.
-            textures: What to take, some of `simulation.cameras.TEXTURES`.
+            textures: What to take, some of `simulation.scene.cameras.TEXTURES`.
 
         Raises:
             SimulationError: If the worlds have no visuals.

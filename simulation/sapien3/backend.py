@@ -10,23 +10,27 @@ from numpy.typing import NDArray
 
 from robots import SimulationError
 from simulation.backend import Built, BuiltRobot, Overlap, Pair, Part, Readout, Rows, Velocity
-from simulation.cameras import AnyCamera, View
 from simulation.maths import Flags, Floats
 from simulation.sapien3.blueprint import Blueprint
 from simulation.sapien3.collision import described_shapes
 from simulation.sapien3.contacts import (
     ArmContacts,
     PairForces,
+    extents_of,
     overlaps_in,
     presses_on_object,
 )
-from simulation.sapien3.extents import extents_of
-from simulation.sapien3.inverse_kinematics import InverseKinematics
-from simulation.sapien3.point_reach import PointReach
-from simulation.sapien3.pose_follower import JOINTS_OF_A_POSE, NearestFollower, PoseFollower
+from simulation.sapien3.kinematics.inverse_kinematics import InverseKinematics
+from simulation.sapien3.kinematics.point_reach import PointReach
+from simulation.sapien3.kinematics.pose_follower import (
+    JOINTS_OF_A_POSE,
+    NearestFollower,
+    PoseFollower,
+)
 from simulation.sapien3.varied import vary
 from simulation.sapien3.world import BuiltWorld, build_world
-from simulation.variation import Variation
+from simulation.scene.cameras import AnyCamera, View
+from simulation.scene.variation import Variation
 from simulation.world import Placements, World
 
 _STILL = np.zeros(3, np.float32)
@@ -161,7 +165,9 @@ class SapienBackend:
         self, env: int, cameras: Mapping[str, AnyCamera], textures: Sequence[str], *, markers: bool
     ) -> Callable[[], list[View]]:
         """Begin to draw what cameras see; see `Backend`."""
-        from simulation.sapien3.studio import look  # what draws is loaded by the first picture
+        from simulation.sapien3.pictures.studio import (
+            look,  # what draws is loaded by the first picture
+        )
 
         return look(self.worlds[env], cameras, textures, markers=markers)
 
@@ -265,4 +271,4 @@ def worlds_below(simulation: Any) -> list[BuiltWorld]:
     Args:
         simulation: A `simulation.Simulation` with this backend.
     """
-    return simulation._backend.worlds
+    return simulation.backend.worlds

@@ -8,7 +8,7 @@ import numpy as np
 import sapien
 import sapien.physx as physx
 
-from simulation.shapes import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
+from simulation.scene.shapes import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
 
 # What a collision shape may have, besides its place in the body.
 _SIZES = ("half_size", "radius", "half_length", "scale", "vertices", "triangles")

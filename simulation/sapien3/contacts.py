@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+import sapien.physx as physx
 
 from simulation.backend import Overlap, Pair, Part
 from simulation.maths import Floats
@@ -144,3 +145,22 @@ def _kind(body: Any) -> str:
     if hasattr(body, "articulation"):
         return "link"
     return "fixed" if getattr(body, "kinematic", True) else "movable"
+
+
+def extents_of(world: BuiltWorld) -> dict[Part, Floats]:
+    """Return the box around each link and body that collides; see `simulation.backend.Backend`."""
+    return {
+        part: component.get_global_aabb_fast()
+        for part, component in _components(world)
+        if any(
+            not isinstance(s, physx.PhysxCollisionShapePlane) for s in component.collision_shapes
+        )
+    }
+
+
+def _components(world: BuiltWorld) -> Iterator[tuple[Part, Any]]:
+    for robot in world.robots.values():
+        for link in robot.links.values():
+            yield Part(robot.name, link.name), link
+    for body in world.bodies.values():
+        yield Part(None, body.declared.name), body.component

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import sapien
 import sapien.physx as physx
 
-from simulation.parts import Part
-from simulation.variation import Variation
+from simulation.scene.parts import Part
+from simulation.scene.variation import Variation
 
 if TYPE_CHECKING:
     from simulation.sapien3.world import BuiltWorld

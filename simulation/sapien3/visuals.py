@@ -20,7 +20,7 @@ from sapien.render import (
 )
 
 from robots.descriptor import Vector3
-from simulation.shapes import Box, Capsule, Cylinder, Floor, Mesh, Plane, Shape, Sphere
+from simulation.scene.shapes import Box, Capsule, Cylinder, Floor, Mesh, Plane, Shape, Sphere
 
 _PLANE_HALF_SIZE = 50.0  # of what is drawn of an infinite plane (m)
 _MIPMAPS = 4  # of a floor's texture, as in mani_skill 3.0.1, utils/building/ground.py

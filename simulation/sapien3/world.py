@@ -11,8 +11,6 @@ import sapien.physx as physx
 from layouts import Layout
 from robots import SimulationError
 from robots.common.portable import is_portable
-from simulation.looks import AS_DECLARED
-from simulation.parts import Part
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
 from simulation.sapien3.blueprint import Blueprint, read_blueprint
 from simulation.sapien3.collision import add_collision
@@ -20,9 +18,37 @@ from simulation.sapien3.collision_groups import FLOOR
 from simulation.sapien3.device import expect_render_device, outlive_forks
 from simulation.sapien3.exact_division import divide_exactly
 from simulation.sapien3.robot import SimulatedRobot
-from simulation.sapien3.settings import apply
-from simulation.shapes import Shape
+from simulation.scene.looks import AS_DECLARED
+from simulation.scene.parts import Part
+from simulation.scene.shapes import Shape
 from simulation.world import Body, World
+
+
+def apply_settings(settings: PhysicsSettings) -> None:
+    """Write the settings into SAPIEN's process-wide configuration.
+
+    They bind when a scene, a body or a shape is made, so this runs before every build: another
+    world's build may have changed them since.
+    """
+    physx.set_shape_config(contact_offset=settings.contact_offset, rest_offset=settings.rest_offset)
+    physx.set_body_config(
+        solver_position_iterations=settings.position_iterations,
+        solver_velocity_iterations=settings.velocity_iterations,
+        sleep_threshold=settings.sleep_threshold,
+    )
+    gravity: Any = settings.gravity  # SAPIEN takes any sequence
+    physx.set_scene_config(
+        gravity=gravity,
+        bounce_threshold=settings.bounce_threshold,
+        enable_pcm=settings.persistent_contacts,
+        enable_tgs=settings.temporal_gauss_seidel,
+        enable_ccd=settings.continuous_collision,
+        enable_enhanced_determinism=settings.enhanced_determinism,
+        enable_friction_every_iteration=settings.friction_every_iteration,
+        cpu_workers=0,  # more workers are slower for scenes this small
+    )
+    friction = settings.friction
+    physx.set_default_material(friction.static, friction.dynamic, friction.restitution)
 
 
 class BuiltBody(NamedTuple):
@@ -87,7 +113,7 @@ class BuiltWorld:
         self.visuals = visuals
         if is_portable():
             divide_exactly()
-        apply(self.physics)
+        apply_settings(self.physics)
         self.system = physx.PhysxCpuSystem()
         systems: list[Any] = [self.system]
         if visuals:

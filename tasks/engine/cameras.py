@@ -9,7 +9,7 @@ from typing import Any
 from layouts import Layout
 from robots import TaskError
 from robots.common.bounds import checked_whole, shown
-from simulation.cameras import AnyCamera, Camera, RobotCamera, camera_name
+from simulation.scene.cameras import AnyCamera, Camera, RobotCamera, camera_name
 from tasks.native.format import observation_keys
 
 Size = tuple[int, int]

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from layouts import Layout
 from robots import TaskError, unknown_name_message
 from simulation import Camera, Simulation, State
-from simulation.cameras import TEXTURES, AnyCamera, RobotCamera, camera_name
 from simulation.maths import Array, Floats, all_finite
+from simulation.scene.cameras import TEXTURES, AnyCamera, RobotCamera, camera_name
 from tasks.engine.cameras import Size, cameras_of, expect_apart, resized
 from tasks.engine.columns import (
     COLUMN_MODES,

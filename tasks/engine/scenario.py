@@ -13,6 +13,7 @@ from layouts import Layout
 from robots import TaskError, UnknownNameError
 from robots.common.bounds import checked_choice, checked_flag, checked_whole, shown
 from simulation import SAPIEN_DEFAULTS, Camera, PhysicsSettings
+from simulation.backend import SIMULATORS
 from simulation.physics import substeps
 from tasks.engine.bystanders import BYSTANDERS
 from tasks.engine.cameras import checked_size
@@ -20,7 +21,6 @@ from tasks.engine.display import scenario_html, scenario_text
 from tasks.engine.observation import read_mode
 from tasks.varying.randomization import Randomization
 
-SIMULATORS = ("sapien3",)
 RENDER_MODES = (None, "rgb_array")
 LEAST_BYTES = 400_000  # of an environment: that of PickCube-v1, one of the smallest, takes 435 kB
 
@@ -125,7 +125,7 @@ class Scenario:
                 " needed"
             )
         for name, choices in (
-            ("simulator", SIMULATORS),
+            ("simulator", tuple(SIMULATORS)),
             ("render_mode", RENDER_MODES),
             ("bystanders", BYSTANDERS),
             ("reward_mode", (None, *reward_modes)),

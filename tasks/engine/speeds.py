@@ -15,7 +15,7 @@ import numpy as np
 
 from robots import SimulationError
 from simulation import Simulation, State
-from simulation.causes import Causes
+from simulation.checks.overlaps import Causes
 from simulation.maths import Array
 
 WARNS, REFUSES = 10.0, 100.0  # times a joint's largest speed

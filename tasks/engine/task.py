@@ -136,6 +136,7 @@ class MultiRobotTask(Declaration, Varied, Remade):
             control_frequency=scenario.control_frequency,
             visuals=scenario.draws,
             links_pass=own.native_id is not None,
+            simulator=scenario.simulator,
         )
         self._speeds = SpeedWatch(self._simulation)
         if scenario.randomization:

@@ -14,7 +14,7 @@ from robots import TaskError
 from robots.common.fields import settle_fields
 from robots.descriptor import IDENTITY, Quaternion
 from simulation import Box, Friction, Shape, Sphere, World, add_table
-from simulation.shapes import Color, Coordinate, Density, Length, Lengths, Place
+from simulation.scene.shapes import Color, Coordinate, Density, Length, Lengths, Place
 from simulation.tabletop import TABLE_OUTLINE
 from simulation.world import BodyKind
 from tasks.language.props import (

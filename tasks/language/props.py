@@ -9,7 +9,7 @@ import numpy as np
 from layouts import Layout
 from robots.descriptor import Vector3
 from simulation import Box, Cylinder, Plane, Shape, Sphere, World
-from simulation.shapes import Color
+from simulation.scene.shapes import Color
 
 RED: Color = (1.0, 0.0, 0.0, 1.0)
 GREEN: Color = (0.0, 1.0, 0.0, 1.0)

@@ -11,8 +11,8 @@ from layouts import Layout
 from robots import TaskError, UnknownNameError
 from robots.common.bounds import shown
 from simulation import Camera, Simulation
-from simulation.cameras import AnyCamera, RobotCamera, camera_name
-from simulation.looks import (
+from simulation.scene.cameras import AnyCamera, RobotCamera, camera_name
+from simulation.scene.looks import (
     LIGHTS,
     PATTERNS,
     Glow,
@@ -21,7 +21,7 @@ from simulation.looks import (
     Pattern,
     Shift,
 )
-from simulation.parts import Part
+from simulation.scene.parts import Part
 from tasks.varying.distributions import Choice, Distribution, LogUniform, Whole
 from tasks.varying.groups import Declared, Group, Limits
 from tasks.varying.targets import linked_parts

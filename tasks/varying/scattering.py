@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from simulation import Box, Cylinder, Shape, Simulation, Sphere, State, World
-from simulation.looks import Paint
 from simulation.maths import Floats
-from simulation.parts import Part
-from simulation.shapes import Capsule
-from simulation.variation import Variation
+from simulation.scene.looks import Paint
+from simulation.scene.parts import Part
+from simulation.scene.shapes import Capsule
+from simulation.scene.variation import Variation
 from simulation.world import Body
 from tasks.varying.distractors import Distractor, Distractors, Rectangle, waiting
 from tasks.varying.distributions import Distribution, Uniform
@@ -98,7 +98,9 @@ def _box(one: Distractor, x: float, y: float) -> Floats:
 
 def _taken(simulation: Simulation, state: State, env: int, without: set[str]) -> Floats:
     """Return the boxes around everything in a world that rises above the table, (K, 2, 3)."""
-    boxes = [box for part, box in simulation.extents(env).items() if part.name not in without]
+    boxes = [
+        box for part, box in simulation.backend.extents(env).items() if part.name not in without
+    ]
     for body in simulation.worlds[env].bodies.values():
         if body.name not in without and not any(shape.collides for shape in body.shapes):
             boxes += _around(body, state.pose(body.name)[env])

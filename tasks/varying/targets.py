@@ -8,8 +8,8 @@ from typing import Any, NamedTuple, TypeVar
 
 from robots import UnknownNameError
 from simulation import Simulation
-from simulation.parts import Part
-from simulation.shapes import SIZED
+from simulation.scene.parts import Part
+from simulation.scene.shapes import SIZED
 
 Thing = TypeVar("Thing")
 

@@ -14,7 +14,7 @@ from layouts import Layout
 from robots.descriptor import Vector3
 from simulation import Camera, Simulation, State, World
 from simulation.maths import Floats
-from simulation.variation import Variation
+from simulation.scene.variation import Variation
 from tasks.varying import targets as find
 from tasks.varying.axes import AXES
 from tasks.varying.bases import shifted

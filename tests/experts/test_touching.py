@@ -25,7 +25,7 @@ def test_hands_in_each_other_are_seen_in_clones_as_in_other_tasks(task_id):
         task.simulation.worlds[0].stand(name, HANDS)
     watch = ArmWatch(task)
     task.step(np.zeros((1, 16), np.float32))
-    by_physics = task.simulation.arms_touching(0)
+    by_physics = task.simulation.backend.arms_touching(0)
     assert any({part.name for part in pair} == {"panda_hand"} for pair in by_physics) == (
         cls.native_id is None
     )

@@ -17,7 +17,7 @@ from experts.script import CLOSED, Pose, Scene, Waypoint
 from experts.tips import pose_solver
 from experts.ways import NoWayError, Ways
 from kinematics.rotations import transform
-from simulation.shapes import Box, Capsule, Cylinder, Plane, Sphere
+from simulation.scene.shapes import Box, Capsule, Cylinder, Plane, Sphere
 
 HALF_PI = np.pi / 2
 MIDDLE = np.array([0.0, 0.0, 0.3])

@@ -8,10 +8,10 @@ import pytest
 import tasks
 from layouts import single
 from simulation import Box, Camera, Simulation, World
-from simulation.cameras import TEXTURES
 from simulation.rendering.pictures import vulkan_problem
 from simulation.sapien3.backend import worlds_below
-from simulation.sapien3.studio import Studio
+from simulation.sapien3.pictures.studio import Studio
+from simulation.scene.cameras import TEXTURES
 from tests.quick import quick_cases
 
 CAMERAS = {

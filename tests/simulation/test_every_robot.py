@@ -15,7 +15,7 @@ from robots.from_urdf import guess_descriptor
 from robots.registry import CATALOGUE
 from robots.urdf.summary import parse_urdf
 from simulation import PhysicsSettings, Simulation
-from simulation.controller import JointPositionController
+from simulation.control.joint_positions import JointPositionController
 from simulation.sapien3.backend import worlds_below
 from tests.catalogue import every_robot
 

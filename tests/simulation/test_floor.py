@@ -13,9 +13,9 @@ from robots import ActionSplit, JointGroup, LocalUrdf, RobotDescriptor, RobotReg
 from robots.common.errors import UnknownNameError
 from robots.from_urdf import guess_descriptor
 from simulation import Simulation
-from simulation.floor import adds_floor, drives_on_floor
-from simulation.overlaps import stand
-from simulation.trial import try_robot
+from simulation.checks.floor import adds_floor, drives_on_floor
+from simulation.checks.overlaps import stand
+from simulation.checks.trial import try_robot
 from tests.faults.toy_robots import joint, link
 
 DRIVES = ("fetch", "fetch_driving", "mobile_panda")

@@ -12,7 +12,7 @@ from layouts import single
 from robots import RobotDescriptor
 from robots.from_urdf import guess_descriptor
 from simulation import Box, PhysicsSettings, Simulation
-from simulation.trial import try_robot
+from simulation.checks.trial import try_robot
 from tests.robots.test_guessing import knuckles, single_arm
 from tests.robots.urdf_parts import Parts
 
@@ -139,7 +139,7 @@ def test_jaws_that_hold_something_stay_parallel_if_their_joints_are_a_linkage(
 
     simulation = Simulation(layout, build, 1, PhysicsSettings())
     if watched:  # what looks at each step of physics leaves them as they are
-        simulation.watch_arms()
+        simulation.backend.watch_arms()
     simulation.worlds[0].stand("arm", robot.keyframe("rest"))
     action = np.zeros((1, robot.action_dim), np.float32)
     action[0, -1] = -1.0

@@ -8,7 +8,7 @@ import sapien
 
 from layouts import Layout, Placement
 from robots import RobotRegistry, SimulationError, UnknownNameError
-from simulation.sapien3.inverse_kinematics import InverseKinematics
+from simulation.sapien3.kinematics.inverse_kinematics import InverseKinematics
 from simulation.sapien3.world import BuiltWorld
 from tests.catalogue import QUICK
 

@@ -7,7 +7,7 @@ import pytest
 
 from layouts import Layout, Placement
 from robots import RobotRegistry, UnknownNameError
-from simulation.sapien3.point_reach import PointReach
+from simulation.sapien3.kinematics.point_reach import PointReach
 from simulation.sapien3.world import BuiltWorld
 from tests.catalogue import QUICK
 

@@ -12,7 +12,7 @@ import torch
 import tasks
 from robots import SimulationError, TaskError
 from simulation.rendering.pictures import Cameras, vulkan_problem
-from simulation.sapien3.studio import look_at
+from simulation.sapien3.pictures.studio import look_at
 
 TASK = "TwoRobotPickCube-v1"
 NO_DRIVER = {"VK_DRIVER_FILES": "/nowhere.json", "VK_ICD_FILENAMES": "/nowhere.json"}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -14,9 +14,8 @@ import torch
 
 import tasks
 from layouts import single
-from robots import RobotDescriptor, RobotRegistry
-from simulation import Simulation
-from simulation.backend import Backend
+from robots import RobotDescriptor, RobotRegistry, UnknownNameError
+from simulation.backend import SIMULATORS, Backend, open_backend
 from simulation.sapien3.backend import SapienBackend, worlds_below
 from tests.quick import quick_cases
 
@@ -38,7 +37,7 @@ def reached(start: Any) -> Iterator[tuple[str, Any]]:
             found += [(f"{path}[{key!r}]", value) for key, value in thing.items()]
         elif isinstance(thing, list | tuple | set | frozenset):
             found += [(f"{path}[{i}]", value) for i, value in enumerate(thing)]
-        if type(thing).__module__.split(".")[0] in ("simulation", "tasks"):
+        if re.match(r"(simulation\.(?!sapien3)|tasks\.)", type(thing).__module__):
             found += list(attributes(path, thing))
 
 
@@ -94,8 +93,7 @@ def calls(monkeypatch: pytest.MonkeyPatch, task_id: str, num_envs: int) -> list[
         made.append(Verbs())
         return made[-1]
 
-    simulation = functools.partial(Simulation, backend=backend)
-    monkeypatch.setattr("tasks.engine.task.Simulation", simulation)
+    monkeypatch.setattr("simulation.simulation.open_backend", lambda _: backend())
     env = tasks.make(task_id, num_envs=num_envs)
     action = torch.zeros(env.action_space.shape)
     env.step(action)
@@ -166,3 +164,15 @@ def taped(env: tasks.MultiRobotTask) -> list[np.ndarray]:
     tape = env.begin_tape()
     env.write_tape(tape)
     return [rows for group in tape.read().values() for rows in group.values()]
+
+
+def test_a_task_is_stepped_by_the_simulator_that_it_names(monkeypatch):
+    class Other(SapienBackend):
+        """SAPIEN under another name."""
+
+    monkeypatch.setattr("simulation.sapien3.backend.Other", Other, raising=False)
+    monkeypatch.setitem(SIMULATORS, "other", "simulation.sapien3.backend:Other")
+    env = tasks.make("PushCube-v1", simulator="other")
+    assert type(env.simulation.backend) is Other
+    with pytest.raises(UnknownNameError, match="Did you mean 'sapien3'"):
+        open_backend("sapien")

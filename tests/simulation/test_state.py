@@ -6,7 +6,7 @@ import tasks
 from layouts import single
 from robots import SimulationError, UnknownNameError
 from simulation import Simulation, State
-from simulation.overlaps import empty, stand
+from simulation.checks.overlaps import empty, stand
 from simulation.sapien3.backend import worlds_below
 from tasks import MultiRobotTask
 

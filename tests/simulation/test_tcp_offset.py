@@ -15,11 +15,11 @@ from robots import DescriptorError, RobotRegistry
 from robots.bodies.hulls import load_model
 from robots.grafting import with_tool
 from simulation import Simulation
-from simulation.overlaps import empty, stand
-from simulation.sapien3.inverse_kinematics import InverseKinematics
+from simulation.checks.overlaps import empty, stand
+from simulation.checks.trial import tcp_error
+from simulation.sapien3.kinematics.inverse_kinematics import InverseKinematics
 from simulation.sapien3.world import BuiltWorld
 from simulation.state import with_means
-from simulation.trial import tcp_error
 from tests.robots.urdf_parts import Parts
 
 OFFSET = (0.03, -0.02, 0.05)

@@ -12,9 +12,8 @@ from layouts import Layout, Placement
 from robots import RobotDescriptor, RobotRegistry
 from robots.inspect import main
 from simulation import Simulation
-from simulation.causes import Causes
-from simulation.overlaps import empty, stand, starting_overlaps
-from simulation.trial import TCP_ERROR, tcp_error, try_robot
+from simulation.checks.overlaps import Causes, empty, stand, starting_overlaps
+from simulation.checks.trial import TCP_ERROR, tcp_error, try_robot
 from tests.three_links import arm, save
 
 

@@ -15,11 +15,11 @@ from robots import (
 )
 from robots.descriptor import ActionSplit
 from simulation import Box, PhysicsSettings, Simulation, Sphere, World, add_table
-from simulation.controller import JointPositionController
+from simulation.control.joint_positions import JointPositionController
 from simulation.sapien3.backend import worlds_below
 from simulation.sapien3.blueprint import read_blueprint
 from simulation.sapien3.world import BuiltWorld
-from simulation.shapes import Capsule, Cylinder
+from simulation.scene.shapes import Capsule, Cylinder
 from simulation.world import Body
 
 HALF = 0.02
@@ -192,12 +192,12 @@ def test_a_rebuilt_world_has_no_past():
     simulation = Simulation(single({"arm": "panda"}), with_cube, 2, PhysicsSettings())
     stand(simulation)
     simulation.step(np.zeros((2, 8), np.float32), simulation.read().joint_positions)
-    assert simulation.contact_counts().all()
+    assert simulation.backend.contact_counts().all()
     kept, built = simulation.worlds[0], worlds_below(simulation)[0]
     simulation.rebuild([1], with_cube)
     assert simulation.worlds[0] is kept
     assert worlds_below(simulation)[0] is built
-    assert (simulation.contact_counts() > 0).tolist() == [True, False]
+    assert (simulation.backend.contact_counts() > 0).tolist() == [True, False]
 
 
 def test_a_rebuilt_world_is_the_same_to_the_last_bit():

@@ -6,7 +6,7 @@ import pytest
 
 from robots import SimulationError, TaskError
 from simulation import Box, Friction, Sphere
-from simulation.shapes import Finish
+from simulation.scene.shapes import Finish
 from tasks.language.bodies import Ball, Compound, Cube, Cuboid, Peg
 
 

@@ -9,7 +9,7 @@ from experts.geometry import gripper_facing
 from experts.script import Scene
 from robots import TaskError
 from simulation.sapien3.backend import worlds_below
-from simulation.sapien3.inverse_kinematics import InverseKinematics
+from simulation.sapien3.kinematics.inverse_kinematics import InverseKinematics
 from tests.tasks.own import look, make, put
 
 TASK = "TwoRobotPushPick-v1"

@@ -9,8 +9,8 @@ import torch
 
 import tasks
 from robots import TaskError, UnknownNameError
-from simulation.parts import Part
 from simulation.sapien3.backend import worlds_below
+from simulation.scene.parts import Part
 from tasks import Camera, Distractors, Light, MultiRobotTask, Randomization, Uniform, Whole
 
 NAMES = [f"distractor_{i}" for i in range(4)]
@@ -36,7 +36,7 @@ def test_they_stand_clear_of_everything_and_rest() -> None:
         env.reset(seed=seed)
         before = env.simulation.read()
         for i in range(2):
-            about, boxes = drawn(env, i), env.simulation.extents(i)
+            about, boxes = drawn(env, i), env.simulation.backend.extents(i)
             there = [name for name in NAMES if about[name]["there"]]
             counts.add(about["count"])
             assert len(there) == about["count"]

@@ -149,7 +149,7 @@ def test_bases_stand_where_they_were_drawn() -> None:
     stands = env.standing()["arm"].base_position
     np.testing.assert_allclose(stands, base + (0.03, -0.02, 0.01), atol=1e-12)
     assert env.layout == plain.layout
-    solver = env.simulation.inverse_kinematics("arm")
+    solver = env.simulation.backend.inverse_kinematics("arm")
     qpos = env.simulation.read().qpos("arm")[0, :7]
     np.testing.assert_allclose(solver.forward(qpos)[0], expected, atol=1e-5)
 

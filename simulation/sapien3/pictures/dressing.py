@@ -12,10 +12,10 @@ from typing import Any
 import sapien
 
 from robots.descriptor import Vector3
-from simulation.looks import Glow, Looks, Paint, Shift
-from simulation.parts import Part
+from simulation.sapien3.pictures.wrapping import cover, materials, wrap
 from simulation.sapien3.world import BuiltWorld
-from simulation.sapien3.wrapping import cover, materials, wrap
+from simulation.scene.looks import Glow, Looks, Paint, Shift
+from simulation.scene.parts import Part
 
 _MOST_TILT = 1.4  # rad from the vertical; light from the horizon and below lights no table
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from kinematics.rotations import Floats
 from kinematics.solve import by_way, nearby, turned_within
 from robots import SimulationError
-from simulation.sapien3.arm_model import ArmModel
+from simulation.sapien3.kinematics.arm_model import ArmModel
 from simulation.sapien3.world import BuiltWorld
 
 Numbers = Sequence[float] | NDArray[np.floating[Any]]

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from robots import RobotDescriptor
-from simulation.trial import HELD, Fastest, NumberTrial, Trial, in_itself, percent, try_robot
+from simulation.checks.trial import HELD, Fastest, NumberTrial, Trial, in_itself, percent, try_robot
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from robots.descriptor import Vector3
-from simulation.parts import Part
+from simulation.scene.parts import Part
 
 LIGHTS = ("side", "top", "ambient")
 """What lights every world: a lamp that shines down and sideways, one that shines straight down, and
@@ -96,7 +96,7 @@ class Looks:
     Always of the same things: each is set from what was built, not from what was set before.
 
     Attributes:
-        cameras: How cameras are off their places, by `simulation.cameras.camera_name`.
+        cameras: How cameras are off their places, by `simulation.scene.cameras.camera_name`.
         lights: By their names in `LIGHTS`.
         paints: By link or body.
         patterns: By body.

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from robots.descriptor import Quaternion, Vector3
-from simulation.looks import Looks
-from simulation.parts import Part
+from simulation.scene.looks import Looks
+from simulation.scene.parts import Part
 
 Factors = Mapping[Part, float]
 

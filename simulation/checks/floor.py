@@ -11,7 +11,7 @@ from robots import RobotDescriptor
 from robots.urdf.model import ModelJoint, UrdfModel
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
-from simulation.shapes import Plane
+from simulation.scene.shapes import Plane
 from simulation.world import World
 
 FLOOR = "floor"  # its name in a world

@@ -15,9 +15,9 @@ import numpy as np
 from layouts import Layout, single
 from robots import ActionNumber, RobotDescriptor
 from simulation.backend import Overlap, Part
-from simulation.floor import FLOOR, adds_floor, drives_on_floor
+from simulation.checks.floor import FLOOR, adds_floor, drives_on_floor
+from simulation.checks.overlaps import empty, stand, starting_overlaps
 from simulation.maths import Array, Floats
-from simulation.overlaps import empty, stand, starting_overlaps
 from simulation.simulation import Simulation
 
 NAME = "robot"  # its name in the layout

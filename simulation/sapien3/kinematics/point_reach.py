@@ -9,7 +9,7 @@ import numpy as np
 from kinematics.rotations import Floats
 from kinematics.solve import descend_by_differences
 from robots import UnknownNameError
-from simulation.sapien3.arm_model import ArmModel
+from simulation.sapien3.kinematics.arm_model import ArmModel
 from simulation.sapien3.world import BuiltWorld
 
 _CONVERGED = 1e-3  # m

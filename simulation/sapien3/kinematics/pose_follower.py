@@ -1,8 +1,8 @@
 """Which joints bring a link to a pose, by the search with which native's controllers drive.
 
 It is SAPIEN's Pinocchio, on the robot's own URDF and with native's arguments: its results are
-native's to the last bit. `simulation.sapien3.arm_model` takes SAPIEN's model of what was built,
-whose numbers are rounded.
+native's to the last bit. `arm_model` beside it takes SAPIEN's model of what was built, whose
+numbers are rounded.
 """
 
 from __future__ import annotations

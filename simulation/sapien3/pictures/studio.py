@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 
 from robots import SimulationError
 from robots.descriptor import Vector3
-from simulation.cameras import AnyCamera, RobotCamera, View, camera_name
-from simulation.looks import AS_DECLARED, LIGHTS, Looks
 from simulation.rotations import quaternion
-from simulation.sapien3.backdrop import COLOR, PLACE, Backdrop, Bodies, planes
 from simulation.sapien3.device import expect_render_device
-from simulation.sapien3.dressing import (
+from simulation.sapien3.pictures.backdrop import COLOR, PLACE, Backdrop, Bodies, planes
+from simulation.sapien3.pictures.dressing import (
     Wardrobe,
     lamp_pose,
     light_color,
@@ -25,6 +23,8 @@ from simulation.sapien3.dressing import (
     widened,
 )
 from simulation.sapien3.world import BuiltWorld
+from simulation.scene.cameras import AnyCamera, RobotCamera, View, camera_name
+from simulation.scene.looks import AS_DECLARED, LIGHTS, Looks
 
 # mani_skill 3.0.1, envs/sapien_env.py, _load_lighting: red, green, blue; directions point away
 # from the lamp.

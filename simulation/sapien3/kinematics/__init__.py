@@ -1,0 +1,1 @@
+"""Where arms can reach, by SAPIEN's Pinocchio on what was built."""

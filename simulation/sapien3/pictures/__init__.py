@@ -1,0 +1,1 @@
+"""What cameras see, drawn by SAPIEN."""
