@@ -240,7 +240,7 @@ def _no_descriptors(folder: Path) -> None:
         "import resource, sys\n"
         "from pathlib import Path\n"
         "from tests.faults.tiny_files import *\n"
-        "import robots.assets.hub_source\n"
+        "import robots.assets.sources\n"
         "folder = Path(sys.argv[1])\n"
         "source, store = another_copy(folder), AssetStore(folder / 'assets')\n"
         "used = len(os.listdir('/proc/self/fd')) - 1\n"

@@ -69,13 +69,23 @@ def fill() -> Callable[[AssetStore, tuple[AssetFile, ...]], None]:
 
 
 @pytest.fixture
-def hub(monkeypatch: pytest.MonkeyPatch) -> Iterator[HubServer]:
+def hub(monkeypatch: pytest.MonkeyPatch, hub_client: None) -> Iterator[HubServer]:
     """A Hub that holds every Panda file but the large pictures."""
     small = [file for file in PANDA.files if file.bytes < 100_000]
     files = {f"{file.origin.hub_folder}/{file.path}": contents(file) for file in small}
     with HubServer(files) as server:
         monkeypatch.setenv("HF_ENDPOINT", server.endpoint)
         yield server
+
+
+@pytest.fixture
+def hub_client(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Give the Hub's client of this process a cache of its own, and little patience."""
+    from huggingface_hub import constants
+
+    monkeypatch.setattr(constants, "HF_HUB_CACHE", str(tmp_path / "hf_home" / "hub"))
+    monkeypatch.setattr(constants, "HF_HUB_ETAG_TIMEOUT", 2)  # s
+    monkeypatch.setattr(constants, "HF_HUB_DOWNLOAD_TIMEOUT", 2)  # s
 
 
 @pytest.fixture

@@ -14,11 +14,11 @@ from pathlib import Path
 import pytest
 
 from robots import AssetError, UrdfLocator
-from robots.assets import wheel_source
+from robots.assets import sources
 from robots.assets.fetching import ensure
 from robots.assets.packages import MANI_SKILL
+from robots.assets.sources import PackageWheel
 from robots.assets.store import FileState
-from robots.assets.wheel_source import PackageWheel
 from tests.robots.conftest import contents
 from tests.robots.hub_server import HubServer, stall
 
@@ -180,7 +180,7 @@ def test_what_pip_says_is_passed_on(wheel_index, store, physics):
 
 
 def test_a_python_without_pip_is_named(store, physics, monkeypatch):
-    monkeypatch.setattr(wheel_source, "find_spec", lambda name: None)
+    monkeypatch.setattr(sources, "find_spec", lambda name: None)
     monkeypatch.setenv("PATH", "")
     with pytest.raises(AssetError, match="this Python has no pip.*and there is no uv"):
         ensure(physics, store, [PackageWheel(MANI_SKILL)])
@@ -193,6 +193,6 @@ def test_uv_runs_pip_where_python_has_none(wheel_index, store, physics, monkeypa
     uv.write_text(f'#!/bin/sh\n{shift}\n"{sys.executable}" -m pip "$@"\n')
     uv.chmod(0o755)
     monkeypatch.setenv("PATH", f"{uv.parent}:{os.environ['PATH']}")
-    monkeypatch.setattr(wheel_source, "find_spec", lambda name: None)
+    monkeypatch.setattr(sources, "find_spec", lambda name: None)
     ensure(physics, store, [PackageWheel(MANI_SKILL)])
     assert store.unusable(physics) == []
