@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import os
 import re
-import sys
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NoReturn, Protocol, runtime_checkable
+from typing import Any, ClassVar, NoReturn, Protocol, runtime_checkable
 
 from robots.action_split import ActionNumber, ActionSplit, JointGroup, is_gripper, names
 from robots.common.errors import DescriptorError, UnknownNameError
@@ -55,6 +54,77 @@ class UrdfSource(Protocol):
 
     def locate(self, *, pictures: bool = False) -> Path:
         """Return the path of a complete, checked URDF on this machine."""
+        ...
+
+
+class FromUrdf(Protocol):
+    """The type of `RobotDescriptor.from_urdf`."""
+
+    def __call__(
+        self,
+        path_or_name: str | os.PathLike[str],
+        name: str | None = None,
+        *,
+        quiet: bool = False,
+        xacro: Mapping[str, object] | None = None,
+        srdf: str | os.PathLike[str] | None = None,
+        **overrides: Any,
+    ) -> RobotDescriptor:
+        """Guess a robot from its URDF, and say on stderr what was guessed and why.
+
+        See `robots.from_urdf.guess_descriptor` for the arguments, the errors, and the guess with
+        its reasons and the data module to paste.
+
+        Args:
+            path_or_name: A URDF on this machine, or a name of the package robot_descriptions.
+            name: Registry name; None takes that of the URDF.
+            quiet: Whether to say nothing.
+            xacro: Arguments of a xacro template, as in ``{"prefix": "left_"}``.
+            srdf: An SRDF: its groups, states, TCPs and disabled pairs are taken over.
+            **overrides: Fields that are known better than guessed.
+        """
+        ...
+
+
+class FromMjcf(Protocol):
+    """The type of `RobotDescriptor.from_mjcf`."""
+
+    def __call__(
+        self,
+        path_or_name: str | os.PathLike[str],
+        name: str | None = None,
+        *,
+        quiet: bool = False,
+        **overrides: Any,
+    ) -> RobotDescriptor:
+        """Guess a robot from its MJCF, and say on stderr what was guessed and why.
+
+        MuJoCo compiles the file (``pip install 'robot-layouts[mjcf]'``), and what it makes of it
+        becomes a URDF. Keyframes, actuators, tool sites and excluded contacts are taken over.
+
+        Args:
+            path_or_name: An MJCF on this machine, or a name of the package robot_descriptions.
+            name: Registry name; None takes that of the model.
+            quiet: Whether to say nothing.
+            **overrides: Fields that are known better than guessed.
+        """
+        ...
+
+
+class WithGripper(Protocol):
+    """The type of `RobotDescriptor.with_gripper`."""
+
+    def __call__(
+        self, gripper: RobotDescriptor | str | os.PathLike[str], **details: Any
+    ) -> RobotDescriptor:
+        """Return the robot with another gripper in the place of its own, if it has one.
+
+        Args:
+            gripper: A descriptor, a registered name, the path of a URDF or MJCF, or ``MODULE:NAME``
+                of a gripper, or of an arm whose gripper is taken.
+            **details: ``link``, ``position``, ``quaternion`` and ``name``; see
+                `robots.grafting.with_gripper`, also for the errors.
+        """
         ...
 
 
@@ -112,6 +182,14 @@ class RobotDescriptor:
         default_factory=dict[str, Mapping[str, JointGroup]]
     )
 
+    # Bound in `robots`: what reads files and fits grippers is built on descriptors.
+    from_urdf: ClassVar[FromUrdf]
+    """Guess a robot from its URDF; see `robots.from_urdf.guess_descriptor`."""
+    from_mjcf: ClassVar[FromMjcf]
+    """Guess a robot from its MJCF; see `robots.from_urdf.guess_descriptor`."""
+    with_gripper: ClassVar[WithGripper]
+    """Return the robot with another gripper; see `robots.grafting.with_gripper`."""
+
     def __post_init__(self) -> None:
         """Freeze the keyframes and refuse contradictions."""
         named = isinstance(self.name, str) and self.name.isprintable()
@@ -143,79 +221,6 @@ class RobotDescriptor:
         modes = {mode: _Frozen(groups) for mode, groups in self.control_modes.items()}
         object.__setattr__(self, "control_modes", _Frozen(modes))
         self._check_modes()
-
-    @classmethod
-    def from_urdf(
-        cls,
-        path_or_name: str | os.PathLike[str],
-        name: str | None = None,
-        *,
-        quiet: bool = False,
-        xacro: Mapping[str, object] | None = None,
-        srdf: str | os.PathLike[str] | None = None,
-        **overrides: Any,
-    ) -> RobotDescriptor:
-        """Guess a robot from its URDF, and say on stderr what was guessed and why.
-
-        See `robots.from_urdf.guess_descriptor` for the arguments, the errors, and the guess with
-        its reasons and the data module to paste.
-
-        Args:
-            path_or_name: A URDF on this machine, or a name of the package robot_descriptions.
-            name: Registry name; None takes that of the URDF.
-            quiet: Whether to say nothing.
-            xacro: Arguments of a xacro template, as in ``{"prefix": "left_"}``.
-            srdf: An SRDF: its groups, states, TCPs and disabled pairs are taken over.
-            **overrides: Fields that are known better than guessed.
-        """
-        from robots.from_urdf import guess_descriptor
-
-        found = guess_descriptor(path_or_name, name, xacro=xacro, srdf=srdf, **overrides)
-        if not quiet:
-            print(found, file=sys.stderr)
-        return found.descriptor
-
-    @classmethod
-    def from_mjcf(
-        cls,
-        path_or_name: str | os.PathLike[str],
-        name: str | None = None,
-        *,
-        quiet: bool = False,
-        **overrides: Any,
-    ) -> RobotDescriptor:
-        """Guess a robot from its MJCF, and say on stderr what was guessed and why.
-
-        MuJoCo compiles the file (``pip install 'robot-layouts[mjcf]'``), and what it makes of it
-        becomes a URDF. Keyframes, actuators, tool sites and excluded contacts are taken over.
-
-        Args:
-            path_or_name: An MJCF on this machine, or a name of the package robot_descriptions.
-            name: Registry name; None takes that of the model.
-            quiet: Whether to say nothing.
-            **overrides: Fields that are known better than guessed.
-        """
-        from robots.from_urdf import guess_descriptor
-
-        found = guess_descriptor(path_or_name, name, form="mjcf", **overrides)
-        if not quiet:
-            print(found, file=sys.stderr)
-        return found.descriptor
-
-    def with_gripper(
-        self, gripper: RobotDescriptor | str | os.PathLike[str], **details: Any
-    ) -> RobotDescriptor:
-        """Return the robot with another gripper in the place of its own, if it has one.
-
-        Args:
-            gripper: A descriptor, a registered name, the path of a URDF or MJCF, or ``MODULE:NAME``
-                of a gripper, or of an arm whose gripper is taken.
-            **details: ``link``, ``position``, ``quaternion`` and ``name``; see
-                `robots.grafting.with_gripper`, also for the errors.
-        """
-        from robots.grafting import with_gripper
-
-        return with_gripper(self, gripper, **details)
 
     @property
     def parts(self) -> Mapping[str, RobotDescriptor]:

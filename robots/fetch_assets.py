@@ -19,11 +19,11 @@ from robots.assets.sources import (
     LocalCopy,
     PackageWheel,
 )
-from robots.assets.store import AssetStore, FileState, default_root
+from robots.assets.store import AssetStore, FileState
 from robots.common.commands import print_error, printable, start
 from robots.common.console import main_of
 from robots.common.errors import RobotLayoutsError
-from robots.common.paths import absolute
+from robots.common.paths import absolute, default_root
 from robots.descriptor import RobotDescriptor
 from robots.named import FORMS, named_robot
 from robots.registry import RobotRegistry

@@ -10,8 +10,9 @@ from robots.assets.manifest import AssetFile, load_manifest
 from robots.assets.packages import INDEX_PACKAGES, SourceError
 from robots.assets.progress import listing, say, size
 from robots.assets.sources import AssetSource, HubSource, InstalledPackage, PackageWheel
-from robots.assets.store import AssetStore, FileState, default_root
+from robots.assets.store import AssetStore, FileState
 from robots.common.errors import AssetError
+from robots.common.paths import default_root
 from robots.urdf.summary import read_references
 
 

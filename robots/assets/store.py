@@ -17,15 +17,14 @@ from typing import TypedDict
 
 from filelock import FileLock, Timeout
 
-from robots.assets.manifest import CHECKOUT_CACHE, AssetFile
+from robots.assets.manifest import AssetFile
 from robots.assets.progress import say
 from robots.common.errors import AssetError, UnreadableFileError
 from robots.common.fields import settle
 from robots.common.files import open_regular, read_json
-from robots.common.paths import absolute
+from robots.common.paths import ROOT_VARIABLE
 from robots.common.writing import remove, written_whole
 
-ROOT_VARIABLE = "ROBOT_LAYOUTS_ASSETS"
 _LOCK, _PARTIAL, _RECORD = ".lock", ".partial", "fetched.json"
 _ABSENT = (errno.ENOENT, errno.ENOTDIR)
 _EXCHANGEABLE = (errno.EINVAL, errno.EFBIG, errno.ELOOP)  # no regular file, too large, a loop
@@ -34,25 +33,6 @@ _WAIT_BEFORE_SAYING = 2.0  # s
 
 # sha256 of files hashed by this process, with what tells that a file has changed since.
 _hashed: dict[Path, tuple[tuple[int, ...], str]] = {}
-
-
-def default_root() -> Path:
-    """Return the folder of the local copy.
-
-    ``ROBOT_LAYOUTS_ASSETS`` if it is set, else ``assets_cache/`` of a source checkout, else the
-    user's cache directory.
-
-    Raises:
-        AssetError: If it is in the home directory of a user that does not exist.
-    """
-    chosen = os.environ.get(ROOT_VARIABLE)
-    if chosen:
-        return absolute(chosen, ROOT_VARIABLE)
-    if (CHECKOUT_CACHE / "manifest.json").is_file():
-        return CHECKOUT_CACHE
-    from platformdirs import user_cache_path
-
-    return user_cache_path("robot-layouts", appauthor=False)
 
 
 class FetchedFile(TypedDict):

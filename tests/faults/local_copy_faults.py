@@ -13,7 +13,8 @@ from pathlib import Path
 
 from robots.assets.fetching import ensure
 from robots.assets.sources import LocalCopy
-from robots.assets.store import AssetStore, FileState, default_root
+from robots.assets.store import AssetStore, FileState
+from robots.common.paths import default_root
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.tiny_files import (
     CONTENTS,

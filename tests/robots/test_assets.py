@@ -10,12 +10,13 @@ from pathlib import Path
 import pytest
 
 from robots import AssetError, RobotRegistry, UnknownNameError, UrdfLocator
-from robots.assets import store as asset_store
 from robots.assets.fetching import ensure
 from robots.assets.manifest import load_manifest
 from robots.assets.packages import INDEX_PACKAGES, MANI_SKILL, SourceError
 from robots.assets.sources import InstalledPackage, LocalCopy
-from robots.assets.store import AssetStore, FileState, default_root
+from robots.assets.store import AssetStore, FileState
+from robots.common import paths
+from robots.common.paths import default_root
 from robots.fetch_assets import main
 from robots.urdf.summary import read_references
 from tests.catalogue import every_robot
@@ -285,8 +286,8 @@ def test_the_local_copy_is_where_it_is_said_to_be(monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path))
     assert default_root() == tmp_path / "robot_files"
     monkeypatch.setenv("ROBOT_LAYOUTS_ASSETS", "")
-    assert default_root() == Path(asset_store.__file__).parents[2] / "assets_cache"
-    monkeypatch.setattr(asset_store, "CHECKOUT_CACHE", tmp_path / "no_checkout")
+    assert default_root() == Path(paths.__file__).parents[2] / "assets_cache"
+    monkeypatch.setattr(paths, "CHECKOUT_CACHE", tmp_path / "no_checkout")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     assert default_root() == tmp_path / "cache" / "robot-layouts"
 
