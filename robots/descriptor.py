@@ -13,7 +13,6 @@ from robots.action_split import ActionNumber, ActionSplit, JointGroup, is_grippe
 from robots.common.errors import DescriptorError, UnknownNameError
 from robots.common.fields import settle_fields
 from robots.control_modes import CONTROL_MODES, MODES, driven_in
-from robots.limbs import share_out
 from robots.parts import (
     IDENTITY,
     CameraMount,
@@ -26,6 +25,7 @@ from robots.parts import (
     Vector3,
     expect,
     expect_different,
+    share_out,
 )
 
 __all__ = [
@@ -279,10 +279,14 @@ class RobotDescriptor:
 
     def _repr_html_(self) -> str:
         """Show a notebook the table of action numbers."""
-        from robots.display import robot_html
+        from robots.display import heading, table
 
-        text = f"{self.summary}, reach {self.reach:g} m"
-        return robot_html(self.name, text, self.describe_action())
+        heads = ("#", "action number", "lowest", "highest", "unit", "joints")
+        rows = [
+            (str(n.index), n.name, f"{n.lower:g}", f"{n.upper:g}", n.unit, ", ".join(n.joints))
+            for n in self.describe_action()
+        ]
+        return heading(self.name, f"{self.summary}, reach {self.reach:g} m") + table(heads, rows)
 
     def keyframe(self, name: str) -> tuple[float, ...]:
         """Return the joint positions of a keyframe (rad, m), in the order of ``joints``.

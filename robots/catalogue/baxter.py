@@ -4,8 +4,7 @@ from dataclasses import replace
 
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, Fingers, GripperMaterial, JointGroup, RobotDescriptor
-from robots.link_pairs import among
-from robots.parts import both_sides
+from robots.parts import among, both_sides
 
 BODY = ("torso", "sonar_ring", "pedestal", "collision_head_link_1", "collision_head_link_2")
 LEFT_ARM = JointGroup(

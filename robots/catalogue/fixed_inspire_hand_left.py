@@ -5,7 +5,7 @@ from dataclasses import replace
 from robots.assets.locator import UrdfLocator
 from robots.catalogue.fixed_inspire_hand_right import FIXED_INSPIRE_HAND_RIGHT
 from robots.descriptor import ActionSplit, GripperMaterial
-from robots.link_pairs import among
+from robots.parts import among
 
 GROUPS = FIXED_INSPIRE_HAND_RIGHT.action_split.groups
 # From the palm on: what grips.

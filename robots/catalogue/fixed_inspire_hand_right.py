@@ -5,7 +5,7 @@ from math import cos, pi, sin
 
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, GripperMaterial, Home, JointGroup, RobotDescriptor
-from robots.link_pairs import among
+from robots.parts import among
 
 WRIST = JointGroup(
     ("right_hand_wrist_pitch_joint", "right_hand_wrist_yaw_joint"),

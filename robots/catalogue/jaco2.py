@@ -4,7 +4,7 @@ from math import pi
 
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, JointGroup, RobotDescriptor, names
-from robots.link_pairs import among
+from robots.parts import among
 
 TURNS = (-2 * pi, 2 * pi)  # of joints that turn without end
 ARM = JointGroup(

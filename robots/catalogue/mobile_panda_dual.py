@@ -6,8 +6,7 @@ from robots.assets.locator import UrdfLocator
 from robots.catalogue.mobile_panda import BASE, LIFT, MOBILE_PANDA
 from robots.catalogue.panda import ARM, PANDA
 from robots.descriptor import ActionSplit, Fingers, GripperMaterial, names
-from robots.link_pairs import among
-from robots.parts import both_sides
+from robots.parts import among, both_sides
 
 LEFT = ("left_panda_leftfinger", "left_panda_rightfinger")
 FINGERS = (*LEFT, "right_panda_leftfinger", "right_panda_rightfinger")

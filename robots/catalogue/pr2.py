@@ -5,8 +5,7 @@ from math import pi
 
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, Fingers, GripperMaterial, JointGroup, RobotDescriptor
-from robots.link_pairs import among
-from robots.parts import both_sides
+from robots.parts import among, both_sides
 
 TURNS = (-2 * pi, 2 * pi)  # of joints that turn without end
 LIMITS = ((-2.3213, 0.0), TURNS, (-2.094, 0.0), TURNS)

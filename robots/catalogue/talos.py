@@ -4,8 +4,7 @@ from dataclasses import replace
 
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, GripperMaterial, JointGroup, RobotDescriptor
-from robots.link_pairs import among
-from robots.parts import both_sides
+from robots.parts import among, both_sides
 
 LIMITS = (
     (-2.443461, 2.443461),

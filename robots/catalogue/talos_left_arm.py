@@ -5,7 +5,7 @@ from dataclasses import replace
 from robots.assets.locator import UrdfLocator
 from robots.catalogue.talos import LEFT_ARM, LEFT_GRIPPER, LEFT_HAND, LEFT_WRIST, TALOS
 from robots.descriptor import ActionSplit, GripperMaterial
-from robots.link_pairs import among
+from robots.parts import among
 
 ARM = replace(  # without the shoulder's first joint, which its URDF lacks
     LEFT_ARM,

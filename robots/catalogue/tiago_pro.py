@@ -4,8 +4,7 @@ from dataclasses import replace
 
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, JointGroup, RobotDescriptor
-from robots.link_pairs import among
-from robots.parts import both_sides
+from robots.parts import among, both_sides
 
 BEND, WRIST, TURN = (-2.443461, 1.134464), (-1.8849556, 3.0019662), (-2.6179938, 2.6179938)
 TIPS = ("gripper_{side}_fingertip_left_link", "gripper_{side}_fingertip_right_link")

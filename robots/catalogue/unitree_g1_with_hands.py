@@ -5,8 +5,7 @@ from dataclasses import replace
 from robots.assets.locator import UrdfLocator
 from robots.catalogue.unitree_g1 import UNITREE_G1
 from robots.descriptor import ActionSplit, GripperMaterial, JointGroup
-from robots.link_pairs import among
-from robots.parts import both_sides
+from robots.parts import among, both_sides
 
 GROUPS = UNITREE_G1.action_split.groups
 LEFT_GRIPPER = JointGroup(

@@ -2,7 +2,7 @@
 
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, GripperMaterial, JointGroup, RobotDescriptor, names
-from robots.link_pairs import among
+from robots.parts import among
 
 ARM = JointGroup(
     names("joint", 1, 6),
