@@ -21,6 +21,7 @@ from robots.assets.sources import PackageWheel
 from robots.assets.store import FileState
 from tests.robots.conftest import contents
 from tests.robots.hub_server import HubServer, stall
+from tests.robots.wheel_index import WHEEL, build_wheel, members
 
 pytestmark = pytest.mark.usefixtures("store")
 
@@ -133,18 +134,7 @@ def wheel_index(tmp_path, monkeypatch, physics) -> Path:
     """Let pip find a small mani_skill wheel, and nothing else."""
     index = tmp_path / "index"
     index.mkdir()
-    info = "mani_skill-3.0.1.dist-info"
-    with zipfile.ZipFile(index / "mani_skill-3.0.1-py3-none-any.whl", "w") as wheel:
-        wheel.writestr(
-            f"{info}/METADATA", "Metadata-Version: 2.1\nName: mani_skill\nVersion: 3.0.1\n"
-        )
-        wheel.writestr(
-            f"{info}/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
-        )
-        wheel.writestr(f"{info}/RECORD", "")
-        wheel.writestr("mani_skill/__init__.py", "raise ImportError('not meant to be imported')")
-        for file in physics:
-            wheel.writestr(f"{file.origin.folder}/{file.path}", contents(file))
+    (index / WHEEL).write_bytes(build_wheel(members(physics, contents)))
     for name in [name for name in os.environ if name.startswith("PIP_")]:
         monkeypatch.delenv(name)
     monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
