@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from robots.assets.manifest import AssetFile, load_manifest
@@ -94,7 +94,11 @@ def ensure(
             asked = [file for file in wanted if source.holds(file)]
             if not asked:
                 continue
-            failure = _Fetch(source, store, scratch, trust).run(asked)
+            fetch = _Fetch(source, store, scratch, trust)
+            failure = fetch.run(asked)
+            if fetch.kept:
+                command = "`robot-layouts robots fetch --check` lists it, with licences"
+                say(f"kept what came along of {len(fetch.kept)} packages; {command}")
             missing = store.unusable(asked)
             outcome = f"{len(asked) - len(missing)} of {len(asked)} files"
             shown = f"{failure[:160]} …" if len(failure) > 160 else failure
@@ -105,7 +109,7 @@ def ensure(
             raise AssetError(_failure_text(wanted, store, failures))
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Fetch:
     """One attempt to get files from one source."""
 
@@ -113,6 +117,8 @@ class _Fetch:
     store: AssetStore
     scratch: Path
     trust: bool
+    kept: set[str] = field(default_factory=set[str])  # packages of which files came along
+    room: bool = True
 
     def run(self, files: Sequence[AssetFile]) -> str:
         """Fetch, refetch once what differs, and return why something is still missing."""
@@ -133,27 +139,26 @@ class _Fetch:
     def _install(self, files: Sequence[AssetFile], *, again: bool) -> dict[AssetFile, str]:
         """Install what the source gives, and return what differs from the manifest, and how."""
         different: dict[AssetFile, str] = {}
-        beside: set[str] = set()  # packages of which files came along, which nobody asked for
-        asked, room = set(files), True
+        asked, trust = set(files), self.trust and again
         for file, data in self.source.fetch(files, self.scratch, again=again):
-            trust = self.trust and again and file in asked
             limit = file.limit(trust=trust)
-            if file in asked:
-                if len(data) > limit:
-                    different[file] = f" (more than {limit:,} bytes)"
-                elif not self._accept(file, data, trust=trust):
-                    different[file] = ""
-            elif room and self.store.state(file) is FileState.MISSING:
-                try:
-                    if self._accept(file, data, trust=False):
-                        beside.add(file.origin.name)
-                except AssetError as error:  # what was asked for is there
-                    room = False
-                    say(f"{error} What came along is not kept.")
-        if beside:
-            command = "`robot-layouts robots fetch --check` lists it, with licences"
-            say(f"kept what came along of {len(beside)} packages; {command}")
+            if file not in asked:
+                self._keep(file, data)
+            elif len(data) > limit:
+                different[file] = f" (more than {limit:,} bytes)"
+            elif not self._accept(file, data, trust=trust):
+                different[file] = ""
         return different
+
+    def _keep(self, file: AssetFile, data: bytes) -> None:
+        """Keep a file that nobody asked for, so that it need not be fetched another time."""
+        try:
+            if self.room and self.store.state(file) is FileState.MISSING:
+                if self._accept(file, data, trust=False):
+                    self.kept.add(file.origin.name)
+        except AssetError as error:  # what was asked for is there
+            self.room = False
+            say(f"{error} What came along is not kept.")
 
     def _accept(self, file: AssetFile, data: bytes, *, trust: bool) -> bool:
         if trust:
