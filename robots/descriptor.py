@@ -159,6 +159,8 @@ class RobotDescriptor:
             limbs is one arm.
         control_modes: Joint groups, by their names, in control modes where they are not those that
             `robots.control_modes` makes of ``action_split``; also modes of the robot's own.
+        declared_split: The action split as declared, once `in_control_mode` has made another of
+            it. Two robots that are driven alike are equal, whatever they were declared as.
     """
 
     name: str
@@ -181,6 +183,7 @@ class RobotDescriptor:
     control_modes: Mapping[str, Mapping[str, JointGroup]] = field(
         default_factory=dict[str, Mapping[str, JointGroup]]
     )
+    declared_split: ActionSplit | None = field(default=None, compare=False)
 
     # Bound in `robots`: what reads files and fits grippers is built on descriptors.
     from_urdf: ClassVar[FromUrdf]
@@ -330,6 +333,7 @@ class RobotDescriptor:
             cameras=tuple(c for c in self.cameras if part in c.name.split("_")),
             limbs={},
             control_modes={},
+            declared_split=None,
         )
 
     def _check_modes(self) -> None:
@@ -355,7 +359,7 @@ class RobotDescriptor:
         It is ``"pd_joint_delta_pos"`` as declared, and None if joint groups were changed since
         `in_control_mode`, so that it is in none.
         """
-        if self.action_split.declared is self.action_split:
+        if self.declared_split is None:
             return CONTROL_MODES[0]
         for mode in self.modes:
             if self._is_in(mode, self.action_split.groups):
@@ -394,15 +398,18 @@ class RobotDescriptor:
                 f"{self.name} was put into a control mode, and its joint groups were changed then;"
                 " change them first"
             )
-        split = self._driven_in(mode)
-        return self if split == self.action_split else replace(self, action_split=split)
+        split, declared = self._driven_in(mode), self.declared_split or self.action_split
+        if split == self.action_split:
+            return self
+        return replace(
+            self, action_split=split, declared_split=None if split == declared else declared
+        )
 
     def _driven_in(self, mode: str | Mapping[str, str]) -> ActionSplit:
         """Return the action split of a control mode, made of the declared one."""
-        declared = self.action_split.declared
         whole = self
-        if declared is not self.action_split:
-            whole = replace(self, action_split=declared)
+        if self.declared_split is not None:
+            whole = replace(self, action_split=self.declared_split, declared_split=None)
         parts = whole.parts or {self.name: whole}
         chosen = mode if isinstance(mode, Mapping) else dict.fromkeys(parts, mode)
         changed: dict[str, JointGroup] = {}
@@ -422,7 +429,7 @@ class RobotDescriptor:
                 raise DescriptorError(f"{self.name}: {error}") from None
         if not changed:  # all of the robot is held
             return self.action_split
-        return self.action_split.replace(**changed).made_of(declared)
+        return self.action_split.replace(**changed)
 
     def describe_action(self) -> tuple[ActionNumber, ...]:
         """Return name, unit and range of every action number, in order."""
