@@ -23,7 +23,7 @@ from layouts.placement import Placement, RobotLike, placed
 from robots import CONTROL_MODES, LayoutError, UnknownNameError
 from robots.common.bounds import FAR, checked_number, shown
 from robots.descriptor import Vector3
-from robots.limbs import BODY
+from robots.parts import BODY
 
 _Self = TypeVar("_Self", bound="Arrangement")
 

@@ -295,7 +295,7 @@ class ActionSplit(Mapping[str, slice]):
         size: How many action numbers drive them.
     """
 
-    __slots__ = ("_declared", "_slices", "groups", "size")
+    __slots__ = ("_slices", "groups", "size")
 
     groups: Mapping[str, JointGroup]
     size: int
@@ -313,9 +313,9 @@ class ActionSplit(Mapping[str, slice]):
         settle(groups, Mapping[str, JointGroup], "ActionSplit", DescriptorError)
         if not any(group.size for group in groups.values()):
             raise DescriptorError("an action split needs at least one joint group to drive")
-        self._lay_out(groups, None)
+        self._lay_out(groups)
 
-    def _lay_out(self, groups: Mapping[str, JointGroup], declared: ActionSplit | None) -> None:
+    def _lay_out(self, groups: Mapping[str, JointGroup]) -> None:
         joints = [joint for group in groups.values() for joint in group.joints]
         twice = sorted({joint for joint in joints if joints.count(joint) > 1})
         if twice:
@@ -328,7 +328,6 @@ class ActionSplit(Mapping[str, slice]):
         object.__setattr__(self, "groups", MappingProxyType(dict(groups)))
         object.__setattr__(self, "_slices", slices)
         object.__setattr__(self, "size", start)
-        object.__setattr__(self, "_declared", declared)
 
     def __setattr__(self, name: str, value: object) -> None:
         """Refuse: a split is frozen."""
@@ -363,31 +362,17 @@ class ActionSplit(Mapping[str, slice]):
         return f"ActionSplit({', '.join(f'{k}={v!r}' for k, v in self.groups.items())})"
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle by the groups, and those that they were made of."""
-        return (_split_from_groups, (dict(self.groups), self._declared))
+        """Pickle by the groups."""
+        return (_split_from_groups, (dict(self.groups),))
 
     @property
     def joints(self) -> tuple[str, ...]:
         """Every driven joint, group after group."""
         return tuple(joint for group in self.groups.values() for joint in group.joints)
 
-    @property
-    def declared(self) -> ActionSplit:
-        """The split that a control mode made this one of; itself if none did."""
-        return self._declared or self
-
     def replace(self, **groups: JointGroup) -> ActionSplit:
         """Return a split with some groups exchanged (new names go to the end)."""
-        made = ActionSplit(**{**self.groups, **groups})
-        return made if self._declared is None else made.made_of(self._declared)
-
-    def made_of(self, declared: ActionSplit) -> ActionSplit:
-        """Return the split as one that a control mode made of another.
-
-        Args:
-            declared: The other; it has the same groups of joints.
-        """
-        return _split_from_groups(dict(self.groups), None if declared == self else declared)
+        return ActionSplit(**{**self.groups, **groups})
 
     def held(self, *groups: str) -> ActionSplit:
         """Return a split in which groups take no number and are held where they start.
@@ -397,8 +382,7 @@ class ActionSplit(Mapping[str, slice]):
         """
         still = groups or self.groups
         return _split_from_groups(
-            {name: _held(g) if name in still else g for name, g in self.groups.items()},
-            self._declared and self._declared.held(*still),
+            {name: _held(g) if name in still else g for name, g in self.groups.items()}
         )
 
 
@@ -410,11 +394,9 @@ def _held(group: JointGroup) -> JointGroup:
     return replace(still, **{name: getattr(group, name) for name in drives})
 
 
-def _split_from_groups(
-    groups: dict[str, JointGroup], declared: ActionSplit | None = None
-) -> ActionSplit:
+def _split_from_groups(groups: dict[str, JointGroup]) -> ActionSplit:
     split = ActionSplit.__new__(ActionSplit)  # one that nobody drives is no mistake here
-    split._lay_out(groups, declared)  # pyright: ignore[reportPrivateUsage]
+    split._lay_out(groups)  # pyright: ignore[reportPrivateUsage]
     return split
 
 

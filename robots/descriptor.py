@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import os
 import re
-import sys
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NoReturn, Protocol, runtime_checkable
+from typing import Any, ClassVar, NoReturn, Protocol, runtime_checkable
 
 from robots.action_split import ActionNumber, ActionSplit, JointGroup, is_gripper, names
 from robots.common.errors import DescriptorError, UnknownNameError
 from robots.common.fields import settle_fields
 from robots.control_modes import CONTROL_MODES, MODES, driven_in
-from robots.limbs import share_out
 from robots.parts import (
     IDENTITY,
     CameraMount,
@@ -27,6 +25,7 @@ from robots.parts import (
     Vector3,
     expect,
     expect_different,
+    share_out,
 )
 
 __all__ = [
@@ -55,6 +54,77 @@ class UrdfSource(Protocol):
 
     def locate(self, *, pictures: bool = False) -> Path:
         """Return the path of a complete, checked URDF on this machine."""
+        ...
+
+
+class FromUrdf(Protocol):
+    """The type of `RobotDescriptor.from_urdf`."""
+
+    def __call__(
+        self,
+        path_or_name: str | os.PathLike[str],
+        name: str | None = None,
+        *,
+        quiet: bool = False,
+        xacro: Mapping[str, object] | None = None,
+        srdf: str | os.PathLike[str] | None = None,
+        **overrides: Any,
+    ) -> RobotDescriptor:
+        """Guess a robot from its URDF, and say on stderr what was guessed and why.
+
+        See `robots.from_urdf.guess_descriptor` for the arguments, the errors, and the guess with
+        its reasons and the data module to paste.
+
+        Args:
+            path_or_name: A URDF on this machine, or a name of the package robot_descriptions.
+            name: Registry name; None takes that of the URDF.
+            quiet: Whether to say nothing.
+            xacro: Arguments of a xacro template, as in ``{"prefix": "left_"}``.
+            srdf: An SRDF: its groups, states, TCPs and disabled pairs are taken over.
+            **overrides: Fields that are known better than guessed.
+        """
+        ...
+
+
+class FromMjcf(Protocol):
+    """The type of `RobotDescriptor.from_mjcf`."""
+
+    def __call__(
+        self,
+        path_or_name: str | os.PathLike[str],
+        name: str | None = None,
+        *,
+        quiet: bool = False,
+        **overrides: Any,
+    ) -> RobotDescriptor:
+        """Guess a robot from its MJCF, and say on stderr what was guessed and why.
+
+        MuJoCo compiles the file (``pip install 'robot-layouts[mjcf]'``), and what it makes of it
+        becomes a URDF. Keyframes, actuators, tool sites and excluded contacts are taken over.
+
+        Args:
+            path_or_name: An MJCF on this machine, or a name of the package robot_descriptions.
+            name: Registry name; None takes that of the model.
+            quiet: Whether to say nothing.
+            **overrides: Fields that are known better than guessed.
+        """
+        ...
+
+
+class WithGripper(Protocol):
+    """The type of `RobotDescriptor.with_gripper`."""
+
+    def __call__(
+        self, gripper: RobotDescriptor | str | os.PathLike[str], **details: Any
+    ) -> RobotDescriptor:
+        """Return the robot with another gripper in the place of its own, if it has one.
+
+        Args:
+            gripper: A descriptor, a registered name, the path of a URDF or MJCF, or ``MODULE:NAME``
+                of a gripper, or of an arm whose gripper is taken.
+            **details: ``link``, ``position``, ``quaternion`` and ``name``; see
+                `robots.grafting.with_gripper`, also for the errors.
+        """
         ...
 
 
@@ -89,6 +159,8 @@ class RobotDescriptor:
             limbs is one arm.
         control_modes: Joint groups, by their names, in control modes where they are not those that
             `robots.control_modes` makes of ``action_split``; also modes of the robot's own.
+        declared_split: The action split as declared, once `in_control_mode` has made another of
+            it. Two robots that are driven alike are equal, whatever they were declared as.
     """
 
     name: str
@@ -111,6 +183,15 @@ class RobotDescriptor:
     control_modes: Mapping[str, Mapping[str, JointGroup]] = field(
         default_factory=dict[str, Mapping[str, JointGroup]]
     )
+    declared_split: ActionSplit | None = field(default=None, compare=False)
+
+    # Bound in `robots`: what reads files and fits grippers is built on descriptors.
+    from_urdf: ClassVar[FromUrdf]
+    """Guess a robot from its URDF; see `robots.from_urdf.guess_descriptor`."""
+    from_mjcf: ClassVar[FromMjcf]
+    """Guess a robot from its MJCF; see `robots.from_urdf.guess_descriptor`."""
+    with_gripper: ClassVar[WithGripper]
+    """Return the robot with another gripper; see `robots.grafting.with_gripper`."""
 
     def __post_init__(self) -> None:
         """Freeze the keyframes and refuse contradictions."""
@@ -143,79 +224,6 @@ class RobotDescriptor:
         modes = {mode: _Frozen(groups) for mode, groups in self.control_modes.items()}
         object.__setattr__(self, "control_modes", _Frozen(modes))
         self._check_modes()
-
-    @classmethod
-    def from_urdf(
-        cls,
-        path_or_name: str | os.PathLike[str],
-        name: str | None = None,
-        *,
-        quiet: bool = False,
-        xacro: Mapping[str, object] | None = None,
-        srdf: str | os.PathLike[str] | None = None,
-        **overrides: Any,
-    ) -> RobotDescriptor:
-        """Guess a robot from its URDF, and say on stderr what was guessed and why.
-
-        See `robots.from_urdf.guess_descriptor` for the arguments, the errors, and the guess with
-        its reasons and the data module to paste.
-
-        Args:
-            path_or_name: A URDF on this machine, or a name of the package robot_descriptions.
-            name: Registry name; None takes that of the URDF.
-            quiet: Whether to say nothing.
-            xacro: Arguments of a xacro template, as in ``{"prefix": "left_"}``.
-            srdf: An SRDF: its groups, states, TCPs and disabled pairs are taken over.
-            **overrides: Fields that are known better than guessed.
-        """
-        from robots.from_urdf import guess_descriptor
-
-        found = guess_descriptor(path_or_name, name, xacro=xacro, srdf=srdf, **overrides)
-        if not quiet:
-            print(found, file=sys.stderr)
-        return found.descriptor
-
-    @classmethod
-    def from_mjcf(
-        cls,
-        path_or_name: str | os.PathLike[str],
-        name: str | None = None,
-        *,
-        quiet: bool = False,
-        **overrides: Any,
-    ) -> RobotDescriptor:
-        """Guess a robot from its MJCF, and say on stderr what was guessed and why.
-
-        MuJoCo compiles the file (``pip install 'robot-layouts[mjcf]'``), and what it makes of it
-        becomes a URDF. Keyframes, actuators, tool sites and excluded contacts are taken over.
-
-        Args:
-            path_or_name: An MJCF on this machine, or a name of the package robot_descriptions.
-            name: Registry name; None takes that of the model.
-            quiet: Whether to say nothing.
-            **overrides: Fields that are known better than guessed.
-        """
-        from robots.from_urdf import guess_descriptor
-
-        found = guess_descriptor(path_or_name, name, form="mjcf", **overrides)
-        if not quiet:
-            print(found, file=sys.stderr)
-        return found.descriptor
-
-    def with_gripper(
-        self, gripper: RobotDescriptor | str | os.PathLike[str], **details: Any
-    ) -> RobotDescriptor:
-        """Return the robot with another gripper in the place of its own, if it has one.
-
-        Args:
-            gripper: A descriptor, a registered name, the path of a URDF or MJCF, or ``MODULE:NAME``
-                of a gripper, or of an arm whose gripper is taken.
-            **details: ``link``, ``position``, ``quaternion`` and ``name``; see
-                `robots.grafting.with_gripper`, also for the errors.
-        """
-        from robots.grafting import with_gripper
-
-        return with_gripper(self, gripper, **details)
 
     @property
     def parts(self) -> Mapping[str, RobotDescriptor]:
@@ -274,10 +282,14 @@ class RobotDescriptor:
 
     def _repr_html_(self) -> str:
         """Show a notebook the table of action numbers."""
-        from robots.display import robot_html
+        from robots.display import heading, table
 
-        text = f"{self.summary}, reach {self.reach:g} m"
-        return robot_html(self.name, text, self.describe_action())
+        heads = ("#", "action number", "lowest", "highest", "unit", "joints")
+        rows = [
+            (str(n.index), n.name, f"{n.lower:g}", f"{n.upper:g}", n.unit, ", ".join(n.joints))
+            for n in self.describe_action()
+        ]
+        return heading(self.name, f"{self.summary}, reach {self.reach:g} m") + table(heads, rows)
 
     def keyframe(self, name: str) -> tuple[float, ...]:
         """Return the joint positions of a keyframe (rad, m), in the order of ``joints``.
@@ -321,6 +333,7 @@ class RobotDescriptor:
             cameras=tuple(c for c in self.cameras if part in c.name.split("_")),
             limbs={},
             control_modes={},
+            declared_split=None,
         )
 
     def _check_modes(self) -> None:
@@ -346,7 +359,7 @@ class RobotDescriptor:
         It is ``"pd_joint_delta_pos"`` as declared, and None if joint groups were changed since
         `in_control_mode`, so that it is in none.
         """
-        if self.action_split.declared is self.action_split:
+        if self.declared_split is None:
             return CONTROL_MODES[0]
         for mode in self.modes:
             if self._is_in(mode, self.action_split.groups):
@@ -385,15 +398,18 @@ class RobotDescriptor:
                 f"{self.name} was put into a control mode, and its joint groups were changed then;"
                 " change them first"
             )
-        split = self._driven_in(mode)
-        return self if split == self.action_split else replace(self, action_split=split)
+        split, declared = self._driven_in(mode), self.declared_split or self.action_split
+        if split == self.action_split:
+            return self
+        return replace(
+            self, action_split=split, declared_split=None if split == declared else declared
+        )
 
     def _driven_in(self, mode: str | Mapping[str, str]) -> ActionSplit:
         """Return the action split of a control mode, made of the declared one."""
-        declared = self.action_split.declared
         whole = self
-        if declared is not self.action_split:
-            whole = replace(self, action_split=declared)
+        if self.declared_split is not None:
+            whole = replace(self, action_split=self.declared_split, declared_split=None)
         parts = whole.parts or {self.name: whole}
         chosen = mode if isinstance(mode, Mapping) else dict.fromkeys(parts, mode)
         changed: dict[str, JointGroup] = {}
@@ -413,7 +429,7 @@ class RobotDescriptor:
                 raise DescriptorError(f"{self.name}: {error}") from None
         if not changed:  # all of the robot is held
             return self.action_split
-        return self.action_split.replace(**changed).made_of(declared)
+        return self.action_split.replace(**changed)
 
     def describe_action(self) -> tuple[ActionNumber, ...]:
         """Return name, unit and range of every action number, in order."""

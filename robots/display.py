@@ -1,25 +1,11 @@
-"""What notebooks show of a robot, a layout and a task: HTML that holds no scripts."""
+"""Headings and tables that notebooks show of a robot, a layout or a task, as HTML."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from html import escape
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from robots.action_split import ActionNumber
 
 _CELL = ' style="text-align: left; padding: 0 1em 0 0"'
-
-
-def robot_html(name: str, text: str, numbers: Iterable[ActionNumber]) -> str:
-    """Return a robot as a heading, with a text behind its name, and a table of action numbers."""
-    rows = [
-        (str(n.index), n.name, f"{n.lower:g}", f"{n.upper:g}", n.unit, ", ".join(n.joints))
-        for n in numbers
-    ]
-    heads = ("#", "action number", "lowest", "highest", "unit", "joints")
-    return f"{heading(name, text)}{table(heads, rows)}"
 
 
 def heading(title: str, text: str) -> str:

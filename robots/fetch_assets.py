@@ -7,18 +7,23 @@ from collections.abc import Sequence
 
 from robots.assets import scenery
 from robots.assets.fetching import default_sources, ensure
-from robots.assets.hub_source import REVISION_VARIABLE, HubSource
 from robots.assets.locator import UrdfLocator
 from robots.assets.manifest import AssetFile, load_manifest
 from robots.assets.packages import INDEX_PACKAGES
 from robots.assets.progress import size
-from robots.assets.sources import AssetSource, InstalledPackage, LocalCopy
-from robots.assets.store import AssetStore, FileState, default_root
-from robots.assets.wheel_source import PackageWheel
+from robots.assets.sources import (
+    REVISION_VARIABLE,
+    AssetSource,
+    HubSource,
+    InstalledPackage,
+    LocalCopy,
+    PackageWheel,
+)
+from robots.assets.store import AssetStore, FileState
 from robots.common.commands import print_error, printable, start
 from robots.common.console import main_of
 from robots.common.errors import RobotLayoutsError
-from robots.common.paths import absolute
+from robots.common.paths import absolute, default_root
 from robots.descriptor import RobotDescriptor
 from robots.named import FORMS, named_robot
 from robots.registry import RobotRegistry
@@ -80,7 +85,7 @@ def describe_file(file: AssetFile, store: AssetStore) -> str:
     """Return one line: state, path, size, what it is for, where it came from."""
     state = store.state(file)
     use = "physics" if file.physics else "pictures"
-    fetched = store.record().files.get(str(file)) if state.usable else None
+    fetched = store.record().get(str(file)) if state.usable else None
     source = fetched["source"] if fetched else None
     return f"{state.value}: {file} ({size(file.bytes)}, {use}{f'; {source}' if source else ''})"
 

@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, count
+from typing import Any
 
 import numpy as np
 
 from kinematics.rotations import Floats, inverse_pose, quaternion_of, transform
-from robots.action_split import ActionSplit, JointGroup, is_gripper
+from robots.action_split import ActionSplit, JointGroup
 from robots.assets.assembled import AssembledUrdf, Part, carried_by
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
 from robots.bodies.overlaps import guess_allowed
@@ -25,10 +26,10 @@ from robots.control_modes import CONTROL_MODES
 from robots.descriptor import (
     IDENTITY,
     CameraMount,
-    Fingers,
     GripperMaterial,
     Home,
     Limb,
+    NativeAgent,
     Quaternion,
     RobotDescriptor,
     UrdfSource,
@@ -149,22 +150,18 @@ def with_tool(
     part = Part(source, link or robot.tcp_link, position, quaternion)
     part = _apart(part, robot)
     urdf = AssembledUrdf(robot.urdf, (part,))
+    tcp: dict[str, Any] = {
+        "tcp_link": part.prefix + tcp_link,
+        "tcp_position_links": (),
+        "tcp_offset": (0.0, 0.0, 0.0),
+    }
     made = replace(
         robot,
         name=name or f"{robot.name}_with_tool",
         urdf=urdf,
-        tcp_link=part.prefix + tcp_link,
-        tcp_position_links=(),
-        tcp_offset=(0.0, 0.0, 0.0),
+        **tcp,
         limbs={
-            key: replace(
-                limb,
-                tcp_link=part.prefix + tcp_link,
-                tcp_position_links=(),
-                tcp_offset=(0.0, 0.0, 0.0),
-            )
-            if limb.tcp_link == part.link
-            else limb
+            key: replace(limb, **tcp) if limb.tcp_link == part.link else limb
             for key, limb in robot.limbs.items()
         },
         allowed_collisions=_allowed(urdf, [(robot, "")]),
@@ -219,32 +216,27 @@ def on_body(
         for key, m in mounts.items()
     ]
     urdf = AssembledUrdf(source, tuple(parts))
-    named = [_prefixed(robot, f"{key}_") for key, robot in robots.items()]
-    groups = {
-        f"{key}_{group}": joints
-        for key, robot in zip(robots, named, strict=True)
-        for group, joints in robot.action_split.groups.items()
+    named = {
+        key: _renamed(robot, {g: f"{key}_{g}" for g in robot.action_split}, f"{key}_")
+        for key, robot in robots.items()
     }
-    first = named[0]
-    start = [x for robot in named for x in robot.keyframe(robot.home.keyframe)]
-    return RobotDescriptor(
+    each, first = named.values(), named[next(iter(named))]
+    return replace(
+        first,
         name=name,
         urdf=urdf,
-        action_split=ActionSplit(**groups),
-        tcp_link=first.tcp_link,
-        tcp_position_links=first.tcp_position_links,
-        tcp_offset=first.tcp_offset,
-        gripper_material=_material(named),
-        fingers=first.fingers,
-        cameras=tuple(camera for robot in named for camera in robot.cameras),
-        keyframes={"rest": start},
+        action_split=_joined_groups(each),
+        control_modes=_joined_modes(each),
+        gripper_material=_material(each),
+        cameras=tuple(camera for robot in each for camera in robot.cameras),
+        keyframes={"rest": [x for robot in each for x in robot.keyframe(robot.home.keyframe)]},
         home=Home(),
         reach=first.reach + math.hypot(*parts[0].position[:2]),
-        source=" and ".join(dict.fromkeys(robot.source for robot in robots.values())),
+        source=" and ".join(dict.fromkeys(robot.source for robot in each)),
         allowed_collisions=_allowed(urdf, [(r, f"{key}_") for key, r in robots.items()]),
-        no_floor_contact=tuple(link for robot in named for link in robot.no_floor_contact),
-        limbs=_limbs(dict(zip(robots, named, strict=True)), model, parts),
-        control_modes=_joined_modes(dict(zip(robots, named, strict=True))),
+        no_floor_contact=tuple(link for robot in each for link in robot.no_floor_contact),
+        native_agent=NativeAgent(),
+        limbs=_limbs(named, model, parts),
     )
 
 
@@ -272,33 +264,23 @@ def _limbs(
             robot.fingers,
             robot.tcp_position_links,
             robot.tcp_offset,
-            tuple(f"{key}_{group}" for group in robot.action_split.groups),
+            tuple(robot.action_split),
         )
     return limbs
 
 
-def _joined_modes(robots: Mapping[str, RobotDescriptor]) -> dict[str, dict[str, JointGroup]]:
-    """Return the control modes of robots on one body, whose groups are called ``NAME_GROUP``."""
+def _joined_groups(robots: Iterable[RobotDescriptor]) -> ActionSplit:
+    """Return the joint groups of robots that become one."""
+    return ActionSplit(**{k: g for robot in robots for k, g in robot.action_split.groups.items()})
+
+
+def _joined_modes(robots: Iterable[RobotDescriptor]) -> dict[str, dict[str, JointGroup]]:
+    """Return the control modes of their own of robots that become one."""
     joined: dict[str, dict[str, JointGroup]] = {}
-    for key, robot in robots.items():
+    for robot in robots:
         for mode, groups in robot.control_modes.items():
-            own = {f"{key}_{name}": group for name, group in groups.items()}
-            joined.setdefault(mode, {}).update(own)
+            joined.setdefault(mode, {}).update(groups)
     return joined
-
-
-def _modes_of(robot: RobotDescriptor, names: Mapping[str, str]) -> dict[str, dict[str, JointGroup]]:
-    """Return a robot's own control modes, of some of its groups.
-
-    Args:
-        robot: The robot.
-        names: What each of these groups is called from now on, by its present name.
-    """
-    chosen = {
-        mode: {names[name]: group for name, group in groups.items() if name in names}
-        for mode, groups in robot.control_modes.items()
-    }
-    return {mode: groups for mode, groups in chosen.items() if groups}
 
 
 def _robot(given: RobotLike) -> RobotDescriptor:
@@ -317,8 +299,7 @@ def _model(source: UrdfSource) -> UrdfModel:
 
 
 def _gripper_joints(robot: RobotDescriptor) -> frozenset[str]:
-    groups = robot.action_split.groups.items()
-    return frozenset(joint for name, group in groups if is_gripper(name) for joint in group.joints)
+    return frozenset(robot.gripper_joints)
 
 
 def _gripper_of(robot: RobotDescriptor) -> tuple[RobotDescriptor, Floats, str]:
@@ -338,24 +319,16 @@ def _gripper_of(robot: RobotDescriptor) -> tuple[RobotDescriptor, Floats, str]:
         return robot, np.eye(4), ""
     model = _model(robot.urdf)
     root, _, origin = _flange(robot, model, joints)
-    groups = {k: g for k, g in robot.action_split.groups.items() if set(g.joints) <= joints}
-    places = [robot.joints.index(joint) for group in groups.values() for joint in group.joints]
+    groups = {k: k for k, g in robot.action_split.groups.items() if set(g.joints) <= joints}
     own = {below.child for near in model.moving_on(root) for below in model.below(near)}
     links = {link for carried in (root, *own) for link in model.rigid_with(carried)}
-    keyframes = {key: [qpos[i] for i in places] for key, qpos in robot.keyframes.items()}
-    return (
-        replace(
-            robot,
-            action_split=ActionSplit(**groups),
-            tcp_link=robot.tcp_link if robot.tcp_link in links else root,
-            tcp_offset=robot.tcp_offset if robot.tcp_link in links else (0.0, 0.0, 0.0),
-            cameras=tuple(camera for camera in robot.cameras if camera.link in links),
-            keyframes=keyframes,
-            control_modes=_modes_of(robot, {name: name for name in groups}),
-        ),
-        origin,
-        root,
+    alone = replace(
+        _renamed(robot, groups),
+        tcp_link=robot.tcp_link if robot.tcp_link in links else root,
+        tcp_offset=robot.tcp_offset if robot.tcp_link in links else (0.0, 0.0, 0.0),
+        cameras=tuple(camera for camera in robot.cameras if camera.link in links),
     )
+    return alone, origin, root
 
 
 def _flange(
@@ -387,35 +360,27 @@ def _with_part(
     model = _model(urdf)
     body = _model(robot.urdf)
     left = _names(body, {*body.links} - carried_by(body, without))
-    added = _prefixed(tool, part.prefix)
-    kept = {
-        key: group
-        for key, group in robot.action_split.groups.items()
-        if left.issuperset(group.joints)
+    kept = {k: k for k, g in robot.action_split.groups.items() if left.issuperset(g.joints)}
+    arm = _renamed(robot, kept)
+    called = {
+        name: f"gripper_{name}" if name in kept and name != "gripper" else name
+        for name in tool.action_split
     }
-    called = {key: _group_name(key, kept) for key in added.action_split.groups}
-    new = {called[key]: group for key, group in added.action_split.groups.items()}
-    modes = _modes_of(robot, {name: name for name in kept})
-    for mode, groups in _modes_of(added, called).items():
-        modes.setdefault(mode, {}).update(groups)
-    places = [robot.joints.index(joint) for group in kept.values() for joint in group.joints]
+    added = _renamed(tool, called, part.prefix)
     opened = added.keyframe(added.home.keyframe)
-    keyframes = {
-        key: (*(qpos[i] for i in places), *opened) for key, qpos in robot.keyframes.items()
-    }
     made = replace(
-        robot,
+        arm,
         name=name,
         urdf=urdf,
-        action_split=ActionSplit(**kept, **new),
+        action_split=_joined_groups([arm, added]),
+        control_modes=_joined_modes([arm, added]),
         tcp_link=added.tcp_link,
         tcp_position_links=added.tcp_position_links,
         tcp_offset=added.tcp_offset,
         gripper_material=added.gripper_material,
         fingers=added.fingers,
         cameras=(*(c for c in robot.cameras if c.link in model.links), *added.cameras),
-        keyframes=keyframes,
-        control_modes=modes,
+        keyframes={key: (*qpos, *opened) for key, qpos in arm.keyframes.items()},
         source=f"{robot.source}; {tool.source}",
         allowed_collisions=_allowed(urdf, [(robot, ""), (tool, part.prefix)]),
     )
@@ -437,37 +402,50 @@ def _names(model: UrdfModel, links: Collection[str]) -> set[str]:
     return {*links, *(joint.name for joint in model.joints if joint.child in links)}
 
 
-def _group_name(name: str, taken: Mapping[str, JointGroup]) -> str:
-    return name if name == "gripper" or name not in taken else f"gripper_{name}"
+def _renamed(
+    robot: RobotDescriptor, called: Mapping[str, str], prefix: str = ""
+) -> RobotDescriptor:
+    """Return what a descriptor says of some joint groups, by other names.
 
+    Args:
+        robot: The robot.
+        called: What each of these groups is called from now on, by its present name.
+        prefix: Put before the names of all links, joints and cameras.
+    """
 
-def _prefixed(robot: RobotDescriptor, prefix: str) -> RobotDescriptor:
-    """Return what a descriptor says of a robot whose links and joints have a prefix."""
-
-    def renamed(names: tuple[str, ...]) -> tuple[str, ...]:
+    def each(names: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(prefix + name for name in names)
 
-    def moved(groups: Mapping[str, JointGroup]) -> dict[str, JointGroup]:
+    def chosen(groups: Mapping[str, JointGroup]) -> dict[str, JointGroup]:
         return {
-            key: replace(
+            called[name]: replace(
                 group,
-                joints=renamed(group.joints),
-                leaders=renamed(group.leaders),
+                joints=each(group.joints),
+                leaders=each(group.leaders),
                 root_link=group.root_link and prefix + group.root_link,
             )
-            for key, group in groups.items()
+            for name, group in groups.items()
+            if name in called
         }
 
+    places = [
+        robot.joints.index(joint)
+        for name, group in robot.action_split.groups.items()
+        if name in called
+        for joint in group.joints
+    ]
+    modes = {mode: chosen(groups) for mode, groups in robot.control_modes.items()}
     material, fingers = robot.gripper_material, robot.fingers
     return replace(
         robot,
-        action_split=ActionSplit(**moved(robot.action_split.groups)),
-        control_modes={mode: moved(groups) for mode, groups in robot.control_modes.items()},
+        action_split=ActionSplit(**chosen(robot.action_split.groups)),
+        control_modes={mode: groups for mode, groups in modes.items() if groups},
+        keyframes={key: [qpos[i] for i in places] for key, qpos in robot.keyframes.items()},
         tcp_link=prefix + robot.tcp_link,
-        tcp_position_links=renamed(robot.tcp_position_links),
-        no_floor_contact=renamed(robot.no_floor_contact),
-        gripper_material=material and replace(material, links=renamed(material.links)),
-        fingers=fingers and _renamed_fingers(fingers, prefix),
+        tcp_position_links=each(robot.tcp_position_links),
+        no_floor_contact=each(robot.no_floor_contact),
+        gripper_material=material and replace(material, links=each(material.links)),
+        fingers=fingers and replace(fingers, links=each(fingers.links)),
         cameras=tuple(
             replace(camera, name=prefix + camera.name, link=prefix + camera.link)
             for camera in robot.cameras
@@ -475,12 +453,7 @@ def _prefixed(robot: RobotDescriptor, prefix: str) -> RobotDescriptor:
     )
 
 
-def _renamed_fingers(fingers: Fingers, prefix: str) -> Fingers:
-    one, other = fingers.links
-    return replace(fingers, links=(prefix + one, prefix + other))
-
-
-def _material(robots: list[RobotDescriptor]) -> GripperMaterial | None:
+def _material(robots: Iterable[RobotDescriptor]) -> GripperMaterial | None:
     """Return the material of all grippers; the numbers are the first one's."""
     given = [robot.gripper_material for robot in robots if robot.gripper_material is not None]
     if not given:
@@ -492,14 +465,11 @@ def _allowed(
     urdf: AssembledUrdf, robots: list[tuple[RobotDescriptor, str]]
 ) -> tuple[tuple[str, str], ...]:
     """Return the pairs that may overlap: each part's own, and those found in the whole."""
-    path = urdf.locate()
-    model = read_model(read_urdf(path), path.as_posix())
-    found, _ = guess_allowed(model, path)
+    model = _model(urdf)
+    found, _ = guess_allowed(model, urdf.locate())
     pairs: set[LinkPair] = {frozenset(pair) for pair in found}
     for robot, prefix in robots:
-        own = robot.urdf.locate()
-        parts = read_model(read_urdf(own), own.as_posix())
-        for pair in read_allowed_pairs(robot, parts, own):
+        for pair in read_allowed_pairs(robot, _model(robot.urdf), robot.urdf.locate()):
             pairs.add(frozenset(prefix + link for link in pair))
     known = set(model.links)
     kept = sorted(sorted(pair) for pair in pairs if pair <= known and len(pair) == 2)

@@ -14,9 +14,10 @@ from robots.assets.locator import LocalUrdf, UrdfLocator
 from robots.assets.manifest import AssetFile, AssetPackage, load_manifest
 from robots.assets.packages import SourceError, find_package
 from robots.assets.progress import size
-from robots.assets.store import AssetStore, FileState, default_root
+from robots.assets.store import AssetStore, FileState
 from robots.common.commands import start
 from robots.common.console import main_of
+from robots.common.paths import default_root
 from robots.descriptor import JointGroup, RobotDescriptor
 from robots.fetch_assets import describe_file
 from robots.listing import table

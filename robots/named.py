@@ -55,7 +55,9 @@ def named_robot(word: str | os.PathLike[str]) -> RobotDescriptor:
     """
     if is_path(word):
         _expect_file(absolute(word, "the path of a robot"))
-        return RobotDescriptor.from_urdf(word, quiet=True)
+        from robots.from_urdf import guess_descriptor
+
+        return guess_descriptor(word).descriptor
     if isinstance(word, str) and ":" in word:
         return _of_module(word)
     if isinstance(word, str) and word not in ROBOTS:

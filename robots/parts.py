@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations, groupby
 
+from robots.action_split import ActionSplit
 from robots.common.errors import DescriptorError
 from robots.common.fields import expect_unit, settle_fields
 
@@ -14,6 +17,9 @@ Quaternion = tuple[float, float, float, float]  # wxyz
 
 IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
+_Owners = dict[str, str | None]
+
+BODY = "body"  # what takes action numbers and is no limb: a torso that turns, a base that drives
 LARGEST_IMAGE = 16384  # pixels; what graphics drivers allow
 
 
@@ -239,6 +245,70 @@ def both_sides(
         )
 
     return {"left": limb("left", 1), "right": limb("right", -1)}
+
+
+def among(*groups: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+    """Return every pair of two links of the same group, each once.
+
+    Args:
+        groups: Link names; a link may be in several groups.
+    """
+    pairs = (pair for group in groups for pair in combinations(group, 2))
+    return tuple({frozenset(pair): pair for pair in pairs}.values())
+
+
+def share_out(limbs: Mapping[str, Limb], split: ActionSplit) -> dict[str, str | None]:
+    """Return whose each joint group is: a limb's, `BODY`'s, or nobody's if it is held.
+
+    Args:
+        limbs: The limbs by name.
+        split: The joint groups.
+
+    Raises:
+        DescriptorError: If a limb has no name of its own, no action number, a group that there is
+            not, one of another limb, or groups that do not follow one another.
+    """
+    owners: _Owners = {name: BODY if group.size else None for name, group in split.groups.items()}
+    for name, limb in limbs.items():
+        if re.fullmatch(r"\w+", name) is None or name == BODY:
+            raise DescriptorError(
+                f"{name!r} names no limb; letters, digits and _ are needed, and {BODY!r} is taken"
+                " by what is no limb"
+            )
+        for group in limb.groups or [group for group in owners if name in group.split("_")]:
+            _give(owners, group, name, limbs)
+    _refuse_gaps(limbs, owners, split)
+    return owners
+
+
+def _give(owners: _Owners, group: str, limb: str, limbs: Mapping[str, Limb]) -> None:
+    if group not in owners:
+        raise DescriptorError(
+            f"limb {limb!r} has a joint group {group!r}, which there is not; the groups are"
+            f" {', '.join(owners)}"
+        )
+    if owners[group] in limbs:
+        raise DescriptorError(
+            f"the joint group {group!r} belongs to two limbs, {owners[group]!r} and {limb!r}"
+        )
+    owners[group] = limb
+
+
+def _refuse_gaps(limbs: Mapping[str, Limb], owners: _Owners, split: ActionSplit) -> None:
+    """Refuse limbs without an action number, and what is not in one piece."""
+    for name in limbs:
+        if not any(split.groups[group].size for group, owner in owners.items() if owner == name):
+            raise DescriptorError(
+                f"limb {name!r} takes no action number; the joint groups are {', '.join(owners)}."
+                " Name its own in groups=(…)"
+            )
+    pieces = [owner for owner, _ in groupby(owners.values())]
+    numbered = [owner for owner, _ in groupby(filter(None, owners.values()))]
+    for name, found in (*((limb, pieces) for limb in limbs), (BODY, numbered)):
+        if found.count(name) > 1:
+            raise DescriptorError(
+                f"the joint groups of {name!r} do not follow one another: {', '.join(owners)}"
+            )
 
 
 def expect(right: bool, otherwise: str) -> None:

@@ -7,68 +7,55 @@ from robots.common.errors import DescriptorError, RobotLayoutsError
 from robots.common.fields import show
 from robots.descriptor import RobotDescriptor
 
-# One line per robot, sorted by name: name -> module:attribute.
-CATALOGUE = {
-    "ability_hand_left": "robots.catalogue.ability_hand_left:ABILITY_HAND_LEFT",
-    "ability_hand_right": "robots.catalogue.ability_hand_right:ABILITY_HAND_RIGHT",
-    "allegro_hand_left": "robots.catalogue.allegro_hand_left:ALLEGRO_HAND_LEFT",
-    "allegro_hand_right": "robots.catalogue.allegro_hand_right:ALLEGRO_HAND_RIGHT",
-    "baxter": "robots.catalogue.baxter:BAXTER",
-    "dclaw": "robots.catalogue.dclaw:DCLAW",
-    "fetch": "robots.catalogue.fetch:FETCH",
-    "fetch_driving": "robots.catalogue.fetch_driving:FETCH_DRIVING",
-    "fixed_inspire_hand_left": "robots.catalogue.fixed_inspire_hand_left:FIXED_INSPIRE_HAND_LEFT",
-    "fixed_inspire_hand_right": (
-        "robots.catalogue.fixed_inspire_hand_right:FIXED_INSPIRE_HAND_RIGHT"
-    ),
-    "floating_ability_hand_left": (
-        "robots.catalogue.floating_ability_hand_left:FLOATING_ABILITY_HAND_LEFT"
-    ),
-    "floating_ability_hand_right": (
-        "robots.catalogue.floating_ability_hand_right:FLOATING_ABILITY_HAND_RIGHT"
-    ),
-    "floating_inspire_hand_left": (
-        "robots.catalogue.floating_inspire_hand_left:FLOATING_INSPIRE_HAND_LEFT"
-    ),
-    "floating_inspire_hand_right": (
-        "robots.catalogue.floating_inspire_hand_right:FLOATING_INSPIRE_HAND_RIGHT"
-    ),
-    "floating_panda_gripper": "robots.catalogue.floating_panda_gripper:FLOATING_PANDA_GRIPPER",
-    "franka_panda": "robots.catalogue.franka_panda:FRANKA_PANDA",
-    "jaco2": "robots.catalogue.jaco2:JACO2",
-    "koch": "robots.catalogue.koch:KOCH",
-    "mobile_panda": "robots.catalogue.mobile_panda:MOBILE_PANDA",
-    "mobile_panda_dual": "robots.catalogue.mobile_panda_dual:MOBILE_PANDA_DUAL",
-    "panda": "robots.catalogue.panda:PANDA",
-    "panda_pinch": "robots.catalogue.panda_pinch:PANDA_PINCH",
-    "panda_stick": "robots.catalogue.panda_stick:PANDA_STICK",
-    "panda_wristcam": "robots.catalogue.panda_wristcam:PANDA_WRISTCAM",
-    "pr2": "robots.catalogue.pr2:PR2",
-    "so100": "robots.catalogue.so100:SO100",
-    "so101": "robots.catalogue.so101:SO101",
-    "talos": "robots.catalogue.talos:TALOS",
-    "talos_left_arm": "robots.catalogue.talos_left_arm:TALOS_LEFT_ARM",
-    "tiago": "robots.catalogue.tiago:TIAGO",
-    "tiago_pro": "robots.catalogue.tiago_pro:TIAGO_PRO",
-    "trifingerpro": "robots.catalogue.trifingerpro:TRIFINGERPRO",
-    "unitree_g1": "robots.catalogue.unitree_g1:UNITREE_G1",
-    "unitree_g1_upper_body": "robots.catalogue.unitree_g1_upper_body:UNITREE_G1_UPPER_BODY",
-    "unitree_g1_upper_body_head_camera": (
-        "robots.catalogue.unitree_g1_upper_body_head_camera:UNITREE_G1_UPPER_BODY_HEAD_CAMERA"
-    ),
-    "unitree_g1_upper_body_right_arm": (
-        "robots.catalogue.unitree_g1_upper_body_right_arm:UNITREE_G1_UPPER_BODY_RIGHT_ARM"
-    ),
-    "unitree_g1_with_hands": "robots.catalogue.unitree_g1_with_hands:UNITREE_G1_WITH_HANDS",
-    "ur10": "robots.catalogue.ur10:UR10",
-    "ur3": "robots.catalogue.ur3:UR3",
-    "ur3_gripper": "robots.catalogue.ur3_gripper:UR3_GRIPPER",
-    "ur5": "robots.catalogue.ur5:UR5",
-    "ur5_gripper": "robots.catalogue.ur5_gripper:UR5_GRIPPER",
-    "xarm7": "robots.catalogue.xarm7:XARM7",
-    "xarm7_ability": "robots.catalogue.xarm7_ability:XARM7_ABILITY",
-    "z1": "robots.catalogue.z1:Z1",
-}
+# One name per robot, sorted: that of its module, and in capitals that of its descriptor.
+NAMES = (
+    "ability_hand_left",
+    "ability_hand_right",
+    "allegro_hand_left",
+    "allegro_hand_right",
+    "baxter",
+    "dclaw",
+    "fetch",
+    "fetch_driving",
+    "fixed_inspire_hand_left",
+    "fixed_inspire_hand_right",
+    "floating_ability_hand_left",
+    "floating_ability_hand_right",
+    "floating_inspire_hand_left",
+    "floating_inspire_hand_right",
+    "floating_panda_gripper",
+    "franka_panda",
+    "jaco2",
+    "koch",
+    "mobile_panda",
+    "mobile_panda_dual",
+    "panda",
+    "panda_pinch",
+    "panda_stick",
+    "panda_wristcam",
+    "pr2",
+    "so100",
+    "so101",
+    "talos",
+    "talos_left_arm",
+    "tiago",
+    "tiago_pro",
+    "trifingerpro",
+    "unitree_g1",
+    "unitree_g1_upper_body",
+    "unitree_g1_upper_body_head_camera",
+    "unitree_g1_upper_body_right_arm",
+    "unitree_g1_with_hands",
+    "ur10",
+    "ur3",
+    "ur3_gripper",
+    "ur5",
+    "ur5_gripper",
+    "xarm7",
+    "xarm7_ability",
+    "z1",
+)
+CATALOGUE = {name: f"robots.catalogue.{name}:{name.upper()}" for name in NAMES}
 
 
 def checked_robot(given: object, origin: str, name: str | None = None) -> RobotDescriptor:

@@ -14,7 +14,6 @@ from pathlib import Path
 from robots.assets import scenery
 from robots.assets.locator import UrdfLocator
 from robots.assets.manifest import (
-    CHECKOUT_CACHE,
     LARGEST_FILE,
     AssetFile,
     AssetPackage,
@@ -33,6 +32,7 @@ from robots.common.commands import start
 from robots.common.console import main_of
 from robots.common.errors import AssetError
 from robots.common.files import read_regular, read_text
+from robots.common.paths import CHECKOUT_CACHE
 from robots.common.writing import write_whole
 from robots.registry import CATALOGUE, RobotRegistry
 from robots.urdf.summary import UrdfReferences, read_references

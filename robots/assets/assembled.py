@@ -10,9 +10,9 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from kinematics.quaternions import quaternion_rpy
-from robots.assets.store import default_root
 from robots.common.errors import DescriptorError, UnknownNameError, UnwritableFileError
 from robots.common.fields import expect_unit, settle
+from robots.common.paths import default_root
 from robots.common.writing import written_whole
 from robots.descriptor import IDENTITY, Quaternion, UrdfSource, Vector3
 from robots.urdf.model import UrdfModel

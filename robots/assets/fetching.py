@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import closing
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from robots.assets.hub_source import HubSource
 from robots.assets.manifest import AssetFile, load_manifest
 from robots.assets.packages import INDEX_PACKAGES, SourceError
 from robots.assets.progress import listing, say, size
-from robots.assets.sources import AssetSource, InstalledPackage
-from robots.assets.store import AssetStore, FileState, default_root
-from robots.assets.wheel_source import PackageWheel
+from robots.assets.sources import AssetSource, HubSource, InstalledPackage, PackageWheel
+from robots.assets.store import AssetStore, FileState
 from robots.common.errors import AssetError
+from robots.common.paths import default_root
 from robots.urdf.summary import read_references
 
 
@@ -84,10 +83,12 @@ def ensure(
     """
     if not store.unusable(files):
         return
-    with store.fetching(say) as scratch:
+    with store.fetching() as scratch:
         wanted = store.unusable(files)  # another process may have fetched them meanwhile
-        if wanted:
-            _say_licences(wanted)
+        for origin in {file.origin: None for file in wanted}:
+            total = sum(file.bytes for file in wanted if file.origin == origin)
+            say(f"fetching {origin.name} ({size(total)})")
+            say(f"licence {origin.licence}: {origin.licence_note}")
         failures: list[str] = []
         for source in sources:
             asked = [file for file in wanted if source.holds(file)]
@@ -95,27 +96,32 @@ def ensure(
                 continue
             fetch = _Fetch(source, store, scratch, trust)
             failure = fetch.run(asked)
-            fetch.say_kept()
+            if fetch.kept:
+                command = "`robot-layouts robots fetch --check` lists it, with licences"
+                say(f"kept what came along of {len(fetch.kept)} packages; {command}")
             missing = store.unusable(asked)
             outcome = f"{len(asked) - len(missing)} of {len(asked)} files"
-            say(f"{source.title}: {outcome}" + (f"; {_shorten(failure)}" if failure else ""))
+            shown = f"{failure[:160]} …" if len(failure) > 160 else failure
+            say(f"{source.title}: {outcome}" + (f"; {shown}" if shown else ""))
             failures.append(f"{source.title}: {failure}")
             wanted = store.unusable(wanted)
         if wanted:
             raise AssetError(_failure_text(wanted, store, failures))
 
 
+@dataclass
 class _Fetch:
     """One attempt to get files from one source."""
 
-    def __init__(self, source: AssetSource, store: AssetStore, scratch: Path, trust: bool) -> None:
-        self._source, self._store, self._scratch, self._trust = source, store, scratch, trust
-        self._kept: set[str] = set()  # packages of which files came along
-        self._room = True
+    source: AssetSource
+    store: AssetStore
+    scratch: Path
+    trust: bool
+    kept: set[str] = field(default_factory=set[str])  # packages of which files came along
+    room: bool = True
 
     def run(self, files: Sequence[AssetFile]) -> str:
         """Fetch, refetch once what differs, and return why something is still missing."""
-        different: dict[AssetFile, str] = {}
         try:
             different = self._install(files, again=False)
             if different:
@@ -127,49 +133,39 @@ class _Fetch:
         return (
             f"refused, as {len(different)} files differ from the manifest, twice:"
             f" {listing([f'{file}{how}' for file, how in different.items()])}"
-            f" (--source {self._source.name} --trust-source would accept them)"
+            f" (--source {self.source.name} --trust-source would accept them)"
         )
 
     def _install(self, files: Sequence[AssetFile], *, again: bool) -> dict[AssetFile, str]:
         """Install what the source gives, and return what differs from the manifest, and how."""
         different: dict[AssetFile, str] = {}
-        asked = set(files)
-        trust = self._trust and again
-        fetch = self._source.fetch(files, self._scratch, again=again, trust=trust)
-        with closing(fetch) as contents:
-            for file, data in contents:
-                if file not in asked:
-                    self._keep(file, data)
-                elif data is None:
-                    different[file] = f" (more than {file.limit(trust=trust):,} bytes)"
-                elif not self._accept(file, data, trust=trust):
-                    different[file] = ""
+        asked, trust = set(files), self.trust and again
+        for file, data in self.source.fetch(files, self.scratch, again=again):
+            limit = file.limit(trust=trust)
+            if file not in asked:
+                self._keep(file, data)
+            elif len(data) > limit:
+                different[file] = f" (more than {limit:,} bytes)"
+            elif not self._accept(file, data, trust=trust):
+                different[file] = ""
         return different
+
+    def _keep(self, file: AssetFile, data: bytes) -> None:
+        """Keep a file that nobody asked for, so that it need not be fetched another time."""
+        try:
+            if self.room and self.store.state(file) is FileState.MISSING:
+                if self._accept(file, data, trust=False):
+                    self.kept.add(file.origin.name)
+        except AssetError as error:  # what was asked for is there
+            self.room = False
+            say(f"{error} What came along is not kept.")
 
     def _accept(self, file: AssetFile, data: bytes, *, trust: bool) -> bool:
         if trust:
             _expect_known_references(file, data)
-        return self._store.install(
-            file, data, scratch=self._scratch, source=self._source.title, trust=trust
+        return self.store.install(
+            file, data, scratch=self.scratch, source=self.source.title, trust=trust
         )
-
-    def _keep(self, file: AssetFile, data: bytes | None) -> None:
-        """Keep a file that nobody asked for, so that it need not be fetched another time."""
-        if data is None or not self._room:
-            return
-        try:
-            if self._store.state(file) is FileState.MISSING:
-                self._kept.add(file.origin.name)
-                self._accept(file, data, trust=False)
-        except AssetError as error:  # what was asked for is there
-            self._room = False
-            say(f"{error} What came along is not kept.")
-
-    def say_kept(self) -> None:
-        """Say in one line what was kept that nobody asked for."""
-        if self._kept:
-            command = "`robot-layouts robots fetch --check` lists it, with licences"
-            say(f"kept what came along of {len(self._kept)} packages; {command}")
 
 
 def _expect_known_references(file: AssetFile, data: bytes) -> None:
@@ -185,17 +181,6 @@ def _expect_known_references(file: AssetFile, data: bytes) -> None:
     unknown = sorted({*references.collision, *references.visual} - known)
     if unknown:
         raise SourceError(f"its {file} refers to files outside the manifest: {', '.join(unknown)}")
-
-
-def _say_licences(files: Sequence[AssetFile]) -> None:
-    for origin in {file.origin: None for file in files}:
-        total = sum(file.bytes for file in files if file.origin == origin)
-        say(f"fetching {origin.name} ({size(total)})")
-        say(f"licence {origin.licence}: {origin.licence_note}")
-
-
-def _shorten(text: str, length: int = 160) -> str:
-    return text if len(text) <= length else f"{text[:length]} …"
 
 
 def _failure_text(wanted: list[AssetFile], store: AssetStore, failures: list[str]) -> str:

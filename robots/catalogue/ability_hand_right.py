@@ -1,29 +1,30 @@
 """PSYONIC Ability Hand, right, five fingers: 4 + 2 action numbers."""
 
+from dataclasses import replace
+
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, GripperMaterial, Home, JointGroup, RobotDescriptor
 
 FRONT = ("thumb_L2", "index_L2", "middle_L2", "ring_L2", "pinky_L2")
 TIPS = ("thumb_tip", "index_tip", "middle_tip", "ring_tip", "pinky_tip")
-
-
-def finger(name: str) -> JointGroup:
-    """Return a finger, whose second joint follows the first."""
-    return JointGroup(
-        (f"{name}_q1", f"{name}_q2"),
-        mimic=True,
-        multipliers=(1.0, 1.05851325),
-        offsets=(0.0, 0.72349796),
-        lower=0.0,
-        upper=1.828,  # where the second joint ends
-        stiffness=1e3,
-        damping=1e2,
-        force_limit=50.0,
-        reset_noise=False,
-    )
-
-
-FINGERS = {name: finger(name) for name in ("index", "middle", "ring", "pinky")}
+INDEX = JointGroup(
+    ("index_q1", "index_q2"),  # the second follows the first
+    mimic=True,
+    multipliers=(1.0, 1.05851325),
+    offsets=(0.0, 0.72349796),
+    lower=0.0,
+    upper=1.828,  # where the second joint ends
+    stiffness=1e3,
+    damping=1e2,
+    force_limit=50.0,
+    reset_noise=False,
+)
+FINGERS = {
+    "index": INDEX,
+    "middle": replace(INDEX, joints=("middle_q1", "middle_q2")),
+    "ring": replace(INDEX, joints=("ring_q1", "ring_q2")),
+    "pinky": replace(INDEX, joints=("pinky_q1", "pinky_q2")),
+}
 THUMB = JointGroup(
     ("thumb_q1", "thumb_q2"),
     lower=-0.1,

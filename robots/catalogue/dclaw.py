@@ -12,7 +12,17 @@ DCLAW = RobotDescriptor(
     urdf=UrdfLocator("maniskill_dclaw", "dclaw_gripper_glb.urdf"),
     action_split=ActionSplit(
         fingers=JointGroup(
-            tuple(f"joint_f{finger}_{i}" for i in range(3) for finger in (1, 2, 3)),
+            (
+                "joint_f1_0",
+                "joint_f2_0",
+                "joint_f3_0",
+                "joint_f1_1",
+                "joint_f2_1",
+                "joint_f3_1",
+                "joint_f1_2",
+                "joint_f2_2",
+                "joint_f3_2",
+            ),
             lower=-0.1,
             upper=0.1,
             delta=True,

@@ -19,18 +19,34 @@ from robots.descriptor import (
 FINGERS = ("l_gripper_finger_link", "r_gripper_finger_link")
 OPEN = (0.015, 0.015)
 TURNS = (-2 * pi, 2 * pi)  # of joints that turn without end
-# fmt: off
 ARM = replace(
     panda.ARM,  # the same drives and steps
-    joints=("shoulder_pan_joint", "shoulder_lift_joint", "upperarm_roll_joint", "elbow_flex_joint",
-            "forearm_roll_joint", "wrist_flex_joint", "wrist_roll_joint"),
-    limits=((-1.6056, 1.6056), (-1.221, 1.518), TURNS, (-2.251, 2.251), TURNS, (-2.16, 2.16),
-            TURNS),
-    reset_noise=False, root_link="torso_lift_link",
+    joints=(
+        "shoulder_pan_joint",
+        "shoulder_lift_joint",
+        "upperarm_roll_joint",
+        "elbow_flex_joint",
+        "forearm_roll_joint",
+        "wrist_flex_joint",
+        "wrist_roll_joint",
+    ),
+    limits=(
+        (-1.6056, 1.6056),
+        (-1.221, 1.518),
+        TURNS,
+        (-2.251, 2.251),
+        TURNS,
+        (-2.16, 2.16),
+        TURNS,
+    ),
+    reset_noise=False,
+    root_link="torso_lift_link",
 )
-GRIPPER = replace(panda.PANDA.action_split.groups["gripper"], upper=0.05,
-                  joints=("l_gripper_finger_joint", "r_gripper_finger_joint"))
-# fmt: on
+GRIPPER = replace(
+    panda.PANDA.action_split.groups["gripper"],
+    upper=0.05,
+    joints=("l_gripper_finger_joint", "r_gripper_finger_joint"),
+)
 HEAD, TORSO = ("head_pan_joint", "head_tilt_joint"), ("torso_lift_joint",)
 BODY = {  # moves by steps in every control mode
     "head": replace(ARM, joints=HEAD, limits=((-1.57, 1.57), (-0.76, 1.45))),

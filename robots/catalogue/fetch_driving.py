@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from robots.catalogue.fetch import FETCH, SLIDE
-from robots.descriptor import JointGroup
+from robots.descriptor import ActionSplit, JointGroup
 
 GROUPS = FETCH.action_split.groups
 BASE = JointGroup(
@@ -21,8 +21,12 @@ BASE = JointGroup(
 FETCH_DRIVING = replace(
     FETCH,
     name="fetch_driving",
-    action_split=type(FETCH.action_split)(
-        **{name: group for name, group in GROUPS.items() if not group.held}, base=BASE
+    action_split=ActionSplit(
+        arm=GROUPS["arm"],
+        gripper=GROUPS["gripper"],
+        head=GROUPS["head"],
+        torso=GROUPS["torso"],
+        base=BASE,
     ),
     source="mani_skill 3.0.1, agents/robots/fetch/fetch.py",
 )

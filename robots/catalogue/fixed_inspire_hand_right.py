@@ -5,51 +5,107 @@ from math import cos, pi, sin
 
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, GripperMaterial, Home, JointGroup, RobotDescriptor
-from robots.link_pairs import among
+from robots.parts import among
 
-FINGERS = ("index", "middle", "ring", "pinky")
-THUMB = ("metacarpal_base", "metacarpal", "proximal", "distal")
-SWING = ((-0.3954916, 0.38606682), (-0.44505897, 0.44505897))  # of the wrist
+WRIST = JointGroup(
+    ("right_hand_wrist_pitch_joint", "right_hand_wrist_yaw_joint"),
+    lower=-0.1,
+    upper=0.1,
+    delta=True,
+    stiffness=1e3,
+    damping=1e2,
+    force_limit=100.0,
+    limits=((-0.3954916, 0.38606682), (-0.44505897, 0.44505897)),
+)
+THUMB_TURN = JointGroup(
+    ("right_hand_thumb_CMC_yaw_joint",),
+    lower=-0.1,
+    upper=0.1,
+    delta=True,
+    stiffness=1e3,
+    damping=1e2,
+    force_limit=20.0,
+    limits=((-1.3089969, 0.0),),
+)
+# The joints that follow are driven like those they follow, as the URDF couples them.
+THUMB = JointGroup(
+    ("right_hand_thumb_CMC_pitch_joint", "right_hand_thumb_MCP_joint", "right_hand_thumb_IP_joint"),
+    lower=-0.47,
+    upper=0.0,
+    stiffness=1e3,
+    damping=1e2,
+    force_limit=20.0,
+    mimic=True,
+    multipliers=(1.0, 4 / 3, 2 / 3),
+    offsets=(0.0, -0.0814487, -0.0407243),
+    reset_noise=False,
+)
+INDEX = JointGroup(
+    ("right_hand_index_MCP_joint", "right_hand_index_PIP_joint"),
+    lower=-1.33,
+    upper=0.0,
+    stiffness=1e3,
+    damping=1e2,
+    force_limit=20.0,
+    mimic=True,
+    multipliers=(1.0, 1.06399),
+    offsets=(0.0, -0.167348),
+    reset_noise=False,
+)
+# From the palm on: what grips.
+GRIPPING = (
+    "right_hand_hand_base_link",
+    "right_hand_thumb_metacarpal",
+    "right_hand_thumb_proximal",
+    "right_hand_thumb_distal",
+    "right_hand_index_proximal",
+    "right_hand_index_middle",
+    "right_hand_middle_proximal",
+    "right_hand_middle_middle",
+    "right_hand_ring_proximal",
+    "right_hand_ring_middle",
+    "right_hand_pinky_proximal",
+    "right_hand_pinky_middle",
+)
 
-
-def hand(side: str) -> RobotDescriptor:
-    """Return a hand; it is ``left`` or ``right``."""
-    hand = f"{side}_hand"
-    turn = JointGroup(
-        (f"{hand}_thumb_CMC_yaw_joint",), -0.1, 0.1, 1e3, 1e2, 20.0, delta=True,
-        limits=((-1.3089969, 0.0),),
-    )  # fmt: skip
-    wrist = tuple(f"{hand}_wrist_{way}_joint" for way in ("pitch", "yaw"))
-    # The joints that follow are driven like those they follow, as the URDF couples them.
-    bend = JointGroup(
-        tuple(f"{hand}_thumb_{joint}_joint" for joint in ("CMC_pitch", "MCP", "IP")),
-        -0.47, 0.0, 1e3, 1e2, 20.0, mimic=True, reset_noise=False,
-        multipliers=(1.0, 4 / 3, 2 / 3), offsets=(0.0, -0.0814487, -0.0407243),
-    )  # fmt: skip
-    groups = {"wrist": replace(turn, joints=wrist, force_limit=100.0, limits=SWING)}
-    groups |= {"thumb_turn": turn, "thumb": bend}
-    for name in FINGERS:
-        joints = (f"{hand}_{name}_MCP_joint", f"{hand}_{name}_PIP_joint")
-        ratios, offsets = (1.0, 1.06399), (0.0, -0.167348)
-        groups[name] = replace(
-            bend, joints=joints, lower=-1.33, multipliers=ratios, offsets=offsets
+FIXED_INSPIRE_HAND_RIGHT = RobotDescriptor(
+    name="fixed_inspire_hand_right",
+    urdf=UrdfLocator("maniskill_inspire_hand", "RH56DFX-2LR/urdf/inspire_hand_right.urdf"),
+    action_split=ActionSplit(
+        wrist=WRIST,
+        thumb_turn=THUMB_TURN,
+        thumb=THUMB,
+        index=INDEX,
+        middle=replace(
+            INDEX, joints=("right_hand_middle_MCP_joint", "right_hand_middle_PIP_joint")
+        ),
+        ring=replace(INDEX, joints=("right_hand_ring_MCP_joint", "right_hand_ring_PIP_joint")),
+        pinky=replace(INDEX, joints=("right_hand_pinky_MCP_joint", "right_hand_pinky_PIP_joint")),
+    ),
+    tcp_link="right_hand_thumb_tip",
+    tcp_position_links=("right_hand_thumb_tip", "right_hand_index_tip"),
+    gripper_material=GripperMaterial(GRIPPING, 2.0, 2.0, 0.0, patch_radius=0.1),
+    keyframes={"rest": (0, 0, 0, 0, -0.0814487, -0.0407243, *(0, -0.167348) * 4)},
+    home=Home((0.0, 0.0, 0.4), (cos(pi / 4), 0.0, 0.0, -sin(pi / 4))),
+    reach=0.14,  # of the thumb's and the first finger's tips, from the URDF
+    source="mani_skill 3.0.1, agents/robots/inspire_hand/fixed_inspire_hand.py",
+    allowed_collisions=among(  # as ManiSkill, which lets the hand overlap
+        (
+            "right_hand_wrist_base_link",
+            "right_hand_wrist_link",
+            "right_hand_hand_base_link",
+            "right_hand_thumb_metacarpal_base",
+            "right_hand_thumb_metacarpal",
+            "right_hand_thumb_proximal",
+            "right_hand_thumb_distal",
+            "right_hand_index_proximal",
+            "right_hand_index_middle",
+            "right_hand_middle_proximal",
+            "right_hand_middle_middle",
+            "right_hand_ring_proximal",
+            "right_hand_ring_middle",
+            "right_hand_pinky_proximal",
+            "right_hand_pinky_middle",
         )
-    links = tuple(f"{hand}_thumb_{part}" for part in THUMB)
-    links += tuple(f"{hand}_{name}_{part}" for name in FINGERS for part in ("proximal", "middle"))
-    palm = (f"{hand}_wrist_base_link", f"{hand}_wrist_link", f"{hand}_hand_base_link")
-    return RobotDescriptor(
-        name=f"fixed_inspire_hand_{side}",
-        urdf=UrdfLocator("maniskill_inspire_hand", f"RH56DFX-2LR/urdf/inspire_hand_{side}.urdf"),
-        action_split=ActionSplit(**groups),
-        tcp_link=f"{hand}_thumb_tip",
-        tcp_position_links=(f"{hand}_thumb_tip", f"{hand}_index_tip"),
-        gripper_material=GripperMaterial((palm[2], *links[1:]), 2.0, 2.0, 0.0, patch_radius=0.1),
-        keyframes={"rest": (0, 0, 0, 0, -0.0814487, -0.0407243, *(0, -0.167348) * 4)},
-        home=Home((0.0, 0.0, 0.4), (cos(pi / 4), 0.0, 0.0, -sin(pi / 4))),
-        reach=0.14,  # of the thumb's and the first finger's tips, from the URDF
-        source="mani_skill 3.0.1, agents/robots/inspire_hand/fixed_inspire_hand.py",
-        allowed_collisions=among((*palm, *links)),  # as ManiSkill, which lets the hand overlap
-    )
-
-
-FIXED_INSPIRE_HAND_RIGHT = hand("right")
+    ),
+)

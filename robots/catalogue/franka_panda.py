@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from robots.assets.locator import UrdfLocator
 from robots.catalogue.panda import PANDA
-from robots.link_pairs import among
+from robots.parts import among
 
 FRANKA_PANDA = replace(
     PANDA,

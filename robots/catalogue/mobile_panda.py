@@ -5,7 +5,7 @@ from dataclasses import replace
 from robots.assets.locator import UrdfLocator
 from robots.catalogue.panda import ARM, PANDA
 from robots.descriptor import ActionSplit, Fingers, GripperMaterial, Home, JointGroup, names
-from robots.link_pairs import among
+from robots.parts import among
 
 FINGERS = ("right_panda_leftfinger", "right_panda_rightfinger")
 # ManiSkill has files of this robot and no agent. The lift carries 20 kg, or twice that.

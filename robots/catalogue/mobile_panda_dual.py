@@ -5,19 +5,12 @@ from dataclasses import replace
 from robots.assets.locator import UrdfLocator
 from robots.catalogue.mobile_panda import BASE, LIFT, MOBILE_PANDA
 from robots.catalogue.panda import ARM, PANDA
-from robots.descriptor import ActionSplit, Fingers, GripperMaterial, JointGroup, names
-from robots.link_pairs import among
-from robots.parts import both_sides
+from robots.descriptor import ActionSplit, Fingers, GripperMaterial, names
+from robots.parts import among, both_sides
 
 LEFT = ("left_panda_leftfinger", "left_panda_rightfinger")
 FINGERS = (*LEFT, "right_panda_leftfinger", "right_panda_rightfinger")
-
-
-def gripper(side: str) -> JointGroup:
-    """Return one hand's fingers."""
-    joints = names(f"{side}_panda_finger_joint", 1, 2)
-    return replace(PANDA.action_split.groups["gripper"], joints=joints)
-
+GRIPPER = PANDA.action_split.groups["gripper"]
 
 MOBILE_PANDA_DUAL = replace(
     MOBILE_PANDA,
@@ -25,9 +18,9 @@ MOBILE_PANDA_DUAL = replace(
     urdf=UrdfLocator("maniskill_panda", "mobile_panda_dual_arm.urdf"),
     action_split=ActionSplit(
         left_arm=replace(ARM, joints=names("left_panda_joint", 1, 7)),
-        left_gripper=gripper("left"),
+        left_gripper=replace(GRIPPER, joints=names("left_panda_finger_joint", 1, 2)),
         right_arm=replace(ARM, joints=names("right_panda_joint", 1, 7)),
-        right_gripper=gripper("right"),
+        right_gripper=replace(GRIPPER, joints=names("right_panda_finger_joint", 1, 2)),
         lift=LIFT,
         base_slide=replace(BASE, joints=("root_x_axis_joint", "root_y_axis_joint"), unit="m"),
         base_turn=BASE,
@@ -41,6 +34,8 @@ MOBILE_PANDA_DUAL = replace(
         (0.0808, 0.3012, 0.42),
         Fingers(("{side}_panda_leftfinger", "{side}_panda_rightfinger")),
     ),
-    allowed_collisions=among(*((f"{s}_panda_link7", f"{s}_panda_hand") for s in ("left", "right"))),
+    allowed_collisions=among(
+        ("left_panda_link7", "left_panda_hand"), ("right_panda_link7", "right_panda_hand")
+    ),
     keyframes={"rest": (*PANDA.keyframe("rest") * 2, 0.0, 0, 0, 0)},
 )

@@ -3,17 +3,31 @@
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, GripperMaterial, JointGroup, RobotDescriptor
 
-# fmt: off
 ARM = JointGroup(
-    ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll"), lower=-0.1,
-    upper=0.1, stiffness=1000.0, damping=(10.2, 9.71, 5.87, 2.0, 0.535), force_limit=10.0,
+    ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll"),
+    lower=-0.1,
+    upper=0.1,
+    stiffness=1000.0,
+    damping=(10.2, 9.71, 5.87, 2.0, 0.535),
+    force_limit=10.0,
     delta=True,
-    limits=((-1.91986, 1.91986), (-1.74533, 1.74533), (-1.69, 1.69), (-1.65806, 1.65806),
-        (-2.74385, 2.84121)),
+    limits=(
+        (-1.91986, 1.91986),
+        (-1.74533, 1.74533),
+        (-1.69, 1.69),
+        (-1.65806, 1.65806),
+        (-2.74385, 2.84121),
+    ),
 )
 GRIPPER = JointGroup(
-    ("gripper",), lower=-0.174533, upper=1.74533, stiffness=1000.0, damping=0.254,
-    force_limit=10.0, reset_noise=False, limits=((-0.174533, 1.74533),),
+    ("gripper",),
+    lower=-0.174533,
+    upper=1.74533,
+    stiffness=1000.0,
+    damping=0.254,
+    force_limit=10.0,
+    reset_noise=False,
+    limits=((-0.174533, 1.74533),),
 )
 
 SO101 = RobotDescriptor(
@@ -22,7 +36,11 @@ SO101 = RobotDescriptor(
     action_split=ActionSplit(arm=ARM, gripper=GRIPPER),
     tcp_link="gripper_frame_link",
     gripper_material=GripperMaterial(
-        ("gripper_link", "moving_jaw_so101_v1_link"), 2.0, 2.0, 0.0, patch_radius=0.1,
+        ("gripper_link", "moving_jaw_so101_v1_link"),
+        2.0,
+        2.0,
+        0.0,
+        patch_radius=0.1,
     ),
     keyframes={
         "rest": (0.0, -0.4, 0.4, 1.2, 0.0, 1.0),

@@ -4,36 +4,83 @@ from dataclasses import replace
 
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, GripperMaterial, JointGroup, RobotDescriptor
-from robots.link_pairs import among
-from robots.parts import both_sides
+from robots.parts import among, both_sides
 
-# fmt: off
-SIDES = ("left", "right")
-LIMITS = ((-2.443461, 2.443461), (-2.3561945, 0.0), (-2.5307274, 2.5307274),
-          (-1.3962634, 1.3962634), (-0.6981317, 0.6981317))
-GRIPPER = ("base", "motor_double", "inner_double", "fingertip_1", "fingertip_2", "motor_single",
-           "inner_single", "fingertip_3")
+LIMITS = (
+    (-2.443461, 2.443461),
+    (-2.3561945, 0.0),
+    (-2.5307274, 2.5307274),
+    (-1.3962634, 1.3962634),
+    (-0.6981317, 0.6981317),
+)
 LEFT_ARM = JointGroup(
-    tuple(f"arm_left_{i}_joint" for i in range(1, 8)),
-    lower=(*(-0.04,) * 4, -0.065, -0.1, -0.1), upper=(*(0.04,) * 4, 0.065, 0.1, 0.1),
+    (
+        "arm_left_1_joint",
+        "arm_left_2_joint",
+        "arm_left_3_joint",
+        "arm_left_4_joint",
+        "arm_left_5_joint",
+        "arm_left_6_joint",
+        "arm_left_7_joint",
+    ),
+    lower=(*(-0.04,) * 4, -0.065, -0.1, -0.1),
+    upper=(*(0.04,) * 4, 0.065, 0.1, 0.1),
     stiffness=(4.17e4, 3.06e4, 8410.0, 7410.0, 1000.0, 1000.0, 1000.0),
     damping=(556.0, 409.0, 112.0, 98.7, 10.4, 10.3, 10.2),
-    force_limit=(119.0, 87.2, 23.9, 21.1, 3.0, 6.6, 6.6), delta=True,
-    limits=((-1.5707964, 0.5235988), (0.0, 2.8797932), *LIMITS))
+    force_limit=(119.0, 87.2, 23.9, 21.1, 3.0, 6.6, 6.6),
+    delta=True,
+    limits=((-1.5707964, 0.5235988), (0.0, 2.8797932), *LIMITS),
+)
 RIGHT_ARM = replace(
-    LEFT_ARM, joints=tuple(f"arm_right_{i}_joint" for i in range(1, 8)),
-    limits=((-0.5235988, 1.5707964), (-2.8797932, 0.0), *LIMITS))
+    LEFT_ARM,
+    joints=(
+        "arm_right_1_joint",
+        "arm_right_2_joint",
+        "arm_right_3_joint",
+        "arm_right_4_joint",
+        "arm_right_5_joint",
+        "arm_right_6_joint",
+        "arm_right_7_joint",
+    ),
+    limits=((-0.5235988, 1.5707964), (-2.8797932, 0.0), *LIMITS),
+)
 LEFT_GRIPPER = JointGroup(
-    ("gripper_left_joint",), lower=-1.0471976, upper=0.0, stiffness=1e3, damping=2e2,
-    force_limit=1.0, reset_noise=False, limits=((-1.0471976, 0.0),))
-
-
-def wrist(side: str) -> tuple[str, ...]:
-    """Return the links from the wrist on, which overlap."""
-    names = (*(f"arm_{side}_{i}" for i in (5, 6, 7)), f"wrist_{side}_ft", f"wrist_{side}_ft_tool")
-    return tuple(f"{name}_link" for name in (*names, *(f"gripper_{side}_{p}" for p in GRIPPER)))
-
-
+    ("gripper_left_joint",),
+    lower=-1.0471976,
+    upper=0.0,
+    stiffness=1e3,
+    damping=2e2,
+    force_limit=1.0,
+    reset_noise=False,
+    limits=((-1.0471976, 0.0),),
+)
+LEFT_HAND = (
+    "gripper_left_base_link",
+    "gripper_left_motor_double_link",
+    "gripper_left_inner_double_link",
+    "gripper_left_fingertip_1_link",
+    "gripper_left_fingertip_2_link",
+    "gripper_left_motor_single_link",
+    "gripper_left_inner_single_link",
+    "gripper_left_fingertip_3_link",
+)
+LEFT_WRIST = (
+    "arm_left_5_link",
+    "arm_left_6_link",
+    "arm_left_7_link",
+    "wrist_left_ft_link",
+    "wrist_left_ft_tool_link",
+)
+RIGHT_HAND = (
+    "gripper_right_base_link",
+    "gripper_right_motor_double_link",
+    "gripper_right_inner_double_link",
+    "gripper_right_fingertip_1_link",
+    "gripper_right_fingertip_2_link",
+    "gripper_right_motor_single_link",
+    "gripper_right_inner_single_link",
+    "gripper_right_fingertip_3_link",
+)
 LEFT_REST = (-0.3, 0.8, -0.4, -1.7, -0.5, 0.2, 0.0, 0.0)
 RIGHT_REST = (0.3, -0.8, 0.4, -1.7, 0.5, -0.2, 0.0, 0.0)
 
@@ -41,19 +88,56 @@ TALOS = RobotDescriptor(
     name="talos",
     urdf=UrdfLocator("example_talos_data", "robots/talos_reduced.urdf"),
     action_split=ActionSplit(
-        left_arm=LEFT_ARM, left_gripper=LEFT_GRIPPER,
-        right_arm=RIGHT_ARM, right_gripper=replace(LEFT_GRIPPER, joints=("gripper_right_joint",)),
+        left_arm=LEFT_ARM,
+        left_gripper=LEFT_GRIPPER,
+        right_arm=RIGHT_ARM,
+        right_gripper=replace(LEFT_GRIPPER, joints=("gripper_right_joint",)),
         torso=JointGroup.hold(("torso_1_joint", "torso_2_joint")),
         head=JointGroup.hold(("head_1_joint", "head_2_joint")),
-        legs=JointGroup.hold(tuple(f"leg_{s}_{i}_joint" for s in SIDES for i in range(1, 7)))),
+        legs=JointGroup.hold(
+            (
+                "leg_left_1_joint",
+                "leg_left_2_joint",
+                "leg_left_3_joint",
+                "leg_left_4_joint",
+                "leg_left_5_joint",
+                "leg_left_6_joint",
+                "leg_right_1_joint",
+                "leg_right_2_joint",
+                "leg_right_3_joint",
+                "leg_right_4_joint",
+                "leg_right_5_joint",
+                "leg_right_6_joint",
+            )
+        ),
+    ),
     tcp_link="gripper_left_fingertip_2_link",
     gripper_material=GripperMaterial(
-        tuple(f"gripper_{s}_{part}_link" for s in SIDES for part in GRIPPER), 2.0, 2.0, 0.0, 0.1),
+        (*LEFT_HAND, *RIGHT_HAND),
+        2.0,
+        2.0,
+        0.0,
+        0.1,
+    ),
     keyframes={"rest": (*LEFT_REST, *RIGHT_REST, *(0,) * 16)},
     limbs=both_sides("gripper_{side}_fingertip_2_link", 0.898, (0.0, 0.1575, 0.3042)),
     reach=1.055,  # of the left TCP, from the URDF
     source="example-robot-data 6.0.0, talos_data; drives from the inertia behind each joint",
     allowed_collisions=among(
-        *(wrist(side) for side in SIDES),
-        *((f"leg_{side}_{i}_link", f"leg_{side}_{i + 2}_link") for side in SIDES for i in (1, 4)),
-        ("head_1_link", "rgbd_link"), ("base_link", "torso_2_link")))
+        (*LEFT_WRIST, *LEFT_HAND),
+        (
+            "arm_right_5_link",
+            "arm_right_6_link",
+            "arm_right_7_link",
+            "wrist_right_ft_link",
+            "wrist_right_ft_tool_link",
+            *RIGHT_HAND,
+        ),
+        ("leg_left_1_link", "leg_left_3_link"),
+        ("leg_left_4_link", "leg_left_6_link"),
+        ("leg_right_1_link", "leg_right_3_link"),
+        ("leg_right_4_link", "leg_right_6_link"),
+        ("head_1_link", "rgbd_link"),
+        ("base_link", "torso_2_link"),
+    ),
+)

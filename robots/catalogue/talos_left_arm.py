@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 from robots.assets.locator import UrdfLocator
-from robots.catalogue.talos import GRIPPER, LEFT_ARM, LEFT_GRIPPER, TALOS, wrist
+from robots.catalogue.talos import LEFT_ARM, LEFT_GRIPPER, LEFT_HAND, LEFT_WRIST, TALOS
 from robots.descriptor import ActionSplit, GripperMaterial
-from robots.link_pairs import among
+from robots.parts import among
 
 ARM = replace(  # without the shoulder's first joint, which its URDF lacks
     LEFT_ARM,
@@ -23,11 +23,9 @@ TALOS_LEFT_ARM = replace(
     name="talos_left_arm",
     urdf=UrdfLocator("example_talos_data", "robots/talos_left_arm.urdf"),
     action_split=ActionSplit(arm=ARM, gripper=LEFT_GRIPPER),
-    gripper_material=GripperMaterial(
-        tuple(f"gripper_left_{part}_link" for part in GRIPPER), 2.0, 2.0, 0.0, patch_radius=0.1
-    ),
+    gripper_material=GripperMaterial(LEFT_HAND, 2.0, 2.0, 0.0, patch_radius=0.1),
     keyframes={"rest": (1.45, 0.6, -1.07, -1.59, 0.9, 0.0, 0.0)},
     reach=0.898,  # of the TCP, from the URDF
-    allowed_collisions=among(wrist("left")),
+    allowed_collisions=among((*LEFT_WRIST, *LEFT_HAND)),
     limbs={},
 )

@@ -5,14 +5,24 @@ from robots.descriptor import ActionSplit, GripperMaterial, JointGroup, RobotDes
 
 ANGLES = (0, 120, 240)  # degrees, where the fingers hang
 JOINTS = ("base_to_upper", "upper_to_middle", "middle_to_lower")
-TIPS = tuple(f"finger_tip_link_{angle}" for angle in ANGLES)
+TIPS = ("finger_tip_link_0", "finger_tip_link_120", "finger_tip_link_240")
 
 TRIFINGERPRO = RobotDescriptor(
     name="trifingerpro",
     urdf=UrdfLocator("maniskill_trifinger", "trifingerpro.urdf"),
     action_split=ActionSplit(
         fingers=JointGroup(
-            tuple(f"finger_{joint}_joint_{angle}" for angle in ANGLES for joint in JOINTS),
+            (
+                "finger_base_to_upper_joint_0",
+                "finger_upper_to_middle_joint_0",
+                "finger_middle_to_lower_joint_0",
+                "finger_base_to_upper_joint_120",
+                "finger_upper_to_middle_joint_120",
+                "finger_middle_to_lower_joint_120",
+                "finger_base_to_upper_joint_240",
+                "finger_upper_to_middle_joint_240",
+                "finger_middle_to_lower_joint_240",
+            ),
             lower=-0.1,
             upper=0.1,
             delta=True,

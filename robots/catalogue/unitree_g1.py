@@ -4,28 +4,39 @@ from dataclasses import replace
 
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, JointGroup, RobotDescriptor
-from robots.link_pairs import among
-from robots.parts import both_sides
+from robots.parts import among, both_sides
 
-# fmt: off
-SIDES = ("left", "right")
-ARM = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_roll", "wrist_pitch",
-       "wrist_yaw")
-LEG = ("hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll")
 PITCH, YAW, ELBOW = (-3.0892, 2.6704), (-2.618, 2.618), (-1.0472, 2.0944)
 WRIST = ((-1.9722221, 1.9722221), (-1.6144296, 1.6144296), (-1.6144296, 1.6144296))
 LEFT_ARM = JointGroup(
-    tuple(f"left_{joint}_joint" for joint in ARM),
+    (
+        "left_shoulder_pitch_joint",
+        "left_shoulder_roll_joint",
+        "left_shoulder_yaw_joint",
+        "left_elbow_joint",
+        "left_wrist_roll_joint",
+        "left_wrist_pitch_joint",
+        "left_wrist_yaw_joint",
+    ),
     lower=(-0.09, -0.095, -0.1, -0.1, -0.1, -0.1, -0.1),
     upper=(0.09, 0.095, 0.1, 0.1, 0.1, 0.1, 0.1),
     stiffness=(3870.0, 3640.0, 1000.0, 1000.0, 1000.0, 1000.0, 1000.0),
     damping=(51.6, 48.5, 12.8, 11.7, 4.35, 4.38, 2.71),
-    force_limit=(25.0, 25.0, 25.0, 25.0, 25.0, 5.0, 5.0), delta=True,
+    force_limit=(25.0, 25.0, 25.0, 25.0, 25.0, 5.0, 5.0),
+    delta=True,
     limits=(PITCH, (-1.5882, 2.2515), YAW, ELBOW, *WRIST),
 )
 RIGHT_ARM = replace(
     LEFT_ARM,
-    joints=tuple(f"right_{joint}_joint" for joint in ARM),
+    joints=(
+        "right_shoulder_pitch_joint",
+        "right_shoulder_roll_joint",
+        "right_shoulder_yaw_joint",
+        "right_elbow_joint",
+        "right_wrist_roll_joint",
+        "right_wrist_pitch_joint",
+        "right_wrist_yaw_joint",
+    ),
     limits=(PITCH, (-2.2515, 1.5882), YAW, ELBOW, *WRIST),
 )
 
@@ -35,10 +46,23 @@ UNITREE_G1 = RobotDescriptor(
     action_split=ActionSplit(
         left_arm=LEFT_ARM,
         right_arm=RIGHT_ARM,
-        torso=JointGroup.hold(
-            tuple(f"waist_{way}_joint" for way in ("yaw", "roll", "pitch"))),
+        torso=JointGroup.hold(("waist_yaw_joint", "waist_roll_joint", "waist_pitch_joint")),
         legs=JointGroup.hold(
-            tuple(f"{side}_{joint}_joint" for side in SIDES for joint in LEG)),
+            (
+                "left_hip_pitch_joint",
+                "left_hip_roll_joint",
+                "left_hip_yaw_joint",
+                "left_knee_joint",
+                "left_ankle_pitch_joint",
+                "left_ankle_roll_joint",
+                "right_hip_pitch_joint",
+                "right_hip_roll_joint",
+                "right_hip_yaw_joint",
+                "right_knee_joint",
+                "right_ankle_pitch_joint",
+                "right_ankle_roll_joint",
+            )
+        ),
     ),
     tcp_link="left_rubber_hand",
     keyframes={"rest": (0,) * 29},
@@ -46,7 +70,9 @@ UNITREE_G1 = RobotDescriptor(
     reach=0.552,  # of the left TCP, from the URDF
     source="example-robot-data 6.0.0, g1_description; drives from the inertia behind each joint",
     allowed_collisions=among(  # neighbours, and what overlaps however the joints stand
-        *((f"{side}_shoulder_pitch_link", "head_link", "logo_link") for side in SIDES),
-        *((f"{side}_hip_pitch_link", "pelvis_contour_link") for side in SIDES),
+        ("left_shoulder_pitch_link", "head_link", "logo_link"),
+        ("right_shoulder_pitch_link", "head_link", "logo_link"),
+        ("left_hip_pitch_link", "pelvis_contour_link"),
+        ("right_hip_pitch_link", "pelvis_contour_link"),
     ),
 )

@@ -1,59 +1,157 @@
 """Unitree G1 on legs that stand still: 5 + 7 numbers for each arm and hand, and 1 for its torso."""
 
+from dataclasses import replace
+
 from robots.assets.locator import UrdfLocator
 from robots.descriptor import ActionSplit, GripperMaterial, Home, JointGroup, RobotDescriptor
-from robots.link_pairs import among
-from robots.parts import both_sides
+from robots.parts import among, both_sides
 
-SIDES = ("left", "right")
-ARM = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow_pitch", "elbow_roll")
-HAND = ("zero", "one", "two", "three", "four", "five", "six")
-CLOSE = ("one", "three", "four", "five", "six", "palm", "elbow_roll")  # overlap, harmlessly
-THUMB = ((-0.523598, 0.523598), (-1.0, 1.2), (0.0, 1.84))
-BENDS = ((-1.84, 0.3), (-1.84, 0.0))  # of a finger
-Limits = tuple[tuple[float, float], ...]
-LIMITS: dict[str, Limits] = {
-    "arm": ((-2.9671, 2.7925), (-1.5882, 2.2515), (-2.618, 2.618), (-0.2268, 3.4208),
-            (-2.0943, 2.0943)),
-    "hand": (*THUMB, *BENDS, *BENDS),
-}  # fmt: skip
-
-
-def group(side: str, parts: tuple[str, ...], limits: Limits, step: float) -> JointGroup:
-    """Return joints of one side (step: rad); the right side is the left one in a mirror."""
-    turned = ("shoulder_roll", *HAND[1:])
-    if side == "right":
-        pairs = zip(parts, limits, strict=True)
-        limits = tuple((-b, -a) if part in turned else (a, b) for part, (a, b) in pairs)
-    joints = tuple(f"{side}_{part}_joint" for part in parts) if side else parts
-    return JointGroup(joints, -step, step, 1e3, 1e2, 100.0, delta=True, limits=limits)
-
+LEFT_ARM = JointGroup(
+    (
+        "left_shoulder_pitch_joint",
+        "left_shoulder_roll_joint",
+        "left_shoulder_yaw_joint",
+        "left_elbow_pitch_joint",
+        "left_elbow_roll_joint",
+    ),
+    lower=-0.2,
+    upper=0.2,
+    delta=True,
+    stiffness=1e3,
+    damping=1e2,
+    force_limit=100.0,
+    limits=(
+        (-2.9671, 2.7925),
+        (-1.5882, 2.2515),
+        (-2.618, 2.618),
+        (-0.2268, 3.4208),
+        (-2.0943, 2.0943),
+    ),
+)
+LEFT_HAND = JointGroup(
+    (
+        "left_zero_joint",
+        "left_one_joint",
+        "left_two_joint",
+        "left_three_joint",
+        "left_four_joint",
+        "left_five_joint",
+        "left_six_joint",
+    ),
+    lower=-0.5,
+    upper=0.5,
+    delta=True,
+    stiffness=1e3,
+    damping=1e2,
+    force_limit=100.0,
+    limits=(
+        (-0.523598, 0.523598),
+        (-1.0, 1.2),
+        (0.0, 1.84),
+        (-1.84, 0.3),
+        (-1.84, 0.0),
+        (-1.84, 0.3),
+        (-1.84, 0.0),
+    ),
+)
+# The right side is the left one in a mirror.
+RIGHT_ARM = replace(
+    LEFT_ARM,
+    joints=(
+        "right_shoulder_pitch_joint",
+        "right_shoulder_roll_joint",
+        "right_shoulder_yaw_joint",
+        "right_elbow_pitch_joint",
+        "right_elbow_roll_joint",
+    ),
+    limits=(
+        (-2.9671, 2.7925),
+        (-2.2515, 1.5882),
+        (-2.618, 2.618),
+        (-0.2268, 3.4208),
+        (-2.0943, 2.0943),
+    ),
+)
+RIGHT_HAND = replace(
+    LEFT_HAND,
+    joints=(
+        "right_zero_joint",
+        "right_one_joint",
+        "right_two_joint",
+        "right_three_joint",
+        "right_four_joint",
+        "right_five_joint",
+        "right_six_joint",
+    ),
+    limits=(
+        (-0.523598, 0.523598),
+        (-1.2, 1.0),
+        (-1.84, -0.0),
+        (-0.3, 1.84),
+        (-0.0, 1.84),
+        (-0.3, 1.84),
+        (-0.0, 1.84),
+    ),
+)
+TORSO = replace(LEFT_ARM, joints=("torso_joint",), limits=((-2.618, 2.618),))
 
 UNITREE_G1_UPPER_BODY = RobotDescriptor(
     name="unitree_g1_upper_body",  # ManiSkill: unitree_g1_simplified_upper_body
     urdf=UrdfLocator("maniskill_g1_humanoid", "g1_simplified_upper_body.urdf"),
     action_split=ActionSplit(
-        left_arm=group("left", ARM, LIMITS["arm"], 0.2),
-        left_gripper=group("left", HAND, LIMITS["hand"], 0.5),
-        right_arm=group("right", ARM, LIMITS["arm"], 0.2),
-        right_gripper=group("right", HAND, LIMITS["hand"], 0.5),
-        torso=group("", ("torso_joint",), ((-2.618, 2.618),), 0.2),
+        left_arm=LEFT_ARM,
+        left_gripper=LEFT_HAND,
+        right_arm=RIGHT_ARM,
+        right_gripper=RIGHT_HAND,
+        torso=TORSO,
     ),
     tcp_link="left_tcp_link",
     gripper_material=GripperMaterial(
-        tuple(f"{side}_{part}_link" for side in SIDES for part in (*HAND[1:], "palm")),
+        (
+            "left_one_link",
+            "left_two_link",
+            "left_three_link",
+            "left_four_link",
+            "left_five_link",
+            "left_six_link",
+            "left_palm_link",
+            "right_one_link",
+            "right_two_link",
+            "right_three_link",
+            "right_four_link",
+            "right_five_link",
+            "right_six_link",
+            "right_palm_link",
+        ),
         2.0,
         2.0,
         0.0,
         patch_radius=0.1,
-    ),  # fmt: skip
+    ),
     keyframes={"standing": (0,) * 25, "rest": (0,) * 25},
     home=Home(position=(0.0, 0.0, 0.755)),
     limbs=both_sides("{side}_tcp_link", 0.531, (-0.0025, 0.104, 0.2593)),
     reach=0.64,  # of the left TCP, from the URDF
     source="mani_skill 3.0.1, agents/robots/unitree_g1/g1_upper_body.py",
     allowed_collisions=among(
-        *(tuple(f"{side}_{part}_link" for part in CLOSE) for side in SIDES),
+        (
+            "left_one_link",
+            "left_three_link",
+            "left_four_link",
+            "left_five_link",
+            "left_six_link",
+            "left_palm_link",
+            "left_elbow_roll_link",
+        ),
+        (
+            "right_one_link",
+            "right_three_link",
+            "right_four_link",
+            "right_five_link",
+            "right_six_link",
+            "right_palm_link",
+            "right_elbow_roll_link",
+        ),
         ("torso_link", "left_shoulder_roll_link", "right_shoulder_roll_link"),
     ),
 )

@@ -5,24 +5,56 @@ from dataclasses import replace
 from robots.assets.locator import UrdfLocator
 from robots.catalogue.unitree_g1 import UNITREE_G1
 from robots.descriptor import ActionSplit, GripperMaterial, JointGroup
-from robots.link_pairs import among
-from robots.parts import both_sides
+from robots.parts import among, both_sides
 
-# fmt: off
-SIDES = ("left", "right")
 GROUPS = UNITREE_G1.action_split.groups
-HAND = ("thumb_0", "thumb_1", "thumb_2", "middle_0", "middle_1", "index_0", "index_1")
 LEFT_GRIPPER = JointGroup(
-    tuple(f"left_hand_{joint}_joint" for joint in HAND), lower=-0.1, upper=0.1, delta=True,
-    stiffness=1e3, damping=2e1, force_limit=(2.45, 1.4, 1.4, 1.4, 1.4, 1.4, 1.4),
+    (
+        "left_hand_thumb_0_joint",
+        "left_hand_thumb_1_joint",
+        "left_hand_thumb_2_joint",
+        "left_hand_middle_0_joint",
+        "left_hand_middle_1_joint",
+        "left_hand_index_0_joint",
+        "left_hand_index_1_joint",
+    ),
+    lower=-0.1,
+    upper=0.1,
+    delta=True,
+    stiffness=1e3,
+    damping=2e1,
+    force_limit=(2.45, 1.4, 1.4, 1.4, 1.4, 1.4, 1.4),
     reset_noise=False,
-    limits=((-1.0471976, 1.0471976), (-0.61086524, 1.0471976), (0.0, 1.7453293), (-1.5707964, 0.0),
-            (-1.7453293, 0.0), (-1.5707964, 0.0), (-1.7453293, 0.0)),
+    limits=(
+        (-1.0471976, 1.0471976),
+        (-0.61086524, 1.0471976),
+        (0.0, 1.7453293),
+        (-1.5707964, 0.0),
+        (-1.7453293, 0.0),
+        (-1.5707964, 0.0),
+        (-1.7453293, 0.0),
+    ),
 )
 RIGHT_GRIPPER = replace(
     LEFT_GRIPPER,
-    joints=tuple(f"right_hand_{joint}_joint" for joint in HAND),
-    limits=tuple((-upper, -lower) for lower, upper in LEFT_GRIPPER.limits),
+    joints=(
+        "right_hand_thumb_0_joint",
+        "right_hand_thumb_1_joint",
+        "right_hand_thumb_2_joint",
+        "right_hand_middle_0_joint",
+        "right_hand_middle_1_joint",
+        "right_hand_index_0_joint",
+        "right_hand_index_1_joint",
+    ),
+    limits=(
+        (-1.0471976, 1.0471976),
+        (-1.0471976, 0.61086524),
+        (-1.7453293, -0.0),
+        (-0.0, 1.5707964),
+        (-0.0, 1.7453293),
+        (-0.0, 1.5707964),
+        (-0.0, 1.7453293),
+    ),
 )
 
 UNITREE_G1_WITH_HANDS = replace(
@@ -30,22 +62,57 @@ UNITREE_G1_WITH_HANDS = replace(
     name="unitree_g1_with_hands",
     urdf=UrdfLocator("example_g1_description", "urdf/g1_29dof_with_hand_rev_1_0.urdf"),
     action_split=ActionSplit(
-        left_arm=GROUPS["left_arm"], left_gripper=LEFT_GRIPPER, right_arm=GROUPS["right_arm"],
-        right_gripper=RIGHT_GRIPPER, torso=GROUPS["torso"], legs=GROUPS["legs"]),
+        left_arm=GROUPS["left_arm"],
+        left_gripper=LEFT_GRIPPER,
+        right_arm=GROUPS["right_arm"],
+        right_gripper=RIGHT_GRIPPER,
+        torso=GROUPS["torso"],
+        legs=GROUPS["legs"],
+    ),
     tcp_link="left_hand_palm_link",
     tcp_position_links=("left_hand_thumb_2_link", "left_hand_index_1_link"),
     gripper_material=GripperMaterial(
-        tuple(f"{side}_hand_{part}_link" for side in SIDES for part in HAND), 2.0, 2.0, 0.0,
-        patch_radius=0.1),
+        (
+            "left_hand_thumb_0_link",
+            "left_hand_thumb_1_link",
+            "left_hand_thumb_2_link",
+            "left_hand_middle_0_link",
+            "left_hand_middle_1_link",
+            "left_hand_index_0_link",
+            "left_hand_index_1_link",
+            "right_hand_thumb_0_link",
+            "right_hand_thumb_1_link",
+            "right_hand_thumb_2_link",
+            "right_hand_middle_0_link",
+            "right_hand_middle_1_link",
+            "right_hand_index_0_link",
+            "right_hand_index_1_link",
+        ),
+        2.0,
+        2.0,
+        0.0,
+        patch_radius=0.1,
+    ),
     keyframes={"rest": (0,) * 43},
     limbs=both_sides(
-        "{side}_hand_palm_link", 0.529, (0.0, 0.1002, 0.2918),
-        tcp_position_links=("{side}_hand_thumb_2_link", "{side}_hand_index_1_link")),
+        "{side}_hand_palm_link",
+        0.529,
+        (0.0, 0.1002, 0.2918),
+        tcp_position_links=("{side}_hand_thumb_2_link", "{side}_hand_index_1_link"),
+    ),
     reach=0.629,  # of the left TCP, from the URDF
     allowed_collisions=among(  # neighbours, and what overlaps however the joints stand
-        *((f"{side}_shoulder_pitch_link", "head_link", "logo_link") for side in SIDES),
-        *((f"{side}_wrist_yaw_link", f"{side}_hand_palm_link", f"{side}_hand_{finger}_0_link")
-          for side in SIDES for finger in ("thumb", "index", "middle")),
-        *((f"{side}_wrist_pitch_link", f"{side}_hand_palm_link") for side in SIDES),
-        *((f"{side}_hip_pitch_link", "pelvis_contour_link") for side in SIDES)),
+        ("left_shoulder_pitch_link", "head_link", "logo_link"),
+        ("right_shoulder_pitch_link", "head_link", "logo_link"),
+        ("left_wrist_yaw_link", "left_hand_palm_link", "left_hand_thumb_0_link"),
+        ("left_wrist_yaw_link", "left_hand_palm_link", "left_hand_index_0_link"),
+        ("left_wrist_yaw_link", "left_hand_palm_link", "left_hand_middle_0_link"),
+        ("right_wrist_yaw_link", "right_hand_palm_link", "right_hand_thumb_0_link"),
+        ("right_wrist_yaw_link", "right_hand_palm_link", "right_hand_index_0_link"),
+        ("right_wrist_yaw_link", "right_hand_palm_link", "right_hand_middle_0_link"),
+        ("left_wrist_pitch_link", "left_hand_palm_link"),
+        ("right_wrist_pitch_link", "right_hand_palm_link"),
+        ("left_hip_pitch_link", "pelvis_contour_link"),
+        ("right_hip_pitch_link", "pelvis_contour_link"),
+    ),
 )

@@ -1,4 +1,4 @@
-"""Paths that people write."""
+"""Paths that people write, and the folder of the local copy of robot files."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ import os
 from pathlib import Path
 
 from robots.common.errors import AssetError
+
+ROOT_VARIABLE = "ROBOT_LAYOUTS_ASSETS"
+CHECKOUT_CACHE = Path(__file__).resolve().parents[2] / "assets_cache"
 
 
 def absolute(path: str | os.PathLike[str], what: str) -> Path:
@@ -29,3 +32,22 @@ def absolute(path: str | os.PathLike[str], what: str) -> Path:
             f"{what} is {text!r}, but {user!r} has no home directory here; write the path out in"
             f" full, or ./{user} if it is called so"
         ) from None
+
+
+def default_root() -> Path:
+    """Return the folder of the local copy.
+
+    ``ROBOT_LAYOUTS_ASSETS`` if it is set, else ``assets_cache/`` of a source checkout, else the
+    user's cache directory.
+
+    Raises:
+        AssetError: If it is in the home directory of a user that does not exist.
+    """
+    chosen = os.environ.get(ROOT_VARIABLE)
+    if chosen:
+        return absolute(chosen, ROOT_VARIABLE)
+    if (CHECKOUT_CACHE / "manifest.json").is_file():
+        return CHECKOUT_CACHE
+    from platformdirs import user_cache_path
+
+    return user_cache_path("robot-layouts", appauthor=False)

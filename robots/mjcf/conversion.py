@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from kinematics.rotations import Floats
-from robots.assets.store import default_root
 from robots.common.errors import UnwritableFileError
+from robots.common.paths import default_root
 from robots.common.writing import written_whole
 from robots.guessing.hints import DriveHint, Hints
 from robots.mjcf.compiling import Model, compiled, name_of

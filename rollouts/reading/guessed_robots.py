@@ -111,7 +111,8 @@ def descriptor_digest(robot: RobotDescriptor) -> str:
 
     `NEWER_FIELDS` count where they differ from their defaults, so that older digests stay.
     """
-    values = {f.name: getattr(robot, f.name) for f in fields(robot) if f.name != "urdf"}
+    counted = [f.name for f in fields(robot) if f.compare and f.name != "urdf"]
+    values = {name: getattr(robot, name) for name in counted}
     for name, default in NEWER_FIELDS.items():
         if values[name] == default:
             del values[name]

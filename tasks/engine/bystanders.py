@@ -102,4 +102,6 @@ def _holding(layout: Layout, arm: str, still: Sequence[str]) -> RobotDescriptor:
             del limbs[limb]
     moving = [group for limb in limbs for group in robot.parts[limb].action_split.groups]
     others = [group for group in robot.action_split.groups if group not in moving]
-    return replace(robot, action_split=robot.action_split.held(*others), limbs=limbs)
+    declared = robot.declared_split and robot.declared_split.held(*others)
+    split = robot.action_split.held(*others)
+    return replace(robot, action_split=split, declared_split=declared, limbs=limbs)

@@ -13,7 +13,8 @@ from pathlib import Path
 
 from robots.assets.fetching import ensure
 from robots.assets.sources import LocalCopy
-from robots.assets.store import AssetStore, FileState, default_root
+from robots.assets.store import AssetStore, FileState
+from robots.common.paths import default_root
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.tiny_files import (
     CONTENTS,
@@ -240,7 +241,7 @@ def _no_descriptors(folder: Path) -> None:
         "import resource, sys\n"
         "from pathlib import Path\n"
         "from tests.faults.tiny_files import *\n"
-        "import robots.assets.hub_source\n"
+        "import robots.assets.sources\n"
         "folder = Path(sys.argv[1])\n"
         "source, store = another_copy(folder), AssetStore(folder / 'assets')\n"
         "used = len(os.listdir('/proc/self/fd')) - 1\n"

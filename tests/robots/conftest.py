@@ -12,7 +12,8 @@ import pytest
 from robots.assets import sources as asset_sources
 from robots.assets.manifest import AssetFile, load_manifest
 from robots.assets.packages import SourceError, find_package
-from robots.assets.store import AssetStore, default_root
+from robots.assets.store import AssetStore
+from robots.common.paths import default_root
 from tests.robots.hub_server import HubServer
 
 REAL_ROOT = default_root()
@@ -69,13 +70,23 @@ def fill() -> Callable[[AssetStore, tuple[AssetFile, ...]], None]:
 
 
 @pytest.fixture
-def hub(monkeypatch: pytest.MonkeyPatch) -> Iterator[HubServer]:
+def hub(monkeypatch: pytest.MonkeyPatch, hub_client: None) -> Iterator[HubServer]:
     """A Hub that holds every Panda file but the large pictures."""
     small = [file for file in PANDA.files if file.bytes < 100_000]
     files = {f"{file.origin.hub_folder}/{file.path}": contents(file) for file in small}
     with HubServer(files) as server:
         monkeypatch.setenv("HF_ENDPOINT", server.endpoint)
         yield server
+
+
+@pytest.fixture
+def hub_client(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Give the Hub's client of this process a cache of its own, and little patience."""
+    from huggingface_hub import constants
+
+    monkeypatch.setattr(constants, "HF_HUB_CACHE", str(tmp_path / "hf_home" / "hub"))
+    monkeypatch.setattr(constants, "HF_HUB_ETAG_TIMEOUT", 2)  # s
+    monkeypatch.setattr(constants, "HF_HUB_DOWNLOAD_TIMEOUT", 2)  # s
 
 
 @pytest.fixture

@@ -9,11 +9,9 @@ import re
 import socket
 import struct
 import threading
-import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from itertools import chain, repeat
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
@@ -44,7 +42,6 @@ class HubServer:
 
     def __post_init__(self) -> None:
         self.dead = False
-        self.sent = 0  # bytes of bodies without end
         self._rules: list[Rule] = []
         self._lock = threading.Lock()
         self._server = _Server(("127.0.0.1", 0), _Handler)
@@ -152,14 +149,6 @@ class _Handler(BaseHTTPRequestHandler):
         self.wfile.flush()
         self.close_connection = True
 
-    def send_slowly(self, body: bytes, pieces: int, pause: float) -> None:
-        self._send_head(200, len(body), _file_headers(body))
-        step = -(-len(body) // pieces)
-        for start in range(0, len(body), step):
-            self.wfile.write(body[start : start + step])
-            self.wfile.flush()
-            time.sleep(pause)
-
     def send_without_length(self, pieces: Iterable[bytes], headers: dict[str, str]) -> None:
         """Send pieces until there are no more or the client goes away."""
         self.send_response(200)
@@ -169,7 +158,6 @@ class _Handler(BaseHTTPRequestHandler):
         self.close_connection = True
         for piece in pieces:
             self.wfile.write(piece)
-            self.server.hub.sent += len(piece)
 
     def send_page(self, status: int, text: str, headers: dict[str, str]) -> None:
         self._send(status, text.encode(), {"Content-Type": "text/html", **headers})
@@ -215,15 +203,6 @@ def die(handler: _Handler, body: bytes) -> None:
     handler.reset()
 
 
-def drip(pieces: int, pause: float) -> Fault:
-    """Send the file in pieces, with a pause (s) after each."""
-
-    def fault(handler: _Handler, body: bytes) -> None:
-        handler.send_slowly(body, pieces, pause)
-
-    return fault
-
-
 def stall(reached: threading.Event) -> Fault:
     """Send half of the file, tell that this happened, and then nothing more."""
 
@@ -235,21 +214,9 @@ def stall(reached: threading.Event) -> Fault:
     return fault
 
 
-def endless(handler: _Handler, body: bytes) -> None:
-    """Send the file, and then zeros up to a gigabyte, without saying how much it will be."""
-    zeros = bytes(2**16)
-    handler.send_without_length(chain([body], repeat(zeros, 2**14)), _file_headers(body))
-
-
 def without_length(handler: _Handler, body: bytes) -> None:
     """Send the file, and only by closing the connection tell where it ends."""
     handler.send_without_length([body], _file_headers(body))
-
-
-def inflated(handler: _Handler, body: bytes) -> None:
-    """Send a few kilobytes that unpack to a hundred megabytes."""
-    bomb = gzip.compress(body + bytes(10**8))
-    handler.send_without_length([bomb], {**_file_headers(body), "Content-Encoding": "gzip"})
 
 
 def compressed(handler: _Handler, body: bytes) -> None:

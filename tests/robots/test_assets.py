@@ -10,12 +10,13 @@ from pathlib import Path
 import pytest
 
 from robots import AssetError, RobotRegistry, UnknownNameError, UrdfLocator
-from robots.assets import store as asset_store
 from robots.assets.fetching import ensure
 from robots.assets.manifest import load_manifest
 from robots.assets.packages import INDEX_PACKAGES, MANI_SKILL, SourceError
 from robots.assets.sources import InstalledPackage, LocalCopy
-from robots.assets.store import AssetStore, FileState, default_root
+from robots.assets.store import AssetStore, FileState
+from robots.common import paths
+from robots.common.paths import default_root
 from robots.fetch_assets import main
 from robots.urdf.summary import read_references
 from tests.catalogue import every_robot
@@ -35,9 +36,11 @@ class FakeSource:
     def holds(self, file) -> bool:
         return True
 
-    def fetch(self, files, scratch, *, again, trust):
+    def fetch(self, files, scratch, *, again):
         self.asked.append(([file.path for file in files], again))
-        yield from ((file, self.given[file.path]) for file in files if file.path in self.given)
+        for file in files:
+            if file.path in self.given:
+                yield file, self.given[file.path]
         if self.error:
             raise SourceError(self.error)
 
@@ -241,7 +244,7 @@ DAMAGED_RECORDS = {
 
 
 @pytest.mark.parametrize("damage", DAMAGED_RECORDS)
-def test_a_damaged_record_is_set_aside_and_loses_nothing(store, physics, fill, capfd, damage):
+def test_a_damaged_record_is_written_anew_and_loses_nothing(store, physics, fill, capfd, damage):
     fill(store, physics)
     record = store.root / "fetched.json"
     record.write_text(DAMAGED_RECORDS[damage])
@@ -250,23 +253,8 @@ def test_a_damaged_record_is_set_aside_and_loses_nothing(store, physics, fill, c
     assert store.unusable(physics) == [physics[0]]
     ensure(physics, store, [FakeSource(right(physics))])
     assert store.unusable(physics) == []
-    said = capfd.readouterr().err
-    assert said.count(f"{record} is damaged: ") == 1
+    assert capfd.readouterr().err.count(f"{record} is damaged: ") == 1
     assert list(json.loads(record.read_text())) == [str(physics[0])]
-    assert Path(f"{record}.damaged").read_text() == DAMAGED_RECORDS[damage]
-
-
-def test_what_of_a_damaged_record_is_right_is_kept(store, physics, fill):
-    mesh = physics[0]
-    ensure(physics, store, [FakeSource({**right(physics), mesh.path: b"my own"})], trust=True)
-    record = store.root / "fetched.json"
-    entries = json.loads(record.read_text())
-    record.write_text(json.dumps({**entries, str(physics[1]): 5}))
-    assert store.state(mesh) is FileState.TRUSTED
-    store.path(physics[2]).unlink()
-    ensure(physics, store, [FakeSource(right(physics))])
-    assert store.state(mesh) is FileState.TRUSTED
-    assert json.loads(record.read_text()).keys() == entries.keys() - {str(physics[1])}
 
 
 def test_what_stands_in_place_of_a_file_is_exchanged_and_never_waited_for(store, physics, fill):
@@ -298,8 +286,8 @@ def test_the_local_copy_is_where_it_is_said_to_be(monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path))
     assert default_root() == tmp_path / "robot_files"
     monkeypatch.setenv("ROBOT_LAYOUTS_ASSETS", "")
-    assert default_root() == Path(asset_store.__file__).parents[2] / "assets_cache"
-    monkeypatch.setattr(asset_store, "CHECKOUT_CACHE", tmp_path / "no_checkout")
+    assert default_root() == Path(paths.__file__).parents[2] / "assets_cache"
+    monkeypatch.setattr(paths, "CHECKOUT_CACHE", tmp_path / "no_checkout")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     assert default_root() == tmp_path / "cache" / "robot-layouts"
 

@@ -14,13 +14,14 @@ from pathlib import Path
 import pytest
 
 from robots import AssetError, UrdfLocator
-from robots.assets import wheel_source
+from robots.assets import sources
 from robots.assets.fetching import ensure
 from robots.assets.packages import MANI_SKILL
+from robots.assets.sources import PackageWheel
 from robots.assets.store import FileState
-from robots.assets.wheel_source import PackageWheel
 from tests.robots.conftest import contents
 from tests.robots.hub_server import HubServer, stall
+from tests.robots.wheel_index import WHEEL, build_wheel, members
 
 pytestmark = pytest.mark.usefixtures("store")
 
@@ -133,18 +134,7 @@ def wheel_index(tmp_path, monkeypatch, physics) -> Path:
     """Let pip find a small mani_skill wheel, and nothing else."""
     index = tmp_path / "index"
     index.mkdir()
-    info = "mani_skill-3.0.1.dist-info"
-    with zipfile.ZipFile(index / "mani_skill-3.0.1-py3-none-any.whl", "w") as wheel:
-        wheel.writestr(
-            f"{info}/METADATA", "Metadata-Version: 2.1\nName: mani_skill\nVersion: 3.0.1\n"
-        )
-        wheel.writestr(
-            f"{info}/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
-        )
-        wheel.writestr(f"{info}/RECORD", "")
-        wheel.writestr("mani_skill/__init__.py", "raise ImportError('not meant to be imported')")
-        for file in physics:
-            wheel.writestr(f"{file.origin.folder}/{file.path}", contents(file))
+    (index / WHEEL).write_bytes(build_wheel(members(physics, contents)))
     for name in [name for name in os.environ if name.startswith("PIP_")]:
         monkeypatch.delenv(name)
     monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
@@ -180,7 +170,7 @@ def test_what_pip_says_is_passed_on(wheel_index, store, physics):
 
 
 def test_a_python_without_pip_is_named(store, physics, monkeypatch):
-    monkeypatch.setattr(wheel_source, "find_spec", lambda name: None)
+    monkeypatch.setattr(sources, "find_spec", lambda name: None)
     monkeypatch.setenv("PATH", "")
     with pytest.raises(AssetError, match="this Python has no pip.*and there is no uv"):
         ensure(physics, store, [PackageWheel(MANI_SKILL)])
@@ -193,6 +183,6 @@ def test_uv_runs_pip_where_python_has_none(wheel_index, store, physics, monkeypa
     uv.write_text(f'#!/bin/sh\n{shift}\n"{sys.executable}" -m pip "$@"\n')
     uv.chmod(0o755)
     monkeypatch.setenv("PATH", f"{uv.parent}:{os.environ['PATH']}")
-    monkeypatch.setattr(wheel_source, "find_spec", lambda name: None)
+    monkeypatch.setattr(sources, "find_spec", lambda name: None)
     ensure(physics, store, [PackageWheel(MANI_SKILL)])
     assert store.unusable(physics) == []

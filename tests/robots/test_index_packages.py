@@ -14,8 +14,7 @@ from robots import AssetError
 from robots.assets.fetching import ensure
 from robots.assets.manifest import AssetFile, PackageOrigin, load_manifest
 from robots.assets.packages import EXAMPLE_ROBOT_DATA, MANI_SKILL, find_package
-from robots.assets.sources import InstalledPackage
-from robots.assets.wheel_source import PackageWheel
+from robots.assets.sources import InstalledPackage, PackageWheel
 from robots.fetch_assets import main
 from robots.write_manifest import build_manifest, build_package
 from tests.robots.wheel_index import WheelIndex, without_pip_settings

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from robots import RobotRegistry
-from robots.assets.store import AssetStore, default_root
+from robots.assets.store import AssetStore
 from robots.common import console
+from robots.common.paths import default_root
 from robots.inspect import find_urdf, main, report
 from tests.catalogue import every_robot
 

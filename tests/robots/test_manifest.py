@@ -12,8 +12,9 @@ import pytest
 
 from robots import AssetError, UnknownNameError, write_manifest
 from robots.assets import manifest
-from robots.assets.manifest import CHECKOUT_CACHE, Manifest, load_manifest
+from robots.assets.manifest import Manifest, load_manifest
 from robots.assets.packages import find_package
+from robots.common.paths import CHECKOUT_CACHE
 from robots.write_manifest import build_package
 
 

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import pytest
@@ -15,12 +12,10 @@ from robots import AssetError, RobotRegistry
 from robots.assets.fetching import ensure
 from robots.assets.manifest import load_manifest
 from robots.assets.packages import MANI_SKILL
+from robots.assets.sources import PackageWheel
 from robots.assets.store import AssetStore, FileState
-from robots.assets.wheel_source import PackageWheel
 from robots.fetch_assets import robot_files
-from tests.process_trees import children_of
 from tests.robots.conftest import PANDA, contents
-from tests.robots.processes import is_alive, wait_until
 from tests.robots.wheel_index import WheelIndex, build_wheel, members, without_pip_settings
 
 pytestmark = pytest.mark.usefixtures("store")
@@ -96,7 +91,7 @@ def test_processes_that_lack_different_files_download_once(index, store):
 import sys
 from robots.assets import fetching
 from robots.assets.packages import MANI_SKILL
-from robots.assets.wheel_source import PackageWheel
+from robots.assets.sources import PackageWheel
 from robots.registry import RobotRegistry
 fetching.default_sources = lambda: [PackageWheel(MANI_SKILL)]
 RobotRegistry.load(sys.argv[1]).urdf.locate(pictures=sys.argv[2] == "True")
@@ -114,49 +109,6 @@ RobotRegistry.load(sys.argv[1]).urdf.locate(pictures=sys.argv[2] == "True")
     assert [process.returncode for process in started] == [0, 0, 0], said
     assert index.downloads == 1
     assert sum("downloading the wheel" in words for words in said) == 1
-
-
-@pytest.mark.long
-def test_a_fetch_killed_while_pip_downloads_leaves_nothing_behind(index, store, physics):
-    reached, end = threading.Event(), threading.Event()
-
-    def hang(handler, body):
-        reached.set()
-        end.wait(120)
-
-    index.wheel_fault = hang
-    with start_fetch() as process:
-        assert reached.wait(60)
-        (pip,) = children_of(process.pid)
-        os.kill(pip, signal.SIGSTOP)
-        process.kill()
-    wait_until(lambda: not is_alive(pip))
-    end.set()
-    index.wheel_fault = None
-    with start_fetch() as process:
-        said = process.communicate(timeout=120)[1]
-    assert process.returncode == 0, said
-    assert store.unusable(physics) == []
-    assert not (store.root / ".partial").exists()
-
-
-@pytest.mark.long
-def test_pip_that_drips_is_given_up(index, store, physics):
-    end = threading.Event()
-
-    def drip(handler, body):
-        handler.send_response(200)
-        handler.send_header("Content-Length", str(len(body)))
-        handler.end_headers()
-        for byte in body:
-            handler.wfile.write(bytes([byte]))
-            if end.wait(0.05):
-                return
-
-    index.wheel_fault = drip
-    with pytest.raises(AssetError, match="next to nothing arrived through pip for 4 s"):
-        ensure(physics, store, [PackageWheel(MANI_SKILL, patience=4.0)])
-    end.set()
 
 
 @pytest.mark.long

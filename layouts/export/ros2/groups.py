@@ -10,7 +10,7 @@ from layouts.export.names import Names
 from layouts.export.ros2.names import RosNames
 from robots import RobotDescriptor
 from robots.action_split import is_gripper
-from robots.limbs import BODY
+from robots.parts import BODY
 from robots.urdf.model import ModelJoint
 
 ALL = "all"
