@@ -41,7 +41,7 @@ from robots.parts import Limb as LimbDescription
 from robots.urdf.cleaning.xacro_files import expand, template_of
 from robots.urdf.model import UrdfModel
 from robots.urdf.reading import read_model
-from robots.urdf.summary import is_template_file, parse_urdf, read_cleaned
+from robots.urdf.summary import is_template_file, read_cleaned
 
 LinkPairs = tuple[tuple[str, str], ...]
 
@@ -178,7 +178,7 @@ def _look_at(path: Path, xml: bytes, hints: Hints, overrides: Mapping[str, Any])
     bodies: dict[int, list[Floats]] = {}
     for hull in hulls:
         bodies.setdefault(hull.link, []).append(hull.corners)
-    masses = read_masses(parse_urdf(xml, path.as_posix()), stance.tree, bodies)
+    masses = read_masses(model, stance.tree, bodies)
     drives = Drives(stance, masses, hints.drives, hints.source)
     hands = [limb for limb in anatomy.limbs if limb.fingers]
     tips = {limb.name: Fingertips(stance, limb, hulls) for limb in hands}

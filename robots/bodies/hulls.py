@@ -20,10 +20,9 @@ from robots.common.errors import AssetError, MissingPackageError
 from robots.descriptor import RobotDescriptor
 from robots.urdf.cleaning.xacro_files import template_of
 from robots.urdf.mesh_files import has_volume, read_corners
-from robots.urdf.model import UrdfModel
+from robots.urdf.model import UrdfModel, UrdfShape
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model
-from robots.urdf.shapes import UrdfShape
 from robots.urdf.srdf import srdf_beside
 from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
-from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from kinematics.rotations import Floats, rpy_pose
+from kinematics.rotations import Floats
 from kinematics.tree import Tree
-from robots.urdf.numbers import numbers_of
+from robots.urdf.model import UrdfModel
 
 WATER = 1000.0  # kg/m³
-_PRODUCTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,32 +30,24 @@ class Masses:
     inertia: Floats
 
 
-def read_masses(root: Element, tree: Tree, bodies: Mapping[int, Sequence[Floats]]) -> Masses:
+def read_masses(model: UrdfModel, tree: Tree, bodies: Mapping[int, Sequence[Floats]]) -> Masses:
     """Return what the links of a URDF weigh; without numbers, as much as their shapes in water.
 
     Args:
-        root: Its ``<robot>``, whose numbers make sense; see `robots.urdf.inertia`.
+        model: What the URDF describes.
         tree: Its links.
         bodies: Corners of the convex bodies of links, by index, in their frames (m).
     """
-    inertial = {link.get("name"): link.find("inertial") for link in root.iterfind("link")}
-    rows = [_row(inertial.get(link)) for link in tree.links]
-    rows = [row if row[0] else _of_shapes(bodies.get(i, ())) for i, row in enumerate(rows)]
+    rows: list[tuple[float, Floats, Floats]] = []
+    for i, link in enumerate(tree.links):
+        inertial = model.inertials.get(link)
+        if inertial is None or not inertial.mass:
+            rows.append(_of_shapes(bodies.get(i, ())))
+        else:
+            turn = inertial.origin[:3, :3]
+            rows.append((inertial.mass, inertial.origin[:3, 3], turn @ inertial.tensor @ turn.T))
     mass, centre, inertia = (np.array(column) for column in zip(*rows, strict=True))
     return Masses(mass, centre, inertia)
-
-
-def _row(inertial: Element | None) -> tuple[float, Floats, Floats]:
-    if inertial is None:
-        return 0.0, np.zeros(3), np.zeros((3, 3))
-    origin = inertial.find("origin")
-    xyz, rpy = (numbers_of(origin, key, (0.0, 0.0, 0.0), "") for key in ("xyz", "rpy"))
-    pose = rpy_pose(xyz, rpy)
-    mass = numbers_of(inertial.find("mass"), "value", (0.0,), "")[0]
-    tensor = inertial.find("inertia")
-    xx, xy, xz, yy, yz, zz = (numbers_of(tensor, key, (0.0,), "")[0] for key in _PRODUCTS)
-    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return mass, pose[:3, 3], pose[:3, :3] @ inertia @ pose[:3, :3].T
 
 
 def _of_shapes(bodies: Sequence[Floats]) -> tuple[float, Floats, Floats]:

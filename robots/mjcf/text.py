@@ -16,11 +16,11 @@ from xml.etree.ElementTree import Element, tostring
 
 from robots.common.errors import AssetError, UnreadableFileError
 from robots.common.files import read_regular
+from robots.common.quoting import shown
 from robots.urdf.mesh_files import MAX_MESH_BYTES
-from robots.urdf.numbers import shown
 from robots.urdf.paths import is_allowed
 from robots.urdf.summary import MAX_URDF_BYTES
-from robots.urdf.xml_text import parse_xml
+from robots.urdf.text import parse_xml
 
 MESH_ENDINGS = (".stl", ".obj", ".msh")
 MOST_FILES = 2000  # that one MJCF refers to

@@ -19,7 +19,7 @@ from urllib.parse import unquote
 from robots.common.errors import AssetError, MissingPackageError, UnreadableFileError
 from robots.common.files import read_regular
 from robots.urdf.paths import is_allowed
-from robots.urdf.xml_text import parse_xml
+from robots.urdf.text import parse_xml
 
 ENDINGS = (".stl", ".obj", ".dae", ".glb", ".gltf", ".ply")
 MAX_MESH_BYTES = 256 << 20

@@ -1,4 +1,4 @@
-"""The links and joints of a robot, as its URDF gives them."""
+"""The links, joints and shapes of a robot, as its URDF gives them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,52 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from robots.urdf.shapes import UrdfShape
-
 if TYPE_CHECKING:
     from kinematics.rotations import Floats
+
+# Attributes of each kind of shape, with how many numbers each has.
+SIZES: Mapping[str, Mapping[str, int]] = {
+    "box": {"size": 3},
+    "sphere": {"radius": 1},
+    "cylinder": {"radius": 1, "length": 1},
+    "capsule": {"radius": 1, "length": 1},
+    "mesh": {},
+}
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfShape:
+    """A shape of a link.
+
+    Attributes:
+        kind: ``box``, ``sphere``, ``cylinder``, ``capsule`` or ``mesh``.
+        sizes: Of a box its extents, of a sphere its radius, of a cylinder and a capsule radius
+            and length (m); of a mesh the scale along x, y and z.
+        file: Of a mesh what the URDF refers to, else empty.
+        origin: Its pose in the link's frame, (4, 4) (m).
+        where: The URDF and the link, for messages.
+    """
+
+    kind: str
+    sizes: tuple[float, ...]
+    file: str
+    origin: Floats
+    where: str
+
+
+@dataclass(frozen=True, eq=False)
+class Inertial:
+    """What a link weighs.
+
+    Attributes:
+        mass: kg; 0 where it follows from the collision shapes.
+        origin: Pose of the frame at the centre of mass in the link's, (4, 4) (m).
+        tensor: Inertia in that frame, (3, 3) (kg·m²).
+    """
+
+    mass: float
+    origin: Floats
+    tensor: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +118,7 @@ class UrdfModel:
         joints: Joints, in the URDF's order.
         collisions: What each link collides with; links that collide with nothing are left out.
         visuals: What each link looks like; links that are not drawn are left out.
+        inertials: What each link weighs; links that do not say are left out.
     """
 
     name: str
@@ -83,6 +126,7 @@ class UrdfModel:
     joints: tuple[ModelJoint, ...]
     collisions: Mapping[str, tuple[UrdfShape, ...]] = field(default_factory=dict)
     visuals: Mapping[str, tuple[UrdfShape, ...]] = field(default_factory=dict)
+    inertials: Mapping[str, Inertial] = field(default_factory=dict)
 
     @cached_property
     def parent_joint(self) -> dict[str, ModelJoint]:

@@ -10,12 +10,17 @@ from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element, SubElement
 
 from robots.common.errors import AssetError, MissingPackageError
-from robots.urdf.inertia import MOMENTS, PRODUCTS, SMALLEST, expect_inertia
+from robots.urdf.checks import (
+    MOMENTS,
+    PRODUCTS,
+    SMALLEST,
+    expect_inertia,
+    moved_links,
+    sizes_of,
+)
 from robots.urdf.mesh_files import read_corners
-from robots.urdf.numbers import numbers_of, required_numbers
 from robots.urdf.paths import resolve
-from robots.urdf.shapes import SIZES
-from robots.urdf.text_checks import link_of
+from robots.urdf.text import numbers_of
 
 if TYPE_CHECKING:
     from kinematics.rotations import Floats
@@ -33,7 +38,7 @@ def repair_inertia(root: Element, urdf: str) -> Iterator[str]:
         root: The ``<robot>``.
         urdf: Its path, by which it refers to meshes.
     """
-    moved = {link_of(j, "child") for j in root.iterfind("joint") if j.get("type") != "fixed"}
+    moved = moved_links(root)
     for link in root.iterfind("link"):
         name = link.get("name", "")
         where = f"{urdf}: link {name!r}"
@@ -167,12 +172,8 @@ def _own_corners(element: Element, where: str, urdf: str) -> Any:
         scale = numbers_of(shape, "scale", (1.0, 1.0, 1.0), where)
         path = resolve(shape.get("filename", ""), urdf, os.path.isfile)
         return read_corners(path, scale, where, urdf)
-    sizes = [
-        size
-        for attribute, count in SIZES[shape.tag].items()
-        for size in required_numbers(shape, attribute, count, where)
-    ]
-    return _box_corners(_edges(shape.tag, sizes))
+    x, y, z = (edge / 2 for edge in _edges(shape.tag, sizes_of(shape, where)))
+    return [(a, b, c) for a in (-x, x) for b in (-y, y) for c in (-z, z)]
 
 
 def _edges(kind: str, sizes: list[float]) -> Size:
@@ -183,8 +184,3 @@ def _edges(kind: str, sizes: list[float]) -> Size:
     if kind == "sphere":
         return (diameter, diameter, diameter)
     return (diameter, diameter, sizes[1] + (diameter if kind == "capsule" else 0.0))
-
-
-def _box_corners(edges: Size) -> list[Size]:
-    x, y, z = (edge / 2 for edge in edges)
-    return [(a, b, c) for a in (-x, x) for b in (-y, y) for c in (-z, z)]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
-from robots.urdf.numbers import numbers_of
-from robots.urdf.text_checks import link_of
+from robots.urdf.checks import link_of
+from robots.urdf.text import numbers_of
 
 FREE = ("floating", "planar")  # types of joints that place a robot rather than move it
 BOUNDED = ("revolute", "prismatic")

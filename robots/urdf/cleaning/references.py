@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element
 from robots.common.errors import AssetError, UnreadableFileError
 from robots.common.files import read_regular
 from robots.urdf.paths import resolve
-from robots.urdf.xml_text import parse_xml
+from robots.urdf.text import parse_xml
 
 MAX_PACKAGE_BYTES = 1 << 20  # of a package.xml
 MOST_NEIGHBOURS = 500  # folders beside a package that are looked into
