@@ -9,11 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from robots.common.errors import DescriptorError
 from robots.guessing import words
-from robots.guessing.lengths import Lengths
 from robots.urdf.model import ModelJoint, UrdfModel
+from robots.urdf.tree import kinematic_tree
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from kinematics.rotations import Floats
+
 
 FARTHEST_SLIDE = 4.0  # m; a slide that goes farther is a way for a whole robot
 LONGEST_HAND = 0.4  # of the length of the arm that carries it
@@ -58,6 +68,43 @@ class Anatomy:
     limbs: tuple[Limb, ...]
     parts: Mapping[str, Joints]
     reasons: tuple[str, ...]
+
+
+class Lengths:
+    """Distances along the joints of a robot (m); turning joints do not change them."""
+
+    def __init__(self, model: UrdfModel) -> None:
+        """Place every link of a robot whose joints are all at 0."""
+        self._model = model
+        tree = kinematic_tree(model)
+        poses = tree.forward(np.zeros((1, len(tree.coordinates))))[0]
+        self._places = dict(zip(tree.links, poses[:, :3, 3], strict=True))
+
+    def place(self, joint: ModelJoint) -> Floats:
+        """Return where a joint is, in the root's frame, (3,) (m)."""
+        return self._places[joint.child]
+
+    def between(self, link: str, joint: ModelJoint) -> float:
+        """Return the length from a link over a joint on it to the end of the chain (m)."""
+        way = np.linalg.norm(self._places[joint.child] - self._places[link])
+        return float(way) + self.behind(joint)
+
+    def along(self, joints: Sequence[ModelJoint]) -> float:
+        """Return the length of joints in a row, from the first to the last (m)."""
+        places = [self.place(joint) for joint in joints]
+        return float(sum(np.linalg.norm(b - a) for a, b in zip(places, places[1:], strict=False)))
+
+    def behind(self, joint: ModelJoint) -> float:
+        """Return the length from a joint to the end of the longest chain that it moves (m)."""
+        return self._behind[joint.name]
+
+    @cached_property
+    def _behind(self) -> dict[str, float]:
+        lengths: dict[str, float] = dict.fromkeys(self._model.links, 0.0)
+        for joint in reversed(self._model.ordered):
+            way = np.linalg.norm(self._places[joint.child] - self._places[joint.parent])
+            lengths[joint.parent] = max(lengths[joint.parent], float(way) + lengths[joint.child])
+        return {joint.name: lengths[joint.child] for joint in self._model.joints}
 
 
 @dataclass
@@ -146,9 +193,13 @@ def _is_accessory(search: _Search, joint: ModelJoint, path: Joints) -> bool:
 
 
 def _moves_the_whole(joint: ModelJoint) -> bool:
+    return flies(joint) or bool(set(words.words(joint.name)) & set(words.BASE))
+
+
+def flies(joint: ModelJoint) -> bool:
+    """Tell whether a joint slides so far that it moves a whole robot."""
     low, high = joint.span
-    far = joint.type == "prismatic" and high - low > FARTHEST_SLIDE
-    return far or bool(set(words.words(joint.name)) & set(words.BASE))
+    return joint.unit == "m" and high - low > FARTHEST_SLIDE
 
 
 def _is_hand(search: _Search, link: str, nexts: Joints, path: Joints) -> bool:
