@@ -138,14 +138,9 @@ def _modified(file: Path) -> int:
 @lru_cache(maxsize=64)
 def _load(robot: RobotDescriptor, urdf: Path, _stamps: tuple[int, ...]) -> RobotModel:
     model = read_model(read_urdf(urdf), str(urdf))
-    kinematics, hulls = _tree(model, robot.joints), read_hulls(model, urdf)
+    kinematics, hulls = kinematic_tree(model, robot.joints), read_hulls(model, urdf)
     allowed = read_allowed_pairs(robot, model, urdf)
     return RobotModel(kinematics, hulls, counted_pairs(kinematics, hulls, allowed))
-
-
-@lru_cache(maxsize=64)
-def _tree(model: UrdfModel, joints: tuple[str, ...]) -> Tree:
-    return kinematic_tree(model, joints)
 
 
 @lru_cache(maxsize=64)

@@ -17,7 +17,7 @@ import numpy as np
 from robots.common.errors import DescriptorError
 from robots.guessing import words
 from robots.urdf.model import ModelJoint, UrdfModel
-from robots.urdf.tree import kinematic_tree
+from robots.urdf.tree import rest_poses
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -76,9 +76,7 @@ class Lengths:
     def __init__(self, model: UrdfModel) -> None:
         """Place every link of a robot whose joints are all at 0."""
         self._model = model
-        tree = kinematic_tree(model)
-        poses = tree.forward(np.zeros((1, len(tree.coordinates))))[0]
-        self._places = dict(zip(tree.links, poses[:, :3, 3], strict=True))
+        self._places = {link: pose[:3, 3] for link, pose in rest_poses(model).items()}
 
     def place(self, joint: ModelJoint) -> Floats:
         """Return where a joint is, in the root's frame, (3,) (m)."""
@@ -189,7 +187,8 @@ def _is_accessory(search: _Search, joint: ModelJoint, path: Joints) -> bool:
     if any(words.has(name, (*words.HEAD, *words.LEG, *words.WHEEL)) for name in names):
         return False
     follows = all(other.mimics for other in behind)
-    return follows or (len(path) > 1 and len(behind) < 3 and not _says(behind, words.ARM))
+    is_arm = any(words.has(name, words.ARM) for name in names)
+    return follows or (len(path) > 1 and len(behind) < 3 and not is_arm)
 
 
 def _moves_the_whole(joint: ModelJoint) -> bool:
@@ -212,7 +211,8 @@ def _is_hand(search: _Search, link: str, nexts: Joints, path: Joints) -> bool:
     named = all(_share(joints, words.FINGER) > 0.5 for joints in behind)
     if not named and any(_spins(joint) for joints in behind for joint in joints):
         return False
-    if named or (path and _is_called_palm(search.model, nexts)):
+    called_palm = any(words.has(joint.parent, (*words.HAND, "palm")) for joint in nexts)
+    if named or (path and called_palm):
         return not path or span <= max(arm, LARGEST_HAND)
     return span <= LONGEST_HAND * arm if len(path) > 2 else span <= LARGEST_HAND and not path
 
@@ -226,11 +226,6 @@ def _is_other(joints: Joints) -> bool:
     """Tell whether most of some joints are called parts of an arm, a head, a leg or a wheel."""
     known = (*words.ARM, *words.HEAD, *words.LEG, *words.WHEEL)
     return _share(joints, known) > 0.5 and not _share(joints, words.FINGER) > 0.5
-
-
-def _is_called_palm(model: UrdfModel, nexts: Joints) -> bool:
-    """Tell whether a link that carries fingers is called a hand, or what is rigid with it is."""
-    return any(words.has(joint.parent, (*words.HAND, "palm")) for joint in nexts)
 
 
 def _hand(search: _Search, nexts: Joints, path: Joints) -> _Chain:
@@ -370,10 +365,6 @@ def _explain(search: _Search, limbs: Iterable[Limb], parts: Mapping[str, Joints]
             reasons.append(
                 f"{which}gripper: none, as no joints branch at the end and none is named like a jaw"
             )
-
-
-def _says(joints: Iterable[ModelJoint], known: Sequence[str]) -> bool:
-    return any(words.has(name, known) for name in _names(joints))
 
 
 def _share(joints: Sequence[ModelJoint], known: Sequence[str]) -> float:

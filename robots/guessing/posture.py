@@ -212,10 +212,8 @@ class PostureSearch:
 
     def _touching(self, links: frozenset[int], apart: frozenset[int]) -> NDArray[np.bool_]:
         """Tell of which pairs one hull is on some links, and none on others, (pairs,)."""
-        sides = [[self._hulls[i].link for i in pair] for pair in self._pairs]
-        return np.array(
-            [bool(links & {*pair}) and not apart & {*pair} for pair in sides], bool
-        )  # fmt: skip
+        sides = [{self._hulls[i].link for i in pair} for pair in self._pairs]
+        return np.array([bool(links & pair) and not apart & pair for pair in sides], bool)
 
     def _opened(self, hands: Sequence[Sequence[Mapping[str, float]]]) -> Floats:
         """Return the middle posture with every hand as open as it can be without overlaps."""
@@ -239,16 +237,13 @@ class PostureSearch:
 
     def _lowest(self) -> float:
         """Return the height of the ground: of the lowest point of the root's body (m)."""
+        heights = self._stance.poses(self._stance.middle)[0, :, 2, 3]
         body = [
-            float(hull.corners[:, 2].min()) + place
+            float(hull.corners[:, 2].min() + heights[hull.link])
             for hull in self._hulls
             if self._stance.tree.bodies[hull.link] == 0
-            for place in (self._root_height(hull.link),)
         ]
         return min([0.0, *body])
-
-    def _root_height(self, link: int) -> float:
-        return float(self._stance.poses(self._stance.middle)[0, link, 2, 3])
 
     def _draw(self, view: View, posture: Floats) -> Floats:
         drawn = np.tile(posture, (DRAWS, 1))

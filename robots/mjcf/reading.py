@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import os
 import posixpath
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -238,12 +238,8 @@ def _python_package(folder: str) -> str:
 
 
 def _drop(parent: Element, tags: tuple[str, ...]) -> None:
-    for child in list(_children(parent, tags)):
+    for child in [child for child in parent if child.tag in tags]:
         parent.remove(child)
-
-
-def _children(parent: Element, tags: tuple[str, ...]) -> Iterator[Element]:
-    return (child for child in parent if child.tag in tags)
 
 
 def mujoco() -> Any:
@@ -265,15 +261,11 @@ def mujoco() -> Any:
 def without_log() -> Generator[None]:
     """Have MuJoCo write its warnings nowhere; else it adds them to a file where it was started."""
     library = mujoco()
-    library.set_mju_user_warning(_ignore)
+    library.set_mju_user_warning(lambda warning: None)  # what is wrong is an error
     try:
         yield
     finally:
         library.set_mju_user_warning(None)
-
-
-def _ignore(warning: str) -> None:
-    """Do nothing about a warning: what is wrong with a model is an error."""
 
 
 def compiled(text: MjcfText, path: Path) -> Model:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from robots.common.errors import AssetError, DescriptorError
 from robots.guessing.hints import DriveHint
@@ -57,17 +59,17 @@ def find_robot(model: Model, path: Path) -> MjcfRobot:
         AssetError: If it has a ball joint behind another joint.
         DescriptorError: If nothing of it is a robot.
     """
-    trees = {root: _below(model, root) for root in range(1, model.nbody) if _on_ground(model, root)}
-    jointed = {root: tree for root, tree in trees.items() if any(_turning(model, b) for b in tree)}
+    roots = np.unique(model.body_rootid[1:]).tolist()
+    root_of = model.body_rootid[model.jnt_bodyid]  # (joints,)
+    jointed = set(root_of[np.isin(model.jnt_type, (SLIDE, HINGE))].tolist())
     if not jointed:
         raise DescriptorError(
             f"{path} has no joint that turns or slides; there is nothing to drive"
         )
-    driven = _driven(model)
-    actuated = {r: tree for r, tree in jointed.items() if driven & _joints_of(model, tree)}
-    chosen = actuated or jointed
-    notes = [*_left_out(model, trees, jointed, chosen)]
-    bodies = tuple(sorted(body for tree in chosen.values() for body in tree))
+    actuated = {int(root_of[joint]) for joint in _driven(model)}
+    chosen = sorted(jointed & actuated or jointed)
+    notes = [*_left_out(model, roots, jointed, chosen)]
+    bodies = tuple(np.flatnonzero(np.isin(model.body_rootid, chosen)).tolist())
     joints: dict[int, tuple[int, ...]] = {}
     for body in bodies:
         joints[body], remarks = _moving(model, body, path)
@@ -79,32 +81,6 @@ def find_robot(model: Model, path: Path) -> MjcfRobot:
         for joint in joints[body]
     )
     return MjcfRobot(model, tuple(chosen), bodies, joints, links, named, tuple(notes))
-
-
-def _on_ground(model: Model, body: int) -> bool:
-    return int(model.body_parentid[body]) == 0
-
-
-def _below(model: Model, root: int) -> tuple[int, ...]:
-    """Return a body and all that it carries; MuJoCo has every body after its parent."""
-    found = {root}
-    for body in range(root + 1, model.nbody):
-        if int(model.body_parentid[body]) in found:
-            found.add(body)
-    return tuple(sorted(found))
-
-
-def _all_joints(model: Model, body: int) -> range:
-    first = int(model.body_jntadr[body])
-    return range(first, first + int(model.body_jntnum[body]))
-
-
-def _turning(model: Model, body: int) -> bool:
-    return any(model.jnt_type[joint] in (SLIDE, HINGE) for joint in _all_joints(model, body))
-
-
-def _joints_of(model: Model, bodies: Sequence[int]) -> set[int]:
-    return {joint for body in bodies for joint in _all_joints(model, body)}
 
 
 def _driven(model: Model) -> set[int]:
@@ -132,13 +108,13 @@ def tendon_joints(model: Model, tendon: int) -> list[tuple[int, float]]:
 
 def _left_out(
     model: Model,
-    trees: dict[int, tuple[int, ...]],
-    jointed: dict[int, tuple[int, ...]],
-    chosen: dict[int, tuple[int, ...]],
+    roots: Sequence[int],
+    jointed: Set[int],
+    chosen: Sequence[int],
 ) -> Iterator[str]:
     """Yield what is no part of the robot."""
-    still = [root for root in trees if root not in jointed]
-    idle = [root for root in jointed if root not in chosen]
+    still = [root for root in roots if root not in jointed]
+    idle = [root for root in roots if root in jointed and root not in chosen]
     if still:
         yield f"left out: {_listing(model, still)}, in which no joint turns or slides"
     if idle:
@@ -156,10 +132,10 @@ def _moving(model: Model, body: int, path: Path) -> tuple[tuple[int, ...], list[
     """
     moving: list[int] = []
     notes: list[str] = []
-    for joint in _all_joints(model, body):
+    for joint in np.flatnonzero(model.jnt_bodyid == body).tolist():
         kind = int(model.jnt_type[joint])
         name = name_of(model, "joint", joint) or name_of(model, "body", body)
-        if kind == FREE or (kind == BALL and _on_ground(model, body)):
+        if kind == FREE or (kind == BALL and model.body_parentid[body] == 0):
             what = "flies freely" if kind == FREE else "turns on a ball joint"
             notes.append(
                 f"joint {name!r}, by which the whole robot {what}, is fixed: a layout says where it"

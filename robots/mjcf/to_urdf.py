@@ -245,7 +245,7 @@ def add_shapes(
         What was left out, one sentence each.
     """
     notes: list[str] = []
-    for geom in _geoms(model, body):
+    for geom in np.flatnonzero(model.geom_bodyid == body).tolist():
         kind = int(model.geom_type[geom])
         if kind in (PLANE, HFIELD) or kind > MESH:
             what = {PLANE: "plane", HFIELD: "height field"}.get(kind, "signed distance field")
@@ -253,8 +253,7 @@ def add_shapes(
             continue
         for use in _uses(model, geom):
             shape = SubElement(link, use)
-            pose = shift @ _pose(model, geom)
-            origin(shape, pose)
+            origin(shape, shift @ pose_of(model.geom_pos[geom], model.geom_quat[geom]))
             _geometry(SubElement(shape, "geometry"), model, geom, meshes)
             if use == "visual":
                 _colour(shape, model, geom)
@@ -278,11 +277,6 @@ def pose_of(position: Floats, quaternion: Floats) -> Floats:
     return pose_matrix(position, quaternion / np.linalg.norm(quaternion))
 
 
-def _geoms(model: Model, body: int) -> range:
-    first = int(model.body_geomadr[body])
-    return range(first, first + int(model.body_geomnum[body]))
-
-
 def _uses(model: Model, geom: int) -> Iterator[str]:
     """Yield what a shape is for: MuJoCo's bits say what collides, its groups what is drawn."""
     collides = bool(model.geom_contype[geom] | model.geom_conaffinity[geom])
@@ -291,10 +285,6 @@ def _uses(model: Model, geom: int) -> Iterator[str]:
     drawn = not collides or int(model.geom_group[geom]) < SEEN_GROUPS
     if drawn and float(_rgba(model, geom)[3]) > 0:
         yield "visual"
-
-
-def _pose(model: Model, geom: int) -> Floats:
-    return pose_of(model.geom_pos[geom], model.geom_quat[geom])
 
 
 def _geometry(geometry: Element, model: Model, geom: int, meshes: dict[str, bytes]) -> None:

@@ -151,13 +151,21 @@ class UrdfModel:
         return carried
 
     @cached_property
+    def _fixed_on(self) -> dict[str, list[str]]:
+        fixed: dict[str, list[str]] = {}
+        for joint in self.joints:
+            if not joint.moves:
+                fixed.setdefault(joint.parent, []).append(joint.child)
+        return fixed
+
+    @cached_property
     def ordered(self) -> tuple[ModelJoint, ...]:
         """All joints, depth first from the root: each after the one that carries its parent."""
         found: list[ModelJoint] = []
-        waiting = list(reversed(self.joints_on(self.root)))
+        waiting = self._carried[self.root][::-1]
         while waiting:
             found.append(waiting.pop())
-            waiting += reversed(self.joints_on(found[-1].child))
+            waiting += self._carried[found[-1].child][::-1]
         return tuple(found)
 
     @cached_property
@@ -172,15 +180,11 @@ class UrdfModel:
                 depths[joint.name] = depth
         return depths
 
-    def joints_on(self, link: str) -> tuple[ModelJoint, ...]:
-        """Return the joints that a link carries, in the URDF's order."""
-        return tuple(self._carried[link])
-
     def rigid_with(self, link: str) -> tuple[str, ...]:
         """Return a link and all that hangs on it by fixed joints, nearest first."""
         found = [link]
         for near in found:
-            found += [joint.child for joint in self.joints_on(near) if not joint.moves]
+            found += self._fixed_on.get(near, ())
         return tuple(found)
 
     def moving_on(self, link: str) -> tuple[ModelJoint, ...]:

@@ -134,5 +134,5 @@ def _sizes(geometry: Any) -> tuple[float, ...]:
 
 def _origin(text: Element | None) -> Floats:
     origin = None if text is None else text.find("origin")
-    xyz, rpy = (numbers_of(origin, key, (0.0, 0.0, 0.0), "") for key in ("xyz", "rpy"))
-    return rpy_pose(xyz, rpy)
+    zeros = (0.0, 0.0, 0.0)
+    return rpy_pose(numbers_of(origin, "xyz", zeros, ""), numbers_of(origin, "rpy", zeros, ""))

@@ -8,7 +8,7 @@ import pytest
 
 from robots import RobotDescriptor, UnknownNameError
 from robots.bodies.allowed import allowed_pairs, joined_pairs, rigid_groups, rigid_pairs
-from robots.bodies.apart import MARGIN, without_distant
+from robots.bodies.overlaps import MARGIN, without_distant
 from robots.bodies.hulls import load_model, read_hulls
 from robots.bodies.overlaps import always_overlapping, guess_allowed, neighbours
 from robots.data_module import write_module

@@ -52,8 +52,8 @@ def repair_inertia(root: Element, urdf: str) -> Iterator[str]:
 def _repair(link: Element, where: str, urdf: str) -> Iterator[str]:
     (inertial, *_) = link.findall("inertial")
     mass, tensor = inertial.find("mass"), inertial.find("inertia")
-    weight = _given(mass, "value", where)
-    moments = [_given(tensor, key, where) for key in (*MOMENTS, *PRODUCTS)]
+    (weight,) = numbers_of(mass, "value", (0.0,), where)
+    moments = [numbers_of(tensor, key, (0.0,), where)[0] for key in (*MOMENTS, *PRODUCTS)]
     if weight < 0 or 0 < weight < SMALLEST:
         return
     if tensor is not None and (products := _complete(tensor)) and _is_possible(link, where):
@@ -92,11 +92,6 @@ def _is_possible(link: Element, where: str) -> bool:
     except AssetError:
         return False
     return True
-
-
-def _given(element: Element | None, key: str, where: str) -> float:
-    """Return a number of an element; 0 if the element or the number is missing."""
-    return numbers_of(element, key, (0.0,), where)[0]
 
 
 def _problem(tensor: Element | None, numbers: list[float]) -> str:
