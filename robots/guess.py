@@ -160,7 +160,7 @@ def _look_at(path: Path, xml: bytes, hints: Hints, overrides: Mapping[str, Any])
     model = read_model(xml, path.as_posix())
     anatomy = known_anatomy(model, find_anatomy(model, path.as_posix()), hints)
     stance = Stance(model)
-    hulls = read_hulls(model, path) if find_spec("fcl") and find_spec("trimesh") else ()
+    hulls = read_hulls(model, path) if find_spec("fcl") else ()
     bodies: dict[int, list[Floats]] = {}
     for hull in hulls:
         bodies.setdefault(hull.link, []).append(hull.corners)

@@ -6,7 +6,6 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib import import_module
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -71,7 +70,7 @@ def load_model(robot: RobotDescriptor) -> RobotModel:
     Raises:
         AssetError: If its files cannot be found or make no sense.
         DescriptorError: If the descriptor and the URDF contradict each other.
-        MissingPackageError: If trimesh or python-fcl is not installed.
+        MissingPackageError: If python-fcl is not installed.
         UnknownNameError: If ``allowed_collisions`` names a link that the URDF lacks.
     """
     require_packages()
@@ -86,14 +85,13 @@ def require_packages() -> None:
     """Say which command installs what collision checks need.
 
     Raises:
-        MissingPackageError: If trimesh or python-fcl is not installed.
+        MissingPackageError: If python-fcl is not installed.
     """
     try:
-        for package in ("fcl", "trimesh"):
-            import_module(package)
+        import fcl  # noqa: F401  # pyright: ignore[reportUnusedImport]
     except ImportError as error:
         raise MissingPackageError(
-            "checking a layout needs trimesh and python-fcl: pip install 'robot-layouts[checks]'"
+            "checking a layout needs python-fcl: pip install 'robot-layouts[checks]'"
         ) from error
 
 
@@ -106,7 +104,7 @@ def read_hulls(model: UrdfModel, urdf: Path) -> tuple[Hull, ...]:
 
     Raises:
         AssetError: If a mesh cannot be read, or a shape has no volume.
-        MissingPackageError: If trimesh or python-fcl is not installed.
+        MissingPackageError: If python-fcl is not installed.
     """
     require_packages()
     return _hulls(model, urdf, _modified(template_of(urdf)[0]))
@@ -162,7 +160,6 @@ def shape_corners(shape: UrdfShape, urdf: Path) -> Floats:
 
     Raises:
         AssetError: If that mesh cannot be read.
-        MissingPackageError: If trimesh is not installed.
     """
     return _corners(shape, urdf) @ shape.origin[:3, :3].T + shape.origin[:3, 3]
 

@@ -78,7 +78,7 @@ def always_overlapping(
 
     Raises:
         AssetError: If a mesh cannot be read, or a shape has no volume.
-        MissingPackageError: If trimesh or python-fcl is not installed.
+        MissingPackageError: If python-fcl is not installed.
     """
     driven = [joint for joint in model.moving if joint.mimics is None]
     tree = kinematic_tree(model, [joint.name for joint in driven])

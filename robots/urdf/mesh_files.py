@@ -16,7 +16,7 @@ from functools import lru_cache
 from typing import Any
 from urllib.parse import unquote
 
-from robots.common.errors import AssetError, MissingPackageError, UnreadableFileError
+from robots.common.errors import AssetError, UnreadableFileError
 from robots.common.files import read_regular
 from robots.urdf.paths import is_allowed
 from robots.urdf.text import parse_xml
@@ -58,10 +58,10 @@ def load_scene(path: str, where: str, urdf: str | None = None, **options: Any) -
     Raises:
         AssetError: If it is missing, no regular file, too large, of an unknown kind or broken, or
             if it refers to files that the URDF may not refer to.
-        MissingPackageError: If trimesh or pycollada is not installed.
     """
+    import trimesh  # which takes half a second to load
+
     ending = _ending(path, where)
-    trimesh = _reader(ending)
     contents = _read(path, where)
     beside: Any = _SideFiles(path, posixpath.dirname(urdf or path), where)
     beside.expect_allowed(ending, contents)
@@ -102,7 +102,6 @@ def read_corners(path: str, scale: Sequence[float], where: str, urdf: str) -> Fl
     Raises:
         AssetError: If it cannot be read (see `load_scene`), is empty or flat, or has corners that
             are not finite or more than `LARGEST` away.
-        MissingPackageError: If trimesh or pycollada is not installed.
     """
     import numpy as np
 
@@ -158,7 +157,6 @@ def has_body(path: str, scale: Sequence[float], where: str, urdf: str) -> bool:
 
     Raises:
         AssetError: If it cannot be read; see `read_corners`.
-        MissingPackageError: If trimesh or pycollada is not installed.
     """
     try:
         status = os.stat(path)
@@ -188,20 +186,6 @@ def has_volume(corners: Floats) -> bool:
     spread = corners - corners.mean(axis=0)
     _, directions = np.linalg.eigh(spread.T @ spread)
     return bool(np.ptp(spread @ directions[:, 0]) >= SMALLEST)
-
-
-def _reader(ending: str) -> Any:
-    """Return the package that reads meshes, once it can read those of an ending."""
-    try:
-        import trimesh
-
-        if ending == ".dae":
-            import collada  # noqa: F401  # pyright: ignore[reportUnusedImport]
-    except ImportError as error:
-        raise MissingPackageError(
-            "reading meshes needs trimesh and pycollada: pip install trimesh pycollada"
-        ) from error
-    return trimesh
 
 
 def _ending(path: str, where: str) -> str:

@@ -9,7 +9,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element, SubElement
 
-from robots.common.errors import AssetError, MissingPackageError
+from robots.common.errors import AssetError
 from robots.urdf.checks import (
     MOMENTS,
     PRODUCTS,
@@ -155,7 +155,7 @@ def _corners(element: Element, where: str, urdf: str) -> Floats | None:
         own = _own_corners(element, where, urdf)
         origin = element.find("origin")
         xyz, rpy = (numbers_of(origin, key, (0.0, 0.0, 0.0), where) for key in ("xyz", "rpy"))
-    except (AssetError, MissingPackageError, ValueError):
+    except (AssetError, ValueError):
         return None
     pose = rpy_pose(xyz, rpy)
     return np.asarray(own) @ pose[:3, :3].T + pose[:3, 3]

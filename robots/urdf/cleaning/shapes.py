@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from copy import deepcopy
 from xml.etree.ElementTree import Element, SubElement
 
-from robots.common.errors import AssetError, MissingPackageError
+from robots.common.errors import AssetError
 from robots.urdf.checks import SMALLEST_SIZE, attributes_of, sizes_of
 from robots.urdf.mesh_files import has_body
 from robots.urdf.model import SIZES
@@ -101,6 +101,6 @@ def _why_no_mesh(mesh: Element, kind: str, where: str, urdf: str) -> str:
         path = resolve(file, urdf, os.path.isfile)
         if kind == "visual" or not os.path.isfile(path) or has_body(path, scale, where, urdf):
             return ""
-    except (AssetError, MissingPackageError):
+    except AssetError:
         return ""
     return f"of the mesh {file!r}, which has no volume"
