@@ -150,7 +150,7 @@ class Drives:
 
     def _drive(self, joint: ModelJoint, stiffest: float) -> tuple[Drive, bool]:
         """Return a drive, and whether its force is more than the URDF's effort."""
-        inertia = self._inertia(joint)
+        inertia = self.moved_by(joint)
         needed = JUST_ENOUGH * inertia / CONTROL_STEP**2  # N·m, N; per rad or m of a step
         force = joint.effort or max(FORCE, needed * SHORTEST_STEP)
         step = min(LONGEST_STEP, force / needed)
@@ -171,7 +171,7 @@ class Drives:
         known = self._known.get(joint.name)
         if known is None or known.stiffness is None:
             return drive
-        inertia = self._inertia(joint)
+        inertia = self.moved_by(joint)
         stiffness = min(known.stiffness, inertia * stiffest**2)
         damping = (known.damping or 0.0) * stiffness / known.stiffness
         damping = max(damping, 2 * (stiffness * inertia) ** 0.5)
@@ -181,8 +181,8 @@ class Drives:
             return drive
         return replace(drive, stiffness=_rounded(stiffness), damping=_rounded(damping))
 
-    def _inertia(self, joint: ModelJoint) -> float:
-        """Return what a joint's drive moves: what hangs on it, and its motor and gear."""
+    def moved_by(self, joint: ModelJoint) -> float:
+        """Return the inertia that a joint's drive moves, with motor and gear (kg·m², kg)."""
         return self._hanging[joint.name] + self._armature(joint)
 
     def _armature(self, joint: ModelJoint) -> float:
@@ -199,17 +199,13 @@ class Drives:
         """
         (drive, raised), settling = self._drive(joint, STIFFEST), SETTLING[joint.unit]
         self._note(joint, raised)
-        inertia = self._inertia(joint)
+        inertia = self.moved_by(joint)
         damping = min(max(drive.damping, drive.stiffness * settling), inertia * MOST_DAMPED)
         stiffness = min(drive.stiffness, damping / settling)
         force = min(drive.force_limit, FORCE)
         return replace(
             drive, stiffness=_rounded(stiffness), damping=_rounded(damping), force_limit=force
         )
-
-    def moved_by(self, joint: ModelJoint) -> float:
-        """Return the inertia that a joint's drive moves, with motor and gear (kg·m², kg)."""
-        return self._inertia(joint)
 
     def geared(
         self,
@@ -228,8 +224,8 @@ class Drives:
             force: The largest (N·m, N).
             settling: Time in which it goes as far as its target is ahead (s).
         """
-        more = max(inertia - self._inertia(joint), 0.0)
-        critical = 2 * (stiffness * (self._inertia(joint) + more)) ** 0.5
+        more = max(inertia - self.moved_by(joint), 0.0)
+        critical = 2 * (stiffness * (self.moved_by(joint) + more)) ** 0.5
         damping = max(critical, stiffness * settling)
         numbers = (stiffness, damping, force, self._armature(joint) + more)
         return Drive(*map(_rounded, numbers), step=LONGEST_STEP)
@@ -337,15 +333,10 @@ def hanging_inertia(tree: Tree, masses: Masses, poses: Floats, links: Iterable[i
         poses: Of the links in each posture, (postures, links, 4, 4) (m).
         links: Indices of the links that the joints carry.
     """
-    behind = _behind(tree)
-    return np.array([_about(tree, masses, poses, link, behind[link]) for link in links])
-
-
-def _behind(tree: Tree) -> list[list[int]]:
     behind = [[i] for i in range(len(tree.links))]
     for i in range(len(tree.links) - 1, 0, -1):
         behind[tree.parents[i]] += behind[i]
-    return behind
+    return np.array([_about(tree, masses, poses, link, behind[link]) for link in links])
 
 
 def _about(tree: Tree, masses: Masses, poses: Floats, link: int, behind: list[int]) -> float:

@@ -40,8 +40,9 @@ class Fingertips:
         self._palm = self._poses[stance.tree.link(limb.palm)]
         self._hulls, self.solid = hulls, bool(hulls)
         leaves = [joint for joint in limb.fingers if not stance.model.moving_on(joint.child)]
-        tips = {joint.child: self._tip(joint.child) for joint in leaves}
-        far = {link: float(np.linalg.norm(tip - self._palm[:3, 3])) for link, tip in tips.items()}
+        palm = self._palm[:3, 3]
+        tips = {j.child: self._outermost(self._points(j.child), palm) for j in leaves}
+        far = {link: float(np.linalg.norm(tip - palm)) for link, tip in tips.items()}
         longest = max(far.values(), default=0.0)
         led = sum(joint.mimics is None for joint in limb.fingers) == 1
         least = (FOLLOWING if led else SHORT) * longest
@@ -136,10 +137,6 @@ class Fingertips:
         """Return the direction from the middle of the tips to one of them, (3,)."""
         way = self._tips[end] - np.mean(list(self._tips.values()), axis=0)
         return way / max(float(np.linalg.norm(way)), 1e-9)
-
-    def _tip(self, link: str) -> Floats:
-        """Return the mean of the outermost points of a link and what is rigid with it."""
-        return self._outermost(self._points(link), self._palm[:3, 3])
 
     def _fixed_tip(self, end: str, tip: Floats) -> Floats:
         """Return the tip of what a single jaw closes on: of the palm, its own size away."""

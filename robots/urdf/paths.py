@@ -71,7 +71,7 @@ def is_allowed(path: str, folder: str, exists: Exists) -> bool:
     """
     if not posixpath.isabs(folder):
         return not (posixpath.isabs(path) or path == ".." or path.startswith("../"))
-    if any(_inside(path, root) for root in _roots(folder, exists)):
+    if _inside(path, folder) or any(_inside(path, root) for root in _roots(folder, exists)):
         return True
     around = posixpath.dirname(folder)
     inner = posixpath.relpath(path, around).split("/")[:-1]
@@ -109,10 +109,9 @@ def _local(path: str, reference: str, urdf: str) -> str:
 
 
 def _roots(folder: str, exists: Exists) -> Iterator[str]:
-    """Yield the folders in which files may lie that a URDF in an absolute folder refers to."""
+    """Yield the folders besides its own in which files may lie that a URDF refers to."""
     from robots.assets.store import default_root
 
-    yield folder
     yield default_root().as_posix()
     if posixpath.basename(folder).lower() in URDF_FOLDERS:
         yield posixpath.dirname(folder)

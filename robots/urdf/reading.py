@@ -73,9 +73,9 @@ def _load(root: Element, urdf: str) -> Any:
 
     plain = deepcopy(root)
     plain.set("name", root.get("name", ""))
-    for element in list(plain.iter()):
-        if element.tag == "capsule":
-            element.tag = "cylinder"
+    for capsule in list(plain.iter("capsule")):
+        capsule.tag = "cylinder"
+    for element in (plain, *plain.iterfind("link/visual"), *plain.iterfind("joint")):
         for part in [part for part in element if part.tag in UNREAD]:
             element.remove(part)
     text = io.BytesIO(tostring(plain, encoding="utf-8"))
