@@ -14,11 +14,11 @@ import numpy as np
 from kinematics.rotations import Floats
 from robots import AssetError, MissingPackageError
 from robots.urdf.mesh_files import expect_near, load_scene
-from robots.urdf.numbers import numbers_of
+from robots.urdf.model import UrdfShape
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model
-from robots.urdf.shapes import UrdfShape
 from robots.urdf.summary import parse_urdf, read_urdf
+from robots.urdf.text import numbers_of
 
 Rgba = tuple[float, float, float, float]  # 0 … 1
 

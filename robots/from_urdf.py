@@ -23,8 +23,7 @@ from robots.common.errors import (
 )
 from robots.common.paths import absolute
 from robots.guess import Guess, guess
-from robots.guessing.hints import NOTHING, Hints
-from robots.guessing.semantics import hints_of
+from robots.guessing.hints import NOTHING, Hints, hints_of
 from robots.mjcf.locator import LocalMjcf, is_mjcf
 from robots.urdf.cleaning.xacro_files import template_of, with_arguments
 from robots.urdf.reading import read_model

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from dataclasses import fields as fields_of
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -142,10 +141,10 @@ def guess(
         "no_floor_contact": wheels,
         "limbs": _limbs(parts, rest),
     }
-    names = [field.name for field in fields_of(RobotDescriptor)]
-    unknown = sorted(set(overrides) - set(names))
+    unknown = sorted(set(overrides) - set(RobotDescriptor.__dataclass_fields__))
     if unknown:
-        raise DescriptorError(f"a descriptor has no fields {unknown}; it has {', '.join(names)}")
+        known = ", ".join(RobotDescriptor.__dataclass_fields__)
+        raise DescriptorError(f"a descriptor has no fields {unknown}; it has {known}")
     tools = [tool.reason for tool in parts.tools.values()]
     repairs = [f"repaired: {repair}" for repair in cleaned.repairs]
     hands_too = (*_about_hands(parts), grasping) if parts.grippers else ()

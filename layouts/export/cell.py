@@ -18,12 +18,12 @@ from robots import AssetError, RobotDescriptor
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
 from robots.common.commands import notice
 from robots.descriptor import JointGroup
-from robots.urdf.inertia import MOMENTS, PRODUCTS
+from robots.urdf.checks import MOMENTS, PRODUCTS
 from robots.urdf.model import ModelJoint, UrdfModel
-from robots.urdf.numbers import numbers_of
 from robots.urdf.reading import read_model
 from robots.urdf.summary import parse_urdf, read_urdf
 from robots.urdf.tcp import find_tcp
+from robots.urdf.text import numbers_of
 from robots.urdf.tree import kinematic_tree
 
 TABLE_DEPTH = 0.9  # m; tables are solid, from their tops down, as checks of layouts have them

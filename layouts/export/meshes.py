@@ -15,7 +15,7 @@ from layouts.export.names import Names
 from layouts.visuals import GREY, Rgba, read_visuals, simplified
 from robots import AssetError, MissingPackageError
 from robots.bodies.hulls import shape_corners
-from robots.urdf.shapes import SIZES, UrdfShape
+from robots.urdf.model import SIZES, UrdfShape
 
 AS_HULLS = ("mesh", "capsule")  # of which most formats' own shapes are not what they are here
 LEAST_AREA = 1e-12  # m²; of a mesh that is drawn: with less, nobody sees it

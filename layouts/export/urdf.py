@@ -15,9 +15,9 @@ from robots.common.writing import written_whole
 from robots.descriptor import Vector3
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model
-from robots.urdf.renaming import rename
 from robots.urdf.srdf import srdf_beside
 from robots.urdf.summary import parse_urdf, read_urdf
+from robots.urdf.text import rename
 
 if TYPE_CHECKING:
     from layouts.arrangement import Arrangement

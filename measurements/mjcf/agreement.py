@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from kinematics.rotations import Floats, inverse_pose
-from robots.mjcf.compiling import compiled, mujoco
 from robots.mjcf.conversion import convert, locate
 from robots.mjcf.couplings import find_couplings
+from robots.mjcf.reading import compiled, mujoco, read_mjcf
 from robots.mjcf.robot import find_robot
-from robots.mjcf.text import read_mjcf
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree

@@ -18,8 +18,8 @@ from robots.descriptor import IDENTITY, Quaternion, UrdfSource, Vector3
 from robots.urdf.model import UrdfModel
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model
-from robots.urdf.renaming import rename
 from robots.urdf.summary import parse_urdf, read_urdf
+from robots.urdf.text import rename
 
 URDF = "assembled.urdf"
 

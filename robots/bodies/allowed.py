@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from itertools import combinations
 from pathlib import Path
 
@@ -84,11 +84,5 @@ def rigid_groups(model: UrdfModel) -> dict[str, list[str]]:
 
 def srdf_pairs(excluded: Iterable[ExcludedPair], model: UrdfModel) -> frozenset[LinkPair]:
     """Return the pairs of an SRDF that are two links of the URDF; it may name others."""
-    return frozenset(_known(excluded, set(model.links)))
-
-
-def _known(excluded: Iterable[ExcludedPair], links: set[str]) -> Iterator[LinkPair]:
-    for pair in excluded:
-        names = frozenset(pair.links)
-        if len(names & links) == 2:
-            yield names
+    pairs = (frozenset(pair.links) for pair in excluded)
+    return frozenset(pair for pair in pairs if len(pair.intersection(model.links)) == 2)

@@ -6,7 +6,6 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib import import_module
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -20,10 +19,9 @@ from robots.common.errors import AssetError, MissingPackageError
 from robots.descriptor import RobotDescriptor
 from robots.urdf.cleaning.xacro_files import template_of
 from robots.urdf.mesh_files import has_volume, read_corners
-from robots.urdf.model import UrdfModel
+from robots.urdf.model import UrdfModel, UrdfShape
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model
-from robots.urdf.shapes import UrdfShape
 from robots.urdf.srdf import srdf_beside
 from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree
@@ -72,7 +70,7 @@ def load_model(robot: RobotDescriptor) -> RobotModel:
     Raises:
         AssetError: If its files cannot be found or make no sense.
         DescriptorError: If the descriptor and the URDF contradict each other.
-        MissingPackageError: If trimesh or python-fcl is not installed.
+        MissingPackageError: If python-fcl is not installed.
         UnknownNameError: If ``allowed_collisions`` names a link that the URDF lacks.
     """
     require_packages()
@@ -87,14 +85,13 @@ def require_packages() -> None:
     """Say which command installs what collision checks need.
 
     Raises:
-        MissingPackageError: If trimesh or python-fcl is not installed.
+        MissingPackageError: If python-fcl is not installed.
     """
     try:
-        for package in ("fcl", "trimesh"):
-            import_module(package)
+        import fcl  # noqa: F401  # pyright: ignore[reportUnusedImport]
     except ImportError as error:
         raise MissingPackageError(
-            "checking a layout needs trimesh and python-fcl: pip install 'robot-layouts[checks]'"
+            "checking a layout needs python-fcl: pip install 'robot-layouts[checks]'"
         ) from error
 
 
@@ -107,7 +104,7 @@ def read_hulls(model: UrdfModel, urdf: Path) -> tuple[Hull, ...]:
 
     Raises:
         AssetError: If a mesh cannot be read, or a shape has no volume.
-        MissingPackageError: If trimesh or python-fcl is not installed.
+        MissingPackageError: If python-fcl is not installed.
     """
     require_packages()
     return _hulls(model, urdf, _modified(template_of(urdf)[0]))
@@ -139,14 +136,9 @@ def _modified(file: Path) -> int:
 @lru_cache(maxsize=64)
 def _load(robot: RobotDescriptor, urdf: Path, _stamps: tuple[int, ...]) -> RobotModel:
     model = read_model(read_urdf(urdf), str(urdf))
-    kinematics, hulls = _tree(model, robot.joints), read_hulls(model, urdf)
+    kinematics, hulls = kinematic_tree(model, robot.joints), read_hulls(model, urdf)
     allowed = read_allowed_pairs(robot, model, urdf)
     return RobotModel(kinematics, hulls, counted_pairs(kinematics, hulls, allowed))
-
-
-@lru_cache(maxsize=64)
-def _tree(model: UrdfModel, joints: tuple[str, ...]) -> Tree:
-    return kinematic_tree(model, joints)
 
 
 @lru_cache(maxsize=64)
@@ -168,7 +160,6 @@ def shape_corners(shape: UrdfShape, urdf: Path) -> Floats:
 
     Raises:
         AssetError: If that mesh cannot be read.
-        MissingPackageError: If trimesh is not installed.
     """
     return _corners(shape, urdf) @ shape.origin[:3, :3].T + shape.origin[:3, 3]
 

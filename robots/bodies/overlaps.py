@@ -1,4 +1,4 @@
-"""Which pairs of a robot's links a guess lets overlap, as contacts between them mean nothing."""
+"""Which pairs of a robot's links overlap wherever its joints stand, and which can never touch."""
 
 from __future__ import annotations
 
@@ -8,17 +8,18 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from kinematics.rotations import Floats
 from robots.bodies.allowed import LinkPair, joined_pairs, rigid_groups, rigid_pairs, srdf_pairs
-from robots.bodies.hulls import Hull, counted_pairs, read_hulls
-from robots.urdf.model import UrdfModel
+from robots.bodies.hulls import Hull, counted_pairs, read_hulls, shape_corners
+from robots.urdf.model import ModelJoint, UrdfModel
 from robots.urdf.srdf import read_excluded_pairs
-from robots.urdf.tree import kinematic_tree
+from robots.urdf.tree import kinematic_tree, rest_poses
 
 POSTURES = 200  # random ones, in which overlaps are looked for
 ALWAYS = 0.95  # of them; what MoveIt's setup assistant takes for always
+MARGIN = 0.05  # m; more than the distance from which PhysX looks at a pair
 
 
 def guess_allowed(
@@ -77,7 +78,7 @@ def always_overlapping(
 
     Raises:
         AssetError: If a mesh cannot be read, or a shape has no volume.
-        MissingPackageError: If trimesh or python-fcl is not installed.
+        MissingPackageError: If python-fcl is not installed.
     """
     driven = [joint for joint in model.moving if joint.mimics is None]
     tree = kinematic_tree(model, [joint.name for joint in driven])
@@ -94,27 +95,28 @@ def always_overlapping(
     return frozenset(frozenset((names[a], names[b])) for a, b in waiting.tolist())
 
 
-def overlapping(
-    hulls: Sequence[Hull], poses: Floats, pairs: Iterable[Sequence[int]]
-) -> NDArray[np.bool_]:
+def overlapping(hulls: Sequence[Hull], poses: Floats, pairs: ArrayLike) -> NDArray[np.bool_]:
     """Return for each pair of hulls whether they overlap, (pairs,).
 
     Args:
         hulls: Hulls of one robot.
         poses: Of its links, (links, 4, 4) (m).
-        pairs: Indices of two hulls each.
+        pairs: Indices of two hulls each, (pairs, 2).
     """
     import fcl
 
-    pairs = [tuple(pair) for pair in pairs]
+    indices = np.array(pairs, int).reshape(-1, 2)
     bodies = {
         i: fcl.CollisionObject(hulls[i].geometry, fcl.Transform(pose[:3, :3], pose[:3, 3]))
-        for i in {i for pair in pairs for i in pair}
+        for i in np.unique(indices).tolist()
         for pose in (poses[hulls[i].link],)
     }
     request = fcl.CollisionRequest()
     return np.array(
-        [fcl.collide(bodies[a], bodies[b], request, fcl.CollisionResult()) > 0 for a, b in pairs],
+        [
+            fcl.collide(bodies[a], bodies[b], request, fcl.CollisionResult()) > 0
+            for a, b in indices.tolist()
+        ],
         bool,
     )
 
@@ -126,3 +128,55 @@ def _in_order(pairs: Iterable[LinkPair], model: UrdfModel) -> tuple[tuple[str, s
     solid = [pair for pair in sorted_pairs if all(link in model.collisions for link in pair)]
     ordered = sorted(solid, key=lambda pair: [place[link] for link in pair])
     return tuple((one, other) for one, other in ordered)
+
+
+def without_distant(pairs: Iterable[LinkPair], model: UrdfModel, urdf: Path) -> frozenset[LinkPair]:
+    """Return those pairs of links that might come within `MARGIN` of each other.
+
+    What is left out provably cannot: the one long way between two joints on the path from link to
+    link is longer than all the others, and the links themselves, together.
+
+    Args:
+        pairs: Pairs of links.
+        model: What a URDF describes.
+        urdf: That URDF, for its meshes.
+
+    Raises:
+        AssetError: If a mesh cannot be read.
+    """
+    rest = rest_poses(model)
+    corners = {
+        link: np.concatenate([shape_corners(shape, urdf) for shape in shapes])
+        for link, shapes in model.collisions.items()
+    }
+    return frozenset(
+        pair
+        for pair in pairs
+        if pair <= corners.keys() and _least_distance(pair, model, rest, corners) < MARGIN
+    )
+
+
+def _least_distance(
+    pair: LinkPair, model: UrdfModel, rest: dict[str, Floats], corners: dict[str, Floats]
+) -> float:
+    """Return a distance that two links keep at least (m); it may be negative."""
+    one, other = sorted(pair)
+    path = _moving_between(one, other, model)
+    if not path:
+        return 0.0
+    places = [rest[joint.child][:3, 3] for joint in path]
+    lengths = [float(np.linalg.norm(a - b)) for a, b in zip(places, places[1:], strict=False)]
+    slides = [max(map(abs, joint.span)) if joint.unit == "m" else 0.0 for joint in path]
+    loose = sum(slides)
+    for link, place in ((one, places[0]), (other, places[-1])):
+        points = corners[link] @ rest[link][:3, :3].T + rest[link][:3, 3]
+        loose += float(np.linalg.norm(points - place, axis=1).max())
+    return 2 * max(lengths, default=0.0) - sum(lengths) - loose
+
+
+def _moving_between(one: str, other: str, model: UrdfModel) -> list[ModelJoint]:
+    """Return the moving joints on the path from a link to another, in that order."""
+    up, down = model.path_to(one), model.path_to(other)
+    shared = sum(a is b for a, b in zip(up, down, strict=False))
+    path = (*reversed(up[shared:]), *down[shared:])
+    return [joint for joint in path if joint.moves]

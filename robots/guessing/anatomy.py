@@ -9,11 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from robots.common.errors import DescriptorError
 from robots.guessing import words
-from robots.guessing.lengths import Lengths
 from robots.urdf.model import ModelJoint, UrdfModel
+from robots.urdf.tree import rest_poses
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from kinematics.rotations import Floats
+
 
 FARTHEST_SLIDE = 4.0  # m; a slide that goes farther is a way for a whole robot
 LONGEST_HAND = 0.4  # of the length of the arm that carries it
@@ -58,6 +68,41 @@ class Anatomy:
     limbs: tuple[Limb, ...]
     parts: Mapping[str, Joints]
     reasons: tuple[str, ...]
+
+
+class Lengths:
+    """Distances along the joints of a robot (m); turning joints do not change them."""
+
+    def __init__(self, model: UrdfModel) -> None:
+        """Place every link of a robot whose joints are all at 0."""
+        self._model = model
+        self._places = {link: pose[:3, 3] for link, pose in rest_poses(model).items()}
+
+    def place(self, joint: ModelJoint) -> Floats:
+        """Return where a joint is, in the root's frame, (3,) (m)."""
+        return self._places[joint.child]
+
+    def between(self, link: str, joint: ModelJoint) -> float:
+        """Return the length from a link over a joint on it to the end of the chain (m)."""
+        way = np.linalg.norm(self._places[joint.child] - self._places[link])
+        return float(way) + self.behind(joint)
+
+    def along(self, joints: Sequence[ModelJoint]) -> float:
+        """Return the length of joints in a row, from the first to the last (m)."""
+        places = [self.place(joint) for joint in joints]
+        return float(sum(np.linalg.norm(b - a) for a, b in zip(places, places[1:], strict=False)))
+
+    def behind(self, joint: ModelJoint) -> float:
+        """Return the length from a joint to the end of the longest chain that it moves (m)."""
+        return self._behind[joint.name]
+
+    @cached_property
+    def _behind(self) -> dict[str, float]:
+        lengths: dict[str, float] = dict.fromkeys(self._model.links, 0.0)
+        for joint in reversed(self._model.ordered):
+            way = np.linalg.norm(self._places[joint.child] - self._places[joint.parent])
+            lengths[joint.parent] = max(lengths[joint.parent], float(way) + lengths[joint.child])
+        return {joint.name: lengths[joint.child] for joint in self._model.joints}
 
 
 @dataclass
@@ -142,13 +187,18 @@ def _is_accessory(search: _Search, joint: ModelJoint, path: Joints) -> bool:
     if any(words.has(name, (*words.HEAD, *words.LEG, *words.WHEEL)) for name in names):
         return False
     follows = all(other.mimics for other in behind)
-    return follows or (len(path) > 1 and len(behind) < 3 and not _says(behind, words.ARM))
+    is_arm = any(words.has(name, words.ARM) for name in names)
+    return follows or (len(path) > 1 and len(behind) < 3 and not is_arm)
 
 
 def _moves_the_whole(joint: ModelJoint) -> bool:
+    return flies(joint) or bool(set(words.words(joint.name)) & set(words.BASE))
+
+
+def flies(joint: ModelJoint) -> bool:
+    """Tell whether a joint slides so far that it moves a whole robot."""
     low, high = joint.span
-    far = joint.type == "prismatic" and high - low > FARTHEST_SLIDE
-    return far or bool(set(words.words(joint.name)) & set(words.BASE))
+    return joint.unit == "m" and high - low > FARTHEST_SLIDE
 
 
 def _is_hand(search: _Search, link: str, nexts: Joints, path: Joints) -> bool:
@@ -161,7 +211,8 @@ def _is_hand(search: _Search, link: str, nexts: Joints, path: Joints) -> bool:
     named = all(_share(joints, words.FINGER) > 0.5 for joints in behind)
     if not named and any(_spins(joint) for joints in behind for joint in joints):
         return False
-    if named or (path and _is_called_palm(search.model, nexts)):
+    called_palm = any(words.has(joint.parent, (*words.HAND, "palm")) for joint in nexts)
+    if named or (path and called_palm):
         return not path or span <= max(arm, LARGEST_HAND)
     return span <= LONGEST_HAND * arm if len(path) > 2 else span <= LARGEST_HAND and not path
 
@@ -175,11 +226,6 @@ def _is_other(joints: Joints) -> bool:
     """Tell whether most of some joints are called parts of an arm, a head, a leg or a wheel."""
     known = (*words.ARM, *words.HEAD, *words.LEG, *words.WHEEL)
     return _share(joints, known) > 0.5 and not _share(joints, words.FINGER) > 0.5
-
-
-def _is_called_palm(model: UrdfModel, nexts: Joints) -> bool:
-    """Tell whether a link that carries fingers is called a hand, or what is rigid with it is."""
-    return any(words.has(joint.parent, (*words.HAND, "palm")) for joint in nexts)
 
 
 def _hand(search: _Search, nexts: Joints, path: Joints) -> _Chain:
@@ -319,10 +365,6 @@ def _explain(search: _Search, limbs: Iterable[Limb], parts: Mapping[str, Joints]
             reasons.append(
                 f"{which}gripper: none, as no joints branch at the end and none is named like a jaw"
             )
-
-
-def _says(joints: Iterable[ModelJoint], known: Sequence[str]) -> bool:
-    return any(words.has(name, known) for name in _names(joints))
 
 
 def _share(joints: Sequence[ModelJoint], known: Sequence[str]) -> float:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from kinematics.rotations import Floats
+from kinematics.tree import Tree
 from robots.guessing.hints import DriveHint
-from robots.guessing.masses import Masses, hanging_inertia
 from robots.guessing.stance import Stance
-from robots.urdf.model import ModelJoint
+from robots.urdf.model import ModelJoint, UrdfModel
 
 CONTROL_STEP = 0.05  # s; at 20 control steps a second, the default
 STIFFNESS = 1e3  # N·m/rad, N/m; the least, as of ManiSkill's Panda
@@ -38,6 +39,7 @@ POSTURES = 16  # in which the inertia is looked at
 # those of Menagerie's Panda, which cover 60 %, an expert that counts on its steps drops cubes.
 SHARE, IN_TIME = 0.9, 2 * CONTROL_STEP
 PHYSICS_STEP = 0.01  # s
+WATER = 1000.0  # kg/m³; of shapes whose weight nothing gives
 
 
 @dataclass(frozen=True)
@@ -148,7 +150,7 @@ class Drives:
 
     def _drive(self, joint: ModelJoint, stiffest: float) -> tuple[Drive, bool]:
         """Return a drive, and whether its force is more than the URDF's effort."""
-        inertia = self._inertia(joint)
+        inertia = self.moved_by(joint)
         needed = JUST_ENOUGH * inertia / CONTROL_STEP**2  # N·m, N; per rad or m of a step
         force = joint.effort or max(FORCE, needed * SHORTEST_STEP)
         step = min(LONGEST_STEP, force / needed)
@@ -169,7 +171,7 @@ class Drives:
         known = self._known.get(joint.name)
         if known is None or known.stiffness is None:
             return drive
-        inertia = self._inertia(joint)
+        inertia = self.moved_by(joint)
         stiffness = min(known.stiffness, inertia * stiffest**2)
         damping = (known.damping or 0.0) * stiffness / known.stiffness
         damping = max(damping, 2 * (stiffness * inertia) ** 0.5)
@@ -179,8 +181,8 @@ class Drives:
             return drive
         return replace(drive, stiffness=_rounded(stiffness), damping=_rounded(damping))
 
-    def _inertia(self, joint: ModelJoint) -> float:
-        """Return what a joint's drive moves: what hangs on it, and its motor and gear."""
+    def moved_by(self, joint: ModelJoint) -> float:
+        """Return the inertia that a joint's drive moves, with motor and gear (kg·m², kg)."""
         return self._hanging[joint.name] + self._armature(joint)
 
     def _armature(self, joint: ModelJoint) -> float:
@@ -197,17 +199,13 @@ class Drives:
         """
         (drive, raised), settling = self._drive(joint, STIFFEST), SETTLING[joint.unit]
         self._note(joint, raised)
-        inertia = self._inertia(joint)
+        inertia = self.moved_by(joint)
         damping = min(max(drive.damping, drive.stiffness * settling), inertia * MOST_DAMPED)
         stiffness = min(drive.stiffness, damping / settling)
         force = min(drive.force_limit, FORCE)
         return replace(
             drive, stiffness=_rounded(stiffness), damping=_rounded(damping), force_limit=force
         )
-
-    def moved_by(self, joint: ModelJoint) -> float:
-        """Return the inertia that a joint's drive moves, with motor and gear (kg·m², kg)."""
-        return self._inertia(joint)
 
     def geared(
         self,
@@ -226,8 +224,8 @@ class Drives:
             force: The largest (N·m, N).
             settling: Time in which it goes as far as its target is ahead (s).
         """
-        more = max(inertia - self._inertia(joint), 0.0)
-        critical = 2 * (stiffness * (self._inertia(joint) + more)) ** 0.5
+        more = max(inertia - self.moved_by(joint), 0.0)
+        critical = 2 * (stiffness * (self.moved_by(joint) + more)) ** 0.5
         damping = max(critical, stiffness * settling)
         numbers = (stiffness, damping, force, self._armature(joint) + more)
         return Drive(*map(_rounded, numbers), step=LONGEST_STEP)
@@ -269,3 +267,87 @@ def _rounded(value: float) -> float:
 def _down(step: float) -> float:
     """Return a step rounded down to 5 mrad or 5 mm."""
     return round(int(step / 0.005 + 1e-9) * 0.005, 6)
+
+
+@dataclass(frozen=True, eq=False)
+class Masses:
+    """Masses of the links of a tree, in its order.
+
+    Attributes:
+        mass: (links,) (kg); 0 of a link without numbers and without shapes.
+        centre: Centres of mass in the links' frames, (links, 3) (m).
+        inertia: About those, turned as the links, (links, 3, 3) (kg·m²).
+    """
+
+    mass: Floats
+    centre: Floats
+    inertia: Floats
+
+
+def read_masses(model: UrdfModel, tree: Tree, bodies: Mapping[int, Sequence[Floats]]) -> Masses:
+    """Return what the links of a URDF weigh; without numbers, as much as their shapes in water.
+
+    Args:
+        model: What the URDF describes.
+        tree: Its links.
+        bodies: Corners of the convex bodies of links, by index, in their frames (m).
+    """
+    rows: list[tuple[float, Floats, Floats]] = []
+    for i, link in enumerate(tree.links):
+        inertial = model.inertials.get(link)
+        if inertial is None or not inertial.mass:
+            rows.append(_of_shapes(bodies.get(i, ())))
+        else:
+            turn = inertial.origin[:3, :3]
+            rows.append((inertial.mass, inertial.origin[:3, 3], turn @ inertial.tensor @ turn.T))
+    mass, centre, inertia = (np.array(column) for column in zip(*rows, strict=True))
+    return Masses(mass, centre, inertia)
+
+
+def _of_shapes(bodies: Sequence[Floats]) -> tuple[float, Floats, Floats]:
+    """Return mass, centre and inertia of bodies with the density of water, as SAPIEN takes it."""
+    if not bodies:
+        return 0.0, np.zeros(3), np.zeros((3, 3))
+    import trimesh
+
+    hulls: list[Any] = [trimesh.convex.convex_hull(corners) for corners in bodies]
+    mass = np.array([hull.volume * WATER for hull in hulls])
+    centres = np.array([hull.center_mass for hull in hulls])
+    centre = mass @ centres / mass.sum()
+    inertia = np.zeros((3, 3))
+    for hull, weight, off in zip(hulls, mass, centres - centre, strict=True):
+        inertia += hull.moment_inertia * WATER
+        inertia += weight * (off @ off * np.eye(3) - np.outer(off, off))
+    return float(mass.sum()), centre, inertia
+
+
+def hanging_inertia(tree: Tree, masses: Masses, poses: Floats, links: Iterable[int]) -> Floats:
+    """Return the inertia that each joint moves, with the others held, (links given,).
+
+    Of a joint that turns about its axis (kg·m²), of one that slides the mass (kg); the largest of
+    some postures.
+
+    Args:
+        tree: The links.
+        masses: What they weigh.
+        poses: Of the links in each posture, (postures, links, 4, 4) (m).
+        links: Indices of the links that the joints carry.
+    """
+    behind = [[i] for i in range(len(tree.links))]
+    for i in range(len(tree.links) - 1, 0, -1):
+        behind[tree.parents[i]] += behind[i]
+    return np.array([_about(tree, masses, poses, link, behind[link]) for link in links])
+
+
+def _about(tree: Tree, masses: Masses, poses: Floats, link: int, behind: list[int]) -> float:
+    mass = masses.mass[behind]
+    if tree.slides[link]:
+        return float(mass.sum())
+    turned = poses[:, behind, :3, :3]
+    centre = (turned @ masses.centre[behind][..., None])[..., 0] + poses[:, behind][..., :3, 3]
+    axis = poses[:, link, :3, :3] @ tree.axes[link]
+    arm = centre - poses[:, link, None, :3, 3]
+    off = arm - (arm @ axis[..., None]) * axis[:, None]
+    local = (np.swapaxes(turned, -1, -2) @ axis[:, None, :, None])[..., 0]
+    own = np.einsum("pli,lij,plj->pl", local, masses.inertia[behind], local)
+    return float((own + mass * (off**2).sum(axis=-1)).sum(axis=-1).max())

@@ -11,13 +11,16 @@ from robots.bodies.hulls import Hull
 from robots.guessing import words
 from robots.guessing.anatomy import Limb
 from robots.guessing.stance import Stance
-from robots.urdf.model import ModelJoint
+from robots.parts import Fingers, GripperMaterial
+from robots.urdf.model import ModelJoint, UrdfModel
 
 SHORT = 0.6  # of the longest finger; what ends before it is a knuckle, not a tip
 FOLLOWING = 0.85  # the same where all joints follow one, as in grippers with knuckles
 PAD = 0.02  # of a finger's length; a pad that ends so near the finger's end is what touches
 FLUSH = 5e-4  # m; how much farther in a pad must lie than what carries it
 CAP = 0.15  # of a finger's length; its corners within it from the end make its tip
+ALONG = 0.7  # cosine; how well a finger's y axis must lie along the way in which it opens
+WIDE = 110.0  # degrees; of a finger that swings, as ManiSkill's SO-100 has it
 
 
 class Fingertips:
@@ -37,8 +40,9 @@ class Fingertips:
         self._palm = self._poses[stance.tree.link(limb.palm)]
         self._hulls, self.solid = hulls, bool(hulls)
         leaves = [joint for joint in limb.fingers if not stance.model.moving_on(joint.child)]
-        tips = {joint.child: self._tip(joint.child) for joint in leaves}
-        far = {link: float(np.linalg.norm(tip - self._palm[:3, 3])) for link, tip in tips.items()}
+        palm = self._palm[:3, 3]
+        tips = {j.child: self._outermost(self._points(j.child), palm) for j in leaves}
+        far = {link: float(np.linalg.norm(tip - palm)) for link, tip in tips.items()}
         longest = max(far.values(), default=0.0)
         led = sum(joint.mimics is None for joint in limb.fingers) == 1
         least = (FOLLOWING if led else SHORT) * longest
@@ -134,10 +138,6 @@ class Fingertips:
         way = self._tips[end] - np.mean(list(self._tips.values()), axis=0)
         return way / max(float(np.linalg.norm(way)), 1e-9)
 
-    def _tip(self, link: str) -> Floats:
-        """Return the mean of the outermost points of a link and what is rigid with it."""
-        return self._outermost(self._points(link), self._palm[:3, 3])
-
     def _fixed_tip(self, end: str, tip: Floats) -> Floats:
         """Return the tip of what a single jaw closes on: of the palm, its own size away."""
         joint = self.stance.model.parent_joint[end]
@@ -161,3 +161,43 @@ class Fingertips:
             if hull.link in rigid
         ]
         return np.concatenate(corners) if corners else self._poses[rigid, :3, 3]
+
+
+def find_material(model: UrdfModel, limbs: Sequence[Limb]) -> GripperMaterial | None:
+    """Return the contact material of all fingers, as ManiSkill's grippers have it."""
+    links = tuple(link for limb in limbs if limb.fingers for link in _finger_links(model, limb))
+    return GripperMaterial(links, 2.0, 2.0, 0.0, patch_radius=0.1) if links else None
+
+
+def find_fingers(
+    limb: Limb, tips: Fingertips | None, opened: Mapping[str, float]
+) -> tuple[Fingers | None, str]:
+    """Return the two links that grasp, if a limb has two that open along their y axes, and why.
+
+    Args:
+        limb: The limb.
+        tips: The tips of its fingers, if it has any.
+        opened: Where its joints are when it is open (rad, m).
+    """
+    none = "fingers: none, so grasps go unnoticed; a Fingers(...) with two links changes that"
+    if tips is None or len(tips.ends) != 2:
+        return None, none
+    ways = tips.opening(opened)
+    if min(abs(way) for way in ways) < ALONG:
+        return None, none
+    swings = any(joint.type != "prismatic" for joint in limb.fingers)
+    one, other = (1 if way > 0 else -1 for way in ways)
+    links = tips.touching(tips.ends[0]), tips.touching(tips.ends[1])
+    fingers = Fingers(links, opening_signs=(one, other))
+    if swings:
+        return Fingers(fingers.links, fingers.opening_signs, max_angle=WIDE), (
+            f"fingers: {' and '.join(links)} swing open along their y axes"
+        )
+    return fingers, "fingers: both slide along their y axis, in which they open"
+
+
+def _finger_links(model: UrdfModel, limb: Limb) -> tuple[str, ...]:
+    """Return the links of a hand's fingers, with the pads that are fixed to them."""
+    own = [joint.child for joint in limb.fingers]
+    pads = [p for link in own for p in model.rigid_with(link)[1:] if p in model.collisions]
+    return (*((limb.palm,) if len(own) == 1 else ()), *own, *pads)

@@ -1,4 +1,10 @@
-"""The joint groups of a hand: how many numbers drive it, and which way it opens."""
+"""The joint groups of a hand: how many numbers drive it, and which way it opens.
+
+In a linkage, as of parallel jaws, no joint moves alone: stopped by an object, the jaws stay
+parallel. Joints that are driven each to its own place do not; the outer ones go on, and the jaws
+splay. So the joints that carry the fingers lead, and all others go where these are. The force and
+the inertia of its motor are the linkage's, whichever joint the motor turns.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +16,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.action_split import JointGroup
 from robots.bodies.hulls import Hull
 from robots.bodies.overlaps import overlapping
-from robots.descriptor import JointGroup
 from robots.guessing.anatomy import Limb
-from robots.guessing.drives import Drives, drive_fields
+from robots.guessing.drives import (
+    CONTROL_STEP,
+    FORCE,
+    FREQUENCY,
+    STIFFEST_FINGER,
+    Drive,
+    Drives,
+    drive_fields,
+)
 from robots.guessing.fingertips import Fingertips
 from robots.guessing.groups import by_steps, name_of
-from robots.guessing.linkages import Follower, find_linkage
 from robots.guessing.stance import Stance, middle_of
 from robots.urdf.model import ModelJoint
 
@@ -28,6 +41,23 @@ MOST_JOINTS = 20  # of a hand whose fingers collide with each other
 USUALLY = 0.5  # of `POSTURES`; links of a hand that overlap so often are one mechanism
 POSTURES = 32  # random ones of a hand
 NOTICEABLE = 1e-4  # m; how much opening changes the distance of the tips
+CLOSING = 8  # control steps that a hand takes from open to closed
+LEAST = 1e-3  # m; of what counts as a tip's travel
+PRESS = 30.0  # N, of a finger whose force nothing gives: about what ManiSkill's Panda presses with
+SPARE = 2.0  # how much more than its share of the force a leader may take to keep the fingers even
+
+
+@dataclass(frozen=True)
+class Follower:
+    """A joint that goes to multiplier · value + offset."""
+
+    joint: ModelJoint
+    multiplier: float
+    offset: float
+
+    def at(self, value: float) -> float:
+        """Return where it goes (rad, m)."""
+        return self.multiplier * value + self.offset
 
 
 @dataclass(frozen=True)
@@ -94,8 +124,8 @@ def entangled(
         gripper: What drives the hand.
         grasping: The last link of each finger.
     """
-    rigid = [stance.model.rigid_with(link) for link in _links(limb)]
-    inside = {stance.tree.link(link) for links in rigid for link in links}
+    moved = (limb.palm, *(joint.child for joint in limb.fingers))
+    inside = {stance.tree.link(link) for own in moved for link in stance.model.rigid_with(own)}
     mine = np.array([p for p in pairs if {hulls[i].link for i in p} <= inside], int).reshape(-1, 2)
     if len(limb.fingers) > MOST_JOINTS:
         return _names(stance, hulls, mine)
@@ -132,10 +162,6 @@ def _usually(
 def _names(stance: Stance, hulls: Sequence[Hull], pairs: NDArray[np.intp]) -> list[tuple[str, str]]:
     links = [stance.tree.links[hull.link] for hull in hulls]
     return list(dict.fromkeys((links[a], links[b]) for a, b in pairs))
-
-
-def _links(limb: Limb) -> tuple[str, ...]:
-    return (limb.palm, *(joint.child for joint in limb.fingers))
 
 
 def _followers(fingers: Sequence[ModelJoint]) -> dict[str, list[Follower]]:
@@ -220,20 +246,9 @@ def _one(
     mimic = len(followers) > 1 or opens_down
     linkage = find_linkage(followers, (low, high), tips, drives)
     made = linkage.drives if linkage else [drives.gripping(joint) for joint in joints]
-    group = JointGroup(
-        tuple(joint.name for joint in joints),
-        lower=_tidy(low - SQUEEZE if leader.unit == "m" else low),
-        upper=_tidy(high),
-        mimic=mimic,
-        multipliers=_unless(1.0, [f.multiplier for f in followers]) if mimic else (),
-        offsets=_unless(0.0, [f.offset for f in followers]) if mimic else (),
-        unit=leader.unit,
-        reset_noise=False,
-        limits=tuple(joint.span for joint in joints),
-        leaders=linkage.leaders if linkage else (),
-        lead=linkage.lead if linkage else 0.0,
-        **drive_fields(made),
-    )
+    ahead = {"leaders": linkage.leaders, "lead": linkage.lead} if linkage else {}
+    lower = _tidy(low - SQUEEZE if leader.unit == "m" else low)
+    group = _group(followers, (lower, _tidy(high)), made, mimic=mimic, **ahead)
     postures = tuple(_led_to(followers, low + (high - low) * part) for part in OPENINGS)
     where = f"{leader.name} at {postures[0][leader.name]:g} {leader.unit}"
     reasons = [f"{name}: +1 opens it, with {where}, as the finger tips part there"]
@@ -243,8 +258,32 @@ def _one(
     return group, postures, tuple(reasons)
 
 
+def _group(
+    followers: Sequence[Follower],
+    span: tuple[float, float],
+    drives: Sequence[Drive],
+    *,
+    mimic: bool = True,
+    **more: Any,
+) -> JointGroup:
+    """Return the group of joints that one value drives, within a span."""
+    return JointGroup(
+        tuple(f.joint.name for f in followers),
+        lower=span[0],
+        upper=span[1],
+        mimic=mimic,
+        multipliers=_unless(1.0, [f.multiplier for f in followers]) if mimic else (),
+        offsets=_unless(0.0, [f.offset for f in followers]) if mimic else (),
+        unit=followers[0].joint.unit,
+        reset_noise=False,
+        limits=tuple(f.joint.span for f in followers),
+        **drive_fields(drives),
+        **more,
+    )
+
+
 def _apart(tips: Fingertips, followers: Sequence[Follower], lead: float) -> float:
-    return tips.apart({f.joint.name: f.multiplier * lead + f.offset for f in followers})
+    return tips.apart({f.joint.name: f.at(lead) for f in followers})
 
 
 def _many(
@@ -262,10 +301,12 @@ def _many(
             made = [drives.finger(joint) for joint in joints]
             groups[name + suffix] = by_steps(joints, made, reset_noise=False)
     for leader in leaders:
-        if len(followers[leader.name]) > 1:
-            groups[_free(f"{name}_{_identifier(leader.name)}", groups)] = _led(
-                followers[leader.name], drives
-            )
+        led = followers[leader.name]
+        if len(led) > 1:
+            own = f"{name}_{re.sub('[^A-Za-z0-9]+', '_', leader.name).strip('_').lower()}"
+            while own in groups:
+                own += "_"
+            groups[own] = _group(led, leader.span, [drives.gripping(f.joint) for f in led])
     counts = f"{len(leaders)} numbers drive it, one for each joint that mimics none"
     postures: list[dict[str, float]] = []
     for part in OPENINGS:
@@ -279,39 +320,9 @@ def _many(
 def _led_to(followers: Sequence[Follower], lead: float) -> dict[str, float]:
     """Return where joints go, each within its limits."""
     return {
-        f.joint.name: min(
-            max(_tidy(f.multiplier * lead + f.offset), f.joint.span[0]), f.joint.span[1]
-        )
+        f.joint.name: min(max(_tidy(f.at(lead)), f.joint.span[0]), f.joint.span[1])
         for f in followers
     }
-
-
-def _led(followers: Sequence[Follower], drives: Drives) -> JointGroup:
-    leader = followers[0].joint
-    low, high = leader.span
-    fields: dict[str, Any] = drive_fields([drives.gripping(f.joint) for f in followers])
-    return JointGroup(
-        tuple(f.joint.name for f in followers),
-        lower=low,
-        upper=high,
-        mimic=True,
-        multipliers=_unless(1.0, [f.multiplier for f in followers]),
-        offsets=_unless(0.0, [f.offset for f in followers]),
-        unit=leader.unit,
-        reset_noise=False,
-        limits=tuple(f.joint.span for f in followers),
-        **fields,
-    )
-
-
-def _identifier(name: str) -> str:
-    return re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_").lower()
-
-
-def _free(name: str, taken: Mapping[str, Any]) -> str:
-    while name in taken:
-        name += "_"
-    return name
 
 
 def _unless(default: float, numbers: Sequence[float]) -> tuple[float, ...]:
@@ -326,3 +337,68 @@ def _tidy(value: float) -> float:
 
 def _listing(joints: Sequence[ModelJoint]) -> str:
     return " and ".join(joint.name for joint in joints)
+
+
+@dataclass(frozen=True)
+class Linkage:
+    """What leads a linkage, and how its joints are driven.
+
+    Attributes:
+        leaders: Names of the joints that carry its fingers.
+        lead: How far ahead of them the value may be (unit of the value).
+        drives: Of each joint.
+    """
+
+    leaders: tuple[str, ...]
+    lead: float
+    drives: tuple[Drive, ...]
+
+
+def find_linkage(
+    followers: Sequence[Follower], span: tuple[float, float], tips: Fingertips, drives: Drives
+) -> Linkage | None:
+    """Return the linkage that joints are; None if in no finger one hangs on another.
+
+    Args:
+        followers: Joints that one value drives.
+        span: The value's limits.
+        tips: The tips of the fingers.
+        drives: The drives of joints.
+    """
+    leaders = _leaders([follower.joint for follower in followers], tips)
+    if not leaders:
+        return None
+    (low, high), fingers = span, len(leaders)
+    travel = abs(_apart(tips, followers, high) - _apart(tips, followers, low)) / (high - low)
+    press = _press(followers, fingers, travel)
+    moved = sum(f.multiplier**2 * drives.moved_by(f.joint) for f in followers) / fingers
+    # A hand that closes within a control step hits what it takes; motors are not as fast.
+    inertia = max(moved, press * travel * CONTROL_STEP**2 / (high - low))
+    lead = (high - low) / CLOSING
+
+    def drive(follower: Follower) -> Drive:
+        joint, factor = follower.joint, abs(follower.multiplier)
+        own = inertia / factor**2
+        if joint.name not in leaders:
+            return drives.geared(joint, own, own * FREQUENCY**2, FORCE)
+        force = press * tips.lever(leaders[joint.name], joint)
+        stiffness = min(force / (lead * factor), own * STIFFEST_FINGER**2)
+        return drives.geared(joint, own, stiffness, SPARE * force, CONTROL_STEP)
+
+    return Linkage(tuple(leaders), round(lead, 6), tuple(map(drive, followers)))
+
+
+def _leaders(joints: Sequence[ModelJoint], tips: Fingertips) -> dict[str, str]:
+    """Return the joints that carry fingers, and their last links, if a finger has several."""
+    named = {joint.name for joint in joints}
+    paths = {end: tips.stance.model.path_to(end) for end in tips.ends}
+    ways = {end: [j.name for j in path if j.name in named] for end, path in paths.items()}
+    if not any(len(way) > 1 for way in ways.values()):
+        return {}
+    return {way[0]: end for end, way in ways.items() if way}
+
+
+def _press(followers: Sequence[Follower], fingers: int, travel: float) -> float:
+    """Return the force with which each finger presses (N), by the motor's where it is given."""
+    efforts = [abs(f.multiplier) * f.joint.effort for f in followers if f.joint.effort]
+    return min(sum(efforts) / fingers / max(travel, LEAST), FORCE) if efforts else PRESS

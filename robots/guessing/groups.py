@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from robots.descriptor import JointGroup
+from robots.action_split import JointGroup
 from robots.guessing.anatomy import PARTS, Anatomy, Limb
 from robots.guessing.drives import Drive, Drives, alike, drive_fields
 from robots.urdf.model import ModelJoint

@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+
+from robots.guessing import words
+from robots.guessing.anatomy import FEWEST_ARM_JOINTS, Anatomy, Limb
+from robots.urdf.model import ModelJoint, UrdfModel
+from robots.urdf.srdf import EndEffector, Group, Semantics
+
+LEFT_OUT = ("arm", "manipulator", "group")  # words that say nothing of which arm a group is
 
 
 @dataclass(frozen=True)
@@ -68,3 +76,133 @@ class Hints:
 
 
 NOTHING = Hints()
+
+
+def hints_of(semantics: Semantics, name: str) -> Hints:
+    """Return the hints that an SRDF gives.
+
+    Args:
+        semantics: What it says.
+        name: Its file's name, for reasons.
+    """
+    limbs = tuple(_limbs(semantics))
+    listing = ", ".join(
+        f"{hint.name} ({len(hint.arm)} joints, {len(hint.fingers)} of its gripper)"
+        for hint in limbs
+    )
+    about = f"the arms are its groups {listing}" if limbs else "none of its groups is an arm"
+    return Hints(
+        source=name,
+        limbs=limbs,
+        postures=semantics.states,
+        allowed=tuple(pair.links for pair in semantics.excluded),
+        reasons=(f"{name}: {about}",),
+    )
+
+
+def known_anatomy(model: UrdfModel, found: Anatomy, hints: Hints) -> Anatomy:
+    """Return a robot's parts with the arms that are known in the place of those that were found.
+
+    Args:
+        model: What its URDF describes.
+        found: Its parts by structure and names.
+        hints: What is known.
+    """
+    if not hints.limbs:
+        return found
+    joints = {joint.name: joint for joint in model.moving}
+    limbs = tuple(_limb(hint, name, joints, model) for hint, name in _named(hints.limbs))
+    taken = {joint.name for limb in limbs for joint in (*limb.arm, *limb.fingers)}
+    parts = {part: _without(group, taken) for part, group in found.parts.items()}
+    base = _without(found.base, taken)
+    known = taken.union(*({j.name for j in group} for group in (base, *parts.values())))
+    left = tuple(joint for joint in model.moving if joint.name not in known)
+    parts["body"] = (*parts.get("body", ()), *left)
+    reasons = [*hints.reasons]
+    held = [joint.name for group in (base, *parts.values()) for joint in group]
+    if held:
+        reasons.append(f"held still: {', '.join(held)}, of no arm of {hints.source}")
+    parts = {part: group for part, group in parts.items() if group}
+    return Anatomy(base, tuple(sorted(limbs, key=lambda limb: limb.name)), parts, tuple(reasons))
+
+
+def known_tip(model: UrdfModel, limb: Limb, hints: Hints) -> str:
+    """Return the link that is known as a limb's end, if it lies beyond its palm; else nothing."""
+    own = {joint.name for joint in limb.arm}
+    tips = [hint.tip for hint in hints.limbs if own and own == set(hint.arm)]
+    beyond = model.rigid_with(limb.palm)[0 if not limb.fingers else 1 :]
+    return next((tip for tip in tips if tip in beyond), "")
+
+
+def _limbs(semantics: Semantics) -> Iterator[LimbHint]:
+    hands = {effector.group: effector for effector in semantics.end_effectors}
+    carried = {_arm_of(effector, semantics): effector for effector in hands.values()}
+    for group in semantics.groups.values():
+        effector = carried.get(group.name)
+        alone = not group.parts and len(group.joints) >= FEWEST_ARM_JOINTS
+        whole = effector is not None or (alone and not _contains_another(group, semantics, hands))
+        if group.name in hands or not group.joints or not whole:
+            continue
+        fingers = semantics.groups[effector.group].joints if effector else ()
+        arm = tuple(joint for joint in group.joints if joint not in fingers)
+        yield LimbHint(group.name, arm, fingers, group.tip)
+
+
+def _arm_of(effector: EndEffector, semantics: Semantics) -> str:
+    """Return the group that carries an end effector: as it says, or the smallest that may."""
+    if effector.parent_group:
+        return effector.parent_group
+    hand = set(semantics.groups[effector.group].joints)
+    arms = [
+        group
+        for group in semantics.groups.values()
+        if group.name != effector.group
+        and not group.parts
+        and not hand & set(group.joints)
+        and (group.tip in ("", effector.parent_link) and len(group.joints) > 1)
+    ]
+    return min(arms, key=lambda group: len(group.joints)).name if arms else ""
+
+
+def _contains_another(group: Group, semantics: Semantics, hands: Iterable[str]) -> bool:
+    """Tell whether another arm is part of a group, which then is an arm with a torso, say."""
+    own = set(group.joints)
+    return any(
+        own > set(other.joints) and len(other.joints) >= FEWEST_ARM_JOINTS
+        for other in semantics.groups.values()
+        if other.name not in hands
+    )
+
+
+def _named(hints: tuple[LimbHint, ...]) -> list[tuple[LimbHint, str]]:
+    """Return the limbs' names: none for a single one, sides, or what the groups are called."""
+    if len(hints) == 1:
+        return [(hints[0], "")]
+    sides = [words.side((hint.name, *hint.arm)) for hint in hints]
+    if sorted(sides) == ["left", "right"]:
+        return list(zip(hints, sides, strict=True))
+    names = [
+        "_".join(w for w in re.split(r"[^a-z0-9]+", hint.name.lower()) if w and w not in LEFT_OUT)
+        for hint in hints
+    ]
+    good = len(set(names)) == len(names) and all(names) and "body" not in names
+    return list(zip(hints, names if good else map(str, range(1, len(hints) + 1)), strict=True))
+
+
+def _limb(hint: LimbHint, name: str, joints: dict[str, ModelJoint], model: UrdfModel) -> Limb:
+    arm = tuple(joints[joint] for joint in hint.arm)
+    fingers = tuple(joints[joint] for joint in hint.fingers)
+    if not fingers:
+        return Limb(name, arm, (), arm[-1].child)
+    moved = {joint.child for joint in fingers}
+    outer = [
+        joint.parent
+        for joint in fingers
+        if moved.isdisjoint(before.child for before in model.path_to(joint.parent))
+    ]
+    carriers = outer or [fingers[0].parent]
+    return Limb(name, arm, fingers, max(dict.fromkeys(carriers), key=carriers.count))
+
+
+def _without(group: tuple[ModelJoint, ...], taken: set[str]) -> tuple[ModelJoint, ...]:
+    return tuple(joint for joint in group if joint.name not in taken)

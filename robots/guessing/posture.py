@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from kinematics.rotations import Floats
 from robots.bodies.hulls import Hull
 from robots.bodies.overlaps import overlapping
-from robots.guessing.anatomy import FARTHEST_SLIDE, Limb
+from robots.guessing.anatomy import Limb, flies
 from robots.guessing.stance import Stance
 from robots.guessing.tool import Tool
-from robots.guessing.view import MARGIN, View
 from robots.urdf.model import ModelJoint
 
+MARGIN = 0.1  # of a joint's range, which it stays away from its ends
 DRAWS = 1500  # random postures of a limb
 BEST = 16  # of them, refined and then looked at for overlaps
 TRIES = 3  # rounds of that, each without the overlaps met before
@@ -34,6 +34,66 @@ ONE_SIDED = 0.25  # of the reach; how far aside the middle of a workspace tells 
 QUARTER = np.pi / 2  # rad; to which the front is rounded, or to half of it
 NEARLY = 0.6  # rad; how near it must be to a quarter turn
 BESIDE = 0.35  # of the reach; how far the TCP may be to the side of what is ahead
+
+
+class View:
+    """One limb: where its joints may be, and where they bring its TCP.
+
+    Attributes:
+        free: Indices of its joints among the leading ones.
+        limits: Lower and upper limits of those, (2, free) (rad, m).
+        room: The same without the margin at the ends.
+        bounded: Whether each of them turns less than a whole turn, or slides.
+        slides: Whether each of them slides.
+        reach: How far the TCP gets from the shoulder (m).
+        shoulder: Where the first of them is, (3,) (m).
+        moving: Indices of the links that move, in the smaller tree.
+        links: Indices of all links that it moves, in the robot's tree.
+    """
+
+    def __init__(self, stance: Stance, limb: Limb, tool: Tool) -> None:
+        """Take a limb with a joint of its own, and its tool centre point."""
+        joints = [joint for joint in limb.arm if joint.mimics is None]
+        self.free = [stance.index[joint.name] for joint in joints]
+        spans = np.array([joint.span for joint in joints]).T
+        self.bounded = spans[1] - spans[0] < 2 * np.pi - 0.1
+        half = np.where(self.bounded, (spans[1] - spans[0]) / 2, np.pi)
+        middle = np.where(self.bounded, spans.mean(axis=0), np.clip(0.0, *spans))
+        self.limits = np.array([middle - half, middle + half])
+        self.slides = np.array([joint.unit == "m" for joint in joints])
+        margin = 1.5 * MARGIN * half * 2
+        self.room = self.limits + np.array([margin, -margin])
+        links = [*tool.on(stance.tree).needed, stance.tree.link(limb.palm)]
+        self._tree = stance.tree.towards(links)
+        self._tcp = tool.on(self._tree)
+        self._palm = self._tree.link(limb.palm)
+        first = self._tree.link(joints[0].child)
+        pose = stance.poses(stance.middle)[0, stance.tree.link(joints[0].child)]
+        self.shoulder: Floats = pose[:3, 3]
+        axis = pose[:3, :3] @ self._tree.axes[first]
+        self.is_upright = abs(axis[2]) > 0.9 and not self._tree.slides[first]
+        self.moving = [i for i in range(len(self._tree.links)) if i > first]
+        self.links = frozenset(
+            stance.tree.link(link)
+            for joint in stance.model.below(joints[0])
+            for link in stance.model.rigid_with(joint.child)
+        )
+        self.reach = 1.0
+
+    def look(self, postures: Floats) -> tuple[Floats, Floats]:
+        """Return the poses of the limb's links, and the TCP from the shoulder (postures, 3)."""
+        poses = self._tree.forward(postures)
+        return poses, self._tcp.places(poses) - self.shoulder
+
+    def places(self, postures: Floats) -> Floats:
+        """Return the TCP from the shoulder, (postures, 3) (m)."""
+        return self.look(postures)[1]
+
+    def pointing(self, poses: Floats) -> Floats:
+        """Return which way the tool points, seen from the palm, (postures, 3); 0 if nowhere."""
+        way = self._tcp.places(poses) - poses[:, self._palm, :3, 3]
+        length = np.linalg.norm(way, axis=1, keepdims=True)
+        return np.where(length > 0.01, way / np.maximum(length, 1e-9), 0.0)
 
 
 @dataclass(frozen=True)
@@ -152,10 +212,8 @@ class PostureSearch:
 
     def _touching(self, links: frozenset[int], apart: frozenset[int]) -> NDArray[np.bool_]:
         """Tell of which pairs one hull is on some links, and none on others, (pairs,)."""
-        sides = [[self._hulls[i].link for i in pair] for pair in self._pairs]
-        return np.array(
-            [bool(links & {*pair}) and not apart & {*pair} for pair in sides], bool
-        )  # fmt: skip
+        sides = [{self._hulls[i].link for i in pair} for pair in self._pairs]
+        return np.array([bool(links & pair) and not apart & pair for pair in sides], bool)
 
     def _opened(self, hands: Sequence[Sequence[Mapping[str, float]]]) -> Floats:
         """Return the middle posture with every hand as open as it can be without overlaps."""
@@ -179,16 +237,13 @@ class PostureSearch:
 
     def _lowest(self) -> float:
         """Return the height of the ground: of the lowest point of the root's body (m)."""
+        heights = self._stance.poses(self._stance.middle)[0, :, 2, 3]
         body = [
-            float(hull.corners[:, 2].min()) + place
+            float(hull.corners[:, 2].min() + heights[hull.link])
             for hull in self._hulls
             if self._stance.tree.bodies[hull.link] == 0
-            for place in (self._root_height(hull.link),)
         ]
         return min([0.0, *body])
-
-    def _root_height(self, link: int) -> float:
-        return float(self._stance.poses(self._stance.middle)[0, link, 2, 3])
 
     def _draw(self, view: View, posture: Floats) -> Floats:
         drawn = np.tile(posture, (DRAWS, 1))
@@ -317,8 +372,8 @@ class PostureSearch:
 
 def _searchable(limb: Limb) -> bool:
     """Tell whether a limb has an arm of its own, which stands somewhere."""
-    flies = any(j.unit == "m" and j.span[1] - j.span[0] > FARTHEST_SLIDE for j in limb.arm)
-    return len([joint for joint in limb.arm if joint.mimics is None]) > 1 and not flies
+    own = [joint for joint in limb.arm if joint.mimics is None]
+    return len(own) > 1 and not any(map(flies, limb.arm))
 
 
 def _as_text(direction: Floats) -> str:

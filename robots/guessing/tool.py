@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import random
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kinematics.rotations import Floats, inverse_pose, transform
+from kinematics.solve import farthest
 from kinematics.tree import Tree
-from robots.descriptor import Vector3
 from robots.guessing import words
-from robots.guessing.anatomy import Limb
+from robots.guessing.anatomy import Limb, flies
 from robots.guessing.fingertips import Fingertips
 from robots.guessing.stance import Stance
+from robots.parts import Vector3
+from robots.urdf.model import UrdfModel
 from robots.urdf.tcp import Tcp, place_tcp
+from robots.urdf.tree import kinematic_tree
 
 BETWEEN = 0.05  # m; a frame named like a tool counts if it is so near to the place between tips
 EXACT = 0.02  # m; farther away, the reason says so
 OPPOSITE = ("index", "middle")  # fingers that a thumb meets, the first one first
 BLIND = (*words.HEAD, "optical", "imu", "ft", "force", "torque", "inertia", "range", "led")
+STARTS = 8  # of the search for the reach
 
 
 @dataclass(frozen=True)
@@ -102,15 +108,12 @@ def _end(stance: Stance, limb: Limb, rigid: list[str], which: str) -> Tool:
         return Tool(
             limb.palm, (), f"{which}: the link {limb.palm}, the last one, as no tool is named"
         )
-    solid = [link for link in rigid if _has_shape(stance, link)] or rigid
+    seen = {*stance.model.collisions, *stance.model.visuals}
+    solid = [link for link in rigid if link in seen] or rigid
     places = stance.places((limb.palm, *solid))
     far = np.linalg.norm(places[1:] - places[0], axis=1)
     last = solid[int(np.argmax(np.round(far, 6)))]
     return Tool(last, (), f"{which}: the link {last}, the farthest one, as no tool is named")
-
-
-def _has_shape(stance: Stance, link: str) -> bool:
-    return link in stance.model.collisions or link in stance.model.visuals
 
 
 def _between(
@@ -203,4 +206,61 @@ def _apart(distance: float, offset: Vector3) -> str:
     return (
         f"; the finger tips meet {distance * 100:.0f} cm away, where no frame lies:"
         f" tcp_offset={offset} moves it there"
+    )
+
+
+def find_base(model: UrdfModel, limb: Limb, rest: Mapping[str, float]) -> Vector3:
+    """Return where a limb's first joint is, in the robot's frame (m).
+
+    Args:
+        model: What the robot's URDF describes.
+        limb: The limb.
+        rest: Where the joints are (rad, m).
+    """
+    tree = kinematic_tree(model)
+    start = np.array([rest.get(joint, 0.0) for joint in tree.coordinates])
+    first = (*limb.arm, *limb.fingers)[0]
+    x, y, z = tree.forward(start[None])[0][tree.link(first.child), :3, 3].round(4).tolist()
+    return x, y, z
+
+
+def find_reach(
+    model: UrdfModel,
+    limb: Limb,
+    tool: Tool,
+    rest: Mapping[str, float],
+    base: Vector3 = (0.0, 0.0, 0.0),
+) -> tuple[float, str]:
+    """Return a limb's reach (m), and how it was found.
+
+    Args:
+        model: What the robot's URDF describes.
+        limb: The limb.
+        tool: Its tool centre point.
+        rest: Where the other joints are (rad, m).
+        base: Where the vertical is that the reach is measured from, in the robot's frame (m).
+    """
+    tree = kinematic_tree(model)
+    start = np.array([rest.get(joint, 0.0) for joint in tree.coordinates])
+    origins = tree.origins.copy()
+    origins[tree.parents == 0, :2, 3] -= base[:2]
+    tree = replace(tree, origins=origins)
+    poses = tree.forward(start[None])
+    palm = tree.link(limb.palm)
+    point = transform(inverse_pose(poses[0, palm]), tool.on(tree).places(poses)[0])
+    moving = [joint for joint in limb.arm if not flies(joint)]
+    free = [tree.coordinates.index(joint.name) for joint in moving]
+    starts = np.tile(start, (STARTS, 1))
+    starts[0, free] = [sum(joint.span) / 2 for joint in moving]
+    generator = random.Random(0)  # the same answer every time
+    for position in starts[1:]:
+        position[free] = [generator.uniform(*joint.span) for joint in moving]
+    limits = tree.limits.copy()
+    limits[free] = np.array([joint.span for joint in moving]).reshape(-1, 2)
+    found = farthest(replace(tree, limits=limits), palm, point, starts, free)
+    if found < 0.01 or len(moving) < len(limb.arm):
+        return 1.0, "reach: 1 m, without ground, as nothing stands fixed or nothing reaches out"
+    return round(found, 3), (
+        "reach: the TCP's largest distance from the base's z axis within the joint limits;"
+        " data sheets, which measure to the flange, give less"
     )

@@ -59,14 +59,15 @@ def words(name: str) -> tuple[str, ...]:
     return tuple(re.sub(r"(?<=[a-z])\d+$", "", part) for part in parts if part)
 
 
-def has(name: str, known: Iterable[str]) -> bool:
+@lru_cache(maxsize=4096)
+def has(name: str, known: tuple[str, ...]) -> bool:
     """Tell whether a name holds one of some words, alone or behind the letter of a side."""
     found = words(name)
-    return any(
-        part == word or (len(word) > 2 and part in (f"l{word}", f"r{word}"))
-        for part in found
-        for word in known
-    ) or any(len(word) > 4 and word in "".join(found) for word in known)
+    spelled = {side + word for word in known if len(word) > 2 for side in ("l", "r")}
+    if not spelled.union(known).isdisjoint(found):
+        return True
+    joined = "".join(found)
+    return any([len(word) > 4 and word in joined for word in known])
 
 
 def is_tool(name: str) -> bool:

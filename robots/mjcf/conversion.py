@@ -13,12 +13,10 @@ from kinematics.rotations import Floats
 from robots.common.errors import UnwritableFileError
 from robots.common.paths import default_root
 from robots.common.writing import written_whole
-from robots.guessing.hints import DriveHint, Hints
-from robots.mjcf.compiling import Model, compiled, name_of
+from robots.guessing.hints import Hints
 from robots.mjcf.couplings import Couplings, find_couplings
-from robots.mjcf.drives import dry_friction, find_drives, find_efforts
-from robots.mjcf.robot import MjcfRobot, find_robot
-from robots.mjcf.text import MjcfText, read_mjcf
+from robots.mjcf.reading import MjcfText, Model, compiled, name_of, read_mjcf
+from robots.mjcf.robot import MjcfRobot, dry_friction, find_drives, find_efforts, find_robot
 from robots.mjcf.to_urdf import excluded, write_urdf
 
 FORM = 1  # of what is made of an MJCF; counted up whenever that changes
@@ -57,7 +55,7 @@ def convert(path: Path) -> Converted:
         DescriptorError: If nothing moves in it.
         MissingPackageError: If MuJoCo is not installed.
     """
-    return _convert(_Read(path, read_mjcf(path)))
+    return _convert(path, read_mjcf(path))
 
 
 def locate(path: Path) -> Path:
@@ -77,32 +75,16 @@ def locate(path: Path) -> Path:
     folder = default_root() / "mjcf" / hashlib.sha256(key.encode()).hexdigest()[:16]
     urdf = folder / f"{path.stem}.urdf"
     if not urdf.is_file():
-        _write(folder, urdf.name, _convert(_Read(path, text)))
+        _write(folder, urdf.name, _convert(path, text))
     return urdf
 
 
-@dataclass(frozen=True)
-class _Read:
-    """An MJCF that was read; two are equal if they have the same contents."""
-
-    path: Path
-    text: MjcfText
-
-    def __hash__(self) -> int:
-        return hash((self.path, self.text.digest))
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, _Read):
-            return False
-        return (self.path, self.text.digest) == (other.path, other.text.digest)
-
-
 @lru_cache(maxsize=KEPT)
-def _convert(read: _Read) -> Converted:
-    model = compiled(read.text, read.path)
-    robot = find_robot(model, read.path)
-    couplings = find_couplings(robot, read.path)
-    urdf = write_urdf(robot, couplings, find_efforts(robot), read.text.name)
+def _convert(path: Path, text: MjcfText) -> Converted:
+    model = compiled(text, path)
+    robot = find_robot(model, path)
+    couplings = find_couplings(robot, path)
+    urdf = write_urdf(robot, couplings, find_efforts(robot), text.name)
     rubbing = dry_friction(robot)
     notes = [*robot.notes, *couplings.notes, *urdf.notes]
     if rubbing:
@@ -114,15 +96,11 @@ def _convert(read: _Read) -> Converted:
         postures=_postures(model, robot, couplings),
         first_is_home=True,
         allowed=excluded(robot),
-        drives=_drives(robot),
+        drives=find_drives(robot),
         frames_at_joints=True,
         reasons=tuple(f"MJCF: {note}" for note in notes),
     )
-    return Converted(read.text.name, urdf.xml, urdf.meshes, hints, urdf.frames)
-
-
-def _drives(robot: MjcfRobot) -> dict[str, DriveHint]:
-    return {robot.names[joint]: drive for joint, drive in find_drives(robot).items()}
+    return Converted(text.name, urdf.xml, urdf.meshes, hints, urdf.frames)
 
 
 def _postures(model: Model, robot: MjcfRobot, couplings: Couplings) -> dict[str, dict[str, float]]:

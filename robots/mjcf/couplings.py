@@ -10,14 +10,16 @@ other of its range.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from copy import copy
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from kinematics.rotations import Floats
 from robots.common.errors import AssetError
-from robots.mjcf.compiling import Model, mujoco, name_of, without_log
+from robots.mjcf.reading import Model, mujoco, name_of, without_log
 from robots.mjcf.robot import JOINT, JOINT_IN_PARENT, SLIDE, TENDON, MjcfRobot, tendon_joints
 
 CONNECT, WELD, BETWEEN_JOINTS = range(3)  # MuJoCo's kinds of equalities
@@ -173,7 +175,7 @@ class _Search:
     def _settled(self, leader: int, place: float) -> Floats:
         """Return the positions (nq,) at which MuJoCo comes to rest while a joint stands still."""
         library = mujoco()
-        model = self._quiet()
+        model = self._quiet
         data = library.MjData(model)
         held = {joint: self._at(joint, leader, place) for joint in self._made.of}
         held = {joint: value for joint, value in held.items() if value is not None}
@@ -196,19 +198,16 @@ class _Search:
             joint = coupling.leader
         return multiplier * place + offset if joint == leader else None
 
+    @cached_property
     def _quiet(self) -> Model:
-        """Return the model without gravity, contacts and drives, and slow to swing."""
-        library = mujoco()
-        if not hasattr(self, "_still"):
-            import copy
-
-            self._still = copy.copy(self._model)
-            flags = library.mjtDisableBit
-            self._still.opt.disableflags |= flags.mjDSBL_CONTACT | flags.mjDSBL_GRAVITY
-            self._still.opt.disableflags |= flags.mjDSBL_ACTUATION
-            self._still.opt.timestep = STEP
-            self._still.opt.integrator = library.mjtIntegrator.mjINT_IMPLICITFAST
-        return self._still
+        """The model without gravity, contacts and drives, and slow to swing."""
+        library, still = mujoco(), copy(self._model)
+        flags = library.mjtDisableBit
+        still.opt.disableflags |= flags.mjDSBL_CONTACT | flags.mjDSBL_GRAVITY
+        still.opt.disableflags |= flags.mjDSBL_ACTUATION
+        still.opt.timestep = STEP
+        still.opt.integrator = library.mjtIntegrator.mjINT_IMPLICITFAST
+        return still
 
     def _couple(self, follower: int, leader: int, places: Floats, values: Floats, why: str) -> None:
         """Have a joint follow another on the line through values, or the other way round."""

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from robots.common.errors import AssetError, DescriptorError
-from robots.mjcf.compiling import Model, name_of
+from robots.guessing.hints import DriveHint
+from robots.mjcf.reading import Model, name_of
 
 FREE, BALL, SLIDE, HINGE = range(4)  # MuJoCo's types of joints
 JOINT, JOINT_IN_PARENT, TENDON = 0, 1, 3  # of what actuators drive; MuJoCo's numbers
+FIXED_GAIN, AFFINE_GAIN = 0, 1  # MuJoCo's kinds of gains and biases
 LOCKED = 1e6  # N·s/m, N·m·s/rad; a joint that is damped so much does not move
 LISTED = 6  # names in a message
 
@@ -54,17 +59,17 @@ def find_robot(model: Model, path: Path) -> MjcfRobot:
         AssetError: If it has a ball joint behind another joint.
         DescriptorError: If nothing of it is a robot.
     """
-    trees = {root: _below(model, root) for root in range(1, model.nbody) if _on_ground(model, root)}
-    jointed = {root: tree for root, tree in trees.items() if any(_turning(model, b) for b in tree)}
+    roots = np.unique(model.body_rootid[1:]).tolist()
+    root_of = model.body_rootid[model.jnt_bodyid]  # (joints,)
+    jointed = set(root_of[np.isin(model.jnt_type, (SLIDE, HINGE))].tolist())
     if not jointed:
         raise DescriptorError(
             f"{path} has no joint that turns or slides; there is nothing to drive"
         )
-    driven = _driven(model)
-    actuated = {r: tree for r, tree in jointed.items() if driven & _joints_of(model, tree)}
-    chosen = actuated or jointed
-    notes = [*_left_out(model, trees, jointed, chosen)]
-    bodies = tuple(sorted(body for tree in chosen.values() for body in tree))
+    actuated = {int(root_of[joint]) for joint in _driven(model)}
+    chosen = sorted(jointed & actuated or jointed)
+    notes = [*_left_out(model, roots, jointed, chosen)]
+    bodies = tuple(np.flatnonzero(np.isin(model.body_rootid, chosen)).tolist())
     joints: dict[int, tuple[int, ...]] = {}
     for body in bodies:
         joints[body], remarks = _moving(model, body, path)
@@ -76,32 +81,6 @@ def find_robot(model: Model, path: Path) -> MjcfRobot:
         for joint in joints[body]
     )
     return MjcfRobot(model, tuple(chosen), bodies, joints, links, named, tuple(notes))
-
-
-def _on_ground(model: Model, body: int) -> bool:
-    return int(model.body_parentid[body]) == 0
-
-
-def _below(model: Model, root: int) -> tuple[int, ...]:
-    """Return a body and all that it carries; MuJoCo has every body after its parent."""
-    found = {root}
-    for body in range(root + 1, model.nbody):
-        if int(model.body_parentid[body]) in found:
-            found.add(body)
-    return tuple(sorted(found))
-
-
-def _all_joints(model: Model, body: int) -> range:
-    first = int(model.body_jntadr[body])
-    return range(first, first + int(model.body_jntnum[body]))
-
-
-def _turning(model: Model, body: int) -> bool:
-    return any(model.jnt_type[joint] in (SLIDE, HINGE) for joint in _all_joints(model, body))
-
-
-def _joints_of(model: Model, bodies: Sequence[int]) -> set[int]:
-    return {joint for body in bodies for joint in _all_joints(model, body)}
 
 
 def _driven(model: Model) -> set[int]:
@@ -129,13 +108,13 @@ def tendon_joints(model: Model, tendon: int) -> list[tuple[int, float]]:
 
 def _left_out(
     model: Model,
-    trees: dict[int, tuple[int, ...]],
-    jointed: dict[int, tuple[int, ...]],
-    chosen: dict[int, tuple[int, ...]],
+    roots: Sequence[int],
+    jointed: Set[int],
+    chosen: Sequence[int],
 ) -> Iterator[str]:
     """Yield what is no part of the robot."""
-    still = [root for root in trees if root not in jointed]
-    idle = [root for root in jointed if root not in chosen]
+    still = [root for root in roots if root not in jointed]
+    idle = [root for root in roots if root in jointed and root not in chosen]
     if still:
         yield f"left out: {_listing(model, still)}, in which no joint turns or slides"
     if idle:
@@ -153,10 +132,10 @@ def _moving(model: Model, body: int, path: Path) -> tuple[tuple[int, ...], list[
     """
     moving: list[int] = []
     notes: list[str] = []
-    for joint in _all_joints(model, body):
+    for joint in np.flatnonzero(model.jnt_bodyid == body).tolist():
         kind = int(model.jnt_type[joint])
         name = name_of(model, "joint", joint) or name_of(model, "body", body)
-        if kind == FREE or (kind == BALL and _on_ground(model, body)):
+        if kind == FREE or (kind == BALL and model.body_parentid[body] == 0):
             what = "flies freely" if kind == FREE else "turns on a ball joint"
             notes.append(
                 f"joint {name!r}, by which the whole robot {what}, is fixed: a layout says where it"
@@ -183,12 +162,98 @@ def _listing(model: Model, bodies: Sequence[int]) -> str:
 
 def _unique(given: Iterator[tuple[int, str]]) -> dict[int, str]:
     """Return names by index, each with a number where it is taken."""
-    names: dict[int, str] = {}
     taken: set[str] = set()
-    for index, name in given:
-        free, count = name, 2
-        while free in taken:
-            free, count = f"{name}_{count}", count + 1
-        taken.add(free)
-        names[index] = free
-    return names
+    return {index: take_name(name, taken) for index, name in given}
+
+
+def take_name(name: str, taken: set[str]) -> str:
+    """Return a name with a number where it is taken, and add it to what is taken."""
+    free, count = name, 2
+    while free in taken:
+        free, count = f"{name}_{count}", count + 1
+    taken.add(free)
+    return free
+
+
+def find_drives(robot: MjcfRobot) -> dict[str, DriveHint]:
+    """Return what an MJCF says of the drive of each joint of a robot, by its name.
+
+    An actuator whose force falls with the joint's position is a spring towards a position: of those
+    on the joint itself stiffness and damping are taken. The joint's own damping comes to it.
+
+    Args:
+        robot: The robot.
+    """
+    model = robot.model
+    drives: dict[str, DriveHint] = {}
+    for joint in robot.moving:
+        dof = int(model.jnt_dofadr[joint])
+        stiffness, damping = _spring(model, joint)
+        own = float(model.dof_damping[dof])
+        drives[robot.names[joint]] = DriveHint(
+            stiffness=stiffness or None,
+            damping=(damping + own) if stiffness else None,
+            armature=float(model.dof_armature[dof]) or None,
+        )
+    return drives
+
+
+def find_efforts(robot: MjcfRobot) -> dict[int, float]:
+    """Return the largest force of each joint's actuators, where an MJCF bounds it (N·m, N)."""
+    model = robot.model
+    efforts: dict[int, float] = {}
+    for joint in robot.moving:
+        found = [_force(model, i) * factor for i, factor in _actuators(model, joint)]
+        total = sum(found) if found else math.inf
+        if model.jnt_actfrclimited[joint]:
+            total = min(total, float(abs(model.jnt_actfrcrange[joint]).max()))
+        if 0 < total < math.inf:
+            efforts[joint] = total
+    return efforts
+
+
+def dry_friction(robot: MjcfRobot) -> list[str]:
+    """Return the names of the joints that rub."""
+    rub = robot.model.dof_frictionloss
+    return [robot.names[j] for j in robot.moving if rub[robot.model.jnt_dofadr[j]] > 0]
+
+
+def _actuators(model: Model, joint: int) -> list[tuple[int, float]]:
+    """Return the actuators of a joint, and the factor from their force to the joint's."""
+    found: list[tuple[int, float]] = []
+    for actuator in range(model.nu):
+        kind, target = int(model.actuator_trntype[actuator]), int(model.actuator_trnid[actuator, 0])
+        gear = abs(float(model.actuator_gear[actuator, 0]))
+        if kind in (JOINT, JOINT_IN_PARENT) and target == joint:
+            found.append((actuator, gear))
+        elif kind == TENDON:
+            factors = [abs(c) for j, c in tendon_joints(model, target) if j == joint]
+            found += [(actuator, gear * factor) for factor in factors if factor]
+    return found
+
+
+def _spring(model: Model, joint: int) -> tuple[float, float]:
+    """Return stiffness and damping of the actuators on a joint itself; 0 if they are no spring."""
+    stiffness = damping = 0.0
+    for actuator in range(model.nu):
+        kind = int(model.actuator_trntype[actuator])
+        if kind in (JOINT, JOINT_IN_PARENT) and int(model.actuator_trnid[actuator, 0]) == joint:
+            if int(model.actuator_biastype[actuator]) == AFFINE_GAIN:
+                _, position, velocity = model.actuator_biasprm[actuator, :3].tolist()
+                gear = float(model.actuator_gear[actuator, 0]) ** 2
+                stiffness += max(-position, 0.0) * gear
+                damping += max(-velocity, 0.0) * gear
+    return stiffness, damping
+
+
+def _force(model: Model, actuator: int) -> float:
+    """Return the largest force of an actuator, before its gear; infinite if nothing bounds it."""
+    found = math.inf
+    if model.actuator_forcelimited[actuator]:
+        found = float(abs(model.actuator_forcerange[actuator]).max())
+    plain = int(model.actuator_biastype[actuator]) == 0
+    plain &= int(model.actuator_gaintype[actuator]) == FIXED_GAIN
+    if plain and model.actuator_ctrllimited[actuator]:  # a motor: what is asked for is its force
+        gain = abs(float(model.actuator_gainprm[actuator, 0]))
+        found = min(found, gain * float(abs(model.actuator_ctrlrange[actuator]).max()))
+    return found

@@ -9,22 +9,27 @@ body, become frames.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import struct
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
-from kinematics.rotations import Floats, inverse_pose, rotation_about
+from kinematics.quaternions import quaternion_rpy
+from kinematics.rotations import Floats, inverse_pose, pose_matrix, quaternion_of, rotation_about
 from robots.guessing import words
-from robots.mjcf.compiling import Model, name_of
 from robots.mjcf.couplings import Couplings
-from robots.mjcf.robot import SLIDE, MjcfRobot
-from robots.mjcf.shapes import Meshes, add_shapes, inertial, origin, pose_of, text
+from robots.mjcf.reading import Model, name_of
+from robots.mjcf.robot import SLIDE, MjcfRobot, take_name
 
 FARTHEST = 10.0  # m; how far a slide goes each way whose range nothing says
 TOOLS = (*words.TCP, *words.GRASP, *words.TOOL, *words.END, *words.HAND, *words.TIP, *words.FLANGE)
 WORLD = "world"
+PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = range(8)  # MuJoCo's kinds
+SEEN_GROUPS = 3  # the first groups of shapes, which MuJoCo draws unless it is asked otherwise
+FEWEST_FACES = 4  # of what has a volume
+_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 @dataclass
@@ -80,7 +85,6 @@ class _Writer:
     ) -> None:
         self._robot, self._model, self._made = robot, robot.model, made
         self._couplings, self._efforts = couplings, efforts
-        self._meshes = Meshes(made.meshes)
         self._taken = {*robot.links.values()}
         self._joints = {*robot.names.values()}
         self._inside: dict[int, Floats] = {}  # pose of each body's frame in its link's
@@ -88,11 +92,7 @@ class _Writer:
 
     def free(self, name: str) -> str:
         """Return a name that no link has, and take it."""
-        free, count = name, 2
-        while free in self._taken:
-            free, count = f"{name}_{count}", count + 1
-        self._taken.add(free)
-        return free
+        return take_name(name, self._taken)
 
     def body(self, body: int) -> list[Element]:
         """Return the links and joints of a body."""
@@ -101,7 +101,7 @@ class _Writer:
         self._inside[body] = inside = inverse_pose(end)
         self._made.frames[self._robot.links[body]] = inside
         inertial(link, self._model, body, inside)
-        self._made.notes += add_shapes(link, self._model, body, inside, self._meshes)
+        self._made.notes += add_shapes(link, self._model, body, inside, self._made.meshes)
         return [link, *elements]
 
     def _chain(self, body: int) -> tuple[list[Element], Floats]:
@@ -118,14 +118,12 @@ class _Writer:
             # The base of a robot that stands alone: where its first body is, as upright as that.
             carrier, start = "", np.eye(4)
             start[:3, :3] = place[:3, :3]
-        if not joints and not carrier:
-            return self._rooted(body, start)
+        elements: list[Element] = []
         if not carrier:
-            base = Element("link", name=self.free("base"))
-            elements = [base]
-            carrier = base.get("name", "")
-        else:
-            elements = []
+            if not joints and np.allclose(start, np.eye(4)):
+                return [], np.eye(4)
+            carrier = self.free("base")
+            elements.append(Element("link", name=carrier))
         if not joints:
             name = self._joint_name(f"{robot.links[body]}_fixed")
             elements.append(_joint(name, "fixed", carrier, robot.links[body], start))
@@ -137,7 +135,8 @@ class _Writer:
             step[:3, 3] = at - before
             last = joint == joints[-1]
             child = robot.links[body] if last else self.free(f"{robot.names[joint]}_link")
-            pose = self._referred(start @ step, joint)
+            reference = float(model.qpos0[model.jnt_qposadr[joint]])
+            pose = start @ step @ self._motion(joint, -reference)  # so that positions are MuJoCo's
             elements.append(self._moving(joint, carrier, child, pose))
             if not last:
                 elements.append(Element("link", name=child))
@@ -145,20 +144,6 @@ class _Writer:
         end = np.eye(4)
         end[:3, 3] = before
         return elements, end
-
-    def _rooted(self, body: int, start: Floats) -> tuple[list[Element], Floats]:
-        """Return the root of a robot that stands alone: upright in its world, at its own place."""
-        if np.allclose(start, np.eye(4)):
-            return [], np.eye(4)
-        base = self.free("base")
-        name = self._joint_name(f"{self._robot.links[body]}_fixed")
-        joint = _joint(name, "fixed", base, self._robot.links[body], start)
-        return [Element("link", name=base), joint], np.eye(4)
-
-    def _referred(self, pose: Floats, joint: int) -> Floats:
-        """Return where a joint's frame is such that its positions are those of MuJoCo."""
-        reference = float(self._model.qpos0[self._model.jnt_qposadr[joint]])
-        return pose @ self._motion(joint, -reference)
 
     def _motion(self, joint: int, by: float) -> Floats:
         """Return by which a joint moves what it carries, in its own frame, (4, 4)."""
@@ -235,10 +220,136 @@ def _joint(name: str, kind: str, parent: str, child: str, pose: Floats) -> Eleme
 
 def excluded(robot: MjcfRobot) -> tuple[tuple[str, str], ...]:
     """Return the pairs of links that an MJCF leaves out of its contacts."""
-    model: Model = robot.model
-    pairs: list[tuple[str, str]] = []
-    for signature in model.exclude_signature.tolist():
-        one, other = signature >> 16, signature & 0xFFFF
-        if one in robot.links and other in robot.links and one != other:
-            pairs.append((robot.links[one], robot.links[other]))
-    return tuple(dict.fromkeys(pairs))
+    pairs = [(both >> 16, both & 0xFFFF) for both in robot.model.exclude_signature.tolist()]
+    named = [
+        (robot.links[one], robot.links[other])
+        for one, other in pairs
+        if one in robot.links and other in robot.links and one != other
+    ]
+    return tuple(dict.fromkeys(named))
+
+
+def add_shapes(
+    link: Element, model: Model, body: int, shift: Floats, meshes: dict[str, bytes]
+) -> list[str]:
+    """Give a link what its body collides with and looks like.
+
+    Args:
+        link: The ``<link>``.
+        model: MuJoCo's model.
+        body: The body.
+        shift: Pose of the body's frame in the link's, (4, 4) (m).
+        meshes: Takes the meshes that the shapes need, by file name.
+
+    Returns:
+        What was left out, one sentence each.
+    """
+    notes: list[str] = []
+    for geom in np.flatnonzero(model.geom_bodyid == body).tolist():
+        kind = int(model.geom_type[geom])
+        if kind in (PLANE, HFIELD) or kind > MESH:
+            what = {PLANE: "plane", HFIELD: "height field"}.get(kind, "signed distance field")
+            notes.append(f"left out: a {what} of {link.get('name')}, which a URDF does not have")
+            continue
+        for use in _uses(model, geom):
+            shape = SubElement(link, use)
+            origin(shape, shift @ pose_of(model.geom_pos[geom], model.geom_quat[geom]))
+            _geometry(SubElement(shape, "geometry"), model, geom, meshes)
+            if use == "visual":
+                _colour(shape, model, geom)
+    return notes
+
+
+def origin(parent: Element, pose: Floats) -> None:
+    """Give an element the ``<origin>`` of a pose, (4, 4) (m)."""
+    w, x, y, z = quaternion_of(pose[:3, :3]).tolist()
+    px, py, pz = pose[:3, 3].tolist()
+    SubElement(parent, "origin", xyz=text(px, py, pz), rpy=text(*quaternion_rpy((w, x, y, z))))
+
+
+def text(*numbers: float) -> str:
+    """Return numbers as a URDF has them, to the last digit."""
+    return " ".join(repr(float(number)) for number in numbers)
+
+
+def pose_of(position: Floats, quaternion: Floats) -> Floats:
+    """Return a pose, (4, 4), from a position (m) and a quaternion wxyz of any length."""
+    return pose_matrix(position, quaternion / np.linalg.norm(quaternion))
+
+
+def _uses(model: Model, geom: int) -> Iterator[str]:
+    """Yield what a shape is for: MuJoCo's bits say what collides, its groups what is drawn."""
+    collides = bool(model.geom_contype[geom] | model.geom_conaffinity[geom])
+    if collides or geom in model.pair_geom1 or geom in model.pair_geom2:
+        yield "collision"
+    drawn = not collides or int(model.geom_group[geom]) < SEEN_GROUPS
+    if drawn and float(_rgba(model, geom)[3]) > 0:
+        yield "visual"
+
+
+def _geometry(geometry: Element, model: Model, geom: int, meshes: dict[str, bytes]) -> None:
+    kind = int(model.geom_type[geom])
+    x, y, z = model.geom_size[geom].tolist()
+    if kind == SPHERE:
+        SubElement(geometry, "sphere", radius=text(x))
+    elif kind == BOX:
+        SubElement(geometry, "box", size=text(2 * x, 2 * y, 2 * z))
+    elif kind in (CAPSULE, CYLINDER):
+        tag = "capsule" if kind == CAPSULE else "cylinder"
+        SubElement(geometry, tag, radius=text(x), length=text(2 * y))
+    else:
+        name, contents = _ellipsoid(x, y, z) if kind == ELLIPSOID else _mesh(model, geom)
+        meshes[name] = contents
+        SubElement(geometry, "mesh", filename=name)
+
+
+def _ellipsoid(x: float, y: float, z: float) -> tuple[str, bytes]:
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    corners = np.asarray(ball.vertices) * (x, y, z)
+    return f"ellipsoid_{x:g}_{y:g}_{z:g}.stl", _stl(corners[ball.faces])
+
+
+def _mesh(model: Model, geom: int) -> tuple[str, bytes]:
+    """Return file name and contents of a mesh, as MuJoCo has scaled, turned and centred it."""
+    mesh = int(model.geom_dataid[geom])
+    vertices = slice(int(model.mesh_vertadr[mesh]), None)
+    first = int(model.mesh_faceadr[mesh])
+    faces = model.mesh_face[first : first + int(model.mesh_facenum[mesh])]
+    given = "".join(c if c.isalnum() and c.isascii() else "_" for c in name_of(model, "mesh", mesh))
+    return f"{mesh}_{given[:60]}.stl", _stl(np.asarray(model.mesh_vert[vertices])[faces])
+
+
+def _stl(triangles: Floats) -> bytes:
+    """Return a binary STL of triangles, (n, 3, 3) (m)."""
+    records = np.zeros(len(triangles), _RECORD)
+    records["corners"] = triangles
+    one, other = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    normals = np.cross(one, other)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    records["normal"] = normals / np.where(lengths > 0, lengths, 1.0)
+    return bytes(80) + struct.pack("<I", len(triangles)) + records.tobytes()
+
+
+def _rgba(model: Model, geom: int) -> Floats:
+    material = int(model.geom_matid[geom])
+    return model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
+
+
+def _colour(visual: Element, model: Model, geom: int) -> None:
+    rgba = [round(float(value), 6) for value in _rgba(model, geom)]
+    material = SubElement(visual, "material", name="_".join(f"{value:g}" for value in rgba))
+    SubElement(material, "color", rgba=text(*rgba))
+
+
+def inertial(link: Element, model: Model, body: int, shift: Floats) -> None:
+    """Give a link the mass and the inertia of its body, if it has any; see `add_shapes`."""
+    mass = float(model.body_mass[body])
+    if mass <= 0:
+        return
+    element = SubElement(link, "inertial")
+    origin(element, shift @ pose_of(model.body_ipos[body], model.body_iquat[body]))
+    SubElement(element, "mass", value=text(mass))
+    xx, yy, zz = map(text, model.body_inertia[body])
+    SubElement(element, "inertia", ixx=xx, iyy=yy, izz=zz, ixy="0", ixz="0", iyz="0")

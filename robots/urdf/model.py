@@ -1,4 +1,4 @@
-"""The links and joints of a robot, as its URDF gives them."""
+"""The links, joints and shapes of a robot, as its URDF gives them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,52 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from robots.urdf.shapes import UrdfShape
-
 if TYPE_CHECKING:
     from kinematics.rotations import Floats
+
+# Attributes of each kind of shape, with how many numbers each has.
+SIZES: Mapping[str, Mapping[str, int]] = {
+    "box": {"size": 3},
+    "sphere": {"radius": 1},
+    "cylinder": {"radius": 1, "length": 1},
+    "capsule": {"radius": 1, "length": 1},
+    "mesh": {},
+}
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfShape:
+    """A shape of a link.
+
+    Attributes:
+        kind: ``box``, ``sphere``, ``cylinder``, ``capsule`` or ``mesh``.
+        sizes: Of a box its extents, of a sphere its radius, of a cylinder and a capsule radius
+            and length (m); of a mesh the scale along x, y and z.
+        file: Of a mesh what the URDF refers to, else empty.
+        origin: Its pose in the link's frame, (4, 4) (m).
+        where: The URDF and the link, for messages.
+    """
+
+    kind: str
+    sizes: tuple[float, ...]
+    file: str
+    origin: Floats
+    where: str
+
+
+@dataclass(frozen=True, eq=False)
+class Inertial:
+    """What a link weighs.
+
+    Attributes:
+        mass: kg; 0 where it follows from the collision shapes.
+        origin: Pose of the frame at the centre of mass in the link's, (4, 4) (m).
+        tensor: Inertia in that frame, (3, 3) (kg·m²).
+    """
+
+    mass: float
+    origin: Floats
+    tensor: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +118,7 @@ class UrdfModel:
         joints: Joints, in the URDF's order.
         collisions: What each link collides with; links that collide with nothing are left out.
         visuals: What each link looks like; links that are not drawn are left out.
+        inertials: What each link weighs; links that do not say are left out.
     """
 
     name: str
@@ -83,6 +126,7 @@ class UrdfModel:
     joints: tuple[ModelJoint, ...]
     collisions: Mapping[str, tuple[UrdfShape, ...]] = field(default_factory=dict)
     visuals: Mapping[str, tuple[UrdfShape, ...]] = field(default_factory=dict)
+    inertials: Mapping[str, Inertial] = field(default_factory=dict)
 
     @cached_property
     def parent_joint(self) -> dict[str, ModelJoint]:
@@ -107,13 +151,21 @@ class UrdfModel:
         return carried
 
     @cached_property
+    def _fixed_on(self) -> dict[str, list[str]]:
+        fixed: dict[str, list[str]] = {}
+        for joint in self.joints:
+            if not joint.moves:
+                fixed.setdefault(joint.parent, []).append(joint.child)
+        return fixed
+
+    @cached_property
     def ordered(self) -> tuple[ModelJoint, ...]:
         """All joints, depth first from the root: each after the one that carries its parent."""
         found: list[ModelJoint] = []
-        waiting = list(reversed(self.joints_on(self.root)))
+        waiting = self._carried[self.root][::-1]
         while waiting:
             found.append(waiting.pop())
-            waiting += reversed(self.joints_on(found[-1].child))
+            waiting += self._carried[found[-1].child][::-1]
         return tuple(found)
 
     @cached_property
@@ -128,15 +180,11 @@ class UrdfModel:
                 depths[joint.name] = depth
         return depths
 
-    def joints_on(self, link: str) -> tuple[ModelJoint, ...]:
-        """Return the joints that a link carries, in the URDF's order."""
-        return tuple(self._carried[link])
-
     def rigid_with(self, link: str) -> tuple[str, ...]:
         """Return a link and all that hangs on it by fixed joints, nearest first."""
         found = [link]
         for near in found:
-            found += [joint.child for joint in self.joints_on(near) if not joint.moves]
+            found += self._fixed_on.get(near, ())
         return tuple(found)
 
     def moving_on(self, link: str) -> tuple[ModelJoint, ...]:

@@ -21,7 +21,6 @@ from collections.abc import Callable, Iterable, Iterator
 from urllib.parse import unquote
 
 from robots.common.errors import AssetError
-from robots.common.paths import default_root
 from robots.urdf.numbers import shown
 
 Exists = Callable[[str], bool]
@@ -116,13 +115,19 @@ def _roots(folder: str, exists: Exists) -> list[str]:
     """Return the folders in which files may lie that a URDF refers to; none by a relative one."""
     if not posixpath.isabs(folder):
         return []
-    roots = [folder, default_root().as_posix()]
+    roots = [folder, _local_copy()]
     if posixpath.basename(folder).lower() in URDF_FOLDERS:
         roots.append(posixpath.dirname(folder))
     for parent in (folder, *_parents(folder)):
         if any(exists(posixpath.join(parent, mark)) for mark in PACKAGE_MARKS):
             return [*roots, parent]
     return roots
+
+
+def _local_copy() -> str:
+    from robots.assets.store import default_root
+
+    return default_root().as_posix()
 
 
 def _is_mesh_folder(path: str) -> bool:

@@ -1,33 +1,27 @@
-"""Reads a URDF: refuses it in clear words, or has yourdfpy read what is left.
+"""Reads a URDF: yourdfpy parses what `robots.urdf.checks` lets through.
 
-This is the one place at which a URDF is given to yourdfpy, and it is given only what a model holds
-and `robots.urdf.text_checks` let through: left to itself it takes for a number what C does not,
-repairs broken text by guesses, and ends in any error at what it does not expect. It has no
-capsules; they go to it as cylinders, with their kind as the shape's name. Roll, pitch and yaw are
-not kept by it, only matrices with last digits of its own, so poses are composed in `kinematics`.
+Left to itself yourdfpy takes for numbers what no other reader does and repairs broken text by
+guesses. It knows no capsules, and keeps matrices for roll, pitch and yaw, with last digits of its
+own; so capsules go to it as cylinders, and poses are composed from the text.
 """
 
 from __future__ import annotations
 
 import io
 import math
-from collections.abc import Iterable
+from copy import deepcopy
 from functools import lru_cache
 from typing import Any
-from xml.etree.ElementTree import Element, SubElement, tostring
+from xml.etree.ElementTree import Element, tostring
 
 from kinematics.rotations import Floats, rpy_pose
 from robots.common.errors import AssetError
-from robots.urdf.model import ModelJoint, UrdfModel
-from robots.urdf.numbers import numbers_of, shown
-from robots.urdf.shapes import SIZES, UrdfShape
+from robots.urdf.checks import expect_drivable, expect_readable
+from robots.urdf.model import Inertial, ModelJoint, UrdfModel, UrdfShape
 from robots.urdf.summary import parse_urdf
-from robots.urdf.text_checks import JOINT_NUMBERS, expect_readable, link_of
+from robots.urdf.text import numbers_of
 
-JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-DRIVEN_TYPES = ("revolute", "continuous", "prismatic")
-
-READ_AS = {"capsule": "cylinder"}
+UNREAD = ("material", "calibration", "safety_controller")  # what no model holds
 
 
 @lru_cache(maxsize=64)
@@ -45,65 +39,51 @@ def read_model(xml: bytes, urdf: str) -> UrdfModel:
     """
     root = parse_urdf(xml, urdf)
     expect_readable(root, urdf)
-    model = _read(root, urdf)
-    leaders = {joint.name: joint for joint in model.moving}
-    for joint in model.moving:
-        _expect_possible(joint, leaders, urdf)
-    return model
-
-
-def _read(root: Element, urdf: str) -> UrdfModel:
-    import yourdfpy  # brings trimesh, which takes half a second to load
-
-    text = io.BytesIO(tostring(_plain(root), encoding="utf-8"))
-    try:
-        robot: Any = yourdfpy.URDF.load(text, build_scene_graph=False, load_meshes=False).robot
-    except Exception as error:  # a reader that raises whatever it meets
-        reason = str(error) or type(error).__name__
-        raise AssetError(f"yourdfpy cannot read {urdf}: {reason}") from error
-    return UrdfModel(
+    robot = _load(root, urdf)
+    links = list(zip(robot.links, root.iterfind("link"), strict=True))
+    model = UrdfModel(
         name=robot.name,
         links=tuple(link.name for link in robot.links),
         joints=tuple(map(_joint, robot.joints, root.iterfind("joint"))),
-        collisions=_by_link(robot, root, "collision", urdf),
-        visuals=_by_link(robot, root, "visual", urdf),
+        collisions={
+            link.name: _shapes(link.collisions, text, "collision", urdf)
+            for link, text in links
+            if link.collisions
+        },
+        visuals={
+            link.name: _shapes(link.visuals, text, "visual", urdf)
+            for link, text in links
+            if link.visuals
+        },
+        inertials={
+            link.name: Inertial(
+                link.inertial.mass, _origin(text.find("inertial")), link.inertial.inertia
+            )
+            for link, text in links
+            if link.inertial
+        },
     )
+    expect_drivable(model.moving, urdf)
+    return model
 
 
-def _plain(root: Element) -> Element:
-    """Return a robot that has what a model holds, and nothing else."""
-    plain = Element("robot", name=root.get("name", ""))
-    for link in root.iterfind("link"):
-        copy = SubElement(plain, "link", name=link.get("name", ""))
-        for kind in ("visual", "collision"):
-            copy.extend(map(_plain_shape, link.iterfind(kind)))
-    plain.extend(map(_plain_joint, root.iterfind("joint")))
-    return plain
+def _load(root: Element, urdf: str) -> Any:
+    """Return the robot that yourdfpy reads in a ``<robot>``."""
+    import yourdfpy  # brings trimesh, which takes half a second to load
 
-
-def _plain_shape(element: Element) -> Element:
-    (shape,) = element.iterfind("geometry/*")
-    plain = Element(element.tag, name=shape.tag)
-    kept = (*SIZES[shape.tag], "filename", "scale")
-    numbers = {key: value for key, value in shape.items() if key in kept}
-    SubElement(SubElement(plain, "geometry"), READ_AS.get(shape.tag, shape.tag), numbers)
-    return plain
-
-
-def _plain_joint(joint: Element) -> Element:
-    plain = Element("joint", name=joint.get("name", ""), type=joint.get("type", ""))
-    for end in ("parent", "child"):
-        SubElement(plain, end, link=link_of(joint, end))
-    for part in ("axis", "limit", "mimic"):
-        _copy(joint, plain, part, ("joint", *JOINT_NUMBERS[part]))
-    return plain
-
-
-def _copy(element: Element, plain: Element, part: str, attributes: Iterable[str]) -> None:
-    found = element.find(part)
-    if found is not None:
-        kept = {key: value for key in attributes if (value := found.get(key)) is not None}
-        SubElement(plain, part, kept)
+    plain = deepcopy(root)
+    plain.set("name", root.get("name", ""))
+    for capsule in list(plain.iter("capsule")):
+        capsule.tag = "cylinder"
+    for element in (plain, *plain.iterfind("link/visual"), *plain.iterfind("joint")):
+        for part in [part for part in element if part.tag in UNREAD]:
+            element.remove(part)
+    text = io.BytesIO(tostring(plain, encoding="utf-8"))
+    try:
+        return yourdfpy.URDF.load(text, build_scene_graph=False, load_meshes=False).robot
+    except Exception as error:  # a reader that raises whatever it meets
+        reason = str(error) or type(error).__name__
+        raise AssetError(f"yourdfpy cannot read {urdf}: {reason}") from error
 
 
 def _joint(joint: Any, text: Element) -> ModelJoint:
@@ -128,26 +108,16 @@ def _joint(joint: Any, text: Element) -> ModelJoint:
     )
 
 
-def _by_link(robot: Any, root: Element, kind: str, urdf: str) -> dict[str, tuple[UrdfShape, ...]]:
-    """Return the shapes of every link that has some, of the kind ``collision`` or ``visual``."""
-    shapes: dict[str, tuple[UrdfShape, ...]] = {}
-    for link, text in zip(robot.links, root.iterfind("link"), strict=True):
-        where = f"{urdf}, link {link.name!r}"
-        if made := _shapes(getattr(link, f"{kind}s"), text.iterfind(kind), where):
-            shapes[link.name] = made
-    return shapes
-
-
-def _shapes(shapes: Iterable[Any], texts: Iterable[Element], where: str) -> tuple[UrdfShape, ...]:
+def _shapes(shapes: list[Any], link: Element, kind: str, urdf: str) -> tuple[UrdfShape, ...]:
     return tuple(
         UrdfShape(
-            kind=shape.name,
+            kind=next(text.iterfind("geometry/*")).tag,
             sizes=_sizes(shape.geometry),
             file="" if shape.geometry.mesh is None else shape.geometry.mesh.filename,
             origin=_origin(text),
-            where=where,
+            where=f"{urdf}, link {link.get('name')!r}",
         )
-        for shape, text in zip(shapes, texts, strict=True)
+        for shape, text in zip(shapes, link.iterfind(kind), strict=True)
     )
 
 
@@ -162,39 +132,7 @@ def _sizes(geometry: Any) -> tuple[float, ...]:
     return (geometry.cylinder.radius, geometry.cylinder.length)
 
 
-def _origin(text: Element) -> Floats:
-    origin = text.find("origin")
-    xyz, rpy = (numbers_of(origin, key, (0.0, 0.0, 0.0), "") for key in ("xyz", "rpy"))
-    return rpy_pose(xyz, rpy)
-
-
-def _expect_possible(joint: ModelJoint, leaders: dict[str, ModelJoint], urdf: str) -> None:
-    where = f"{urdf}: joint {joint.name!r}"
-    if joint.type not in DRIVEN_TYPES:
-        known = ", ".join(JOINT_TYPES)
-        more = "" if joint.type in JOINT_TYPES else f" (the types are {known})"
-        raise AssetError(
-            f"{where} is {shown(joint.type)}{more}; only revolute, continuous, prismatic and fixed"
-            " joints can be driven or left alone"
-        )
-    if joint.lower is not None and joint.upper is not None and not joint.lower < joint.upper:
-        raise AssetError(
-            f"{where} has the limits {joint.lower:g} … {joint.upper:g} {joint.unit}, which leave"
-            " no way to go; give it <limit lower= upper=>, or make it continuous or fixed"
-        )
-    if joint.mimics is not None:
-        if joint.mimics not in leaders:
-            raise AssetError(f"{where} mimics {shown(joint.mimics)}, which is no joint that moves")
-        if joint.multiplier == 0:
-            raise AssetError(f"{where} mimics with multiplier 0, so it never moves; make it fixed")
-        _leader(joint, leaders, where)
-
-
-def _leader(joint: ModelJoint, leaders: dict[str, ModelJoint], where: str) -> None:
-    seen = [joint.name]
-    leader = leaders.get(joint.mimics or "")
-    while leader is not None:
-        if leader.name in seen:
-            raise AssetError(f"{where} mimics itself, by way of {' and '.join(seen)}")
-        seen.append(leader.name)
-        leader = leaders.get(leader.mimics or "")
+def _origin(text: Element | None) -> Floats:
+    origin = None if text is None else text.find("origin")
+    zeros = (0.0, 0.0, 0.0)
+    return rpy_pose(numbers_of(origin, "xyz", zeros, ""), numbers_of(origin, "rpy", zeros, ""))

@@ -10,8 +10,8 @@ from xml.etree.ElementTree import Element
 
 from robots.common.errors import AssetError, UnknownNameError
 from robots.urdf.model import UrdfModel
-from robots.urdf.numbers import numbers_of
 from robots.urdf.summary import parse_urdf, read_urdf
+from robots.urdf.text import numbers_of
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -11,7 +12,7 @@ from robots.common.files import read_regular
 from robots.urdf.cleaning.cleaning import Cleaned, clean, is_template
 from robots.urdf.cleaning.xacro_files import XACRO, expand, template_of
 from robots.urdf.paths import Exists, resolve
-from robots.urdf.xml_text import parse_xml
+from robots.urdf.text import parse_xml
 
 MAX_URDF_BYTES = 32 << 20
 
@@ -101,17 +102,30 @@ def read_references(xml: bytes, urdf: str, exists: Exists = lambda path: False) 
         AssetError: If it is no URDF, or refers to files that it may not refer to; see
             `robots.urdf.paths`.
     """
-    root = parse_urdf(xml, urdf)
-    found: dict[str, set[str]] = {"collision": set(), "visual": set()}
-    for kind, paths in found.items():
-        for element in (*root.iterfind(f".//{kind}//mesh"), *root.iterfind(f".//{kind}//texture")):
-            paths.add(resolve(element.get("filename", ""), urdf, exists))
-    for texture in root.iterfind("./material/texture"):
-        found["visual"].add(resolve(texture.get("filename", ""), urdf, exists))
+    found = {
+        kind: {resolve(file, urdf, exists) for file in files}
+        for kind, files in _named_files(xml, urdf).items()
+    }
     return UrdfReferences(
         collision=tuple(sorted(found["collision"])),
         visual=tuple(sorted(found["visual"] - found["collision"])),
     )
+
+
+@lru_cache(maxsize=64)
+def _named_files(xml: bytes, urdf: str) -> dict[str, set[str]]:
+    """Return the meshes and textures that a URDF names, by what needs them."""
+    root = parse_urdf(xml, urdf)
+    found = {
+        kind: {
+            element.get("filename", "")
+            for file in ("mesh", "texture")
+            for element in root.iterfind(f".//{kind}//{file}")
+        }
+        for kind in ("collision", "visual")
+    }
+    found["visual"] |= {file.get("filename", "") for file in root.iterfind("./material/texture")}
+    return found
 
 
 def parse_urdf(xml: bytes, urdf: str) -> ElementTree.Element:
@@ -123,6 +137,6 @@ def parse_urdf(xml: bytes, urdf: str) -> ElementTree.Element:
     root = parse_xml(xml, urdf, "a URDF")
     if root.tag != "robot":
         raise AssetError(f"{urdf} is not a URDF: it holds <{root.tag}>, not <robot>")
-    if any(f"{XACRO}}}" in element.tag for element in root.iter()):
+    if any([f"{XACRO}}}" in element.tag for element in root.iter()]):  # quicker than one by one
         raise AssetError(f"{urdf} is a xacro template; only a file of its own is expanded")
     return root

@@ -9,7 +9,8 @@ import numpy as np
 
 from kinematics.rotations import Floats
 from kinematics.tree import Tree
-from robots.descriptor import RobotDescriptor, Vector3
+from robots.descriptor import RobotDescriptor
+from robots.parts import Vector3
 from robots.urdf.tree import link_index
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from kinematics.rotations import Floats
 from kinematics.tree import FIXED, Tree
 from robots.common.errors import DescriptorError, UnknownNameError
 from robots.urdf.model import ModelJoint, UrdfModel
@@ -50,6 +51,13 @@ def kinematic_tree(model: UrdfModel, driven: Sequence[str] | None = None) -> Tre
         coordinates=coordinates,
         limits=np.array([_limits(moving[name]) for name in coordinates]).reshape(-1, 2),
     )
+
+
+def rest_poses(model: UrdfModel) -> dict[str, Floats]:
+    """Return the pose of each link with every joint at 0, (4, 4), in the root's frame (m)."""
+    tree = kinematic_tree(model)
+    poses = tree.forward(np.zeros((1, len(tree.coordinates))))[0]
+    return dict(zip(tree.links, poses, strict=True))
 
 
 def link_index(tree: Tree, name: str) -> int:

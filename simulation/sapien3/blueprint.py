@@ -20,10 +20,9 @@ from sapien.wrapper.urdf_loader import URDFLoader
 
 from robots import AssetError, RobotDescriptor, UnknownNameError
 from robots.urdf.mesh_files import has_body, load_scene
-from robots.urdf.model import UrdfModel
+from robots.urdf.model import UrdfModel, UrdfShape
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model
-from robots.urdf.shapes import UrdfShape
 from robots.urdf.srdf import ExcludedPair, read_excluded_pairs
 from robots.urdf.summary import parse_urdf, read_urdf
 from simulation.sapien3.collision_groups import NO_FLOOR_CONTACT, USUAL, overlap_words
@@ -128,7 +127,7 @@ def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
             loader.set_link_material(link, *friction)
             loader.set_link_patch_radius(link, material.patch_radius)
             loader.set_link_min_patch_radius(link, material.patch_radius)
-    text = _for_sapien(parse_urdf(contents, urdf.as_posix()), visuals=visuals)
+    text = _for_sapien(contents, urdf.as_posix(), visuals=visuals)
     own = descriptor.allowed_collisions is not None
     overlaps = overlap_words(descriptor, model, urdf) if own else None
     pairs = [] if own else _pairs(read_excluded_pairs(urdf), model, urdf)
@@ -203,8 +202,10 @@ def _needs_tendon(mimic: Any, descriptor: RobotDescriptor, model: UrdfModel) -> 
     return mimic.joint not in descriptor.joints or (alike and beside)
 
 
-def _for_sapien(root: ElementTree.Element, *, visuals: bool) -> str:
+@lru_cache(maxsize=64)
+def _for_sapien(xml: bytes, urdf: str, *, visuals: bool) -> str:
     """Return a URDF's XML without what neither physics nor pictures use, and with defaults."""
+    root = parse_urdf(xml, urdf)
     for element in list(root):
         if element.tag not in ELEMENTS or (element.tag == "material" and not visuals):
             root.remove(element)

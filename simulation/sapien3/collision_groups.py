@@ -12,7 +12,7 @@ from pathlib import Path
 
 from robots import AssetError, RobotDescriptor
 from robots.bodies.allowed import LinkPair, joined_pairs, read_allowed_pairs
-from robots.bodies.apart import without_distant
+from robots.bodies.overlaps import without_distant
 from robots.urdf.model import UrdfModel
 
 BITS = 32  # of word 2

@@ -8,9 +8,14 @@ import pytest
 
 from robots import RobotDescriptor, UnknownNameError
 from robots.bodies.allowed import allowed_pairs, joined_pairs, rigid_groups, rigid_pairs
-from robots.bodies.apart import MARGIN, without_distant
 from robots.bodies.hulls import load_model, read_hulls
-from robots.bodies.overlaps import always_overlapping, guess_allowed, neighbours
+from robots.bodies.overlaps import (
+    MARGIN,
+    always_overlapping,
+    guess_allowed,
+    neighbours,
+    without_distant,
+)
 from robots.data_module import write_module
 from robots.urdf.reading import read_model
 from robots.urdf.srdf import ExcludedPair, read_excluded_pairs

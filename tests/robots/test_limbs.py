@@ -11,8 +11,7 @@ import pytest
 from kinematics.rotations import transform
 from robots import ActionSplit, DescriptorError, JointGroup, Limb, RobotDescriptor, RobotRegistry
 from robots.guessing.anatomy import find_anatomy
-from robots.guessing.reach import find_base, find_reach
-from robots.guessing.tool import Tool
+from robots.guessing.tool import Tool, find_base, find_reach
 from robots.registry import CATALOGUE
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_cleaned

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import yourdfpy
 
 from robots import AssetError, RobotRegistry
 from robots.urdf.reading import read_model
+from robots.urdf.summary import read_urdf
 
 CAPSULE = '<capsule radius="0.1" length="0.5"/>'
 ORIGIN = '<origin xyz="1 2 3" rpy="0.1 -0.2 0.3"/>'
@@ -111,6 +113,23 @@ def test_shapes_keep_their_kind_and_sizes(toy):
 
 def test_the_same_contents_are_read_once(toy):
     assert read_model(TOY.encode(), "toy.urdf") is toy
+
+
+def test_a_robot_that_was_read_before_is_not_parsed_again():
+    def read():
+        urdf = RobotRegistry.load("panda").urdf.locate()
+        return read_model(read_urdf(urdf), urdf.as_posix())
+
+    called: list[str] = []
+    model = read()
+    sys.setprofile(lambda frame, event, _: event == "call" and called.append(frame.f_code.co_name))
+    try:
+        again = read()
+    finally:
+        sys.setprofile(None)
+    assert again is model
+    assert "read_urdf" in called
+    assert "parse_xml" not in called
 
 
 class TestYourdfpyAlone:

@@ -6,7 +6,7 @@ import pytest
 
 from robots import AssetError, LocalUrdf
 from robots.urdf.srdf import read_excluded_pairs
-from robots.urdf.xml_text import MAX_DEPTH, parse_xml
+from robots.urdf.text import MAX_DEPTH, parse_xml
 
 ENTITY = '<?xml version="1.0" encoding="{}"?><!DOCTYPE robot [<!ENTITY a "b">]><robot name="&a;"/>'
 
@@ -34,7 +34,7 @@ def test_what_is_no_xml_is_refused(xml):
 def test_depth_is_bounded():
     assert parse_xml(b"<a>" * MAX_DEPTH + b"</a>" * MAX_DEPTH, "toy", "a URDF").tag == "a"
     with pytest.raises(AssetError, match=f"nests elements deeper than {MAX_DEPTH} levels"):
-        parse_xml(b"<a>" * 100_000, "toy", "a URDF")
+        parse_xml(b"<a>" * 100_000 + b"</a>" * 100_000, "toy", "a URDF")
 
 
 @pytest.mark.parametrize("ending", ["urdf", "srdf"])

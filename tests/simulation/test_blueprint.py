@@ -8,7 +8,7 @@ import trimesh
 
 from layouts import Layout, Placement
 from robots import AssetError
-from robots.urdf.text_checks import MAX_LINKS
+from robots.urdf.checks import MAX_LINKS
 from simulation.sapien3.blueprint import read_blueprint
 from simulation.sapien3.world import BuiltWorld
 from tests.faults.toy_robots import descriptor, joint, link, mesh, robot, toy, write_mesh
@@ -37,7 +37,7 @@ def test_every_shape_of_the_urdf_is_built(urdf):
 
 def test_a_mesh_that_sapien_cannot_read_is_an_error(urdf):
     (urdf.parent / "arm.stl").write_bytes(b"")
-    with pytest.raises(AssetError, match=r"link 'arm': cannot read the mesh .*arm\.stl"):
+    with pytest.raises(AssetError, match=r"link 'arm': the mesh .*arm\.stl is empty"):
         world(urdf)
 
 

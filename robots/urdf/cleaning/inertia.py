@@ -9,13 +9,18 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element, SubElement
 
-from robots.common.errors import AssetError, MissingPackageError
-from robots.urdf.inertia import MOMENTS, PRODUCTS, SMALLEST, expect_inertia
+from robots.common.errors import AssetError
+from robots.urdf.checks import (
+    MOMENTS,
+    PRODUCTS,
+    SMALLEST,
+    expect_inertia,
+    moved_links,
+    sizes_of,
+)
 from robots.urdf.mesh_files import read_corners
-from robots.urdf.numbers import numbers_of, required_numbers
 from robots.urdf.paths import resolve
-from robots.urdf.shapes import SIZES
-from robots.urdf.text_checks import link_of
+from robots.urdf.text import numbers_of
 
 if TYPE_CHECKING:
     from kinematics.rotations import Floats
@@ -33,7 +38,7 @@ def repair_inertia(root: Element, urdf: str) -> Iterator[str]:
         root: The ``<robot>``.
         urdf: Its path, by which it refers to meshes.
     """
-    moved = {link_of(j, "child") for j in root.iterfind("joint") if j.get("type") != "fixed"}
+    moved = moved_links(root)
     for link in root.iterfind("link"):
         name = link.get("name", "")
         where = f"{urdf}: link {name!r}"
@@ -47,8 +52,8 @@ def repair_inertia(root: Element, urdf: str) -> Iterator[str]:
 def _repair(link: Element, where: str, urdf: str) -> Iterator[str]:
     (inertial, *_) = link.findall("inertial")
     mass, tensor = inertial.find("mass"), inertial.find("inertia")
-    weight = _given(mass, "value", where)
-    moments = [_given(tensor, key, where) for key in (*MOMENTS, *PRODUCTS)]
+    (weight,) = numbers_of(mass, "value", (0.0,), where)
+    moments = [numbers_of(tensor, key, (0.0,), where)[0] for key in (*MOMENTS, *PRODUCTS)]
     if weight < 0 or 0 < weight < SMALLEST:
         return
     if tensor is not None and (products := _complete(tensor)) and _is_possible(link, where):
@@ -87,11 +92,6 @@ def _is_possible(link: Element, where: str) -> bool:
     except AssetError:
         return False
     return True
-
-
-def _given(element: Element | None, key: str, where: str) -> float:
-    """Return a number of an element; 0 if the element or the number is missing."""
-    return numbers_of(element, key, (0.0,), where)[0]
 
 
 def _problem(tensor: Element | None, numbers: list[float]) -> str:
@@ -155,7 +155,7 @@ def _corners(element: Element, where: str, urdf: str) -> Floats | None:
         own = _own_corners(element, where, urdf)
         origin = element.find("origin")
         xyz, rpy = (numbers_of(origin, key, (0.0, 0.0, 0.0), where) for key in ("xyz", "rpy"))
-    except (AssetError, MissingPackageError, ValueError):
+    except (AssetError, ValueError):
         return None
     pose = rpy_pose(xyz, rpy)
     return np.asarray(own) @ pose[:3, :3].T + pose[:3, 3]
@@ -167,12 +167,8 @@ def _own_corners(element: Element, where: str, urdf: str) -> Any:
         scale = numbers_of(shape, "scale", (1.0, 1.0, 1.0), where)
         path = resolve(shape.get("filename", ""), urdf, os.path.isfile)
         return read_corners(path, scale, where, urdf)
-    sizes = [
-        size
-        for attribute, count in SIZES[shape.tag].items()
-        for size in required_numbers(shape, attribute, count, where)
-    ]
-    return _box_corners(_edges(shape.tag, sizes))
+    x, y, z = (edge / 2 for edge in _edges(shape.tag, sizes_of(shape, where)))
+    return [(a, b, c) for a in (-x, x) for b in (-y, y) for c in (-z, z)]
 
 
 def _edges(kind: str, sizes: list[float]) -> Size:
@@ -183,8 +179,3 @@ def _edges(kind: str, sizes: list[float]) -> Size:
     if kind == "sphere":
         return (diameter, diameter, diameter)
     return (diameter, diameter, sizes[1] + (diameter if kind == "capsule" else 0.0))
-
-
-def _box_corners(edges: Size) -> list[Size]:
-    x, y, z = (edge / 2 for edge in edges)
-    return [(a, b, c) for a in (-x, x) for b in (-y, y) for c in (-z, z)]

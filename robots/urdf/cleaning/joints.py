@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
-from robots.urdf.numbers import numbers_of
-from robots.urdf.text_checks import link_of
+from robots.urdf.checks import link_of
+from robots.urdf.text import numbers_of
 
 FREE = ("floating", "planar")  # types of joints that place a robot rather than move it
 BOUNDED = ("revolute", "prismatic")
@@ -44,8 +44,9 @@ def _fix_base(joints: list[Element]) -> Iterator[str]:
     carried = {link_of(joint, "child") for joint in joints}
     for joint in joints:
         kind, parent = joint.get("type", ""), link_of(joint, "parent")
-        alone = sum(link_of(other, "parent") == parent for other in joints) == 1
-        if kind in FREE and alone and parent not in carried:
+        if kind not in FREE or parent in carried:
+            continue
+        if sum(link_of(other, "parent") == parent for other in joints) == 1:
             _fix(joint)
             yield (
                 f"joint {joint.get('name')!r}, by which the whole robot is {kind}, is fixed: a"

@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element
 from robots.common.errors import AssetError, UnreadableFileError
 from robots.common.files import read_regular
 from robots.urdf.paths import resolve
-from robots.urdf.xml_text import parse_xml
+from robots.urdf.text import parse_xml
 
 MAX_PACKAGE_BYTES = 1 << 20  # of a package.xml
 MOST_NEIGHBOURS = 500  # folders beside a package that are looked into
@@ -121,13 +121,9 @@ def _paths(reference: str, folder: str) -> Iterator[tuple[str, str]]:
         for package in _packages(name, folder):
             yield posixpath.normpath(f"{package}/{inside}"), package
         for parent in _around(folder):
-            for package in _alike(name, parent):
-                yield posixpath.normpath(f"{package}/{inside}"), package
-
-
-def _alike(name: str, folder: str) -> list[str]:
-    """Return the folders in a folder whose name differs at most by the case of letters."""
-    return [f"{folder}/{entry}" for entry in _listing(folder) if entry.lower() == name.lower()]
+            for entry in _listing(parent):
+                if entry.lower() == name.lower():
+                    yield posixpath.normpath(f"{parent}/{entry}/{inside}"), f"{parent}/{entry}"
 
 
 def _packages(name: str, folder: str) -> Iterator[str]:

@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from copy import deepcopy
 from xml.etree.ElementTree import Element, SubElement
 
-from robots.common.errors import AssetError, MissingPackageError
+from robots.common.errors import AssetError
+from robots.urdf.checks import SMALLEST_SIZE, attributes_of, sizes_of
 from robots.urdf.mesh_files import has_body
-from robots.urdf.numbers import numbers_of, required_numbers
+from robots.urdf.model import SIZES
 from robots.urdf.paths import resolve
-from robots.urdf.shapes import SIZES, SMALLEST_SIZE
+from robots.urdf.text import numbers_of
 
 KINDS = ("visual", "collision")
 
@@ -80,16 +81,12 @@ def _why_nothing(element: Element, kind: str, where: str, urdf: str) -> str:
     if shape.tag == "mesh":
         return _why_no_mesh(shape, kind, where, urdf)
     try:
-        sizes = [
-            size
-            for attribute, count in SIZES[shape.tag].items()
-            for size in required_numbers(shape, attribute, count, where)
-        ]
+        sizes = sizes_of(shape, where)
     except AssetError:
         return ""
     least = SMALLEST_SIZE if kind == "collision" else 0.0
     if min(sizes) >= 0 and (min(sizes) < least or max(sizes) == 0):
-        return f"of a {shape.tag} with {_listing(shape)}, which has no volume"
+        return f"of a {shape.tag} with {attributes_of(shape)}, which has no volume"
     return ""
 
 
@@ -100,14 +97,10 @@ def _why_no_mesh(mesh: Element, kind: str, where: str, urdf: str) -> str:
     try:
         scale = numbers_of(mesh, "scale", (1.0, 1.0, 1.0), where)
         if 0.0 in scale:
-            return f"of a mesh with {_listing(mesh)}, which has no volume"
+            return f"of a mesh with {attributes_of(mesh)}, which has no volume"
         path = resolve(file, urdf, os.path.isfile)
         if kind == "visual" or not os.path.isfile(path) or has_body(path, scale, where, urdf):
             return ""
-    except (AssetError, MissingPackageError):
+    except AssetError:
         return ""
     return f"of the mesh {file!r}, which has no volume"
-
-
-def _listing(shape: Element) -> str:
-    return " ".join(f"{key}={value!r}" for key, value in shape.items())

@@ -55,7 +55,7 @@ def is_unfinished(root: Element) -> bool:
 
     Expressions count only beside elements of xacro's: a name may hold a ``${`` of its own.
     """
-    written_for_it = any(map(_kind, root.iter()))
+    written_for_it = any([f"{XACRO}}}" in element.tag for element in root.iter()])
     return written_for_it and any(map(_is_instruction, _outside_definitions(root)))
 
 

@@ -1,4 +1,4 @@
-"""The text of an MJCF file with what it includes, and the meshes that it refers to.
+"""Reads an MJCF: its text with what it includes, its meshes, and MuJoCo's model of them.
 
 MuJoCo is given only what was read here: one XML text without includes, and the contents of meshes.
 It opens no file. What a robot's motion does not need is left out: textures, skins, lights, sensors.
@@ -9,18 +9,22 @@ from __future__ import annotations
 import hashlib
 import os
 import posixpath
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 from xml.etree.ElementTree import Element, tostring
 
-from robots.common.errors import AssetError, UnreadableFileError
+import numpy as np
+
+from robots.common.errors import AssetError, MissingPackageError, UnreadableFileError
 from robots.common.files import read_regular
+from robots.common.quoting import shown
 from robots.urdf.mesh_files import MAX_MESH_BYTES
-from robots.urdf.numbers import shown
 from robots.urdf.paths import is_allowed
 from robots.urdf.summary import MAX_URDF_BYTES
-from robots.urdf.xml_text import parse_xml
+from robots.urdf.text import parse_xml
 
 MESH_ENDINGS = (".stl", ".obj", ".msh")
 MOST_FILES = 2000  # that one MJCF refers to
@@ -29,6 +33,13 @@ MOST_BYTES = 1 << 30  # of them together
 # Parts of an MJCF that say nothing of links, joints and drives; some of them name files.
 UNUSED = ("size", "visual", "statistic", "option", "custom", "sensor", "extension")
 UNUSED_ASSETS = ("texture", "skin", "hfield")
+MESSAGE = 400  # characters of MuJoCo's own that an error keeps
+NUMBERS = {  # MuJoCo takes "nan" for a number
+    "a body": ("body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat"),
+    "a joint": ("jnt_pos", "jnt_axis", "jnt_range", "qpos0", "dof_armature", "dof_damping"),
+    "a shape": ("geom_pos", "geom_quat", "geom_size"),
+    "a site": ("site_pos", "site_quat"),
+}
 # What makes many bodies of one, or bodies that bend.
 REFUSED = {
     "replicate": "copies bodies",
@@ -40,9 +51,13 @@ REFUSED = {
 }
 
 
+Model = Any
+"""A ``mujoco.MjModel``, whose package need not be installed."""
+
+
 @dataclass(frozen=True)
 class MjcfText:
-    """An MJCF as MuJoCo is given it.
+    """An MJCF as MuJoCo is given it; two are equal if they have the same contents.
 
     Attributes:
         name: What it calls its model, or its file's name.
@@ -51,9 +66,9 @@ class MjcfText:
         digest: SHA-256 over the text and the meshes, in hex.
     """
 
-    name: str
-    xml: str
-    meshes: Mapping[str, bytes]
+    name: str = field(compare=False)
+    xml: str = field(compare=False)
+    meshes: Mapping[str, bytes] = field(compare=False)
     digest: str
 
 
@@ -223,9 +238,67 @@ def _python_package(folder: str) -> str:
 
 
 def _drop(parent: Element, tags: tuple[str, ...]) -> None:
-    for child in list(_children(parent, tags)):
+    for child in [child for child in parent if child.tag in tags]:
         parent.remove(child)
 
 
-def _children(parent: Element, tags: tuple[str, ...]) -> Iterator[Element]:
-    return (child for child in parent if child.tag in tags)
+def mujoco() -> Any:
+    """Return the package mujoco.
+
+    Raises:
+        MissingPackageError: If it is not installed.
+    """
+    try:
+        import mujoco  # pyright: ignore[reportMissingImports]
+    except ImportError as error:
+        raise MissingPackageError(
+            "reading an MJCF needs MuJoCo: pip install 'robot-layouts[mjcf]'"
+        ) from error
+    return mujoco
+
+
+@contextmanager
+def without_log() -> Generator[None]:
+    """Have MuJoCo write its warnings nowhere; else it adds them to a file where it was started."""
+    library = mujoco()
+    library.set_mju_user_warning(lambda warning: None)  # what is wrong is an error
+    try:
+        yield
+    finally:
+        library.set_mju_user_warning(None)
+
+
+def compiled(text: MjcfText, path: Path) -> Model:
+    """Return the model that MuJoCo makes of an MJCF.
+
+    Args:
+        text: The MJCF.
+        path: Where it lies, for messages.
+
+    Raises:
+        AssetError: If MuJoCo refuses it, or a number of it is not finite.
+        MissingPackageError: If MuJoCo is not installed.
+    """
+    library = mujoco()
+    try:
+        with without_log():
+            model = library.MjModel.from_xml_string(text.xml, dict(text.meshes))
+    except Exception as error:  # a compiler that raises whatever it meets
+        reason = " ".join(str(error).split())[:MESSAGE]
+        raise AssetError(f"MuJoCo cannot compile {path}: {reason}") from error
+    for what, fields in NUMBERS.items():
+        if not all(np.isfinite(getattr(model, field)).all() for field in fields):
+            raise AssetError(f"{path} has {what} with a number that is not finite")
+    return model
+
+
+def name_of(model: Model, kind: str, index: int) -> str:
+    """Return the name of an object of a model; empty if it has none.
+
+    Args:
+        model: The model.
+        kind: Such as ``"body"`` or ``"joint"``.
+        index: Its index.
+    """
+    library = mujoco()
+    return library.mj_id2name(model, getattr(library.mjtObj, f"mjOBJ_{kind.upper()}"), index) or ""

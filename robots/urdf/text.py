@@ -1,14 +1,18 @@
-"""Numbers in the attributes of a URDF."""
+"""The text of a URDF: XML that may come from anyone, and the numbers and names in it."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
+from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from robots.common.errors import AssetError
+from robots.common.quoting import shown
+
+MAX_DEPTH = 100  # elements inside one another; the deepest Collada meshes have about 20
 
 # Beyond it, squares and quotients leave the range of single precision, in which physics computes.
 LARGEST = 1e18
@@ -16,6 +20,43 @@ LARGEST_LENGTH = 1e4  # m
 
 # As C and Python both read it; Python alone also takes 1_000 and the digits of other scripts.
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+
+
+class _DocumentTypeError(Exception):
+    """A text has a document type, in which entities are declared."""
+
+
+class _Builder(ElementTree.TreeBuilder):
+    """Builds a tree, and stops where a document type begins."""
+
+    def doctype(self, *_: Any) -> None:
+        raise _DocumentTypeError
+
+
+def parse_xml(xml: bytes, file: str, kind: str) -> Element:
+    """Return the root element of an XML file.
+
+    Args:
+        xml: The file's contents, in any encoding that they declare.
+        file: Its path, for messages.
+        kind: What it should be, for messages, such as ``"a URDF"``.
+
+    Raises:
+        AssetError: If it is no XML, has a document type, which is where entities are declared,
+            or nests elements deeper than `MAX_DEPTH`.
+    """
+    try:
+        root = ElementTree.fromstring(xml, ElementTree.XMLParser(target=_Builder()))
+    except _DocumentTypeError:
+        raise AssetError(f"{file} declares XML entities; {kind} has no use for them") from None
+    except (ElementTree.ParseError, LookupError, ValueError) as error:  # unknown encodings
+        raise AssetError(f"{file} is not {kind}: {error}") from None
+    level, depth = [root], 0
+    while level:
+        level, depth = [child for element in level for child in element], depth + 1
+    if depth > MAX_DEPTH:
+        raise AssetError(f"{file} nests elements deeper than {MAX_DEPTH} levels")
+    return root
 
 
 def numbers_of(
@@ -83,10 +124,24 @@ def expect_numbers(element: Element, counts: Mapping[str, Mapping[str, int]], wh
         AssetError: As `numbers_of`.
     """
     for part, attributes in counts.items():
-        for attribute, count in attributes.items():
-            numbers_of(element.find(part), attribute, (0.0,) * count, where)
+        found = element.find(part)
+        for attribute in attributes if found is not None else ():
+            numbers_of(found, attribute, (0.0,) * attributes[attribute], where)
 
 
-def shown(text: str) -> str:
-    """Return a text of the file as a message shows it: quoted, and not too long."""
-    return repr(text if len(text) <= 60 else f"{text[:60]}…")
+def rename(element: Element, name: Callable[[str], str], file: Callable[[str], str]) -> None:
+    """Give a link, joint or material, and what it refers to, other names.
+
+    Args:
+        element: An element directly below ``<robot>``; it is changed.
+        name: Returns the new name of a link, joint or material.
+        file: Returns the new path of a mesh or texture.
+    """
+    names = [(element, "name"), *((part, "name") for part in element.iter("material"))]
+    names += [(part, "link") for part in element if part.tag in ("parent", "child")]
+    names += [(part, "joint") for part in element.iterfind("mimic")]
+    for part, key in {id(part): (part, key) for part, key in names}.values():
+        if old := part.get(key):
+            part.set(key, name(old))
+    for part in (*element.iter("mesh"), *element.iter("texture")):
+        part.set("filename", file(part.get("filename", "")))
