@@ -131,7 +131,7 @@ def moments(
     Args:
         task: A task with one environment.
         seed: Seed of the reset.
-        policy: Who acts; see `follow` for actions that are known.
+        policy: Who acts; see `open_loop` for actions that are known.
         most: Steps after which this ends; whoever looks on may end it before.
         start: State to begin from instead of the one after the reset; see
             `MultiRobotTask.set_state_dict`, which is not exact.
@@ -169,7 +169,7 @@ def take_step(task: MultiRobotTask, action: Any) -> Moment:
     return Moment(observation, reward.item(), success, over, late, seconds, elapsed)
 
 
-def follow(actions: Iterable[Any]) -> Policy:
+def open_loop(actions: Iterable[Any]) -> Policy:
     """Return a policy that carries out actions without looking."""
     left = iter(actions)
     return lambda observation: next(left)
@@ -240,7 +240,7 @@ def play(
     """
     if task.num_envs == 1 and not len(actions):
         raise TaskError("an episode needs at least one action")
-    happening = moments(task, seed, follow(actions), len(actions), start=start)
+    happening = moments(task, seed, open_loop(actions), len(actions), start=start)
     next(happening)
     tape = EpisodeTape(task, seed)
     watch()

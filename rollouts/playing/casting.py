@@ -15,7 +15,7 @@ from rollouts.playing.together import Player, is_batched
 from rollouts.sources.actors import is_person
 from rollouts.sources.policies import EXPERT, check_policy, find_policy
 from tasks import MultiRobotTask
-from tasks.episode import PlayedEpisode, Policy, follow
+from tasks.episode import PlayedEpisode, Policy, open_loop
 
 
 @dataclass(frozen=True)
@@ -102,10 +102,10 @@ class Casting:
         try:
             plan = planner(seed)
         except TaskError as error:
-            return Player(seed, follow(()), 0, random_states(), str(error))
+            return Player(seed, open_loop(()), 0, random_states(), str(error))
         to_the_end = self._cast.to_the_end
         states, reason = random_states(), planner.reason
-        player = Player(seed, follow(plan), len(plan), states, reason, True, to_the_end)
+        player = Player(seed, open_loop(plan), len(plan), states, reason, True, to_the_end)
         if planner.rehearsed is not None and (to_the_end or _ends_at_last(planner.rehearsed)):
             player.rehearsed = planner.rehearsed
         return player

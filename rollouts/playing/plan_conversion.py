@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from experts.registry import Expert
 from experts.rehearsal import rehearsed
 from robots import CONTROL_MODES, RobotDescriptor, TaskError
-from rollouts.playing.mode_conversion import converted
+from rollouts.playing.mode_conversion import converted_steps
 from tasks import MultiRobotTask
-from tasks.episode import PlayedEpisode, follow, moments
+from tasks.episode import PlayedEpisode, moments, open_loop
 
 DELTAS, POSITIONS = CONTROL_MODES[:2]  # all experts plan in deltas
 
@@ -48,7 +48,7 @@ class Planner:
             return actions
         if self._played.control_mode == POSITIONS:
             return as_positions(self._task, seed, actions)
-        return converted(self._task, seed, actions, self._played)
+        return converted_steps(self._task, seed, actions, self._played)[0]
 
     def close(self) -> None:
         """Let the worlds of its own task go, if it made one."""
@@ -78,7 +78,7 @@ def as_positions(
     if task.control_mode != DELTAS:
         raise TaskError(f"actions of {DELTAS} are converted; the task has {task.control_mode}")
     positions = np.array(actions, np.float32)
-    happening = moments(task, seed, follow(positions), len(positions))
+    happening = moments(task, seed, open_loop(positions), len(positions))
     next(happening)
     for row, _ in zip(positions, happening, strict=True):
         targets = iter(task.simulation.drive_targets[0].tolist())
