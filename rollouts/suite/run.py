@@ -11,8 +11,8 @@ from experts import find_expert
 from robots import TaskError
 from rollouts.evaluation import evaluate
 from rollouts.playing.executor import Event, Executor, choose_executor
+from rollouts.receipts.provenance import describe_expert, describe_policy
 from rollouts.receipts.receipt import Receipt
-from rollouts.receipts.sources import describe_expert, describe_policy
 from rollouts.sources.policies import EXPERT
 from rollouts.suite.folder import SuiteRun, begin_run, read_run, receipt_path, sole_run
 from rollouts.suite.policies import Player, chosen_cases, chosen_policies

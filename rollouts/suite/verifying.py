@@ -8,8 +8,8 @@ from pathlib import Path
 from shlex import quote
 
 from rollouts.playing.executor import Event, Executor, choose_executor
+from rollouts.receipts.provenance import EXPERT
 from rollouts.receipts.receipt import Receipt, ReceiptError
-from rollouts.receipts.sources import EXPERT
 from rollouts.receipts.verification import Verification, verify
 from rollouts.suite.files import OTHERS
 from rollouts.suite.folder import SuiteRun, read_run
