@@ -10,8 +10,7 @@ from robots.common.pages import plural
 from rollouts.receipts.receipt import Receipt
 from rollouts.sources.policies import EXPERT
 from rollouts.suite.folder import SuiteRun
-from rollouts.suite.results import Comparison, Result, compare, overall, result_of
-from rollouts.suite.statistics import Interval
+from rollouts.suite.results import Comparison, Interval, Result, compare, overall, result_of
 from rollouts.suite.suite import SHORT
 
 ALL = "all"  # the row of all cases together
