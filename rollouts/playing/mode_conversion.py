@@ -41,17 +41,19 @@ class Schedule(NamedTuple):
     noise: float = 0.0
 
 
-# Where something slips, the least difference decides when it does, so that attempts scatter and
-# more of them help. Where they come to rest beside the recording, only noise moves them on.
+# How many of 1,008 conversions each solved that those before had not: recordings of the experts of
+# 17 tasks in 8 modes, 3 seeds of each, and 600 of PegInsertionSide, PullCubeTool, PushT, RollBall.
 _SCHEDULES = (
-    Schedule(1, attempts=8, gain=1.0),
-    Schedule(1, attempts=12, gain=0.3),
-    Schedule(2, attempts=8, gain=0.3),
-    Schedule(4, attempts=8, gain=0.5),
-    Schedule(10, attempts=4, gain=0.5),
-    Schedule(1, attempts=20, gain=0.5),
-    Schedule(1, attempts=20, gain=0.15),
-    Schedule(3, attempts=8, gain=0.3),
+    Schedule(1, attempts=8, gain=1.0),  # 971, nearly all at once: the modes can move alike
+    Schedule(1, attempts=12, gain=0.3),  # 10 of PushT: what slips overreacts to a whole correction
+    Schedule(2, attempts=8, gain=0.3),  # 15: bounds of relative TCP poses are narrower than steps
+    Schedule(4, attempts=8, gain=0.5),  # 4, likewise; ManiSkill's replay_trajectory takes 4 steps
+    Schedule(10, attempts=4, gain=0.5),  # none of these; for modes of still narrower bounds
+    Schedule(1, attempts=20, gain=0.5),  # 3 of PushT, whose attempts scatter: more of them help
+    Schedule(1, attempts=20, gain=0.15),  # 1 of PushT, likewise
+    Schedule(3, attempts=8, gain=0.3),  # 1 of PushT, likewise
+    # 2, of PushT and RollBall, whose attempts had come to rest beside the recording. One of PushT
+    # was given up before, after 150 s.
     Schedule(3, attempts=60, gain=0.15, noise=3e-3),
 )
 _SETTLING = 10  # steps at the end, while the task is not solved
