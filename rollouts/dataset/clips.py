@@ -41,8 +41,8 @@ class Clip:
     poster: bytes
 
 
-def chosen(contents: Contents, most: int) -> dict[int, str]:
-    """Return places of episodes that are worth a look, each with what is special about it."""
+def chosen_places(contents: Contents, most: int) -> dict[int, str]:
+    """Return places of episodes that are worth showing, each with what is special about it."""
     steps, order = contents.steps, np.argsort(contents.steps, kind="stable")
     failed = np.flatnonzero(~contents.success)
     named = [

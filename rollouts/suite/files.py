@@ -30,14 +30,13 @@ SHIPPED = {"standard": Path(__file__).with_name("standard.yaml")}
 """Suites that come with the library, by name."""
 
 SHARED = ("seeds", "control_mode", "obs_mode", "randomization")  # for all tasks, or for one
+TOP = ("name", *SHARED, "policies", "tasks")
+ENTRY = ("task", "name", *SHARED, "layout", "layouts")
 OTHERS = "others"  # in a mapping of policies: every task that is not named
 OWN = "own"  # the task's own layout
 
 _HOW = f"{OWN!r}, a file, a preset ({{preset: ring, robots: …}}), or frames and robots"
-_LINE = re.compile(r"^line \d+: ")  # of a text that nobody has seen
-
-TOP = ("name", *SHARED, "policies", "tasks")
-ENTRY = ("task", "name", *SHARED, "layout", "layouts")
+_LINE = re.compile(r"^line \d+: ")  # of a text that is in no file
 
 
 def load_suite(path: str | PathLike[str], *, import_tasks: bool = False) -> Suite:
@@ -121,6 +120,7 @@ def _cases(
     entry: Any, shared: Mapping[str, Any], folder: Path, number: int, import_tasks: bool
 ) -> Sequence[Case]:
     """Return the cases of an entry: one for each of its layouts."""
+    named = entry.get("task") if isinstance(entry, Mapping) else entry
     try:
         own = {"task": entry} if isinstance(entry, str) else _mapping(entry, "an entry", ENTRY)
         about = {**shared, **own}
@@ -128,10 +128,21 @@ def _cases(
             if key not in about:
                 raise TaskError(f"{key!r} is missing; it needs a task, and seeds unless all share")
         cls = _task_class(str(about["task"]), import_tasks)
-        name = str(about.get("name") or cls.task_id)
-        return [_case(about, *place, folder) for place in _places(about, name)]
+        return [
+            Case(
+                about["task"],
+                about["seeds"],
+                name,
+                read_layout(layout, folder),
+                about.get("control_mode"),
+                about.get("obs_mode", "state"),
+                read_randomization(about.get("randomization"), folder),
+            )
+            for name, layout in _places(about, str(about.get("name") or cls.task_id))
+        ]
     except RobotLayoutsError as error:
-        raise TaskError(f"task {number}{_named(entry)}: {error}") from error
+        which = f" ({named})" if isinstance(named, str) else ""
+        raise TaskError(f"task {number}{which}: {error}") from error
 
 
 def _places(about: Mapping[str, Any], name: str) -> list[tuple[str, Any]]:
@@ -144,18 +155,6 @@ def _places(about: Mapping[str, Any], name: str) -> list[tuple[str, Any]]:
     if not several:
         raise TaskError(f"layouts is empty; leave it out for the task's {OWN}")
     return [(name if key == OWN else f"{name}.{key}", value) for key, value in several.items()]
-
-
-def _case(about: Mapping[str, Any], name: str, layout: Any, folder: Path) -> Case:
-    return Case(
-        about["task"],
-        about["seeds"],
-        name,
-        read_layout(layout, folder),
-        about.get("control_mode"),
-        about.get("obs_mode", "state"),
-        read_randomization(about.get("randomization"), folder),
-    )
 
 
 def _entry(case: Case, folder: Path) -> dict[str, Any]:
@@ -173,11 +172,6 @@ def _mapping(value: Any, what: str, keys: Sequence[str] | None = None) -> Mappin
         if keys is not None and key not in keys:
             raise UnknownNameError(f"key of {what}", key, keys)
     return value
-
-
-def _named(entry: Any) -> str:
-    name = entry.get("task") if isinstance(entry, Mapping) else entry
-    return f" ({name})" if isinstance(name, str) else ""
 
 
 def read_layout(value: Any, folder: Path) -> Layout | None:
@@ -199,7 +193,11 @@ def read_layout(value: Any, folder: Path) -> Layout | None:
     if isinstance(value, Mapping) and "preset" in value:
         return _preset(value, folder)
     if isinstance(value, Mapping) and "robots" in value:
-        return _written_out(value, folder)
+        try:
+            text = yaml.safe_dump({**value, "version": 1}, sort_keys=False)
+            return Layout.from_yaml(text, folder)
+        except LayoutError as error:
+            raise LayoutError(_LINE.sub("", str(error))) from error
     raise LayoutError(f"a layout is {shown(value)}; it takes {_HOW}")
 
 
@@ -254,36 +252,28 @@ class _Loader(yaml.SafeLoader):
     }
 
 
-def _written_out(value: Mapping[str, Any], folder: Path) -> Layout:
-    text = yaml.safe_dump({**value, "version": 1}, sort_keys=False)
-    try:
-        return Layout.from_yaml(text, folder)
-    except LayoutError as error:
-        raise LayoutError(_LINE.sub("", str(error))) from error
-
-
 def _preset(value: Mapping[str, Any], folder: Path) -> Layout:
-    options = {key: _whole(given) for key, given in value.items() if key not in ("preset",)}
+    preset = str(value["preset"])
+    options = {
+        # A file's numbers are all read as floats.
+        key: int(given) if isinstance(given, float) and given.is_integer() else given
+        for key, given in value.items()
+        if key != "preset"
+    }
     if isinstance(robots := options.get("robots"), Mapping):
         options["robots"] = {
             place: robot_in_file(robot, place, folder) if isinstance(robot, str) else robot
             for place, robot in robots.items()
         }
-    place = PRESETS[str(value["preset"])]
+    place = PRESETS[preset]
     takes = signature(place).parameters
     for name in options:
         if name not in takes:
-            raise UnknownNameError(f"argument of {value['preset']}", name, takes)
-    lacking = [name for name, one in takes.items() if one.default is one.empty]
-    for name in lacking:
-        if name not in options:
-            raise LayoutError(f"{value['preset']} needs {name!r}")
+            raise UnknownNameError(f"argument of {preset}", name, takes)
+    for name, one in takes.items():
+        if one.default is one.empty and name not in options:
+            raise LayoutError(f"{preset} needs {name!r}")
     layout = place(**options)
     if not isinstance(layout, Layout):
-        raise LayoutError(f"the preset {value['preset']} returned {shown(layout)}, no Layout")
+        raise LayoutError(f"the preset {preset} returned {shown(layout)}, no Layout")
     return layout
-
-
-def _whole(value: Any) -> Any:
-    """Return a whole number as one; a file's numbers are all read as floats."""
-    return int(value) if isinstance(value, float) and value.is_integer() else value
