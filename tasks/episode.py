@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import fsum
 from time import perf_counter
@@ -83,6 +83,36 @@ class PlayedEpisode(Episode):
     actor: NDArray[np.uint8] | None = None
     corrections: NDArray[np.float32] | None = None
     reason: str = ""
+
+    @classmethod
+    def of(
+        cls,
+        seed: int,
+        actions: Sequence[NDArray[np.float32]],
+        states: States,
+        moments: Sequence[Moment],
+        **others: Any,
+    ) -> PlayedEpisode:
+        """Return the episode of T steps, T of 1 or more.
+
+        Args:
+            seed: Seed of its reset.
+            actions: The action of each step, (A,).
+            states: See above.
+            moments: What each step returned.
+            **others: Other fields.
+        """
+        return cls(
+            seed=seed,
+            actions=np.stack(actions),
+            states=states,
+            rewards=np.array([moment.reward for moment in moments], np.float32),
+            success=np.array([moment.success for moment in moments]),
+            terminated=np.array([moment.terminated for moment in moments]),
+            truncated=np.array([moment.truncated for moment in moments]),
+            seconds=fsum(moment.seconds for moment in moments),
+            **others,
+        )
 
     @property
     def solved(self) -> bool:
@@ -199,22 +229,12 @@ class EpisodeTape:
 
     def read(self) -> PlayedEpisode:
         """Return the episode of T steps, T of 1 or more."""
-        columns = zip(*(moment[1:5] for moment in self._moments), strict=True)
-        rewards, success, terminated, truncated = columns
-        return PlayedEpisode(
-            seed=self._seed,
-            actions=np.stack(self._actions),
-            states={
-                kind: {name: rows[:, 0] for name, rows in entries.items()}
-                for kind, entries in self._states.read().items()
-            },
-            rewards=np.array(rewards, np.float32),
-            success=np.array(success),
-            terminated=np.array(terminated),
-            truncated=np.array(truncated),
-            seconds=sum(moment.seconds for moment in self._moments),
-            drawn=self._task.drawn(),
-        )
+        states = {
+            kind: {name: rows[:, 0] for name, rows in entries.items()}
+            for kind, entries in self._states.read().items()
+        }
+        drawn = self._task.drawn()
+        return PlayedEpisode.of(self._seed, self._actions, states, self._moments, drawn=drawn)
 
 
 def play(

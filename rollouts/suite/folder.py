@@ -12,8 +12,7 @@ from typing import Any
 from robots import TaskError
 from robots.common.writing import writing_errors
 from robots.control_modes import plain_mode
-from rollouts.reading.recorded_layout import same_places
-from rollouts.receipts.making import make_again
+from rollouts.receipts.making import make_again, same_layout
 from rollouts.receipts.receipt import Receipt, ReceiptError
 from rollouts.recording.disk import claim
 from rollouts.suite.files import load_suite, save_suite
@@ -162,16 +161,12 @@ def expect_of_case(receipt: Receipt, case: Case, path: Path) -> Receipt:
 
 
 def _differing(cls: type[MultiRobotTask], made: Scenario, wanted: Scenario) -> Iterator[str]:
-    if not same_places(made.layout, wanted.layout) or _modes(made) != _modes(wanted):
+    if not same_layout(made.layout, wanted.layout):
         yield "layout"
     for field in fields(Scenario):
         name = field.name
         if name not in _APART and _plain(cls, made, name) != _plain(cls, wanted, name):
             yield name
-
-
-def _modes(scenario: Scenario) -> list[str | None]:
-    return [placement.control_mode for placement in scenario.layout.values()]
 
 
 def _plain(cls: type[MultiRobotTask], scenario: Scenario, name: str) -> Any:

@@ -53,22 +53,28 @@ class Comparison:
         gained: Seeds that it alone solved.
         lost: Seeds that the other alone solved.
         episodes: Seeds that both played.
-        interval: 95 % confidence interval of the difference of their rates.
-        p: Of McNemar's exact test.
-        adjusted: The same, by Holm's procedure for all cases; of all cases together, as it is.
+        adjusted: `p`, by Holm's procedure for all cases; of all cases together, as it is.
     """
 
     gained: int
     lost: int
     episodes: int
-    interval: Interval
-    p: float
     adjusted: float
 
     @property
     def difference(self) -> float:
         """Its success rate minus the other's."""
         return (self.gained - self.lost) / self.episodes
+
+    @property
+    def interval(self) -> Interval:
+        """95 % confidence interval of that difference."""
+        return paired_difference(self.gained, self.lost, self.episodes)
+
+    @property
+    def p(self) -> float:
+        """The p-value of McNemar's exact test."""
+        return mcnemar(self.gained, self.lost)
 
 
 def result_of(episodes: Episodes) -> Result:
@@ -100,22 +106,15 @@ def compare(pairs: Sequence[tuple[Receipt, Receipt]]) -> list[Comparison]:
     Args:
         pairs: Receipts of one case, each played with the same seeds.
     """
-    counts = [_counts(*pair) for pair in pairs]
+    counts: list[tuple[int, int, int]] = []
+    for one, other in pairs:
+        solved = {episode.seed: episode.success for episode in other.episodes}
+        both = [(e.success, solved[e.seed]) for e in one.episodes if e.seed in solved]
+        counts.append((both.count((True, False)), both.count((False, True)), len(both)))
     adjusted = holm([mcnemar(gained, lost) for gained, lost, _ in counts])
-    found = [_comparison(*of, p) for of, p in zip(counts, adjusted, strict=True)]
+    found = [Comparison(*of, p) for of, p in zip(counts, adjusted, strict=True)]
     gained, lost, episodes = (sum(column) for column in zip(*counts, strict=True))
-    return [*found, _comparison(gained, lost, episodes, mcnemar(gained, lost))]
-
-
-def _counts(one: Receipt, other: Receipt) -> tuple[int, int, int]:
-    solved = {episode.seed: episode.success for episode in other.episodes}
-    both = [(e.success, solved[e.seed]) for e in one.episodes if e.seed in solved]
-    return both.count((True, False)), both.count((False, True)), len(both)
-
-
-def _comparison(gained: int, lost: int, episodes: int, adjusted: float) -> Comparison:
-    interval = paired_difference(gained, lost, episodes)
-    return Comparison(gained, lost, episodes, interval, mcnemar(gained, lost), adjusted)
+    return [*found, Comparison(gained, lost, episodes, mcnemar(gained, lost))]
 
 
 def wilson(successes: int, episodes: int) -> Interval:
