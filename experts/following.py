@@ -31,7 +31,7 @@ _ROUNDING = 1e-9  # s
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """What came of following a motion.
+    """The result of following a motion.
 
     Attributes:
         actions: What was done, (T, A).
@@ -55,11 +55,11 @@ class Followed:
 class Follower:
     """Says what to do next so that the robots of a task carry out a motion, in any control mode.
 
-    Drives lag behind what they are driven to; they are driven further, by what their stiffness and
-    damping tell, and by what they missed. Where a control mode cannot keep up, the motion's clock
-    goes slower, for all robots alike, so that they stay on their way. TCP modes leave it to the
-    solver how an arm of more joints than needed holds its elbow, and those of positions alone how
-    the TCP is turned: there only the TCP follows.
+    Drives lag behind what they are driven to; they are driven further, by what follows from their
+    stiffness and damping, and by what they missed. Where a control mode cannot keep up, the
+    motion's clock goes slower, for all robots alike, so that they stay on their way. TCP modes
+    leave it to the solver how an arm of more joints than needed holds its elbow, and those of
+    positions alone how the TCP is turned: there only the TCP follows.
 
     Attributes:
         motion: What is carried out.

@@ -24,12 +24,12 @@ from tasks.episode import REBUILT, EpisodeTape, PlayedEpisode, take_step
 
 @dataclass(frozen=True)
 class Attempt:
-    """What came of playing a script.
+    """The result of playing a script.
 
     Attributes:
         actions: Shape (T, A).
         success: Whether the task's own success was reached, at the last action.
-        reason: Why not, in words.
+        reason: Why not.
         obstructed: Whether it failed because something was in an arm's way.
         episode: What happened, if it was kept; see `Rehearsal.episode`.
     """
@@ -56,7 +56,7 @@ class Plan(NDArray[np.float32] if TYPE_CHECKING else np.ndarray):
 
     @classmethod
     def of(cls, attempt: Attempt, task: MultiRobotTask) -> Plan:
-        """Return what came of an attempt at a task."""
+        """Return the plan that an attempt at a task made."""
         plan = attempt.actions.view(cls)
         plan.reason, plan.episode, plan.task = attempt.reason, attempt.episode, ref(task)
         return plan
@@ -120,7 +120,7 @@ class Rehearsal:
     def episode(self, actions: NDArray[np.float32]) -> PlayedEpisode | None:
         """Return what happened since `begin`, if it followed from these actions, (T, A), alone.
 
-        That is, if `step` took all of them and no others, and nobody set the task's state; else
+        That is, if `step` took all of them and no others, and the task's state was not set; else
         return None.
         """
         if self._tape is None or not len(actions) or not self._tape.unbroken:

@@ -23,12 +23,12 @@ from tasks import MultiRobotTask
 
 CLEARANCE = 0.02  # m
 RESOLUTION: Resolution = (0.02, 0.1)  # m and rad
-SHARES = np.linspace(0.0, 1.0, 5)  # of their ways, where arms that move too are looked at
+SHARES = np.linspace(0.0, 1.0, 5)  # of their ways, at which arms that move too are checked
 STANDING = 0.02  # rad: an arm that has less to go stands
 SHORT = 0.4  # rad: a way that long at most, from or to a body, is only made straight
-CANDIDATES = 8  # postures at the goal that are looked at
+CANDIDATES = 8  # postures at the goal that are checked
 SOUGHT = 2  # postures at the goal to which a way round is sought
-CHECKS = 600  # lines and postures that a search may look at
+CHECKS = 600  # lines and postures that a search may check
 
 
 def without_planner() -> str:
@@ -58,7 +58,7 @@ class Ways:
         ]
 
     def known(self, arm: str) -> str | None:
-        """Return the full name of an arm; None if it is none."""
+        """Return the full name of an arm; None if there is no such arm."""
         name = self._layout.arm_name(arm)
         return name if name in self._columns else None
 
@@ -78,7 +78,7 @@ class Ways:
 
         Raises:
             MissingPackageError: If a way round is needed and the extra ``motion`` not installed.
-            NoWayError: If there is none now.
+            NoWayError: If there is no free way now.
         """
         query = self._query(self._layout.arm_name(arm), scene, ahead)
         places: list[_Place] = []

@@ -54,7 +54,7 @@ class Score:
 
 @dataclass(frozen=True)
 class PlayedEpisode(Episode):
-    """An episode and what came of it.
+    """An episode and what happened in it.
 
     Attributes:
         states: State dict of `MultiRobotTask.get_state_dict`, each entry (T + 1, k), the first
@@ -64,12 +64,12 @@ class PlayedEpisode(Episode):
         terminated: Shape (T,).
         truncated: Shape (T,).
         seconds: Time that the steps took, without reading the states (s).
-        source: Who acted, as plain data that json can hold; None if nobody says.
+        source: Who acted, as plain data that json can hold; None if unknown.
         drawn: What was varied in its world, likewise; None if nothing was.
         actor: Who acted at each step where several did, (T,) uint8: the number of one of the
             ``"actors"`` of ``source``; else None.
         corrections: What a corrector would have done at each step, (T, A), or None.
-        reason: Why it failed, in words; empty if it did not, or if nobody says: an expert does.
+        reason: Why it failed; empty if it did not, or if that is unknown. Experts give a reason.
     """
 
     states: States
@@ -162,7 +162,7 @@ def moments(
         task: A task with one environment.
         seed: Seed of the reset.
         policy: Who acts; see `open_loop` for actions that are known.
-        most: Steps after which this ends; whoever looks on may end it before.
+        most: Steps after which this ends; the caller may end it before.
         start: State to begin from instead of the one after the reset; see
             `MultiRobotTask.set_state_dict`, which is not exact.
 
@@ -186,7 +186,7 @@ def moments(
 
 
 def take_step(task: MultiRobotTask, action: Any) -> Moment:
-    """Take a control step in a task with one environment, and return what came of it.
+    """Take a control step in a task with one environment, and return what it returned.
 
     Raises:
         ActionError: If the action has the wrong shape or numbers that are not finite.
@@ -200,7 +200,7 @@ def take_step(task: MultiRobotTask, action: Any) -> Moment:
 
 
 def open_loop(actions: Iterable[Any]) -> Policy:
-    """Return a policy that carries out actions without looking."""
+    """Return a policy that carries out actions, whatever it observes."""
     left = iter(actions)
     return lambda observation: next(left)
 
@@ -216,7 +216,7 @@ class EpisodeTape:
         task.write_tape(self._states)
 
     def add(self, action: Any, moment: Moment) -> None:
-        """Add a step that was just taken: its action, (A,), and what came of it."""
+        """Add a step that was just taken: its action, (A,), and what it returned."""
         self._actions.append(np.array(action, np.float32))
         self._moments.append(moment._replace(observation=None))
         self._task.write_tape(self._states)

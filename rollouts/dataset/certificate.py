@@ -165,7 +165,7 @@ class Certificate:
         """Read one.
 
         Raises:
-            RecordingError: If it cannot be read, or is none.
+            RecordingError: If it cannot be read, or is no certificate.
         """
         try:
             found = read_json(path, MAX_JSON)
@@ -186,7 +186,7 @@ def versions() -> dict[str, str]:
 
 
 def sentences(certificate: Certificate) -> Sequence[str]:
-    """Return what a certificate says, in words."""
+    """Return a certificate as sentences."""
     c = certificate
     lines = [
         f"{c.equal} of {c.episodes} episodes equal to the last bit, {c.steps} steps, {c.successes}"
@@ -208,7 +208,7 @@ def sentences(certificate: Certificate) -> Sequence[str]:
 
 
 def _seeds(certificate: Certificate) -> str:
-    """Return in which episodes arms touched, the first three, in words."""
+    """Return the first three episodes in which arms touched, as the end of a sentence."""
     named = [
         f"{one['seed']}{'' if one['success'] else ' (no success)'}" for one in certificate.touching
     ][:3]

@@ -44,7 +44,7 @@ def measure(
     Args:
         file: The recording.
         task: Its task.
-        places: Which episodes are looked at, by their place in the recording.
+        places: Which episodes are measured, by their place in the recording.
         progress: Called after each episode.
 
     Raises:

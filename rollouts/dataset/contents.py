@@ -55,7 +55,7 @@ class Contents:
         files: Its files.
         steps: Control steps of each episode, (n,).
         success: Whether each ended in success, (n,).
-        sources: What is known of each source, by its name in words.
+        sources: Counts of each source, by its name.
         drawn: What was varied, by axis and name: a number for each episode, (n,), NaN where
             nothing was drawn.
     """
@@ -114,7 +114,7 @@ def read_contents(
 
 
 def describe_source(entry: Entry, summary: Summary) -> str:
-    """Return who acted in an episode, in words."""
+    """Return the name of an episode's source: who acted, and who corrected."""
     source = entry.source
     if source is None:
         named = (summary.source_type, summary.source_desc)

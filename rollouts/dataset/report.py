@@ -34,7 +34,7 @@ def make_report(
     clips: int = 4,
     progress: Progress = lambda done, total, what: None,
 ) -> Report:
-    """Return what is known of a dataset.
+    """Gather what the report of a data set shows.
 
     Args:
         path: The recording: an h5 file, a folder or a manifest.
@@ -85,7 +85,7 @@ def make_report(
 
 
 def _certificate(path: Path, remarks: list[str]) -> Certificate | None:
-    """Return the certificate of these very files, as far as their sizes tell."""
+    """Return the certificate of these files, which are recognised by their sizes."""
     place = certificate_path(path)
     if not place.exists():
         return None

@@ -51,7 +51,7 @@ class Player:
         most: Steps after which the episode ends.
         states: Where the random generators are when it acts.
         reason: Why it can but fail, if that is known.
-        blind: Whether the policy acts without looking, as a plan does; then it draws nothing.
+        blind: Whether the policy ignores observations, as a plan does; then it draws nothing.
         to_the_end: Whether it plays all its steps, those after a success or out of time included.
         takeover: May act in place of the policy: obs → action, or None to let the policy act.
         corrector: Says at every step what it would do: obs → action.

@@ -55,7 +55,7 @@ class Change:
             ``"making"``, ``"variable"`` (of the environment) or ``"receipt"``.
         name: Which.
         recorded: What the receipt says; None if nothing.
-        here: What it is here; None if there is none.
+        here: What it is here; None if it does not exist.
     """
 
     about: str
@@ -64,7 +64,7 @@ class Change:
     here: Any
 
     def __str__(self) -> str:
-        """Say it in words."""
+        """Name it, with both values."""
         return f"{self.name}: {_shown(self.recorded)} in the receipt, {_shown(self.here)} here"
 
 
@@ -78,7 +78,7 @@ def episode_differences(recorded: Receipt, here: Receipt) -> Iterator[EpisodeDif
 
 
 def first_step(before: EpisodeReceipt, now: EpisodeReceipt) -> int | None:
-    """Return the first step that differs; the last one if the short digests do not tell."""
+    """Return the first step that differs; the last one if the short digests are equal."""
     if before.states == now.states:
         return None
     row = first_row(before.digests(), now.digests())

@@ -126,7 +126,7 @@ def make_again(
         robots: Which robots to take, by place, where that does not say it.
 
     Raises:
-        ReceiptError: If it makes no sense here, or a robot cannot be had.
+        ReceiptError: If it is invalid, or a robot is not available here.
     """
     try:
         _MAKING.expect(dict(making), "making")
@@ -149,7 +149,7 @@ def make_again(
 
 
 def same_layout(first: Layout, second: Layout) -> bool:
-    """Return whether a layout is another one, but for frames that things hang on."""
+    """Return whether two layouts have the same robots, places and control modes."""
     modes = ([placement.control_mode for placement in each.values()] for each in (first, second))
     return same_places(first, second) and next(modes) == next(modes)
 

@@ -126,7 +126,7 @@ class EpisodeReceipt:
 
 @dataclass(frozen=True)
 class Receipt:
-    """What an evaluation was of, and what came of it.
+    """What was evaluated, and the results.
 
     Attributes:
         task: ``id``, ``class`` (``module:Class``) and ``sha256`` of the module's source.

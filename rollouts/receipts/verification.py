@@ -101,9 +101,9 @@ def verify(
             played as many at once as when the receipt was written.
 
     Raises:
-        ReceiptError: If it cannot be read or is none; its task or policy cannot be had here, or
-            would have to be named.
-        TaskError: If a policy is given that is none, or both ``workers`` and an executor.
+        ReceiptError: If it is no receipt or cannot be read, or its task or policy is not available
+            here or has to be named.
+        TaskError: If something is given that is no policy, or both ``workers`` and an executor.
         AssetError: If robot files cannot be found.
         WorkerError: If the policy raised something, or workers die of it again and again.
     """

@@ -45,7 +45,7 @@ def load_suite(path: str | PathLike[str], *, import_tasks: bool = False) -> Suit
     Args:
         path: A YAML file, or the name of a suite that comes with the library: ``"standard"``.
         import_tasks: Whether to import the modules of the tasks that it names as ``module:Id``.
-            Otherwise these have to be imported already, so that a file of somebody else runs no
+            Otherwise these have to be imported already, so that another person's file runs no
             code.
 
     Raises:
@@ -216,7 +216,7 @@ def read_randomization(value: Any, folder: Path) -> Randomization | None:
     """Return what varies: a file's, or what a mapping describes; None if it is None.
 
     Raises:
-        TaskError: If it makes no sense.
+        TaskError: If it is invalid.
         UnknownNameError: If there is no such axis.
     """
     if value is None:
@@ -229,7 +229,7 @@ def read_randomization(value: Any, folder: Path) -> Randomization | None:
 
 
 def _below(folder: Path, name: str) -> Path:
-    """Return the path of a file below a folder; a suite of somebody else reads no other.
+    """Return the path of a file below a folder; another person's suite reads no other.
 
     Raises:
         TaskError: If it is not below it, links followed.

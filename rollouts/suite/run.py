@@ -55,7 +55,7 @@ def run_suite(
 
     Raises:
         UnknownNameError: If a case or a task is unknown.
-        TaskError: If nobody plays a task, or the folder holds the run of another suite, receipts
+        TaskError: If a task has no policy, or the folder holds the run of another suite, receipts
             of another policy, or a run that is playing; nothing was played then.
         ReceiptError: If a receipt in the folder is damaged, or was changed.
         WorkerError: If a policy raised something; finished receipts are kept.
@@ -132,7 +132,7 @@ def verify_run(
 
 
 def chosen_cases(suite: Suite, names: Sequence[str] = ()) -> tuple[Case, ...]:
-    """Return the cases that some names mean, each that of a case or a task; all if there are none.
+    """Return the cases of some names, each of a case or a task; all if no name is given.
 
     Raises:
         UnknownNameError: If a name means none.

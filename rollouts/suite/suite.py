@@ -96,7 +96,7 @@ class Case:
 
         Raises:
             UnknownNameError: If there is no such task.
-            TaskError: If seeds, name or modes make no sense, or the task cannot be played in the
+            TaskError: If seeds, name or modes are invalid, or the task cannot be played in the
                 layout.
         """
         cls = get_task_class(self.task)

@@ -1,4 +1,4 @@
-"""The tables of a suite's report, in words, for the page and for Markdown."""
+"""The tables of a suite's report as texts, for the page and for Markdown."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ class Jog:
     """What a key does to the target of a TCP, in the world.
 
     Attributes:
-        label: The same in words.
+        label: What it is called on the page.
         axis: Along which it moves, or about which it turns, of length 1.
         shift: Whether it is pressed together with shift, and turns.
     """

@@ -136,7 +136,7 @@ class Steering:
         self.begin_anew()
 
     def begin_anew(self) -> None:
-        """Take all joints where they are now, after somebody else has moved them."""
+        """Start from where all joints are now, after something else has moved them."""
         self._begun = self._task.simulation.read().joint_positions[0].astype(float)
         self.reference = self._begun.copy()
         self._speed = np.zeros_like(self.reference)
