@@ -24,7 +24,6 @@ from kinematics.own_rooms import expect_own
 
 expect_own("robots", "layouts", "motion", "simulation", "tasks")
 
-from experts.closed_loop import rehearse
 from experts.driver import ArmDriver
 from experts.following import Followed, Follower, follow
 from experts.geometry import (
@@ -45,7 +44,7 @@ from experts.grasps import (
     pick,
 )
 from experts.registry import Expert, find_expert, list_experts, register_expert
-from experts.rehearsal import Attempt, Plan, Rehearsal, first_success, search
+from experts.rehearsal import Attempt, Plan, Rehearsal, first_success, rehearse, search
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
 
 __all__ = [

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.motion_drives import NEAR, Aim, Constant, Drive, JointDrive, TcpDrive
+from experts.motion_drives import NEAR, Aim, MotionDrive, drive_within_bounds
 from experts.tips import link_tree
 from kinematics.rotations import Floats
 from layouts import Layout
@@ -17,7 +17,6 @@ from motion.motion import Motion
 from robots import TaskError
 from robots.action_split import is_gripper
 from robots.urdf.tcp import find_tcp
-from simulation import State
 from simulation.backend import Overlap
 from simulation.checks.overlaps import between_robots, deepest
 from tasks import MultiRobotTask
@@ -32,7 +31,7 @@ _ROUNDING = 1e-9  # s
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """What came of following a motion.
+    """The result of following a motion.
 
     Attributes:
         actions: What was done, (T, A).
@@ -56,11 +55,11 @@ class Followed:
 class Follower:
     """Says what to do next so that the robots of a task carry out a motion, in any control mode.
 
-    Drives lag behind what they are driven to; they are driven further, by what their stiffness and
-    damping tell, and by what they missed. Where a control mode cannot keep up, the motion's clock
-    goes slower, for all robots alike, so that they stay on their way. TCP modes leave it to the
-    solver how an arm of more joints than needed holds its elbow, and those of positions alone how
-    the TCP is turned: there only the TCP follows.
+    Drives lag behind what they are driven to; they are driven further, by what follows from their
+    stiffness and damping, and by what they missed. Where a control mode cannot keep up, the
+    motion's clock goes slower, for all robots alike, so that they stay on their way. TCP modes
+    leave it to the solver how an arm of more joints than needed holds its elbow, and those of
+    positions alone how the TCP is turned: there only the TCP follows.
 
     Attributes:
         motion: What is carried out.
@@ -96,7 +95,8 @@ class Follower:
                     f" its gripper closed: grippers={{{held.place!r}: -1.0}}"
                 )
         self._still = task.simulation.read().joint_positions[0].astype(float)
-        self._drives = list(self._driven(given))
+        self._constant = np.zeros(task.layout.action_dim, np.float32)
+        self._drives = self._driven(given)
 
     @property
     def ended(self) -> bool:
@@ -123,42 +123,30 @@ class Follower:
         state = self._task.simulation.read()
         for drive in self._drives:
             drive.learn(state)
-        action, within = self._towards(1.0, state)
-        share = 1.0
-        if not within:
-            share = self._possible_share(state)
-            action, _ = self._towards(share, state)
+        action = self._constant.copy()
+        share = drive_within_bounds(self._drives, self._aim, state, action, _HALVINGS)
         self.time = min(self.time + share * self._seconds, self.motion.duration)
         return action
 
     # -- inside ------------------------------------------------------------------------------
 
-    def _driven(self, grippers: Mapping[str, float]) -> Iterator[Drive]:
+    def _driven(self, grippers: Mapping[str, float]) -> list[MotionDrive]:
+        """Return what moves along the motion, and note the numbers of what does not."""
         path = np.array([self.joints(time) for time in self.motion.times])
         moving = np.ptp(path, axis=0) > NEAR
+        drives: list[MotionDrive] = []
         for driven in driven_groups(self._task.layout):
+            moves = bool(moving[driven.joints].any())
             if is_gripper(driven.name) and (number := grippers.get(driven.arm or "")) is not None:
-                yield Constant(driven, number)
-            elif driven.group.asks.drive or not driven.group.size:
-                if moving[driven.joints].any():
-                    raise TaskError(
-                        f"the motion moves {driven.robot}'s {driven.name}, which cannot be driven"
-                        " along it in this control mode"
-                    )
-                yield Constant(driven, 0.0)
-            else:
-                kind = TcpDrive if driven.group.asks.tcp else JointDrive
-                yield kind(driven, self._task, self._seconds, moves=moving[driven.joints].any())
-
-    def _towards(self, share: float, state: State) -> tuple[NDArray[np.float32], bool]:
-        """Return the action of a share of a step of the clock, and whether it is within bounds."""
-        action = np.zeros(self._task.layout.action_dim, np.float32)
-        aim = self._aim(share)
-        every = True
-        for drive in self._drives:
-            action[drive.numbers], within = drive.towards(aim, state)
-            every = every and within
-        return action, every
+                self._constant[driven.numbers] = number
+            elif driven.group.size and not driven.group.asks.drive:
+                drives.append(MotionDrive(driven, self._task, moves=moves))
+            elif moves:
+                raise TaskError(
+                    f"the motion moves {driven.robot}'s {driven.name}, which cannot be driven"
+                    " along it in this control mode"
+                )
+        return drives
 
     def _aim(self, share: float) -> Aim:
         now, then = self.time, self.time + share * self._seconds
@@ -168,15 +156,6 @@ class Follower:
             change[self._joints[name]] = share * (rows[1] - rows[0])
         here = self.joints(now)
         return Aim(here, self.joints(then) - here, change)
-
-    def _possible_share(self, state: State) -> float:
-        """Return how much of a step the robots can go; 0 if they have to catch up first."""
-        enough, too_much = 0.0, 1.0
-        for _ in range(_HALVINGS):
-            middle = (enough + too_much) / 2
-            _, within = self._towards(middle, state)
-            enough, too_much = (middle, too_much) if within else (enough, middle)
-        return enough
 
 
 def follow(

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinematics.rotations import Floats, inverse, multiply
 from simulation import State
 from tasks import MultiRobotTask
-from tasks.driving import DrivenGroup, JointNumbers, TcpNumbers, further
+from tasks.driving import DrivenGroup, TcpDrive, VelocityDrive, drive_of
 
 NEAR = 0.005  # rad, m; as near to their end are joints that have arrived
 NEAR_TCP = 0.002, 0.01  # m, rad; the same of TCPs, where a control mode drives these
@@ -31,155 +33,53 @@ class Aim(NamedTuple):
     way: Floats
     change: Floats
 
-    def of(self, joints: slice) -> Aim:
-        """Return what some joints do."""
-        return Aim(self.here[joints], self.way[joints], self.change[joints])
 
-
-class Drive(Protocol):
-    """Moves a joint group along a motion."""
-
-    numbers: slice
-
-    def towards(self, aim: Aim, state: State) -> tuple[Floats | float, bool]:
-        """Return the numbers of a step, and whether they are within bounds."""
-        ...
-
-    def arrived(self, end: Floats, state: State) -> bool:
-        """Return whether the group is where some joints, (dof,), have it."""
-        ...
-
-    def learn(self, state: State) -> None:
-        """See what came of the step that ended with a state."""
-        ...
-
-
-class Constant:
-    """A group whose numbers stay the same."""
-
-    def __init__(self, driven: DrivenGroup, number: float) -> None:
-        """Take the group."""
-        self.numbers, self._number = driven.numbers, number
-
-    def towards(self, aim: Aim, state: State) -> tuple[Floats | float, bool]:
-        """See `Drive`."""
-        return self._number, True
-
-    def arrived(self, end: Floats, state: State) -> bool:
-        """See `Drive`."""
-        return True
-
-    def learn(self, state: State) -> None:
-        """See `Drive`."""
-
-
-class JointDrive:
-    """A group that is driven by positions of its joints, or by their velocities."""
-
-    def __init__(
-        self, driven: DrivenGroup, task: MultiRobotTask, seconds: float, *, moves: bool
-    ) -> None:
-        """Take the group.
-
-        Args:
-            driven: The group.
-            task: Of which it is.
-            seconds: Of a control step (s).
-            moves: Whether the motion moves it.
-        """
-        self.numbers, self._joints, self._moves = driven.numbers, driven.joints, moves
-        self._numbers, self._lag = JointNumbers(driven, task), _Lag(driven, task, seconds)
-        self._seconds = seconds
-        self._bounds = np.full((2, len(driven.group.joints)), [[-np.inf], [np.inf]])
-        if driven.group.asks.positions and not driven.group.delta and driven.group.limits:
-            self._bounds = np.array(driven.group.limits).T
-        self.learn = self._lag.learn
-
-    def towards(self, aim: Aim, state: State) -> tuple[Floats | float, bool]:
-        """See `Drive`."""
-        here, way, change = aim.of(self._joints)
-        where = self._numbers.where(state)
-        pull = self._lag.pulled(way + _CORRECTION * (here - where), change)
-        wanted = np.clip(where + pull, *self._bounds)
-        if self._numbers.by_speed:
-            wanted = pull / self._seconds
-        numbers, within = self._numbers.towards(wanted, state)
-        return numbers, within or not self._moves
-
-    def arrived(self, end: Floats, state: State) -> bool:
-        """See `Drive`."""
-        return bool(np.abs(end[self._joints] - self._numbers.where(state)).max() < NEAR)
-
-
-class TcpDrive:
-    """A group that is driven by where its TCP is."""
-
-    def __init__(
-        self, driven: DrivenGroup, task: MultiRobotTask, seconds: float, *, moves: bool
-    ) -> None:
-        """Take the group.
-
-        Args:
-            driven: The group.
-            task: Of which it is.
-            seconds: Of a control step (s).
-            moves: Whether the motion moves it.
-        """
-        self.numbers, self._joints, self._moves = driven.numbers, driven.joints, moves
-        self._turns = driven.group.asks.turn
-        self._numbers, self._lag = TcpNumbers(driven, task), _Lag(driven, task, seconds)
-        self._share = _CORRECTION * float(self._lag.pulls.mean()) - 1
-        self.learn = self._lag.learn
-
-    def towards(self, aim: Aim, state: State) -> tuple[Floats | float, bool]:
-        """See `Drive`."""
-        _, way, change = aim.of(self._joints)
-        ahead = aim.here.copy()
-        ahead[self._joints] += self._lag.pulled(way, change)
-        wanted, here = (self._numbers.pose(joints, state) for joints in (ahead, aim.here))
-        pulled = further(wanted, here, self._numbers.where(state), self._share)
-        numbers, within = self._numbers.towards(pulled, state)
-        return numbers, within or not self._moves
-
-    def arrived(self, end: Floats, state: State) -> bool:
-        """See `Drive`."""
-        wanted, here = self._numbers.pose(end, state), self._numbers.where(state)
-        turn = 2 * np.arccos(min(1.0, abs(multiply(wanted[3:], inverse(here[3:]))[0])))
-        near = np.linalg.norm(wanted[:3] - here[:3]) < NEAR_TCP[0]
-        return bool(near and (turn < NEAR_TCP[1] or not self._turns))
-
-
-class _Lag:
-    """How far the joints of a group have to be pulled to go some way in a control step.
+class MotionDrive:
+    """Moves a joint group along a motion.
 
     A drive pulls by stiffness · way − damping · speed: without inertia it goes a certain share of
     the way. What inertia costs besides grows with the change of speed; how fast, is learnt on the
     way from what earlier steps missed.
     """
 
-    def __init__(self, driven: DrivenGroup, task: MultiRobotTask, seconds: float) -> None:
-        self._joints, self._simulation = driven.joints, task.simulation
-        self._by_speed = driven.group.asks.velocities and not driven.group.asks.positions
+    def __init__(self, driven: DrivenGroup, task: MultiRobotTask, *, moves: bool) -> None:
+        """Take the group.
+
+        Args:
+            driven: The group.
+            task: Of which it is.
+            moves: Whether the motion moves it.
+        """
+        self.numbers, self._joints, self._moves = driven.numbers, driven.joints, moves
+        self._drive, self._simulation = drive_of(driven, task), task.simulation
+        self._seconds = 1 / task.scenario.control_frequency
+        self._by_speed = isinstance(self._drive, VelocityDrive)
         rates = [k / d if d else np.inf for k, d, _ in driven.group.drives]
-        shares = 1 - np.exp(-np.array(rates) * seconds)
-        self.pulls = np.ones_like(shares) if self._by_speed else 1 / shares
+        shares = 1 - np.exp(-np.array(rates) * self._seconds)
+        self._pulls = np.ones_like(shares) if self._by_speed else 1 / shares
+        self._bounds = np.full((2, len(driven.group.joints)), [[-np.inf], [np.inf]])
+        if driven.group.asks.positions and not driven.group.delta and driven.group.limits:
+            self._bounds = np.array(driven.group.limits).T
         self._sums = np.zeros((2, len(shares)))
         self._before: tuple[Floats, Floats] | None = None
         self._pull = np.zeros_like(shares)
 
-    def pulled(self, way: Floats, change: Floats) -> Floats:
-        """Return how far, (n,) (rad, m).
+    def toward(self, aim: Aim, state: State) -> tuple[Floats, bool]:
+        """Return the action numbers of a step, and whether they are within bounds."""
+        numbers, within = self._drive.toward(self._target(aim, state), state)
+        return numbers, within or not self._moves
 
-        Args:
-            way: How far the joints shall go, (n,) (rad, m).
-            change: Of their speeds meanwhile, (n,) (rad/s, m/s).
-        """
-        cost = np.maximum(self._sums[0] / (self._sums[1] + _SLIGHT**2), 0.0)
-        self._pull = (way + cost * change) * self.pulls
-        return self._pull
+    def arrived(self, end: Floats, state: State) -> bool:
+        """Return whether the group is where some joints, (dof,), have it."""
+        wanted, here = self._drive.target(end, state), self._drive.at(state)
+        if not isinstance(self._drive, TcpDrive):
+            return bool(np.abs(wanted - here).max() < NEAR)
+        turn = 2 * np.arccos(min(1.0, abs(multiply(wanted[3:], inverse(here[3:]))[0])))
+        near = np.linalg.norm(wanted[:3] - here[:3]) < NEAR_TCP[0]
+        return bool(near and (turn < NEAR_TCP[1] or not self._drive.driven.group.asks.turn))
 
     def learn(self, state: State) -> None:
-        """See what came of the step that ended with a state."""
+        """Compare the step that ended with a state with what it was meant to do."""
         where = state.joint_positions[0, self._joints].astype(float)
         speed = state.joint_velocities[0, self._joints].astype(float)
         if self._before is not None:
@@ -187,7 +87,61 @@ class _Lag:
             pull = self._pull
             if not self._by_speed:
                 pull = self._simulation.drive_targets[0, self._joints] - began
-            missed = pull / self.pulls - (where - began)
+            missed = pull / self._pulls - (where - began)
             change = speed - earlier
             self._sums = _MEMORY * self._sums + [missed * change, change**2]
         self._before = where, speed
+
+    def _target(self, aim: Aim, state: State) -> Floats:
+        """Return what the drive is driven to so that the group goes as far as it should."""
+        here, way, change = (each[self._joints] for each in aim)
+        cost = np.maximum(self._sums[0] / (self._sums[1] + _SLIGHT**2), 0.0)
+        where = self._drive.at(state)
+        if isinstance(self._drive, TcpDrive):
+            self._pull = (way + cost * change) * self._pulls
+            ahead = aim.here.copy()
+            ahead[self._joints] += self._pull
+            share = _CORRECTION * float(self._pulls.mean()) - 1
+            wanted, now = (self._drive.target(joints, state) for joints in (ahead, aim.here))
+            return self._drive.shifted(wanted, now, where, share)
+        self._pull = (way + _CORRECTION * (here - where) + cost * change) * self._pulls
+        if self._by_speed:
+            return self._pull / self._seconds
+        return np.clip(where + self._pull, *self._bounds)
+
+
+def drive_within_bounds(
+    drives: Sequence[MotionDrive],
+    aim: Callable[[float], Aim],
+    state: State,
+    action: NDArray[np.float32],
+    halvings: int,
+) -> float:
+    """Write into an action, (A,), what drives go in a step as far as all are within bounds.
+
+    Args:
+        drives: What is driven.
+        aim: What all joints do in a share of the step, 0 … 1.
+        state: The world before the step.
+        action: Where their numbers are written.
+        halvings: How often the interval in which the share lies is halved.
+
+    Returns:
+        The share: 1 if all of the step is within bounds, 0 if none of it is.
+    """
+
+    def within(share: float) -> bool:
+        wanted, every = aim(share), True
+        for drive in drives:
+            action[drive.numbers], fits = drive.toward(wanted, state)
+            every = every and fits
+        return every
+
+    if within(1.0):
+        return 1.0
+    enough, too_much = 0.0, 1.0
+    for _ in range(halvings):
+        middle = (enough + too_much) / 2
+        enough, too_much = (middle, too_much) if within(middle) else (enough, middle)
+    within(enough)
+    return enough

@@ -9,13 +9,12 @@ import numpy as np
 
 from experts.driver import ArmDriver
 from experts.geometry import heading
-from experts.script import OPEN, Pose, Scene, Waypoint
+from experts.script import OPEN, Scene, Waypoint
 from experts.tips import pose_solver
 from experts.ways import NoWayError, Ways
 from kinematics.rotations import Floats, inverse, rotate
 from kinematics.solve import by_way
-from layouts import Layout
-from simulation.checks.overlaps import RobotsAlone
+from simulation.overlaps import RobotsAlone
 from tasks import MultiRobotTask
 
 PATIENCE = 40  # control steps without progress after which an arm counts as blocked
@@ -56,7 +55,9 @@ class Player:
         self._driver = ArmDriver(task.layout.arm(robot).robot)
         if any(waypoint.to is not None for waypoint in waypoints):
             self._kinematics = pose_solver(task, robot)
-            self._posture = _Posture(alone, task.layout, robot)
+            self._alone, self._owner = alone, task.layout.owner(robot)
+            joints = task.layout[self._owner].robot.joints
+            self._own = [joints.index(joint) for joint in task.layout.arm(robot).robot.arm_joints]
         if any(waypoint.at is not None for waypoint in waypoints):
             self._reach = task.simulation.backend.point_reach(robot)
             self._base = scene.base(robot)
@@ -84,7 +85,7 @@ class Player:
 
     def ahead(self, scene: Scene) -> Floats:
         """Return what lies before the arm, (n, arm joints) (rad), beginning where it is."""
-        return np.stack([self._driver.arm(scene.qpos(self._robot)), self._goal, *self._later])
+        return np.stack([self._arm(scene), self._goal, *self._later])
 
     @property
     def place(self) -> str:
@@ -98,13 +99,19 @@ class Player:
             StuckError: If the next waypoint cannot be reached, or the present one takes too long.
         """
         self._go_on(scene)
-        if self._current is not None and self._is_done(self._current, scene):
-            done.add(self.place)
-        self._check_time(done)
+        if self._current is not None:
+            if self._is_done(self._current, scene):
+                done.add(self.place)
+            most = self._current.most
+            if most is not None and self._elapsed >= most and self.place not in done:
+                raise StuckError(f"{self.place} took more than {most} steps")
         if self._may_begin(done):
             self._begin(self._waypoints[self._begun], scene)
         self._elapsed += 1
         return self._driver.action(self._goal, self._gripper, scene.qpos(self._robot))
+
+    def _arm(self, scene: Scene) -> Floats:
+        return self._driver.arm(scene.qpos(self._robot))
 
     def _check_progress(self, away: float) -> None:
         """Give up if the arm is kept from its goal: for `PATIENCE` steps it came no nearer."""
@@ -114,16 +121,11 @@ class Player:
         if self._waited > PATIENCE:
             raise BlockedError(f"{self.place} is blocked {away:.2f} rad before its end")
 
-    def _check_time(self, done: set[str]) -> None:
-        most = self._current and self._current.most
-        if most is not None and self._elapsed >= most and self.place not in done:
-            raise StuckError(f"{self.place} took more than {most} steps")
-
     def _is_done(self, waypoint: Waypoint, scene: Scene) -> bool:
         if self._elapsed < waypoint.steps:
             return False
         if (waypoint.to, waypoint.turn, waypoint.at) != (None, None, None):
-            away = np.abs(self._driver.arm(scene.qpos(self._robot)) - self._goal).max()
+            away = np.abs(self._arm(scene) - self._goal).max()
             if self._later or away > waypoint.near:
                 self._check_progress(float(away))
                 return False
@@ -140,7 +142,7 @@ class Player:
         """Go to the next place of a way round once the arm is near the one before."""
         if not self._later:
             return
-        away = np.abs(self._driver.arm(scene.qpos(self._robot)) - self._goal).max()
+        away = np.abs(self._arm(scene) - self._goal).max()
         if away < VIA:
             self._goal = self._later.pop(0)
             self._nearest_yet, self._waited = np.inf, 0
@@ -166,9 +168,10 @@ class Player:
         Raises:
             StuckError: If there are none.
         """
-        arm = self._driver.arm(scene.qpos(self._robot))
+        arm = self._arm(scene)
         if waypoint.to is not None:
-            goals = self._postures(waypoint.to(scene), scene)
+            qpos, solutions = scene.qpos(self._robot), self._kinematics.solutions
+            goals = [goal for pose in waypoint.to(scene) for goal in solutions(*pose, qpos)]
         elif waypoint.turn is not None:
             goals = [arm + waypoint.turn(arm)]
         elif waypoint.at is not None:
@@ -200,12 +203,11 @@ class Player:
         return list(way)
 
     def _is_free(self, goal: Floats, scene: Scene) -> bool:
-        return self._posture.is_free(goal, scene)
-
-    def _postures(self, poses: Sequence[Pose], scene: Scene) -> list[Floats]:
-        """Return arm joints that bring the TCP to one of the poses."""
-        qpos = scene.qpos(self._robot)
-        return [goal for pose in poses for goal in self._kinematics.solutions(*pose, qpos)]
+        """Return whether the robot is not inside itself with the arm at a goal."""
+        qpos = scene.qpos(self._owner)
+        qpos[self._own] = goal
+        overlaps = self._alone.overlaps({self._owner: qpos})
+        return not any(o.one.robot == o.other.robot == self._owner for o in overlaps)
 
     def _reaching(self, place: Floats, scene: Scene) -> list[Floats]:
         """Return arm joints that bring the TCP to a place.
@@ -220,19 +222,3 @@ class Player:
         starts = [arm + about * side * (np.arange(len(arm)) == 0) for side in (0, 1, -1)]
         goals = [self._reach.solve(point, place, start) for start in starts]
         return [goal for goal in goals if goal is not None]
-
-
-class _Posture:
-    """Tells whether a robot is inside itself with one of its arms somewhere."""
-
-    def __init__(self, alone: RobotsAlone, layout: Layout, arm: str) -> None:
-        self._alone, self._owner = alone, layout.owner(arm)
-        joints = layout[self._owner].robot.joints
-        self._places = [joints.index(joint) for joint in layout.arm(arm).robot.arm_joints]
-
-    def is_free(self, arm: Floats, scene: Scene) -> bool:
-        """Return whether that is so at some arm joints (rad), other joints being as they are."""
-        qpos = scene.qpos(self._owner)
-        qpos[self._places] = arm
-        overlaps = self._alone.overlaps({self._owner: qpos})
-        return not any(o.one.robot == o.other.robot == self._owner for o in overlaps)

@@ -1,11 +1,11 @@
-"""Plays scripts in a private copy of a task until one succeeds."""
+"""Plays scripts, or closed loops in their place, in a private copy of a task."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary, ref
 
 import numpy as np
@@ -18,17 +18,18 @@ from experts.ways import Ways, without_planner
 from robots import TaskError, UnknownNameError
 from simulation.checks.overlaps import RobotsAlone
 from tasks import MultiRobotTask
+from tasks.engine.actions import ActionReader
 from tasks.episode import REBUILT, EpisodeTape, PlayedEpisode, take_step
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """What came of playing a script.
+    """The result of playing a script.
 
     Attributes:
         actions: Shape (T, A).
         success: Whether the task's own success was reached, at the last action.
-        reason: Why not, in words.
+        reason: Why not.
         obstructed: Whether it failed because something was in an arm's way.
         episode: What happened, if it was kept; see `Rehearsal.episode`.
     """
@@ -55,7 +56,7 @@ class Plan(NDArray[np.float32] if TYPE_CHECKING else np.ndarray):
 
     @classmethod
     def of(cls, attempt: Attempt, task: MultiRobotTask) -> Plan:
-        """Return what came of an attempt at a task."""
+        """Return the plan that an attempt at a task made."""
         plan = attempt.actions.view(cls)
         plan.reason, plan.episode, plan.task = attempt.reason, attempt.episode, ref(task)
         return plan
@@ -119,7 +120,7 @@ class Rehearsal:
     def episode(self, actions: NDArray[np.float32]) -> PlayedEpisode | None:
         """Return what happened since `begin`, if it followed from these actions, (T, A), alone.
 
-        That is, if `step` took all of them and no others, and nobody set the task's state; else
+        That is, if `step` took all of them and no others, and the task's state was not set; else
         return None.
         """
         if self._tape is None or not len(actions) or not self._tape.unbroken:
@@ -238,7 +239,7 @@ def search(
 ) -> Plan:
     """Make attempts until one succeeds and return its actions.
 
-    If none does, the actions of the longest attempt are returned: they fail as honestly.
+    If none does, the actions of the longest attempt are returned: it got furthest.
 
     Args:
         task: Says layout and physics; left alone.
@@ -261,6 +262,41 @@ def search(
     if not len(best.actions):
         raise TaskError(f"no plan: {best.reason}")
     return Plan.of(best, task)
+
+
+def rehearse(task: MultiRobotTask, seed: int, act: Callable[[Scene], Any]) -> Plan:
+    """Let a function act in a private copy of a task until it succeeds or the episode ends.
+
+    It also ends, and has failed, when two arms touch: robots, or limbs of one robot.
+
+    Args:
+        task: Says layout and physics; left alone.
+        seed: The episode.
+        act: Called before every step with what there is to see; returns the action, (A,), or a
+            mapping robot name → (a,) with every robot.
+
+    Returns:
+        What it did, (T, A), and the reason if that fails.
+
+    Raises:
+        ActionError: If an action has the wrong shape or numbers that are not finite.
+    """
+    with rehearsing(task) as rehearsal:
+        return Plan.of(_closed_loop(rehearsal, seed, act), task)
+
+
+def _closed_loop(rehearsal: Rehearsal, seed: int, act: Callable[[Scene], Any]) -> Attempt:
+    copy, scene = rehearsal.task, rehearsal.begin(seed)
+    reader, actions = ActionReader(copy.layout, 1), list[NDArray[np.float32]]()
+    success, touching = False, ""
+    while not (success or touching) and len(actions) < copy.max_episode_steps:
+        actions.append(reader.read(act(scene))[0].copy())
+        success, touching = rehearsal.step(actions[-1])
+        scene = rehearsal.scene()
+    success = success and not touching
+    reason = "" if success else touching or f"no success within {len(actions)} steps"
+    done = np.stack(actions)
+    return Attempt(done, success, reason, episode=rehearsal.episode(done))
 
 
 def _stack(actions: list[NDArray[np.float32]], task: MultiRobotTask) -> NDArray[np.float32]:

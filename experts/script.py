@@ -1,4 +1,4 @@
-"""Scripts as data: waypoints for each robot, and what a script may look at."""
+"""Scripts as data: waypoints for each robot, and what a script sees of a world."""
 
 from __future__ import annotations
 

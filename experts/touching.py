@@ -1,4 +1,4 @@
-"""Which arms touch each other in a task, whether physics tells of it or not."""
+"""Which arms touch each other in a task, whether physics reports it or not."""
 
 from __future__ import annotations
 

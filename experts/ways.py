@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,12 +23,12 @@ from tasks import MultiRobotTask
 
 CLEARANCE = 0.02  # m
 RESOLUTION: Resolution = (0.02, 0.1)  # m and rad
-SHARES = np.linspace(0.0, 1.0, 5)  # of their ways, where arms that move too are looked at
+SHARES = np.linspace(0.0, 1.0, 5)  # of their ways, at which arms that move too are checked
 STANDING = 0.02  # rad: an arm that has less to go stands
 SHORT = 0.4  # rad: a way that long at most, from or to a body, is only made straight
-CANDIDATES = 8  # postures at the goal that are looked at
+CANDIDATES = 8  # postures at the goal that are checked
 SOUGHT = 2  # postures at the goal to which a way round is sought
-CHECKS = 600  # lines and postures that a search may look at
+CHECKS = 600  # lines and postures that a search may check
 
 
 def without_planner() -> str:
@@ -58,7 +58,7 @@ class Ways:
         ]
 
     def known(self, arm: str) -> str | None:
-        """Return the full name of an arm; None if it is none."""
+        """Return the full name of an arm; None if there is no such arm."""
         name = self._layout.arm_name(arm)
         return name if name in self._columns else None
 
@@ -78,17 +78,20 @@ class Ways:
 
         Raises:
             MissingPackageError: If a way round is needed and the extra ``motion`` not installed.
-            NoWayError: If there is none now.
+            NoWayError: If there is no free way now.
         """
         query = self._query(self._layout.arm_name(arm), scene, ahead)
-        places = [place for goal in goals[:CANDIDATES] if (place := query.at(goal)) is not None]
+        places: list[_Place] = []
+        for goal in goals[:CANDIDATES]:
+            if (place := query.place(goal)) is None:
+                continue
+            if place.space.edge_free(query.start, goal, RESOLUTION):
+                return goal[None]
+            places.append(place)
         if not places:
             raise NoWayError(f"{query.trouble} at its end")
-        for place in places:
-            if place.is_straight_free:
-                return place.goal[None]
         for place in places[:SOUGHT]:
-            points = place.way_round()
+            points = query.way_round(place)
             if points is not None:
                 return points
         raise NoWayError("all ways there are blocked")
@@ -130,6 +133,18 @@ class Ways:
         return np.array([first + own.index(joint) for joint in joints], np.intp)
 
 
+class _Place(NamedTuple):
+    """A posture at the goal, (arm joints,) (rad), and the space in which ways there lie."""
+
+    goal: Floats
+    space: Space
+    only_straight: bool
+
+
+_Nearer = dict[frozenset[str], float]
+"""How near two bodies may be, by their names, where that is nearer than usual (m)."""
+
+
 class _Query:
     """Where one arm may go: what it has to keep clear of, and what its hand is at already."""
 
@@ -141,7 +156,7 @@ class _Query:
         everywhere: Floats,
         movable: set[str],
     ) -> None:
-        """Look at where the arm is.
+        """Note what the arm is near now.
 
         Args:
             cell: All robots and bodies.
@@ -150,37 +165,63 @@ class _Query:
             everywhere: All coordinates now, and as the other arms go on, (k, D) (rad, m).
             movable: Obstacles that physics moves.
         """
-        self.cell, self.columns, self._movable = cell, columns, movable
-        self.robot = cell.layout.owner(arm)
+        self._cell, self._columns, self._movable = cell, columns, movable
+        self._robot = cell.layout.owner(arm)
         hand = cell.hand(arm)
         held = {held.obstacle.name for held in cell.held if held.place == arm}
-        links = {s.name for s in cell.solids if s.mover == self.robot and s.part in hand}
+        links = {s.name for s in cell.solids if s.mover == self._robot and s.part in hand}
         self._hand = held | links
-        self._whole = cell.checker((self.robot,), CLEARANCE)
+        self._whole = cell.checker((self._robot,), CLEARANCE)
         self.start = everywhere[0, columns]
-        self._allowed = _Allowed(cell, self._whole)
-        self.at_body = self._look(self._allowed, everywhere[0], leaving=True)
-        later = [state for state in everywhere[1:] if self._forbidden(self._allowed, state) is None]
-        self.everywhere = np.stack([everywhere[0], *later])
+        self._nearer: _Nearer = {}
+        self._at_body = self._allow(self._nearer, everywhere[0], leaving=True)
+        later = [state for state in everywhere[1:] if self._forbidden(self._nearer, state) is None]
+        self._everywhere = np.stack([everywhere[0], *later])
         self.trouble = ""
 
-    def at(self, goal: Floats) -> _Place | None:
-        """Return what is to know about a posture at the goal; None if something is in the way."""
-        allowed = self._allowed.copy()
-        states = self.everywhere.copy()
-        states[:, self.columns] = goal
-        at_body = self._look(allowed, states[0], leaving=False)
-        self._look(allowed, states[-1], leaving=False)
-        found = (self._forbidden(allowed, state) for state in states)
+    def place(self, goal: Floats) -> _Place | None:
+        """Return a posture at the goal; None if something is in the way there, see `trouble`."""
+        nearer, states = dict(self._nearer), self._everywhere.copy()
+        states[:, self._columns] = goal
+        at_body = self._allow(nearer, states[0], leaving=False)
+        self._allow(nearer, states[-1], leaving=False)
+        found = (self._forbidden(nearer, state) for state in states)
         contact = next((contact for contact in found if contact is not None), None)
-        self.trouble = str(contact or "")
-        return _Place(self, goal, allowed, self.at_body or at_body) if contact is None else None
+        if contact is not None:
+            self.trouble = str(contact)
+            return None
+        short = bool(np.abs(goal - self.start).max() < SHORT)
+        only_straight = (self._at_body or at_body) and short
+        return _Place(goal, self._space(nearer, goal), only_straight)
 
-    def _forbidden(self, allowed: _Allowed, state: Floats) -> Contact | None:
+    def way_round(self, place: _Place) -> Floats | None:
+        """Return the points of a way that is not straight, without its start; None if none."""
+        if place.only_straight:
+            return None
+        try:
+            points = connect(place.space, self.start, [place.goal], 0, RESOLUTION, restarts=1)
+            if points is None:
+                return None
+            return shortened(place.space, points, 0, RESOLUTION)[1:]
+        except NoPlanError:
+            return None
+
+    def _space(self, nearer: _Nearer, goal: Floats) -> Space:
+        cell, columns, everywhere = self._cell, self._columns, self._everywhere
+        ends = np.stack([self.start, goal])
+        checker = _AmongMoving(cell, *self._counted(nearer), columns, everywhere)
+        bounds = _bounds(cell.limits[columns], ends)
+        ones = np.ones(len(goal))
+        return Space(cell, (self._robot,), columns, everywhere[0], bounds, ones, checker, _Budget())
+
+    def _forbidden(self, nearer: _Nearer, state: Floats) -> Contact | None:
         """Return a contact in a state that is not allowed, or None."""
-        return next((c for c in self._whole.contacts(state) if allowed.forbids(c)), None)
+        for contact in self._whole.contacts(state):
+            if contact.distance < nearer.get(frozenset(contact.names), np.inf):
+                return contact
+        return None
 
-    def _look(self, allowed: _Allowed, state: Floats, *, leaving: bool) -> bool:
+    def _allow(self, nearer: _Nearer, state: Floats, *, leaving: bool) -> bool:
         """Allow what may be nearer than usual in a state; return whether the hand is at a body.
 
         What is nearer than the clearance already may be so on the way. What physics moves may be
@@ -189,97 +230,27 @@ class _Query:
         """
         at_body = False
         for contact in self._whole.contacts(state):
+            names = frozenset(contact.names)
             bodies = [name for name in contact.names if name not in self._hand]
             of_hand = len(bodies) == 1 and bodies[0] in contact.owners
             at_body |= of_hand
             touches = of_hand and bodies[0] in self._movable
             if touches or (contact.distance <= 0 and (of_hand or leaving)):
-                allowed.touch(contact)
+                nearer[names] = -np.inf
             elif contact.distance > 0:
-                allowed.near(contact)
+                nearer.setdefault(names, 0.0)
         return at_body
 
-
-class _Allowed:
-    """What may be nearer than usual, by the names of two bodies."""
-
-    def __init__(
-        self, cell: Cell, whole: Checker, nearer: Mapping[frozenset[str], float] | None = None
-    ) -> None:
-        """Begin with what a checker asks, or with what is allowed already."""
-        self._cell, self._whole = cell, whole
-        self._nearer = dict(nearer or {})
-
-    def copy(self) -> _Allowed:
-        """Return a copy, to allow more."""
-        return _Allowed(self._cell, self._whole, self._nearer)
-
-    def touch(self, contact: Contact) -> None:
-        """Let two bodies overlap."""
-        self._nearer[frozenset(contact.names)] = -np.inf
-
-    def near(self, contact: Contact) -> None:
-        """Let two bodies be as near as they like, as long as they do not overlap."""
-        self._nearer.setdefault(frozenset(contact.names), 0.0)
-
-    def forbids(self, contact: Contact) -> bool:
-        """Whether two bodies that the checker calls too near may not be so."""
-        return contact.distance < self._nearer.get(frozenset(contact.names), np.inf)
-
-    def counted(self) -> tuple[NDArray[np.intp], Floats]:
+    def _counted(self, nearer: _Nearer) -> tuple[NDArray[np.intp], Floats]:
         """Return the pairs that count, and how far each has to be apart, (m, 2) and (m,) (m)."""
         names = np.array([solid.name for solid in self._cell.solids])[self._whole.pairs]
         apart = self._whole.apart.copy()
-        for bodies, distance in self._nearer.items():
+        for bodies, distance in nearer.items():
             one, other = bodies if len(bodies) > 1 else (*bodies, *bodies)
             theirs = ((names == one) & (names[:, ::-1] == other)).any(axis=1)
             apart[theirs] = np.minimum(apart[theirs], distance)
         counts = apart > -np.inf
         return self._whole.pairs[counts], apart[counts]
-
-
-class _Place:
-    """A posture at the goal, and the ways there."""
-
-    def __init__(self, query: _Query, goal: Floats, allowed: _Allowed, at_body: bool) -> None:
-        self.goal, self._start = goal, query.start
-        self._query, self._allowed = query, allowed
-        self._only_straight = at_body and bool(np.abs(goal - self._start).max() < SHORT)
-
-    @cached_property
-    def _space(self) -> Space:
-        query = self._query
-        ends = np.stack([self._start, self.goal])
-        checker = _AmongMoving(
-            query.cell, *self._allowed.counted(), query.columns, query.everywhere
-        )
-        return Space(
-            query.cell,
-            (query.robot,),
-            query.columns,
-            query.everywhere[0],
-            _bounds(query.cell.limits[query.columns], ends),
-            np.ones(len(self.goal)),
-            checker,
-            _Budget(),
-        )
-
-    @property
-    def is_straight_free(self) -> bool:
-        """Whether the straight way touches nothing."""
-        return self._space.edge_free(self._start, self.goal, RESOLUTION)
-
-    def way_round(self) -> Floats | None:
-        """Return the points of another way, without its start; None if none was found."""
-        if self._only_straight:
-            return None
-        try:
-            points = connect(self._space, self._start, [self.goal], 0, RESOLUTION, restarts=1)
-            if points is None:
-                return None
-            return shortened(self._space, points, 0, RESOLUTION)[1:]
-        except NoPlanError:
-            return None
 
 
 class _AmongMoving(Checker):

@@ -35,7 +35,7 @@ from rollouts.reading.recorded_task import task_for
 from rollouts.reading.trajectory import TrajectoryFile
 from rollouts.recording.recorder import Recorder
 from simulation.rendering.pictures import Observers
-from tasks.episode import follow, moments, play
+from tasks.episode import moments, open_loop, play
 
 FORMS: Mapping[str, Mapping[str, Any]] = {
     "lerobot, videos": {"format": FORMATS[0]},
@@ -110,7 +110,9 @@ def drawing_alone(recording: Path, names: Sequence[str]) -> tuple[int, Cost]:
         reader, shots = ColumnReader(task), choose_shots(task, names)
         for trajectory in file:
             columns = reader.read(trajectory)
-            happening = moments(task, columns.seed or 0, follow(columns.actions), len(columns) - 1)
+            happening = moments(
+                task, columns.seed or 0, open_loop(columns.actions), len(columns) - 1
+            )
             next(happening)
             observers = Observers(task.simulation, shots.cameras, shots.textures)
             passed, processor = 0.0, 0.0

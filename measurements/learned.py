@@ -16,7 +16,7 @@ from measurements.robots.record import versions_of
 from robots import RecordingError
 from robots.common.commands import exit_code
 from robots.common.writing import write_whole
-from rollouts.suite.statistics import wilson
+from rollouts.suite.results import wilson
 
 PACKAGES = ("numpy", "torch", "sapien")  # whose versions are kept
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")

@@ -18,7 +18,7 @@ from rollouts.playing.evaluation_job import EvaluationJob, scores_of
 from rollouts.playing.executor import EPISODE_SECONDS, Event, Executor, choose_executor
 from rollouts.playing.seeds import checked_seeds, seed_lines
 from rollouts.playing.together import grouped
-from rollouts.receipts.evaluated import describe_job, receipt_of
+from rollouts.receipts.provenance import describe_job, receipt_of
 from rollouts.receipts.receipt import Receipt
 from rollouts.sources.policies import EXPERT
 from tasks import get_task_class

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
+from itertools import count
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -15,7 +16,6 @@ from numpy.typing import NDArray
 
 from robots import MissingPackageError, RecordingError
 from robots.common.writing import PARTIAL, written_whole
-from robots.descriptor import Vector3
 from simulation.rendering.pictures import Cameras, vulkan_problem
 from tasks import MultiRobotTask
 from tasks.engine.columns import overview
@@ -62,15 +62,42 @@ def film(
         MissingPackageError: If imageio is not installed.
         RecordingError: If the file cannot be written.
     """
-    eye, target = overview(task.layout) or task.viewpoint
     start, shown = perf_counter(), 0
     with open_video(path, task.scenario.control_frequency) as append:
         for episode in episodes:
             if shown and (perf_counter() - start) * (shown + 1) / shown > seconds:
                 break
-            _film_one(task, episode, (eye, target), append, progress)
+            last = len(episode.actions)
+
+            def take(step: int, picture: Picture, last: int = last) -> None:
+                for _ in range(1 + STILL_FRAMES * (step == last)):
+                    append(picture)
+                progress(step + 1, last + 1)
+
+            play_pictured(task, episode, take)
             shown += 1
     return shown
+
+
+def play_pictured(
+    task: MultiRobotTask, episode: Episode, take: Callable[[int, Picture], None], stride: int = 1
+) -> None:
+    """Play an episode, and take a picture after the reset and after every few steps.
+
+    Args:
+        task: Made with ``render_mode="rgb_array"``, with one environment.
+        episode: What is played.
+        take: Called with the number of the step, 0 being the reset, and the picture, (H, W, 3).
+        stride: Steps from one picture to the next.
+    """
+    eye, target = overview(task.layout) or task.viewpoint
+    steps = count()
+
+    def watch() -> None:
+        if (step := next(steps)) % stride == 0:
+            take(step, Cameras(task.simulation, eye, target).take()[0])
+
+    play(task, episode.seed, episode.actions, watch)
 
 
 @contextmanager
@@ -94,27 +121,6 @@ def open_video(path: Path, frames_per_second: float) -> Generator[Callable[[Pict
         _writer(partial, frames_per_second) as writer,
     ):
         yield writer.append_data
-
-
-def _film_one(
-    task: MultiRobotTask,
-    episode: Episode,
-    view: tuple[Vector3, Vector3],
-    append: Callable[[Picture], None],
-    progress: Callable[[int, int], None],
-) -> None:
-    frames = 0
-
-    def watch() -> None:
-        nonlocal frames
-        frames += 1
-        picture = Cameras(task.simulation, *view).take()[0]
-        last = frames == len(episode.actions) + 1
-        for _ in range(1 + STILL_FRAMES * last):
-            append(picture)
-        progress(frames, len(episode.actions) + 1)
-
-    play(task, episode.seed, episode.actions, watch)
 
 
 def _writer(path: Path, frames_per_second: float) -> Any:

@@ -1,4 +1,4 @@
-"""Which action numbers drive a joint group somewhere, whatever its control mode."""
+"""Drives of joint groups: the action numbers that bring one to a target, by kind of action."""
 
 from __future__ import annotations
 
@@ -49,139 +49,157 @@ def driven_groups(layout: Layout) -> Iterator[DrivenGroup]:
             number, joint = numbers.stop, joints.stop
 
 
-class JointNumbers:
-    """The numbers of a group that is driven by positions of its joints, or by their velocities."""
+class PositionDrive:
+    """A group whose numbers are positions of its joints, with or without velocities.
+
+    Its targets are positions of these joints (rad, m), (n,).
+    """
 
     def __init__(self, driven: DrivenGroup, task: MultiRobotTask) -> None:
         """Take the group of a task with one environment."""
-        self._driven, self._task = driven, task
-        asks = driven.group.asks
-        self.by_speed = asks.velocities and not asks.positions
+        self.driven, self._task = driven, task
 
-    def towards(self, wanted: Floats, state: State) -> tuple[Floats, bool]:
-        """Return the numbers, and whether none had to be cut to be within bounds.
+    def toward(self, target: Floats, state: State) -> tuple[Floats, bool]:
+        """Return the action numbers that drive to a target, and whether none had to be clipped.
 
         Args:
-            wanted: Positions that the joints are to be pulled to (rad, m), (n,); if the group is
-                driven by velocities, these (rad/s, m/s).
+            target: Where to.
             state: The world before the step.
         """
-        group = self._driven.group
-        if self.by_speed:
-            return normalised(group, wanted)
-        if group.delta:
-            kept = group.target and remembered(self._task, self._driven, "target_qpos")
-            wanted = wanted - (kept if group.target else self.where(state))
+        group = self.driven.group
+        if group.target:
+            target = target - _remembered(self._task, self.driven, "target_qpos")
+        elif group.delta:
+            target = target - self.at(state)
         if group.mimic:
             multiplier, offset = group.followers[0]
-            wanted = (wanted[:1] - (0.0 if group.delta else offset)) / multiplier
+            target = (target[:1] - (0.0 if group.delta else offset)) / multiplier
         if group.asks.velocities:  # a drive to positions brakes by itself
-            wanted = np.concatenate([wanted, np.zeros(len(group.joints))])
-        return normalised(group, wanted)
+            target = np.concatenate([target, np.zeros(len(group.joints))])
+        return _normalised(group, target)
 
-    def where(self, state: State) -> Floats:
-        """Return the joints' positions, (n,) (rad, m)."""
-        return state.joint_positions[0, self._driven.joints].astype(float)
+    def at(self, state: State) -> Floats:
+        """Return the target that the group has reached now."""
+        return self.target(state.joint_positions[0].astype(float), state)
+
+    def target(self, joints: Floats, state: State) -> Floats:
+        """Return the target that is reached at some joints.
+
+        Args:
+            joints: Positions of all robots' joints, (dof,) (rad, m).
+            state: The world.
+        """
+        return joints[self.driven.joints]
+
+    @staticmethod
+    def shifted(target: Floats, wanted: Floats, reached: Floats, share: float) -> Floats:
+        """Return targets further by a share of the way from what was reached to what was wanted."""
+        return target + share * (wanted - reached)
 
 
-class TcpNumbers:
-    """The numbers of a group that is driven by where its TCP is to be, in the world."""
+class VelocityDrive(PositionDrive):
+    """A group whose numbers are velocities of its joints, which `toward` takes (rad/s, m/s)."""
+
+    def toward(self, target: Floats, state: State) -> tuple[Floats, bool]:
+        """See `PositionDrive`."""
+        return _normalised(self.driven.group, target)
+
+
+class TcpDrive:
+    """A group whose numbers are positions or poses of its TCP.
+
+    Its targets are poses of the TCP in the world: position (m), then quaternion (wxyz), (7,).
+    """
 
     def __init__(self, driven: DrivenGroup, task: MultiRobotTask) -> None:
         """Take the group of a task with one environment."""
         assert driven.arm is not None
-        self._driven, self._task, self._arm = driven, task, driven.arm
-        self._robot = task.layout.arm(driven.arm).robot
-        self._forward = task.simulation.backend.point_reach(driven.arm).forward
+        self.driven, self._task = driven, task
+        self._arm, self._robot = driven.arm, task.layout.arm(driven.arm).robot
+        self._forward = task.simulation.point_reach(driven.arm).forward
 
-    def towards(self, pose: Floats, state: State) -> tuple[Floats, bool]:
-        """Return the numbers, and whether none had to be cut to be within bounds.
-
-        Args:
-            pose: Where the TCP is to be: position (m, world), then quaternion (wxyz), (7,).
-            state: The world before the step.
-        """
-        group, root = self._driven.group, self._root(state)
-        place, turn = _seen_from(root, pose)
+    def toward(self, target: Floats, state: State) -> tuple[Floats, bool]:
+        """See `PositionDrive`."""
+        group = self.driven.group
+        root = self._root(state)
+        place, turn = _seen_from(root, target)
         if not group.delta:
-            return normalised(group, np.concatenate([place, _angles(turn)]))
+            return _normalised(group, np.concatenate([place, _angles(turn)]))
         if group.target:
-            before = remembered(self._task, self._driven, "target_pose")
-            before, ways = before[:3], before[3:]
+            before = _remembered(self._task, self.driven, "target_pose")
+            origin, turned = before[:3], before[3:]
         else:
-            before, ways = _seen_from(root, self.where(state))
+            origin, turned = _seen_from(root, self.at(state))
+        back = inverse(turned)
         moves, turns = group.frame.split(":")
-        way = place - before
-        way = way if moves.startswith("root") else rotate(inverse(ways), way)
+        way = place - origin if moves.startswith("root") else rotate(back, place - origin)
         if not group.asks.turn:
-            return normalised(group, way)
-        back = inverse(ways)
+            return _normalised(group, way)
         rest = multiply(turn, back) if turns.startswith("root") else multiply(back, turn)
-        return normalised(group, np.concatenate([way, _angles(rest)]))
+        return _normalised(group, np.concatenate([way, _angles(rest)]))
 
-    def where(self, state: State) -> Floats:
-        """Return the TCP's pose: position (m, world), then quaternion (wxyz), (7,)."""
+    def at(self, state: State) -> Floats:
+        """See `PositionDrive`."""
         return state.tcp_pose(self._arm)[0].astype(float)
 
-    def pose(self, joints: Floats, state: State) -> Floats:
-        """Return the TCP's pose at some joints, (7,).
-
-        Args:
-            joints: Positions of all robots' joints, (dof,) (rad, m).
-            state: The world; where the TCP is none of the robot's links, it lies beside that link
-                as it does there.
-        """
+    def target(self, joints: Floats, state: State) -> Floats:
+        """See `PositionDrive`; a TCP that is no link lies beside its link as it does now."""
         robot = self._robot
         places = self._task.simulation.index.joints[self._arm]
         own = dict(zip(robot.joints, joints[places], strict=True))
         place, turn = self._forward(np.array([own[joint] for joint in robot.arm_joints]))
-        link = state.link_pose(self._driven.robot, robot.tcp_link)[0].astype(float)
-        beside = self.where(state)[:3] - link[:3]
+        link = state.link_pose(self.driven.robot, robot.tcp_link)[0].astype(float)
+        beside = self.at(state)[:3] - link[:3]
         return np.concatenate([place + rotate(turn, rotate(inverse(link[3:]), beside)), turn])
 
+    @staticmethod
+    def shifted(target: Floats, wanted: Floats, reached: Floats, share: float) -> Floats:
+        """See `PositionDrive`; each (..., 7)."""
+        places = target[..., :3] + share * (wanted[..., :3] - reached[..., :3])
+        missed = multiply(wanted[..., 3:], inverse(reached[..., 3:]))
+        missed = missed * np.where(missed[..., :1] < 0, -share, share)
+        missed[..., 0] += 1 - share
+        missed /= np.linalg.norm(missed, axis=-1, keepdims=True)
+        return np.concatenate([places, multiply(missed, target[..., 3:])], -1)
+
     def _root(self, state: State) -> Floats:
-        robot, link = self._driven.robot, self._driven.group.root_link
+        robot, link = self.driven.robot, self.driven.group.root_link
         pose = state.base_pose(robot) if link is None else state.link_pose(robot, link)
         return pose[0].astype(float)
 
 
-def remembered(task: MultiRobotTask, driven: DrivenGroup, kind: str) -> Floats:
+Drive = PositionDrive | VelocityDrive | TcpDrive
+
+
+def drive_of(driven: DrivenGroup, task: MultiRobotTask) -> Drive:
+    """Return the drive of a group of a task with one environment."""
+    asks = driven.group.asks
+    if asks.tcp:
+        return TcpDrive(driven, task)
+    return (PositionDrive if asks.positions else VelocityDrive)(driven, task)
+
+
+def _normalised(group: JointGroup, values: Floats) -> tuple[Floats, bool]:
+    """Return the action numbers of some values, and whether none had to be clipped."""
+    if not group.normalised:
+        return values, True
+    low, high = np.array(group.ranges).T
+    numbers = (values - (high + low) / 2) / ((high - low) / 2)
+    fits = True
+    if group.asks.turn:
+        turn = values[3:] / low[-1]  # ManiSkill scales a turn by its lower bound
+        length = float(np.linalg.norm(turn))
+        numbers[3:] = turn / max(length, 1.0)
+        fits = length <= _NEARLY
+    return np.clip(numbers, -1, 1), fits and bool((abs(numbers) <= _NEARLY).all())
+
+
+def _remembered(task: MultiRobotTask, driven: DrivenGroup, kind: str) -> Floats:
     """Return what a group was last asked for; see `simulation.control.modes.Remembered`."""
     modes = task.simulation.modes
     assert modes is not None
     names = [(kept.robot, kept.group, kept.kind) for kept in modes.remembered]
     return modes.recall()[names.index((driven.robot, driven.name, kind))][0].astype(float)
-
-
-def normalised(group: JointGroup, values: Floats) -> tuple[Floats, bool]:
-    """Return what a group is to be asked for as its numbers, and whether none had to be cut."""
-    if not group.normalised:
-        return values, True
-    low, high = np.array(group.ranges).T
-    numbers = (values - (high + low) / 2) / ((high - low) / 2)
-    if group.asks.turn:
-        turn = values[3:] / low[-1]  # ManiSkill scales a turn by its lower bound
-        length = float(np.linalg.norm(turn))
-        numbers[3:] = turn / max(length, 1.0)
-        return np.clip(numbers, -1, 1), length <= _NEARLY and bool((abs(numbers) <= _NEARLY).all())
-    return np.clip(numbers, -1, 1), bool((abs(numbers) <= _NEARLY).all())
-
-
-def further(wanted: Floats, passed: Floats, own: Floats, share: float) -> Floats:
-    """Return poses further by a share of what some miss of others, (..., 7).
-
-    Args:
-        wanted: Poses to start from: position (m), quaternion (wxyz).
-        passed: Where something should have been.
-        own: Where it was.
-        share: Of the way between the two.
-    """
-    places = wanted[..., :3] + share * (passed[..., :3] - own[..., :3])
-    missed = multiply(passed[..., 3:], inverse(own[..., 3:]))
-    missed = missed * np.where(missed[..., :1] < 0, -share, share)
-    missed[..., 0] += 1 - share
-    missed /= np.linalg.norm(missed, axis=-1, keepdims=True)
-    return np.concatenate([places, multiply(missed, wanted[..., 3:])], -1)
 
 
 def _seen_from(root: Floats, pose: Floats) -> tuple[Floats, Floats]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import fsum
 from time import perf_counter
@@ -54,7 +54,7 @@ class Score:
 
 @dataclass(frozen=True)
 class PlayedEpisode(Episode):
-    """An episode and what came of it.
+    """An episode and what happened in it.
 
     Attributes:
         states: State dict of `MultiRobotTask.get_state_dict`, each entry (T + 1, k), the first
@@ -64,12 +64,12 @@ class PlayedEpisode(Episode):
         terminated: Shape (T,).
         truncated: Shape (T,).
         seconds: Time that the steps took, without reading the states (s).
-        source: Who acted, as plain data that json can hold; None if nobody says.
+        source: Who acted, as plain data that json can hold; None if unknown.
         drawn: What was varied in its world, likewise; None if nothing was.
         actor: Who acted at each step where several did, (T,) uint8: the number of one of the
             ``"actors"`` of ``source``; else None.
         corrections: What a corrector would have done at each step, (T, A), or None.
-        reason: Why it failed, in words; empty if it did not, or if nobody says: an expert does.
+        reason: Why it failed; empty if it did not, or if that is unknown. Experts give a reason.
     """
 
     states: States
@@ -83,6 +83,36 @@ class PlayedEpisode(Episode):
     actor: NDArray[np.uint8] | None = None
     corrections: NDArray[np.float32] | None = None
     reason: str = ""
+
+    @classmethod
+    def of(
+        cls,
+        seed: int,
+        actions: Sequence[NDArray[np.float32]],
+        states: States,
+        moments: Sequence[Moment],
+        **others: Any,
+    ) -> PlayedEpisode:
+        """Return the episode of T steps, T of 1 or more.
+
+        Args:
+            seed: Seed of its reset.
+            actions: The action of each step, (A,).
+            states: See above.
+            moments: What each step returned.
+            **others: Other fields.
+        """
+        return cls(
+            seed=seed,
+            actions=np.stack(actions),
+            states=states,
+            rewards=np.array([moment.reward for moment in moments], np.float32),
+            success=np.array([moment.success for moment in moments]),
+            terminated=np.array([moment.terminated for moment in moments]),
+            truncated=np.array([moment.truncated for moment in moments]),
+            seconds=fsum(moment.seconds for moment in moments),
+            **others,
+        )
 
     @property
     def solved(self) -> bool:
@@ -131,8 +161,8 @@ def moments(
     Args:
         task: A task with one environment.
         seed: Seed of the reset.
-        policy: Who acts; see `follow` for actions that are known.
-        most: Steps after which this ends; whoever looks on may end it before.
+        policy: Who acts; see `open_loop` for actions that are known.
+        most: Steps after which this ends; the caller may end it before.
         start: State to begin from instead of the one after the reset; see
             `MultiRobotTask.set_state_dict`, which is not exact.
 
@@ -156,7 +186,7 @@ def moments(
 
 
 def take_step(task: MultiRobotTask, action: Any) -> Moment:
-    """Take a control step in a task with one environment, and return what came of it.
+    """Take a control step in a task with one environment, and return what it returned.
 
     Raises:
         ActionError: If the action has the wrong shape or numbers that are not finite.
@@ -169,8 +199,8 @@ def take_step(task: MultiRobotTask, action: Any) -> Moment:
     return Moment(observation, reward.item(), success, over, late, seconds, elapsed)
 
 
-def follow(actions: Iterable[Any]) -> Policy:
-    """Return a policy that carries out actions without looking."""
+def open_loop(actions: Iterable[Any]) -> Policy:
+    """Return a policy that carries out actions, whatever it observes."""
     left = iter(actions)
     return lambda observation: next(left)
 
@@ -186,7 +216,7 @@ class EpisodeTape:
         task.write_tape(self._states)
 
     def add(self, action: Any, moment: Moment) -> None:
-        """Add a step that was just taken: its action, (A,), and what came of it."""
+        """Add a step that was just taken: its action, (A,), and what it returned."""
         self._actions.append(np.array(action, np.float32))
         self._moments.append(moment._replace(observation=None))
         self._task.write_tape(self._states)
@@ -199,22 +229,12 @@ class EpisodeTape:
 
     def read(self) -> PlayedEpisode:
         """Return the episode of T steps, T of 1 or more."""
-        columns = zip(*(moment[1:5] for moment in self._moments), strict=True)
-        rewards, success, terminated, truncated = columns
-        return PlayedEpisode(
-            seed=self._seed,
-            actions=np.stack(self._actions),
-            states={
-                kind: {name: rows[:, 0] for name, rows in entries.items()}
-                for kind, entries in self._states.read().items()
-            },
-            rewards=np.array(rewards, np.float32),
-            success=np.array(success),
-            terminated=np.array(terminated),
-            truncated=np.array(truncated),
-            seconds=sum(moment.seconds for moment in self._moments),
-            drawn=self._task.drawn(),
-        )
+        states = {
+            kind: {name: rows[:, 0] for name, rows in entries.items()}
+            for kind, entries in self._states.read().items()
+        }
+        drawn = self._task.drawn()
+        return PlayedEpisode.of(self._seed, self._actions, states, self._moments, drawn=drawn)
 
 
 def play(
@@ -240,7 +260,7 @@ def play(
     """
     if task.num_envs == 1 and not len(actions):
         raise TaskError("an episode needs at least one action")
-    happening = moments(task, seed, follow(actions), len(actions), start=start)
+    happening = moments(task, seed, open_loop(actions), len(actions), start=start)
     next(happening)
     tape = EpisodeTape(task, seed)
     watch()

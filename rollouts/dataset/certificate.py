@@ -14,8 +14,8 @@ from robots import RecordingError, UnreadableFileError
 from robots.common.files import read_json
 from robots.common.pages import plural
 from robots.common.writing import write_whole
-from rollouts.dataset.comparison import Replay
 from rollouts.playing.environment import versions as installed
+from rollouts.playing.replay import Replayed
 from rollouts.reading.json_fields import FLAG, NAME, OBJECT, FieldError, Kind, fields, items, whole
 from rollouts.reading.manifest import MOST_EPISODES, spans_of
 from rollouts.reading.summary import MAX_JSON, MAX_SEED
@@ -45,9 +45,24 @@ _CERTIFICATE = fields(
 )
 
 
+@dataclass(frozen=True)
+class CheckedEpisode:
+    """An episode that was played again, and in how many of its steps arms touched.
+
+    Attributes:
+        replayed: Whether it is the same.
+        touching: Control steps in which links of different arms touched, by pair of links.
+        touching_steps: Control steps in which any did.
+    """
+
+    replayed: Replayed
+    touching: dict[str, int]
+    touching_steps: int
+
+
 @dataclass
 class Certificate:
-    """What came of playing a recording again; it does not depend on who played.
+    """What was found when a recording was played again; it does not depend on who played.
 
     Attributes:
         task_id: Id of the task.
@@ -91,21 +106,22 @@ class Certificate:
         """Whether every episode was played, and was the same to the last bit."""
         return self.complete and self.equal == self.episodes
 
-    def note(self, seed: int, replay: Replay) -> None:
+    def note(self, seed: int, checked: CheckedEpisode) -> None:
         """Count an episode."""
+        replayed = checked.replayed
         self.checked.add(seed)
-        self.steps += replay.steps
-        self.successes += replay.success
-        if replay.difference is None:
+        self.steps += replayed.steps
+        self.successes += replayed.success
+        if (differs := replayed.difference) is None:
             self.equal += 1
         else:
-            _keep(self.differing, {"seed": seed, **vars(replay.difference)})
-        if replay.touching:
+            _keep(self.differing, {"seed": seed, "step": differs.step, "array": differs.array})
+        if checked.touching:
             self.contact_episodes += 1
-            self.contact_steps += replay.touching_steps
-            self.pairs.update(replay.touching)
-            told = {"success": replay.success, "steps": replay.touching_steps}
-            _keep(self.touching, {"seed": seed, **told})
+            self.contact_steps += checked.touching_steps
+            self.pairs.update(checked.touching)
+            about = {"success": replayed.success, "steps": checked.touching_steps}
+            _keep(self.touching, {"seed": seed, **about})
 
     def note_failure(self, seed: int, reason: str) -> None:
         """Count an episode that could not be played."""
@@ -149,7 +165,7 @@ class Certificate:
         """Read one.
 
         Raises:
-            RecordingError: If it cannot be read, or is none.
+            RecordingError: If it cannot be read, or is no certificate.
         """
         try:
             found = read_json(path, MAX_JSON)
@@ -170,7 +186,7 @@ def versions() -> dict[str, str]:
 
 
 def sentences(certificate: Certificate) -> Sequence[str]:
-    """Return what a certificate says, in words."""
+    """Return a certificate as sentences."""
     c = certificate
     lines = [
         f"{c.equal} of {c.episodes} episodes equal to the last bit, {c.steps} steps, {c.successes}"
@@ -192,7 +208,7 @@ def sentences(certificate: Certificate) -> Sequence[str]:
 
 
 def _seeds(certificate: Certificate) -> str:
-    """Return in which episodes arms touched, the first three, in words."""
+    """Return the first three episodes in which arms touched, as the end of a sentence."""
     named = [
         f"{one['seed']}{'' if one['success'] else ' (no success)'}" for one in certificate.touching
     ][:3]
@@ -209,19 +225,13 @@ def _keep(listed: list[dict[str, Any]], entry: dict[str, Any]) -> None:
 
 def _from_json(found: Mapping[str, Any]) -> Certificate:
     contacts = found["arm_contacts"]
+    as_they_are = ("files", "episodes", "versions", "equal", "steps", "successes")
     return Certificate(
-        found["task"],
-        found["files"],
-        found["episodes"],
-        found["versions"],
-        {seed for first, last in found["checked"] for seed in range(first, last + 1)},
-        found["equal"],
-        found["steps"],
-        found["successes"],
-        found["differing"],
-        found["not_played"],
-        contacts["episodes"],
-        contacts["steps"],
-        Counter(contacts["pairs"]),
-        contacts.get("touching", []),
+        task_id=found["task"],
+        **{name: found[name] for name in (*as_they_are, "differing", "not_played")},
+        checked={seed for first, last in found["checked"] for seed in range(first, last + 1)},
+        contact_episodes=contacts["episodes"],
+        contact_steps=contacts["steps"],
+        pairs=Counter(contacts["pairs"]),
+        touching=contacts.get("touching", []),
     )

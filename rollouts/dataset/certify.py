@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
@@ -12,10 +13,9 @@ from typing import Any
 import torch
 
 from experts.touching import ArmWatch
-from rollouts.dataset.certificate import FILE, Certificate
-from rollouts.dataset.comparison import Replay, play_again
+from rollouts.dataset.certificate import FILE, Certificate, CheckedEpisode
 from rollouts.playing.executor import Event, Executor, modules_of, play_all
-from rollouts.playing.replay import open_recording
+from rollouts.playing.replay import open_recording, replay
 from rollouts.playing.seeds import checked_seeds
 from rollouts.reading.manifest import sized_file
 from rollouts.reading.recorded_task import task_class, task_for
@@ -49,7 +49,7 @@ class CertifyJob:
         """What other machines may need to play it."""
         return modules_of(self.task)
 
-    def __call__(self) -> Callable[[int], Replay]:
+    def __call__(self) -> Callable[[int], CheckedEpisode]:
         """Open the recording and make its task in a worker.
 
         Raises:
@@ -69,8 +69,22 @@ class _Certifier:
         self._arms = ArmWatch(self._task)
         self._places = {seed: place for place, seed in enumerate(self._file.seeds)}
 
-    def __call__(self, seed: int) -> Replay:
-        return play_again(self._task, self._file[self._places[seed]], self._arms)
+    def __call__(self, seed: int) -> CheckedEpisode:
+        trajectory = self._file[self._places[seed]]
+        if not trajectory.rebuilt or trajectory.states is None:
+            raise TrajectoryError(
+                f"episode {trajectory.episode_id} cannot be played exactly: it needs the seed of"
+                " its reset, which must have built the world anew, and states to compare with"
+            )
+        pairs: list[set[str]] = []
+
+        def watch() -> None:
+            pairs.append({", ".join(sorted(map(str, pair))) for pair in self._arms.touching()})
+
+        replayed = replay(self._task, trajectory, everything=True, watch=watch)
+        steps = pairs[1:]  # the first is that after the reset
+        touching = Counter(pair for touched in steps for pair in touched)
+        return CheckedEpisode(replayed, dict(touching), sum(map(bool, steps)))
 
     def close(self) -> None:
         self._task.close()
@@ -117,7 +131,10 @@ def certify(
     try:
         with closing(play_all(executor, job, missing)) as events:
             for event in events:
-                _note(certificate, event)
+                if event.seed is not None and event.error is not None:
+                    certificate.note_failure(event.seed, str(event.error))
+                elif event.seed is not None and isinstance(event.result, CheckedEpisode):
+                    certificate.note(event.seed, event.result)
                 on_event(certificate, event)
                 if time.monotonic() - written > INTERVAL:
                     certificate.write(out)
@@ -170,18 +187,5 @@ def _begun(out: Path, fresh: Certificate) -> Certificate:
     if not out.exists():
         return fresh
     there = Certificate.read(out)
-    same = (there.task_id, there.files, there.versions) == (
-        fresh.task_id,
-        fresh.files,
-        fresh.versions,
-    )
+    same = all(getattr(there, n) == getattr(fresh, n) for n in ("task_id", "files", "versions"))
     return there if same and not there.complete else fresh
-
-
-def _note(certificate: Certificate, event: Event) -> None:
-    if event.seed is None:
-        return
-    if event.error is not None:
-        certificate.note_failure(event.seed, str(event.error))
-    elif isinstance(event.result, Replay):
-        certificate.note(event.seed, event.result)

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from layouts import Layout, Placement
-from rollouts.export.columns import ColumnReader, Columns
-from rollouts.reading.trajectory import Trajectory, TrajectoryFile
+from rollouts.export.columns import ColumnReader
+from rollouts.reading.trajectory import TrajectoryFile
 from tasks import MultiRobotTask
 from tasks.native.format import articulation_keys
 
@@ -44,7 +44,7 @@ def measure(
     Args:
         file: The recording.
         task: Its task.
-        places: Which episodes are looked at, by their place in the recording.
+        places: Which episodes are measured, by their place in the recording.
         progress: Called after each episode.
 
     Raises:
@@ -52,47 +52,33 @@ def measure(
     """
     if len(task.layout) < 2:
         return None
-    meter, least = _Meter(task), list[float]()
+    layout, reader, keys = task.layout, ColumnReader(task), articulation_keys(task.layout)
+    least = list[float]()
+    standing, distance = None, None  # where robots stood in the last episode, and what measures
     for place in places:
         trajectory = file[place]
         if trajectory.states is None:
             return None
-        least.append(meter.least(trajectory))
+        columns = reader.read(trajectory)
+        rows = columns.states["articulations"]
+        poses = tuple(tuple(rows[keys[name]][0, :7].tolist()) for name in layout)
+        if distance is None or poses != standing:
+            standing, distance = poses, _between_robots(_moved(layout, poses))
+        qpos = np.concatenate([columns.qpos[name] for name in layout], axis=1)
+        least.append(float(distance(qpos.astype(float)).min()))
         progress()
     return Clearances(list(places), np.array(least))
 
 
-class _Meter:
-    """Measures distances of robots where their bases stood in an episode."""
-
-    def __init__(self, task: MultiRobotTask) -> None:
-        self._layout, self._reader = task.layout, ColumnReader(task)
-        self._keys = articulation_keys(task.layout)
-        self._standing: tuple[tuple[float, ...], ...] = ()
-        self._distance: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
-
-    def least(self, trajectory: Trajectory) -> float:
-        columns = self._reader.read(trajectory)
-        states = np.concatenate([columns.qpos[name] for name in self._layout], axis=1)
-        return float(self._distances(columns)(states.astype(float)).min())
-
-    def _distances(self, columns: Columns) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-        """Return what measures where robots stand in an episode; mostly that of the last one."""
-        rows = columns.states["articulations"]
-        standing = tuple(tuple(rows[self._keys[name]][0, :7].tolist()) for name in self._layout)
-        if self._distance is None or standing != self._standing:
-            self._standing, self._distance = standing, _between_robots(self._moved(standing))
-        return self._distance
-
-    def _moved(self, standing: Sequence[Sequence[float]]) -> Layout:
-        """Return the layout with robots where they stood, which may have been varied."""
-        moved: dict[str, Placement] = {}
-        for (name, placement), pose in zip(self._layout.items(), standing, strict=True):
-            x, y, z = pose[:3]
-            w, i, j, k = (np.array(pose[3:]) / np.linalg.norm(pose[3:])).tolist()
-            there = {"position": (x, y, z), "quaternion": (w, i, j, k)}
-            moved[name] = replace(placement, **there, rpy=None, on=None)
-        return Layout(moved)
+def _moved(layout: Layout, poses: Sequence[Sequence[float]]) -> Layout:
+    """Return a layout with robots at other poses, each (x, y, z, w, i, j, k) (m)."""
+    moved: dict[str, Placement] = {}
+    for (name, placement), pose in zip(layout.items(), poses, strict=True):
+        x, y, z = pose[:3]
+        w, i, j, k = (np.array(pose[3:]) / np.linalg.norm(pose[3:])).tolist()
+        there = {"position": (x, y, z), "quaternion": (w, i, j, k)}
+        moved[name] = replace(placement, **there, rpy=None, on=None)
+    return Layout(moved)
 
 
 def _between_robots(layout: Layout) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:

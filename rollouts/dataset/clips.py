@@ -6,18 +6,15 @@ import io
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import count
 from pathlib import Path
 
 import numpy as np
 
 from rollouts.dataset.contents import Contents
 from rollouts.reading.trajectory import Trajectory, TrajectoryFile
-from rollouts.video import Picture, open_video
-from simulation.rendering.pictures import Cameras
+from rollouts.video import Picture, open_video, play_pictured
 from tasks import MultiRobotTask
-from tasks.engine.columns import overview
-from tasks.episode import play
+from tasks.episode import Episode
 
 STRIDE = 2  # control steps from one picture to the next
 
@@ -41,8 +38,8 @@ class Clip:
     poster: bytes
 
 
-def chosen(contents: Contents, most: int) -> dict[int, str]:
-    """Return places of episodes that are worth a look, each with what is special about it."""
+def chosen_places(contents: Contents, most: int) -> dict[int, str]:
+    """Return places of episodes that are worth showing, each with what is special about it."""
     steps, order = contents.steps, np.argsort(contents.steps, kind="stable")
     failed = np.flatnonzero(~contents.success)
     named = [
@@ -90,18 +87,17 @@ def _film_one(task: MultiRobotTask, trajectory: Trajectory) -> tuple[bytes, byte
     """Return an mp4 file's bytes, and those of a jpeg of the last picture."""
     import imageio.v2 as imageio
 
-    eye, target = overview(task.layout) or task.viewpoint
-    steps, pictures = count(), list[Picture]()
+    pictures: list[Picture] = []
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "clip.mp4"
         with open_video(path, task.scenario.control_frequency / STRIDE) as append:
 
-            def watch() -> None:
-                if next(steps) % STRIDE == 0:
-                    pictures[:] = [_halved(Cameras(task.simulation, eye, target).take()[0])]
-                    append(pictures[0])
+            def take(step: int, picture: Picture) -> None:
+                pictures[:] = [_halved(picture)]
+                append(pictures[0])
 
-            play(task, trajectory.seed or 0, trajectory.actions, watch)
+            episode = Episode(trajectory.seed or 0, trajectory.actions)
+            play_pictured(task, episode, take, STRIDE)
         video = path.read_bytes()
     poster = io.BytesIO()
     imageio.imwrite(poster, pictures[0], format="jpg")  # pyright: ignore[reportArgumentType]

@@ -14,6 +14,7 @@ from rollouts.reading.recording import all_files
 from rollouts.reading.summary import Entry, Summary, read_summary
 
 _UNKNOWN = "unknown"
+_Columns = tuple[NDArray[np.int64], NDArray[np.bool_], dict[str, NDArray[np.float64]]]
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Contents:
         files: Its files.
         steps: Control steps of each episode, (n,).
         success: Whether each ended in success, (n,).
-        sources: What is known of each source, by its name in words.
+        sources: Counts of each source, by its name.
         drawn: What was varied, by axis and name: a number for each episode, (n,), NaN where
             nothing was drawn.
     """
@@ -87,27 +88,33 @@ def read_contents(
     """
     files = all_files(path)
     found: Contents | None = None
-    parts: list[tuple[NDArray[np.int64], NDArray[np.bool_], dict[str, NDArray[np.float64]]]] = []
+    parts: list[_Columns] = []
     for number, file in enumerate(files):
         summary = read_summary(file)
         found = found or Contents(summary.task_id, summary.control_mode)
-        found.files.append(_file(file, summary))
-        _count_sources(found.sources, summary)
+        seeds = [entry.seed for entry in summary.episodes] or [None]
+        size = file.stat().st_size / 1e6 if file.exists() else 0.0
+        facts = FileFacts(file.name, size, len(summary.episodes), seeds[0], seeds[-1])
+        found.files.append(facts)
+        for entry in summary.episodes:
+            source = found.sources.setdefault(describe_source(entry, summary), SourceFacts())
+            source.episodes += 1
+            source.successes += bool(entry.success)
+            source.steps += entry.steps or 0
         parts.append(_columns(summary.episodes))
         progress(number + 1, len(files))
     assert found is not None  # there is a file at least
     found.steps = np.concatenate([steps for steps, _, _ in parts])
     found.success = np.concatenate([success for _, success, _ in parts])
-    names = dict.fromkeys(name for _, _, drawn in parts for name in drawn)
     found.drawn = {
         name: np.concatenate([drawn.get(name, np.full(len(s), np.nan)) for s, _, drawn in parts])
-        for name in names
+        for name in dict.fromkeys(name for _, _, drawn in parts for name in drawn)
     }
     return found
 
 
 def describe_source(entry: Entry, summary: Summary) -> str:
-    """Return who acted in an episode, in words."""
+    """Return the name of an episode's source: who acted, and who corrected."""
     source = entry.source
     if source is None:
         named = (summary.source_type, summary.source_desc)
@@ -130,24 +137,8 @@ def numbers_of(drawn: Any, name: str = "") -> Iterator[tuple[str, float]]:
         yield name, float(drawn)
 
 
-def _file(path: Path, summary: Summary) -> FileFacts:
-    seeds = [entry.seed for entry in summary.episodes]
-    ends = (seeds[0], seeds[-1]) if seeds else (None, None)
-    size = path.stat().st_size / 1e6 if path.exists() else 0.0
-    return FileFacts(path.name, size, len(seeds), *ends)
-
-
-def _count_sources(sources: dict[str, SourceFacts], summary: Summary) -> None:
-    for entry in summary.episodes:
-        facts = sources.setdefault(describe_source(entry, summary), SourceFacts())
-        facts.episodes += 1
-        facts.successes += bool(entry.success)
-        facts.steps += entry.steps or 0
-
-
-def _columns(
-    episodes: tuple[Entry, ...],
-) -> tuple[NDArray[np.int64], NDArray[np.bool_], dict[str, NDArray[np.float64]]]:
+def _columns(episodes: tuple[Entry, ...]) -> _Columns:
+    """Return steps, success and what was drawn, a number for each episode."""
     steps = np.array([entry.steps or 0 for entry in episodes], np.int64)
     success = np.array([bool(entry.success) for entry in episodes], np.bool_)
     drawn: dict[str, NDArray[np.float64]] = {}

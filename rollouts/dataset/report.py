@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from importlib.util import find_spec
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,13 @@ import numpy as np
 
 from rollouts.dataset.certificate import Certificate
 from rollouts.dataset.certify import certificate_path
-from rollouts.dataset.clearance import Clearances, measure
-from rollouts.dataset.clips import Clip, chosen, film
-from rollouts.dataset.contents import Contents, read_contents
+from rollouts.dataset.clearance import measure
+from rollouts.dataset.clips import Clip, chosen_places, film
+from rollouts.dataset.contents import read_contents
 from rollouts.dataset.page import Report
 from rollouts.playing.replay import open_recording, task_for
 from rollouts.reading.recording import all_files, first_file
-from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.reading.trajectory import TrajectoryError
 from rollouts.video import video_problem
 
 Progress = Callable[[float, float, str], None]
@@ -33,7 +34,7 @@ def make_report(
     clips: int = 4,
     progress: Progress = lambda done, total, what: None,
 ) -> Report:
-    """Return what is known of a dataset.
+    """Gather what the report of a data set shows.
 
     Args:
         path: The recording: an h5 file, a folder or a manifest.
@@ -47,24 +48,30 @@ def make_report(
         TrajectoryError: If it cannot be read.
         RecordingError: If something that is no certificate is in its place.
     """
-    count, remarks = len(all_files(path)), list[str]()
-    total = count + clearances + clips
+    cell, remarks = cell or {}, list[str]()
+    files = len(all_files(path))
+    total = files + clearances + clips
     contents = read_contents(path, lambda done, _: progress(done, total, "reading"))
     if not len(contents.steps):
         raise TrajectoryError(f"{path} holds no episodes; there is nothing to report")
-    done = count
-
-    def step(what: str) -> Callable[[], None]:
-        def advance() -> None:
-            nonlocal done
-            done += 1
-            progress(done, total, what)
-
-        return advance
-
+    done, near, films = count(files + 1), None, list[Clip]()
     with open_recording(path, task_id) as file:
-        near = _near(file, contents, clearances, cell or {}, remarks, step("measuring"))
-        films = _films(file, contents, clips, cell or {}, remarks, step("filming"))
+        if clearances and find_spec("fcl") is None:
+            remarks.append("Clearances need python-fcl: pip install 'robot-layouts[checks]'.")
+        elif clearances:
+            last = len(contents.steps) - 1
+            evenly = np.linspace(0, last, min(clearances, last + 1)).tolist()
+            places = sorted({round(place) for place in evenly})
+            with closing(task_for(file, **cell)) as task:
+                near = measure(file, task, places, lambda: progress(next(done), total, "measuring"))
+            if near is None and len(file.layout or {}) > 1:
+                remarks.append("Clearances need recorded states.")
+        if clips and (problem := video_problem()):
+            remarks.append(f"There are no clips: {problem}.")
+        elif clips:
+            chosen = chosen_places(contents, clips)
+            with closing(task_for(file, **cell, pictures=True)) as task:
+                films = film(file, task, chosen, lambda: progress(next(done), total, "filming"))
         described = file.layout or {}
     return Report(
         title=first_file(path).absolute().parent.name if first_file(path) != path else path.name,
@@ -77,47 +84,8 @@ def make_report(
     )
 
 
-def _near(
-    file: TrajectoryFile,
-    contents: Contents,
-    count: int,
-    cell: Mapping[str, Any],
-    remarks: list[str],
-    step: Callable[[], None],
-) -> Clearances | None:
-    if not count:
-        return None
-    if find_spec("fcl") is None:
-        remarks.append("Clearances need python-fcl: pip install 'robot-layouts[checks]'.")
-        return None
-    last = len(contents.steps) - 1
-    places = sorted({round(x) for x in np.linspace(0, last, min(count, last + 1)).tolist()})
-    with closing(task_for(file, **cell)) as task:
-        found = measure(file, task, places, progress=step)
-    if found is None and len(file.layout or {}) > 1:
-        remarks.append("Clearances need recorded states.")
-    return found
-
-
-def _films(
-    file: TrajectoryFile,
-    contents: Contents,
-    count: int,
-    cell: Mapping[str, Any],
-    remarks: list[str],
-    step: Callable[[], None],
-) -> list[Clip]:
-    if not count:
-        return []
-    if problem := video_problem():
-        remarks.append(f"There are no clips: {problem}.")
-        return []
-    with closing(task_for(file, **cell, pictures=True)) as task:
-        return film(file, task, chosen(contents, count), step)
-
-
 def _certificate(path: Path, remarks: list[str]) -> Certificate | None:
-    """Return the certificate of these very files, as far as their sizes tell."""
+    """Return the certificate of these files, which are recognised by their sizes."""
     place = certificate_path(path)
     if not place.exists():
         return None

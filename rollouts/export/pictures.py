@@ -16,7 +16,7 @@ from simulation import Simulation
 from simulation.rendering.pictures import SIZE, Cameras, Observers, vulkan_problem
 from tasks import MultiRobotTask
 from tasks.engine.columns import OVERVIEW
-from tasks.episode import States, follow, moments
+from tasks.episode import States, moments, open_loop
 
 SHAPE = (SIZE, SIZE, 3)  # of the overview
 
@@ -83,7 +83,7 @@ class Drawing:
 
     def __iter__(self) -> Iterator[Frame]:
         """Play and draw."""
-        task, actions = self._task, follow(self._columns.actions)
+        task, actions = self._task, open_loop(self._columns.actions)
         happening = moments(task, self._seed, actions, len(self) - 1)
         next(happening)
         take = _taker(self._shots, task.simulation)

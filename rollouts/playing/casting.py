@@ -15,7 +15,7 @@ from rollouts.playing.together import Player, is_batched
 from rollouts.sources.actors import is_person
 from rollouts.sources.policies import EXPERT, check_policy, find_policy
 from tasks import MultiRobotTask
-from tasks.episode import PlayedEpisode, Policy, follow
+from tasks.episode import PlayedEpisode, Policy, open_loop
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def cast_of(policy: Policy | str, task: type[MultiRobotTask]) -> tuple[Cast, str
         task: What is played.
 
     Raises:
-        TaskError: If that is nobody, or the task has no expert.
+        TaskError: If that is no policy, or the task has no expert.
     """
     name = policy if isinstance(policy, str) else None
     if name == EXPERT:
@@ -102,10 +102,10 @@ class Casting:
         try:
             plan = planner(seed)
         except TaskError as error:
-            return Player(seed, follow(()), 0, random_states(), str(error))
+            return Player(seed, open_loop(()), 0, random_states(), str(error))
         to_the_end = self._cast.to_the_end
         states, reason = random_states(), planner.reason
-        player = Player(seed, follow(plan), len(plan), states, reason, True, to_the_end)
+        player = Player(seed, open_loop(plan), len(plan), states, reason, True, to_the_end)
         if planner.rehearsed is not None and (to_the_end or _ends_at_last(planner.rehearsed)):
             player.rehearsed = planner.rehearsed
         return player

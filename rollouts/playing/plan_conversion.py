@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +9,11 @@ from numpy.typing import NDArray
 
 from experts.registry import Expert
 from experts.rehearsal import rehearsed
-from robots import CONTROL_MODES, RobotDescriptor, TaskError
-from rollouts.playing.mode_conversion import converted
+from robots import CONTROL_MODES, TaskError
+from rollouts.playing.mode_conversion import converted_steps, followed
 from tasks import MultiRobotTask
-from tasks.episode import PlayedEpisode, follow, moments
+from tasks.driving import driven_groups
+from tasks.episode import PlayedEpisode
 
 DELTAS, POSITIONS = CONTROL_MODES[:2]  # all experts plan in deltas
 
@@ -48,7 +48,7 @@ class Planner:
             return actions
         if self._played.control_mode == POSITIONS:
             return as_positions(self._task, seed, actions)
-        return converted(self._task, seed, actions, self._played)
+        return converted_steps(self._task, seed, actions, self._played)[0]
 
     def close(self) -> None:
         """Let the worlds of its own task go, if it made one."""
@@ -78,20 +78,8 @@ def as_positions(
     if task.control_mode != DELTAS:
         raise TaskError(f"actions of {DELTAS} are converted; the task has {task.control_mode}")
     positions = np.array(actions, np.float32)
-    happening = moments(task, seed, follow(positions), len(positions))
-    next(happening)
-    for row, _ in zip(positions, happening, strict=True):
-        targets = iter(task.simulation.drive_targets[0].tolist())
-        for robot, part in task.layout.robot_actions.items():
-            _write_targets(task.layout[robot].robot, targets, row[part])
+    targets = followed(task, seed, positions).targets
+    for driven in driven_groups(task.layout):
+        if driven.group.delta:
+            positions[:, driven.numbers] = targets[:, driven.joints][:, : driven.group.size]
     return positions
-
-
-def _write_targets(
-    robot: RobotDescriptor, targets: Iterator[float], numbers: NDArray[np.float32]
-) -> None:
-    """Write what a robot's joints were driven to over the numbers of its relative groups."""
-    for name, group in robot.action_split.groups.items():
-        driven = [next(targets) for _ in group.joints]
-        if group.delta:
-            numbers[robot.action_split[name]] = driven[: group.size]

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-
 from robots import TaskError
+from rollouts.playing.comparison import Difference, first_difference
 from rollouts.reading.recorded_task import task_class, task_for
 from rollouts.reading.recording import FILE, open_trajectories
 from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
 from tasks import MultiRobotTask, get_task_class
-from tasks.episode import States, play
+from tasks.episode import play
 
 Start = Literal["seed", "state"]
 STARTS: tuple[Start, ...] = ("seed", "state")
@@ -24,9 +24,7 @@ __all__ = [
     "STARTS",
     "Replayed",
     "Start",
-    "StateDifference",
     "find_official",
-    "first_difference",
     "open_recording",
     "replay",
     "task_for",
@@ -34,31 +32,8 @@ __all__ = [
 
 
 @dataclass(frozen=True)
-class StateDifference:
-    """Where the states of a replay part from the recorded ones.
-
-    Attributes:
-        step: Control step; 0 is the state after the reset.
-        entry: The first body or robot that differs there, by its key in the state dict.
-        largest: Largest |Δ| over the whole episode (m, rad and their velocities).
-        largest_entry: The body or robot that has it, by its key in the state dict.
-    """
-
-    step: int
-    entry: str
-    largest: float
-    largest_entry: str
-
-    def __str__(self) -> str:
-        """Say it in words."""
-        where = "at the start" if self.step == 0 else f"from step {self.step}"
-        also = "" if self.largest_entry == self.entry else f" in {self.largest_entry}"
-        return f"{where} in {self.entry}, max |Δ| {self.largest:.1e}{also}"
-
-
-@dataclass(frozen=True)
 class Replayed:
-    """What came of an episode that was played again.
+    """The result of an episode that was played again.
 
     Attributes:
         episode_id: Its number in the file.
@@ -67,7 +42,7 @@ class Replayed:
         recorded: Whether the recorded episode ended in success, or None if the file is silent.
         success: Whether it ended in success here.
         compared: Whether the file holds states to compare with.
-        difference: Where the states part, or None.
+        difference: Where it differs first, or None.
         exact: Whether the states must be equal to the last bit.
         varied_alike: Whether what varies in its world was drawn here as it was recorded.
     """
@@ -78,7 +53,7 @@ class Replayed:
     recorded: bool | None
     success: bool
     compared: bool
-    difference: StateDifference | None
+    difference: Difference | None
     exact: bool
     varied_alike: bool = True
 
@@ -141,27 +116,39 @@ def find_official(task_id: str) -> Path:
     return min(playable)[1]
 
 
-def replay(task: MultiRobotTask, trajectory: Trajectory, start: Start = "seed") -> Replayed:
-    """Play the actions of a recorded episode.
+def replay(
+    task: MultiRobotTask,
+    trajectory: Trajectory,
+    start: Start = "seed",
+    *,
+    everything: bool = False,
+    watch: Callable[[], None] = lambda: None,
+) -> Replayed:
+    """Play the actions of a recorded episode again, and compare.
 
     Args:
         task: A task with one environment; see `task_for`.
         trajectory: The episode.
         start: ``"seed"`` resets with its seed, ``"state"`` then puts everything into the first
             recorded state. The latter is not exact, as PhysX's memory is not part of a state.
+        everything: Whether to compare rewards, flags and what was varied, too, not states alone.
+        watch: Called after the reset and after every step.
 
     Raises:
         TrajectoryError: If the file does not say the seed, or has no states to start from.
     """
-    first = None
-    if start == "state":
-        if trajectory.states is None:
-            raise _refusal(trajectory, "holds no states; start from its seed")
-        first = _first(trajectory.states)
-    elif trajectory.seed is None:
+    states = trajectory.states
+    if start == "state" and states is None:
+        raise _refusal(trajectory, "holds no states; start from its seed")
+    if start == "seed" and trajectory.seed is None:
         raise _refusal(trajectory, "has no reset seed; start from its state")
-    episode = play(task, trajectory.seed or 0, trajectory.actions, start=first)
-    compared = trajectory.states is not None
+    first = {
+        kind: {name: rows[:1] for name, rows in entries.items()}
+        for kind, entries in (states or {}).items()
+    }
+    begin = first if start == "state" else None
+    episode = play(task, trajectory.seed or 0, trajectory.actions, watch, start=begin)
+    compared = states is not None
     return Replayed(
         episode_id=trajectory.episode_id,
         seed=trajectory.seed,
@@ -169,45 +156,12 @@ def replay(task: MultiRobotTask, trajectory: Trajectory, start: Start = "seed") 
         recorded=trajectory.solved,
         success=episode.solved,
         compared=compared,
-        difference=first_difference(trajectory.states or {}, episode.states) if compared else None,
+        difference=(
+            first_difference(trajectory, episode, everything=everything) if compared else None
+        ),
         exact=start == "seed" and trajectory.rebuilt,
         varied_alike=trajectory.drawn in (None, episode.drawn),
     )
-
-
-def first_difference(recorded: States, played: States) -> StateDifference | None:
-    """Return where two episodes' states part, to the last bit; None if they do not.
-
-    An entry that only one of them has differs from the start.
-    """
-    steps: dict[str, int] = {}
-    sizes: dict[str, float] = {}
-    for name, before, now in _pairs(recorded, played):
-        if before is None or now is None or before.shape != now.shape:
-            steps[name], sizes[name] = 0, float("inf")
-        elif differing := np.flatnonzero((before != now).any(axis=1)).tolist():
-            steps[name] = differing[0]
-            sizes[name] = float(np.abs(before.astype(float) - now).max())
-    if not steps:
-        return None
-    first, most = min(steps, key=steps.__getitem__), max(sizes, key=sizes.__getitem__)
-    return StateDifference(steps[first], first, sizes[most], most)
-
-
-def _pairs(
-    recorded: States, played: States
-) -> list[tuple[str, np.ndarray | None, np.ndarray | None]]:
-    return [
-        (name, recorded.get(kind, {}).get(name), played.get(kind, {}).get(name))
-        for kind in dict.fromkeys([*recorded, *played])
-        for name in dict.fromkeys([*recorded.get(kind, {}), *played.get(kind, {})])
-    ]
-
-
-def _first(states: States) -> States:
-    return {
-        kind: {name: rows[:1] for name, rows in entries.items()} for kind, entries in states.items()
-    }
 
 
 def _refusal(trajectory: Trajectory, why: str) -> TrajectoryError:

@@ -18,7 +18,7 @@ from rollouts.playing.events import Event
 from rollouts.playing.randomness import random_states, set_random_states
 from tasks import MultiRobotTask
 from tasks.engine.actions import ActionReader
-from tasks.episode import REBUILT, PlayedEpisode, Policy, Score, States
+from tasks.episode import REBUILT, Moment, PlayedEpisode, Policy, Score, States
 
 Row = NDArray[np.float32]
 
@@ -27,33 +27,23 @@ class BatchError(TaskError):
     """A batched policy did not return one action for each observation."""
 
 
-class Step(NamedTuple):
-    """A step of an episode.
+class Choice(NamedTuple):
+    """What is carried out in a step of an episode.
 
     Attributes:
-        action: What was carried out, (A,).
+        action: The action, (A,).
         turn: 0 if the policy acted, 1 if another took over.
         correction: What the corrector would have done, (A,), or None.
-        reward: What the step was worth.
-        success: Whether the task was solved after it.
-        terminated: Whether it ended the episode.
-        truncated: Whether time was over.
-        seconds: Time that it took (s).
     """
 
     action: Row
-    turn: int
-    correction: Row | None
-    reward: float
-    success: bool
-    terminated: bool
-    truncated: bool
-    seconds: float
+    turn: int = 0
+    correction: Row | None = None
 
 
 @dataclass
 class Player:
-    """Who plays the episode of a seed, and what came of it.
+    """Who plays the episode of a seed, and what has happened in it.
 
     Attributes:
         seed: The seed.
@@ -61,13 +51,14 @@ class Player:
         most: Steps after which the episode ends.
         states: Where the random generators are when it acts.
         reason: Why it can but fail, if that is known.
-        blind: Whether the policy acts without looking, as a plan does; then it draws nothing.
+        blind: Whether the policy ignores observations, as a plan does; then it draws nothing.
         to_the_end: Whether it plays all its steps, those after a success or out of time included.
         takeover: May act in place of the policy: obs → action, or None to let the policy act.
         corrector: Says at every step what it would do: obs → action.
         rehearsed: Its episode, if that has happened already, in the rehearsal of its plan; then
             there is nothing left to play.
-        steps: The steps so far.
+        choices: The choice of each step so far.
+        moments: What each of these steps returned.
     """
 
     seed: int
@@ -80,14 +71,15 @@ class Player:
     takeover: Policy | None = None
     corrector: Policy | None = None
     rehearsed: PlayedEpisode | None = None
-    steps: list[Step] = field(default_factory=list[Step])
+    choices: list[Choice] = field(default_factory=list[Choice])
+    moments: list[Moment] = field(default_factory=list[Moment])
 
     @property
     def over(self) -> bool:
         """Whether its episode is over."""
-        if len(self.steps) >= self.most:
+        if len(self.moments) >= self.most:
             return True
-        ended = bool(self.steps) and (self.steps[-1].terminated or self.steps[-1].truncated)
+        ended = bool(self.moments) and (self.moments[-1].terminated or self.moments[-1].truncated)
         return ended and not self.to_the_end
 
     @property
@@ -95,9 +87,9 @@ class Player:
         """How its episode went."""
         if self.rehearsed is not None:
             return self.rehearsed.score
-        success = bool(self.steps) and self.steps[-1].success
-        total = fsum(step.reward for step in self.steps)
-        return Score(success, total, len(self.steps), "" if success else self.reason)
+        success = bool(self.moments) and self.moments[-1].success
+        total = fsum(moment.reward for moment in self.moments)
+        return Score(success, total, len(self.moments), "" if success else self.reason)
 
     def episode(self, states: States, drawn: dict[str, Any] | None) -> PlayedEpisode:
         """Return what happened.
@@ -109,20 +101,16 @@ class Player:
         Raises:
             TaskError: If it took no step.
         """
-        if not self.steps:
+        if not self.moments:
             raise TaskError(self.reason or "an episode needs at least one action")
-        corrections = [s.correction for s in self.steps if s.correction is not None]
-        return PlayedEpisode(
-            seed=self.seed,
-            actions=np.stack([step.action for step in self.steps]),
-            states=states,
-            rewards=np.array([step.reward for step in self.steps], np.float32),
-            success=np.array([step.success for step in self.steps]),
-            terminated=np.array([step.terminated for step in self.steps]),
-            truncated=np.array([step.truncated for step in self.steps]),
-            seconds=fsum(step.seconds for step in self.steps),
+        corrections = [c.correction for c in self.choices if c.correction is not None]
+        return PlayedEpisode.of(
+            self.seed,
+            [choice.action for choice in self.choices],
+            states,
+            self.moments,
             drawn=drawn,
-            actor=np.array([step.turn for step in self.steps], np.uint8),
+            actor=np.array([choice.turn for choice in self.choices], np.uint8),
             corrections=np.stack(corrections) if corrections else None,
             reason=self.score.reason,
         )
@@ -187,7 +175,7 @@ def _played_states(env: MultiRobotTask, players: Sequence[Player]) -> list[State
     states = tape.read()
     return [
         {
-            kind: {name: rows[: len(player.steps) + 1, i] for name, rows in entries.items()}
+            kind: {name: rows[: len(player.moments) + 1, i] for name, rows in entries.items()}
             for kind, entries in states.items()
         }
         for i, player in enumerate(players)
@@ -203,8 +191,8 @@ def steps_together(env: MultiRobotTask, players: Sequence[Player]) -> Generator[
 
     Args:
         env: The task, with at least as many environments as players.
-        players: Who plays, one after the other in the environments; it is noted in them what
-            comes of it.
+        players: Who plays, one after the other in the environments; what happens is added to
+            them.
 
     Yields:
         Nothing: once after the reset, and once after every step.
@@ -221,19 +209,21 @@ def steps_together(env: MultiRobotTask, players: Sequence[Player]) -> Generator[
     env.trust(actions)  # what is written there was checked
     while running := [i for i in ids if not players[i].over]:
         choices = _choices(players, running, observation, reader)
-        for i, (action, _, _) in choices.items():
-            actions[i] = action
+        for i, choice in choices.items():
+            actions[i] = choice.action
         everywhere = len(running) == env.num_envs
         began = perf_counter()
         observation, rewards, terminated, truncated, info = env.step(
             actions, None if everywhere else running
         )
         seconds = (perf_counter() - began) / len(running)
-        came = (rewards, info["success"], terminated, truncated)
-        rows = list(zip(*(of_all.tolist() for of_all in came), strict=True))
+        columns = (rewards, info["success"], terminated, truncated)
+        rows = list(zip(*(column.tolist() for column in columns), strict=True))
         for i in running:
             reward, success, ended, late = rows[i]
-            players[i].steps.append(Step(*choices[i], reward, bool(success), ended, late, seconds))
+            moment = Moment(None, reward, bool(success), ended, late, seconds)
+            players[i].choices.append(choices[i])
+            players[i].moments.append(moment)
         yield
 
 
@@ -244,18 +234,18 @@ def is_batched(policy: object) -> bool:
 
 def _choices(
     players: Sequence[Player], running: Sequence[int], observation: Any, reader: ActionReader
-) -> Mapping[int, tuple[Row, int, Row | None]]:
-    """Return what is carried out in each environment, whose turn it is, and its correction."""
+) -> Mapping[int, Choice]:
+    """Return what is carried out in each environment."""
     at_once: dict[int, Any] = {}
     if is_batched(players[0].policy):
         at_once = _act_at_once(players[0].policy, running, observation)
-    choices: dict[int, tuple[Row, int, Row | None]] = {}
+    choices: dict[int, Choice] = {}
     for i in running:
         player = players[i]
         if player.blind:
-            choices[i] = reader.read(player.policy(None))[0].copy(), 0, None
+            choices[i] = Choice(reader.read(player.policy(None))[0].copy())
         elif at_once and player.takeover is None and player.corrector is None:
-            choices[i] = reader.read(at_once[i])[0].copy(), 0, None
+            choices[i] = Choice(reader.read(at_once[i])[0].copy())
         else:
             seen = _rows(observation, [i])
             with _own_generators(player, shared=len(players) > 1):
@@ -264,15 +254,13 @@ def _choices(
     return choices
 
 
-def _choice(
-    player: Player, proposed: Any, seen: Any, reader: ActionReader
-) -> tuple[Row, int, Row | None]:
-    action, turn, correction = reader.read(proposed)[0].copy(), 0, None
+def _choice(player: Player, proposed: Any, seen: Any, reader: ActionReader) -> Choice:
+    choice = Choice(reader.read(proposed)[0].copy())
     if player.takeover is not None and (instead := player.takeover(seen)) is not None:
-        action, turn = _read(instead, reader, "takeover"), 1
+        choice = Choice(_read(instead, reader, "takeover"), 1)
     if player.corrector is not None:
-        correction = _read(player.corrector(seen), reader, "corrector")
-    return action, turn, correction
+        choice = choice._replace(correction=_read(player.corrector(seen), reader, "corrector"))
+    return choice
 
 
 def _read(action: Any, reader: ActionReader, whose: str) -> Row:

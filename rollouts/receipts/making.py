@@ -126,7 +126,7 @@ def make_again(
         robots: Which robots to take, by place, where that does not say it.
 
     Raises:
-        ReceiptError: If it makes no sense here, or a robot cannot be had.
+        ReceiptError: If it is invalid, or a robot is not available here.
     """
     try:
         _MAKING.expect(dict(making), "making")
@@ -137,7 +137,7 @@ def make_again(
         chosen = {name: making[name] for name in _AS_THEY_ARE}
         return {
             **chosen,
-            "layout": cls.layout if _same(layout, cls.layout) else layout,
+            "layout": cls.layout if same_layout(layout, cls.layout) else layout,
             "physics": None if physics is None else _physics(physics),
             "randomization": None if varied is None else Randomization.from_json(varied),
             "cameras": [Camera(**camera) for camera in making["cameras"]],
@@ -148,8 +148,8 @@ def make_again(
         raise ReceiptError(f"the receipt's task cannot be made here: {error}") from error
 
 
-def _same(first: Layout, second: Layout) -> bool:
-    """Return whether a layout is another one, but for frames that things hang on."""
+def same_layout(first: Layout, second: Layout) -> bool:
+    """Return whether two layouts have the same robots, places and control modes."""
     modes = ([placement.control_mode for placement in each.values()] for each in (first, second))
     return same_places(first, second) and next(modes) == next(modes)
 

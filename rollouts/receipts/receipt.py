@@ -13,6 +13,9 @@ from os import PathLike
 from statistics import mean
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from robots import RobotLayoutsError, UnreadableFileError
 from robots.common.files import read_json
 from robots.common.writing import write_whole
@@ -116,21 +119,20 @@ class EpisodeReceipt:
                 f" bytes in base64, {BYTES} for the reset and for each of {self.steps} steps"
             )
 
-    def moments(self) -> list[bytes]:
-        """Return the digest of each moment, two bytes: that of the reset, then of each step."""
-        trace = b64decode(self.trace)
-        return [trace[i : i + BYTES] for i in range(0, len(trace), BYTES)]
+    def digests(self) -> NDArray[np.uint8]:
+        """Return the first bytes of the digest after the reset and each step, (steps + 1, 2)."""
+        return np.frombuffer(b64decode(self.trace), np.uint8).reshape(-1, BYTES)
 
 
 @dataclass(frozen=True)
 class Receipt:
-    """What an evaluation was of, and what came of it.
+    """What was evaluated, and the results.
 
     Attributes:
         task: ``id``, ``class`` (``module:Class``) and ``sha256`` of the module's source.
-            See `rollouts.receipts.sources.describe_task`.
+            See `rollouts.receipts.provenance.describe_task`.
         policy: ``kind`` (``expert`` or ``policy``), ``name`` (``module:name``), ``sha256`` of its
-            module's source, and more; see `rollouts.receipts.sources.describe_policy`.
+            module's source, and more; see `rollouts.receipts.provenance.describe_policy`.
         making: What the task was made with: its ``layout`` with the checksums of robot files, and
             more; see `rollouts.receipts.making.describe_making`.
         environment: ``versions`` and ``processor`` of where it was played; see

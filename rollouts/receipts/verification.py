@@ -1,4 +1,4 @@
-"""Plays the episodes of a receipt again, and tells what is not the same."""
+"""Plays the episodes of a receipt again, and names what is not the same."""
 
 from __future__ import annotations
 
@@ -17,11 +17,10 @@ from rollouts.playing.casting import cast_of
 from rollouts.playing.evaluation_job import EvaluationJob, scores_of
 from rollouts.playing.executor import Event, Executor, choose_executor
 from rollouts.playing.together import grouped
-from rollouts.receipts.comparison import Change, Difference, changes, episode_differences
-from rollouts.receipts.evaluated import describe_job, receipt_of
+from rollouts.receipts.comparison import Change, EpisodeDifference, changes, episode_differences
 from rollouts.receipts.making import make_again
+from rollouts.receipts.provenance import EXPERT, describe_job, receipt_of
 from rollouts.receipts.receipt import Receipt, ReceiptError
-from rollouts.receipts.sources import EXPERT
 from tasks import MultiRobotTask, get_task_class
 from tasks.episode import Policy
 from tasks.registry import TASKS, make_scenario
@@ -31,7 +30,7 @@ _SHOWN = 10  # episodes that a text names
 
 @dataclass(frozen=True)
 class Verification:
-    """What came of playing the episodes of a receipt again.
+    """The result of playing the episodes of a receipt again.
 
     Attributes:
         receipt: The receipt.
@@ -47,7 +46,7 @@ class Verification:
         return self.receipt.untouched and self.receipt.hash == self.here.hash
 
     @cached_property
-    def differences(self) -> tuple[Difference, ...]:
+    def differences(self) -> tuple[EpisodeDifference, ...]:
         """The episodes that were not the same, in the receipt's order."""
         return tuple(episode_differences(self.receipt, self.here))
 
@@ -102,9 +101,9 @@ def verify(
             played as many at once as when the receipt was written.
 
     Raises:
-        ReceiptError: If it cannot be read or is none; its task or policy cannot be had here, or
-            would have to be named.
-        TaskError: If a policy is given that is none, or both ``workers`` and an executor.
+        ReceiptError: If it is no receipt or cannot be read, or its task or policy is not available
+            here or has to be named.
+        TaskError: If something is given that is no policy, or both ``workers`` and an executor.
         AssetError: If robot files cannot be found.
         WorkerError: If the policy raised something, or workers die of it again and again.
     """

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from hashlib import sha256
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -116,13 +117,22 @@ def _checksum(policy: Any) -> str | None:
             file = None
         if file is None or not Path(file).is_file():
             return None
-    digest = sha256()
     try:
-        with open_regular(file) as stream:
-            while chunk := stream.read(_CHUNK):
-                digest.update(chunk)
+        return checksum(file)
     except (TypeError, ValueError, OSError, UnreadableFileError) as error:
         raise RecordingError(
             f"the file {file!r} of the policy {name_of(policy)} cannot be read: {error}"
         ) from error
+
+
+def checksum(path: str | PathLike[str]) -> str:
+    """Return the SHA-256 of a file, in hex.
+
+    Raises:
+        UnreadableFileError: If it cannot be read.
+    """
+    digest = sha256()
+    with open_regular(path) as stream:
+        while chunk := stream.read(_CHUNK):
+            digest.update(chunk)
     return digest.hexdigest()

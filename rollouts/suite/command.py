@@ -120,8 +120,7 @@ def _show(options: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace) -> int:
     from rollouts.progress import LiveLine
     from rollouts.suite.files import load_suite
-    from rollouts.suite.policies import chosen_cases
-    from rollouts.suite.run import run_suite
+    from rollouts.suite.run import chosen_cases, run_suite
     from rollouts.suite.tables import summary
 
     suite = load_suite(options.suite, import_tasks=True)
@@ -156,7 +155,7 @@ def _report(options: argparse.Namespace) -> int:
 def _verify(options: argparse.Namespace) -> int:
     from rollouts.progress import LiveLine
     from rollouts.suite.folder import read_run
-    from rollouts.suite.verifying import verify_run
+    from rollouts.suite.run import verify_run
 
     _import_tasks(options)
     run = read_run(options.folder)

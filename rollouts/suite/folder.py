@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from robots import TaskError
 from robots.common.writing import writing_errors
+from robots.control_modes import plain_mode
+from rollouts.receipts.making import make_again, same_layout
 from rollouts.receipts.receipt import Receipt, ReceiptError
 from rollouts.recording.disk import claim
-from rollouts.suite.belonging import expect_of_case
 from rollouts.suite.files import load_suite, save_suite
 from rollouts.suite.suite import Case, Suite
+from tasks import MultiRobotTask, Scenario, get_task_class
+from tasks.registry import make_scenario
 
 SUITE, RECEIPTS = "suite.yaml", "receipts"
+
+_APART = ("layout", "num_envs", "check_layout")  # compared otherwise, or of no consequence
 
 
 @dataclass(frozen=True)
@@ -101,7 +107,7 @@ def read_run(folder: Path) -> SuiteRun:
         )
     suite = load_suite(folder / SUITE)
     found = {
-        case.name: _receipt(path, case)
+        case.name: expect_of_case(Receipt.read(path), case, path)
         for case in suite.cases
         if (path := receipt_path(folder, case)).exists()
     }
@@ -122,7 +128,51 @@ def expect_untouched(run: SuiteRun) -> SuiteRun:
     return run
 
 
-def _receipt(path: Path, case: Case) -> Receipt:
-    receipt = Receipt.read(path)
-    expect_of_case(receipt, case, path)
+def expect_of_case(receipt: Receipt, case: Case, path: Path) -> Receipt:
+    """Return a receipt that is of a case: the same task, seeds, places and settings.
+
+    Files of robots and sources of tasks are not compared: that is what verifying is for.
+
+    Args:
+        receipt: The receipt.
+        case: The case.
+        path: Where the receipt is, for errors.
+
+    Raises:
+        ReceiptError: If it is of another task, of other seeds, or made otherwise.
+    """
+    cls = get_task_class(case.task)
+    if receipt.task["id"] != cls.task_id:
+        raise ReceiptError(f"{path} is of {receipt.task['id']}, not of {cls.task_id}")
+    if {episode.seed for episode in receipt.episodes} != {*case.seeds}:
+        raise ReceiptError(f"{path} has other seeds than the case {case.name} of its suite")
+    try:
+        guessed = receipt.environment.get("guessed", {})
+        made = make_scenario(cls, **make_again(receipt.making, guessed, cls, {}))
+    except ReceiptError as error:
+        raise ReceiptError(f"{path}: {error}") from error
+    others = list(_differing(cls, made, make_scenario(cls, **case.making)))
+    if others:
+        raise ReceiptError(
+            f"{path} was not made as the case {case.name} of its suite: different are"
+            f" {', '.join(others)}"
+        )
     return receipt
+
+
+def _differing(cls: type[MultiRobotTask], made: Scenario, wanted: Scenario) -> Iterator[str]:
+    if not same_layout(made.layout, wanted.layout):
+        yield "layout"
+    for field in fields(Scenario):
+        name = field.name
+        if name not in _APART and _plain(cls, made, name) != _plain(cls, wanted, name):
+            yield name
+
+
+def _plain(cls: type[MultiRobotTask], scenario: Scenario, name: str) -> Any:
+    """Return a field of a scenario; what was left out as the task fills it in."""
+    value: Any = getattr(scenario, name)
+    if name == "control_mode" and value is not None:
+        return plain_mode(value)
+    defaults = {"reward_mode": cls.reward_modes[0], "max_episode_steps": cls.max_episode_steps}
+    return defaults.get(name) if value is None else value

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -17,8 +17,9 @@ from robots import RobotDescriptor, RobotLayoutsError, TaskError
 from robots.common.bounds import shown
 from robots.fingerprint import asset_fingerprint
 from robots.registry import ROBOTS
+from rollouts.playing.seeds import checked_seeds
 from rollouts.reading.guessed_robots import descriptor_digest
-from rollouts.suite.seeds import read_seeds, write_seeds
+from rollouts.reading.manifest import spans_of
 from tasks.registry import full_name, get_task_class, make_scenario
 from tasks.varying.randomization import Randomization
 
@@ -28,7 +29,44 @@ if TYPE_CHECKING:
 FORMAT = 1
 SHORT = 12  # digits of a hash that tell suites apart
 
+MOST_SEEDS = 100_000  # of a case; a receipt of as many episodes can still be read
+
+_SPAN = re.compile(r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,99}")
+
+
+def read_seeds(value: Any) -> tuple[int, ...]:
+    """Return the seeds that a value names, smallest first.
+
+    Args:
+        value: A whole number, a text such as ``"0-99"`` or ``"0-9, 20"``, or a list of these.
+
+    Raises:
+        TaskError: If it names none, or one twice, or more than `MOST_SEEDS`.
+    """
+    spans: list[range] = []
+    for one in list(value) if isinstance(value, (list, tuple, range)) else [value]:
+        whole = int(one) if isinstance(one, float) and one.is_integer() else one  # as files have it
+        for part in str(whole).split(","):
+            match = _SPAN.fullmatch(part.strip())
+            if match is None:
+                raise TaskError(f"seeds is {shown(value)}; it takes 0-99, 7, or a list of such")
+            first, last = int(match[1]), int(match[2] or match[1])
+            if last < first:
+                raise TaskError(f"seeds {first}-{last} end before they begin; write {last}-{first}")
+            spans.append(range(first, last + 1))
+    count = sum(map(len, spans))
+    if not count:
+        raise TaskError(f"seeds is {shown(value)}; one or more are needed, such as 0-99")
+    if count > MOST_SEEDS:
+        raise TaskError(f"seeds are {count:,}; {MOST_SEEDS:,} are most")
+    return tuple(sorted(checked_seeds([seed for span in spans for seed in span])))
+
+
+def write_seeds(seeds: Sequence[int]) -> str:
+    """Return sorted seeds as the text that `read_seeds` reads."""
+    spans = spans_of(seeds)
+    return ", ".join(f"{a}-{b}" if b > a else str(a) for a, b in spans)
 
 
 @dataclass(frozen=True)
@@ -58,7 +96,7 @@ class Case:
 
         Raises:
             UnknownNameError: If there is no such task.
-            TaskError: If seeds, name or modes make no sense, or the task cannot be played in the
+            TaskError: If seeds, name or modes are invalid, or the task cannot be played in the
                 layout.
         """
         cls = get_task_class(self.task)

@@ -1,4 +1,4 @@
-"""The tables of a suite's report, in words, for the page and for Markdown."""
+"""The tables of a suite's report as texts, for the page and for Markdown."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from robots.common.pages import plural
 from rollouts.receipts.receipt import Receipt
 from rollouts.sources.policies import EXPERT
 from rollouts.suite.folder import SuiteRun
-from rollouts.suite.results import Comparison, Result, compare, overall, result_of
-from rollouts.suite.statistics import Interval
+from rollouts.suite.results import Comparison, Interval, Result, compare, overall, result_of
 from rollouts.suite.suite import SHORT
 
 ALL = "all"  # the row of all cases together
@@ -47,56 +46,56 @@ class Table:
 
 def results_of(runs: Sequence[SuiteRun]) -> dict[str, list[Result | None]]:
     """Return how each run did, by case; `ALL` together last, of runs that played anything."""
-    cases = [case.name for case in runs[0].suite.cases]
-    found = {name: [_result(run.receipts.get(name)) for run in runs] for name in cases}
-    return {**found, ALL: [overall(list(run.receipts.values())) for run in runs]}
+    played = [run.receipts for run in runs]
+    found: dict[str, list[Result | None]] = {
+        case.name: [result_of(r[case.name].episodes) if case.name in r else None for r in played]
+        for case in runs[0].suite.cases
+    }
+    return {**found, ALL: [overall(list(receipts.values())) for receipts in played]}
 
 
 def successes(runs: Sequence[SuiteRun]) -> Table:
     """Return the success rate of each case, by run."""
-    names = ("case", *(_column(runs, number, "success") for number in _numbers(runs)), "episodes")
-    rows = [
-        (name, *map(_rate, results), _episodes(results))
-        for name, results in results_of(runs).items()
-    ]
-    return Table(names, rows)
+    rows: list[tuple[str, ...]] = []
+    for name, results in results_of(runs).items():
+        counts = {f"{result.episodes:,}" for result in results if result is not None}
+        rates = [
+            NONE if result is None else f"{percent(result.rate)} ({_interval(result.interval)})"
+            for result in results
+        ]
+        rows.append((name, *rates, " / ".join(sorted(counts)) or NONE))
+    return Table(("case", *_columns(runs, "success"), "episodes"), rows)
 
 
 def lengths(runs: Sequence[SuiteRun]) -> Table:
     """Return lengths and returns of each case, by run."""
-    names = ["case"]
-    for number in _numbers(runs):
-        names += [_column(runs, number, what) for what in ("steps", "from, to", "return")]
+    results = {name: found for name, found in results_of(runs).items() if name != ALL}
     rows = [
-        (name, *(cell for result in results for cell in _length(result)))
-        for name, results in results_of(runs).items()
-        if name != ALL
+        (name, *(cell for result in found for cell in _length(result)))
+        for name, found in results.items()
     ]
-    return Table(tuple(names), rows)
+    return Table(("case", *_columns(runs, "steps", "from, to", "return")), rows)
 
 
 def comparisons(runs: Sequence[SuiteRun]) -> Iterator[tuple[str, Table]]:
     """Yield a title and a table for each run but the first, which it is compared with."""
-    for number in _numbers(runs)[1:]:
-        one, other = runs[number], runs[0]
+    other = runs[0]
+    for letter, one in list(zip(LETTERS, runs, strict=False))[1:]:
         both = [name for name in other.receipts if name in one.receipts]
         if both:
-            names = ("case", f"only {LETTERS[number]}", f"only {LETTERS[0]}")
             found = compare([(one.receipts[name], other.receipts[name]) for name in both])
             rows = [(n, *_compared(c)) for n, c in zip([*both, ALL], found, strict=True)]
-            title = f"{LETTERS[number]} beside {LETTERS[0]}, seed by seed"
-            yield (
-                title,
-                Table((*names, "difference", "95 % interval", "p", "p (Holm)"), rows),
-            )
+            names = ("case", f"only {letter}", f"only {LETTERS[0]}", "difference")
+            title = f"{letter} beside {LETTERS[0]}, seed by seed"
+            yield title, Table((*names, "95 % interval", "p", "p (Holm)"), rows)
 
 
 def failures(runs: Sequence[SuiteRun]) -> Table:
     """Return which seeds failed, and why if that is known."""
     rows = [
-        (LETTERS[number], name, *_failed(receipt))
-        for number in _numbers(runs)
-        for name, receipt in runs[number].receipts.items()
+        (letter, name, *_failed(receipt))
+        for letter, run in zip(LETTERS, runs, strict=False)
+        for name, receipt in run.receipts.items()
         if receipt.success_rate < 1
     ]
     return Table(("run", "case", "failed", "seeds", "reasons"), rows)
@@ -104,22 +103,26 @@ def failures(runs: Sequence[SuiteRun]) -> Table:
 
 def players(runs: Sequence[SuiteRun]) -> Table:
     """Return who played, where, and on what."""
-    rows = [
-        (LETTERS[number], runs[number].folder.resolve().name, *player)
-        for number in _numbers(runs)
-        for player in _players(runs[number])
-    ]
+    rows: list[tuple[str, ...]] = []
+    for letter, run in zip(LETTERS, runs, strict=False):
+        cases = Counter(_player(receipt) for receipt in run.receipts.values())
+        rows += [
+            (letter, run.folder.resolve().name, policy, plural(count, "case"), digest, machine)
+            for (policy, digest, machine), count in cases.items()
+        ]
     return Table(("run", "folder", "policy", "played", "SHA-256 begins", "on"), rows)
 
 
 def receipts(runs: Sequence[SuiteRun]) -> Table:
     """Return how the hash of each receipt begins."""
-    names = ("case", *(_column(runs, number, "receipt") for number in _numbers(runs)))
     rows = [
-        (case.name, *(_short_hash(run.receipts.get(case.name)) for run in runs))
+        (
+            case.name,
+            *(r.hash[:16] if (r := run.receipts.get(case.name)) else NONE for run in runs),
+        )
         for case in runs[0].suite.cases
     ]
-    return Table(names, rows)
+    return Table(("case", *_columns(runs, "receipt")), rows)
 
 
 def percent(share: float) -> str:
@@ -127,27 +130,11 @@ def percent(share: float) -> str:
     return f"{100 * share:.1f}"
 
 
-def _result(receipt: Receipt | None) -> Result | None:
-    return None if receipt is None else result_of(receipt.episodes)
-
-
-def _numbers(runs: Sequence[SuiteRun]) -> range:
-    return range(len(runs))
-
-
-def _column(runs: Sequence[SuiteRun], number: int, what: str) -> str:
-    return what if len(runs) == 1 else f"{LETTERS[number]}: {what}"
-
-
-def _episodes(results: Sequence[Result | None]) -> str:
-    counts = {f"{result.episodes:,}" for result in results if result is not None}
-    return " / ".join(sorted(counts)) or NONE
-
-
-def _rate(result: Result | None) -> str:
-    if result is None:
-        return NONE
-    return f"{percent(result.rate)} ({_interval(result.interval)})"
+def _columns(runs: Sequence[SuiteRun], *names: str) -> list[str]:
+    """Return the names of columns of each run, with its letter where there are several."""
+    if len(runs) == 1:
+        return list(names)
+    return [f"{letter}: {name}" for letter in LETTERS[: len(runs)] for name in names]
 
 
 def _interval(interval: Interval, sign: str = "") -> str:
@@ -182,40 +169,23 @@ def _failed(receipt: Receipt) -> tuple[str, str, str]:
     return f"{len(failed):,}", f"{seeds}{more}", words or NONE
 
 
-def _players(run: SuiteRun) -> Sequence[tuple[str, str, str, str]]:
-    """Return each policy, the cases that it played, its source, and what it was played on."""
-    cases: dict[tuple[str, str, str], list[str]] = {}
-    for name, receipt in run.receipts.items():
-        policy, digest = receipt.policy, receipt.policy.get("sha256") or NONE
-        own = policy["name"] if policy["kind"] != EXPERT else EXPERT
-        digest = NONE if own == EXPERT else digest[:SHORT]
-        cases.setdefault((own, digest, _played_on(receipt)), []).append(name)
-    return [
-        (policy, plural(len(names), "case"), digest, machine)
-        for (policy, digest, machine), names in cases.items()
-    ]
-
-
-def _played_on(receipt: Receipt) -> str:
-    """Return the versions that a paper would name, and the processor."""
+def _player(receipt: Receipt) -> tuple[str, str, str]:
+    """Return who played, its source, and the versions and processor that a paper would name."""
+    policy = receipt.policy
     versions, processor = (receipt.environment[name] for name in ("versions", "processor"))
     known = [f"{name} {versions[name]}" for name in _NAMED if name in versions]
-    return ", ".join([*known, *filter(None, [processor.get("name")])])
-
-
-def _short_hash(receipt: Receipt | None) -> str:
-    return NONE if receipt is None else receipt.hash[:16]
+    machine = ", ".join([*known, *filter(None, [processor.get("name")])])
+    if policy["kind"] == EXPERT:
+        return EXPERT, NONE, machine
+    return policy["name"], (policy.get("sha256") or NONE)[:SHORT], machine
 
 
 def summary(run: SuiteRun) -> Iterator[str]:
-    """Yield what came of a run, a line for each case."""
+    """Yield the success of a run, a line for each case."""
     suite = run.suite
     yield f"{suite.name} {suite.id} in {run.folder}"
     table = successes([run])
     width = max(len(row[0]) for row in table.rows)
     for name, rate, episodes in table.rows:
-        yield (
-            f"  {name:<{width}}  {rate} % of {episodes}"
-            if rate != NONE
-            else (f"  {name:<{width}}  not played")
-        )
+        words = "not played" if rate == NONE else f"{rate} % of {episodes}"
+        yield f"  {name:<{width}}  {words}"

@@ -13,7 +13,7 @@ class Pace:
     """The clock of an episode: a step is never left out.
 
     Steps that are late are taken one right after the other until they have caught up. Where that
-    would take too long the clock stands still meanwhile, and what was lost is told.
+    would take too long the clock stands still meanwhile, which counts as lost.
 
     Attributes:
         lost: For how long the clock has stood still so far (s).
@@ -25,7 +25,7 @@ class Pace:
 
         Args:
             seconds: From one step to the next (s).
-            clock: Tells the time (s).
+            clock: Returns the time (s).
         """
         self._seconds, self._clock = seconds, clock
         self.restart()
@@ -46,7 +46,7 @@ class Pace:
         return self.left() < -self._seconds
 
     def stepped(self) -> None:
-        """Note that a step was taken."""
+        """Count a step that was taken."""
         now = self._clock()
         self._due += self._seconds
         if now - self._due > MOST_BEHIND:

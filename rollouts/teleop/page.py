@@ -14,16 +14,15 @@ from layouts.viewer.page import tell
 from layouts.viewer.server import serving
 from layouts.viewer.text import Text, printable
 from robots import RobotLayoutsError
-from rollouts.teleop.keys import KEYS, KEYS_TEXT, Jog
+from rollouts.teleop.controls import KEYS, KEYS_TEXT, ArmControl, Jog, browser_name
 from rollouts.teleop.pace import Pace
 from rollouts.teleop.picture import Picture
-from rollouts.teleop.seats import Seats
 from rollouts.teleop.session import Phase, Session
 from rollouts.teleop.stopwatch import QUICK, Stopwatch, gizmo_node
 from tasks.description import read_docstring
 
 LONGEST_UNSEEN = 0.1  # s between pictures while late steps are caught up
-IDLE = 0.25  # s between looks at what the page should say while nothing happens
+IDLE = 0.25  # s between updates of the page's texts while nothing happens
 GIZMO_SIZE = 0.2  # m
 UNDO = 1.0  # s that the key takes back
 SLOW = 0.98  # of real time; below that the page says so
@@ -47,16 +46,16 @@ class TeleopPage:
             session: What to steer; its replays are shown from now on.
         """
         self._server, self._session = server, session
-        self._waiting: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._waiting: SimpleQueue[Callable[[], object]] = SimpleQueue()
         self._latest: dict[tuple[int, str], Floats] = {}  # where a browser has dragged a gizmo
-        self._said = self._drawn = 0.0  # when
-        self.pace, self._seats = Pace(session.seconds), Seats(session.arms)
+        self._updated = self._drawn = 0.0  # when
+        self.pace, self._control = Pace(session.seconds), ArmControl(session.arms)
         self._picture = Picture(server, session)
         self._gizmos = {arm: self._add_gizmo(arm) for arm in session.arms}
         self._build()
         session.on_replay = self._show_replay
-        server.on_client_connect(self._greet)
-        server.on_client_disconnect(self._bid_farewell)
+        server.on_client_connect(self._connected)
+        server.on_client_disconnect(self._disconnected)
         self._show_targets()
 
     def run(self) -> NoReturn:
@@ -70,9 +69,9 @@ class TeleopPage:
         asked = self._handle_waiting(max(self.pace.left(), 0.0) if running else IDLE)
         if self._session.phase is Phase.RUNNING and self.pace.left() <= 0:
             self._step()
-        if asked or monotonic() - self._said > IDLE:
-            self._say()
-            self._said = monotonic()
+        if asked or monotonic() - self._updated > IDLE:
+            self._update_texts()
+            self._updated = monotonic()
 
     # -- what happens ------------------------------------------------------------------------
 
@@ -112,14 +111,14 @@ class TeleopPage:
             self._do(self._waiting.get())
         return True
 
-    def _do(self, act: Callable[[], None]) -> None:
+    def _do(self, act: Callable[[], object]) -> None:
         try:
             act()
         except RobotLayoutsError as error:
             self._note.text = f"Not done: {error}"
 
-    def _asks(self, act: Callable[[int], None]) -> Callable[[Any], Any]:
-        """Return a callback of viser that lets the thread of this page do something."""
+    def _callback(self, act: Callable[[int], None]) -> Callable[[Any], Any]:
+        """Return a callback of viser that queues something for the thread of this page."""
 
         async def ask(event: Any) -> None:  # awaited, so that nothing overtakes
             client = event.client_id
@@ -152,15 +151,15 @@ class TeleopPage:
         if phase == "start":
             self._take(client, arm)
         elif phase == "update":
-            if self._latest[client, arm] is pose and self._seats.owns(client, arm):
+            if self._latest[client, arm] is pose and self._control.steers(client, arm):
                 pose[3:] /= np.linalg.norm(pose[3:])
                 self._session.aim(arm, pose)
-        elif phase == "end" and not self._seats.owns(client, arm):
+        elif phase == "end" and not self._control.steers(client, arm):
             self._show_targets()
 
     def _take(self, client: int, arm: str) -> None:
         """Let a browser steer an arm; if a policy has acted so far, people steer now."""
-        self._seats.take(client, arm)
+        self._control.take(client, arm)
         if not self._session.by_hand:
             self._session.take_over()
             self._show_targets()
@@ -169,7 +168,7 @@ class TeleopPage:
         self._session.give_back()
 
     def _jog(self, client: int, jog: Jog) -> None:
-        arm = self._seats.arm_of(client)
+        arm = self._control.arm_of(client)
         self._session.take_over()
         way, turn = jog.scaled(self._key_step.value / 1000, np.radians(self._key_turn.value))
         self._session.shift(arm, way, turn)
@@ -178,7 +177,7 @@ class TeleopPage:
     def _toggle(self, client: int, arm: str | None = None) -> None:
         if arm is not None:
             self._take(client, arm)
-        arm = self._seats.arm_of(client)
+        arm = self._control.arm_of(client)
         self._session.take_over()
         self._session.grip(arm, not self._session.closed[arm])
 
@@ -235,8 +234,8 @@ class TeleopPage:
             gizmo = self._gizmos[arm]
             gizmo.position, gizmo.wxyz = pose[:3], pose[3:]
 
-    def _say(self) -> None:
-        """Say how the episode stands; texts that stay the same are not sent again."""
+    def _update_texts(self) -> None:
+        """Show the state of the episode; texts that stay the same are not sent again."""
         session = self._session
         steps = len(session.actions)
         solved = "solved" if session.success else "not solved"
@@ -261,8 +260,8 @@ class TeleopPage:
             gripper = f", gripper {'closed' if session.closed[arm] else 'open'}"
             own = gripper if arm in session.steering.with_gripper else ""
             place = ", ".join(f"{x:.3f}" for x in session.targets[arm][:3])
-            holder = self._seats.holder(arm)
-            _write(text, f"{holder}{own}\ntarget ({place}) m, {away * 1000:.0f} mm away")
+            status = self._control.status(arm)
+            _write(text, f"{status}{own}\ntarget ({place}) m, {away * 1000:.0f} mm away")
 
     # -- the panel ---------------------------------------------------------------------------
 
@@ -276,13 +275,13 @@ class TeleopPage:
         for note in self._picture.notes:
             Text(gui, note)
         self._status, self._note = Text(gui, ""), Text(gui, "")
-        self._run = self._add_button("Start (P)", self._start_or_stop)
-        self._add_button(f"Back {UNDO:g} s (Z)", self._back)
-        self._add_button("Keep (M)", self._keep)
-        self._add_button("Discard (X)", self._discard)
-        self._add_button("Next seed (N)", self._skip)
+        self._run = self._add_action("Start", "P", self._start_or_stop, "Start or stop")
+        self._add_action(f"Back {UNDO:g} s", "Z", self._back, "Back")
+        self._add_action("Keep", "M", self._keep)
+        self._add_action("Discard", "X", self._discard)
+        self._add_action("Next seed", "N", self._skip)
         if session.has_policy:
-            self._add_button("Back to the policy (B)", self._give_back)
+            self._add_action("Back to the policy", "B", self._give_back)
         self._arm_texts: dict[str, Text] = {}
         for arm in session.arms:
             self._build_arm(arm)
@@ -292,7 +291,8 @@ class TeleopPage:
             quick = gui.add_checkbox(QUICK, False)
             quick.on_update(lambda event: self._picture.hurry(event.target.value))
         with gui.add_folder("Back to an earlier step"):
-            self._build_undo(gui)
+            self._earlier = gui.add_slider("Step", 0, 1, 1, 0)
+            self._add_button("Go back there", lambda _: self._undo(int(self._earlier.value)))
         with gui.add_folder("Keys"):
             Text(gui, f"{KEYS_TEXT}\n{_GIZMO_TEXT}")
             self._key_step = gui.add_slider("Move by (mm)", 1, 50, 1, 10)
@@ -309,29 +309,22 @@ class TeleopPage:
                 self._add_button("Open or close (G)", lambda client: self._toggle(client, arm))
             self._add_button("Stay where it is", lambda client: self._let_go(client, arm))
 
-    def _build_undo(self, gui: Any) -> None:
-        self._earlier = gui.add_slider("Step", 0, 1, 1, 0)
-        self._add_button("Go back there", lambda _: self._undo(int(self._earlier.value)))
-
     def _add_button(self, label: str, act: Callable[[int], None]) -> Any:
         button = self._server.gui.add_button(label)
-        button.on_click(self._asks(act))
+        button.on_click(self._callback(act))
         return button
+
+    def _add_action(
+        self, label: str, key: str, act: Callable[[int], None], command: str | None = None
+    ) -> Any:
+        """Add a button, and a key whose command is called otherwise if need be."""
+        self._add_key(key, command or label, act)
+        return self._add_button(f"{label} ({key})", act)
 
     def _add_keys(self) -> None:
         for key, jog in KEYS.items():
             self._add_key(key, jog.label, lambda client, jog=jog: self._jog(client, jog), jog.shift)
-        for key, label, act in (
-            ("P", "Start or stop", self._start_or_stop),
-            ("Z", "Back", self._back),
-            ("M", "Keep", self._keep),
-            ("X", "Discard", self._discard),
-            ("N", "Next seed", self._skip),
-            ("G", "Open or close the gripper", self._toggle),
-        ):
-            self._add_key(key, label, act)
-        if self._session.has_policy:
-            self._add_key("B", "Back to the policy", self._give_back)
+        self._add_key("G", "Open or close the gripper", self._toggle)
         for number, arm in enumerate(self._session.arms[:9], start=1):
             act = lambda client, arm=arm: self._take(client, arm)  # noqa: E731
             self._add_key(str(number), f"Take {printable(arm)}", act)
@@ -341,15 +334,16 @@ class TeleopPage:
     ) -> None:
         modifier = "shift" if shift else None
         command = self._server.gui.add_command(label, hotkey=key[-1], modifier=modifier)
-        command.on_trigger(self._asks(act))
+        command.on_trigger(self._callback(act))
 
     # -- browsers ----------------------------------------------------------------------------
 
-    async def _greet(self, client: Any) -> None:
-        self._waiting.put(lambda: self._seats.enter(client))
+    async def _connected(self, client: Any) -> None:
+        name = browser_name(client.client_id)
+        self._waiting.put(lambda: Text(client.gui, f"This is {name}."))
 
-    async def _bid_farewell(self, client: Any) -> None:
-        self._waiting.put(lambda: self._seats.leave(client.client_id))
+    async def _disconnected(self, client: Any) -> None:
+        self._waiting.put(lambda: self._control.disconnect(client.client_id))
 
 
 def serve(

@@ -1,4 +1,4 @@
-"""The live picture of a task: where its robots and bodies are, and where one looks at them from."""
+"""The live picture of a task: its robots and bodies, and the first camera pose."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Picture:
 
 
 def viewpoint(session: Session) -> tuple[Floats, Floats]:
-    """Return where the camera is at first, and what it looks at: the TCPs; each (3,) (m, world)."""
+    """Return the first place of the camera, and its target amid the TCPs; each (3,) (m, world)."""
     places = np.array([pose[:3] for pose in session.targets.values()])
     middle = places.mean(axis=0)
     distance = NEAREST + 1.2 * float(np.linalg.norm(np.ptp(places, axis=0)))

@@ -115,7 +115,7 @@ class Session:
 
         Raises:
             UnknownNameError: If no arm of that name can be steered.
-            TaskError: If the pose makes no sense.
+            TaskError: If the pose is invalid.
         """
         self._check(arm)
         pose = np.array(pose, float)
@@ -136,7 +136,7 @@ class Session:
 
         Raises:
             UnknownNameError: If no arm of that name can be steered.
-            TaskError: If it makes no sense.
+            TaskError: If it is invalid.
         """
         self._check(arm)
         pose = self.targets[arm].copy()
@@ -179,7 +179,7 @@ class Session:
         """Take one control step towards what people ask for.
 
         Raises:
-            TaskError: If the policy fails, or its action makes no sense; nothing is done then.
+            TaskError: If the policy fails, or its action is invalid; nothing is done then.
         """
         targets = {arm: pose.copy() for arm, pose in self.targets.items()}
         reference = self.steering.reference.copy()
@@ -205,7 +205,7 @@ class Session:
         """Let the policy act again.
 
         Raises:
-            TaskError: If there is none.
+            TaskError: If there is no policy.
         """
         if self._passed is None:
             raise TaskError("there is no policy to give the arms to")

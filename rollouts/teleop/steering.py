@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from experts.motion_drives import Aim, JointDrive, TcpDrive
+from experts.motion_drives import Aim, MotionDrive, drive_within_bounds
 from experts.script import CLOSED, OPEN
 from experts.tips import link_tree
 from kinematics.rotations import (
@@ -29,59 +28,49 @@ from tasks.driving import DrivenGroup, driven_groups
 SPEED, TURN_SPEED = 0.5, 2.0  # of a TCP (m/s, rad/s)
 JOINT_SPEED = {"rad": 2.0, "m": 0.3}  # rad/s, m/s
 LEAD = {"rad": 0.02, "m": 0.005}  # how far joints are driven ahead of what stops them (rad, m)
-_HALVINGS = 6  # of a step, until all numbers are within bounds
-_Drive = JointDrive | TcpDrive
+_HALVINGS = 5  # of a step, until all numbers are within bounds
 
 
-@dataclass
 class _Arm:
-    """An arm, and what its TCP hangs on.
+    """An arm that can be steered.
 
     Attributes:
         name: As the task calls it.
-        task: Of which it is.
-        groups: What drives it.
-        drives: The same, each in its control mode.
         grippers: Its grippers.
+        drives: What drives its TCP.
+        joints: Those joints, among those of all robots.
+        lead: How far each is driven ahead of what stops it (rad, m).
+        turns: Whether its control mode says how the TCP is turned, too.
+        others: Its other groups, such as fingers that are no gripper.
     """
 
-    name: str
-    task: MultiRobotTask
-    groups: list[DrivenGroup] = field(default_factory=list[DrivenGroup])
-    drives: list[_Drive] = field(default_factory=list[_Drive])
-    grippers: list[DrivenGroup] = field(default_factory=list[DrivenGroup])
-
-    def prepare(self) -> list[_Drive]:
-        """Look up its links, once all of its groups are known.
-
-        Returns:
-            What drives those that do not move its TCP, such as fingers: it is no longer its own.
-        """
-        layout = self.task.layout
-        self._robot = layout.owner(self.name)
+    def __init__(self, name: str, task: MultiRobotTask, driven: Sequence[DrivenGroup]) -> None:
+        """Take the groups of an arm, one or more of which are no gripper."""
+        self.name, layout = name, task.layout
+        self._robot = layout.owner(name)
         before = list(layout)[: list(layout).index(self._robot)]
-        first = sum(layout[name].robot.dof for name in before)
+        first = sum(layout[robot].robot.dof for robot in before)
         robot = layout[self._robot].robot
         tree = link_tree(robot)
-        tcp = find_tcp(layout.arm(self.name).robot, tree)
+        tcp = find_tcp(layout.arm(name).robot, tree)
         self._tree = tree.towards(tcp.needed)
         self._links = [self._tree.link(tree.links[link]) for link in tcp.links]
         self._turned, self._offset = self._tree.link(tree.links[tcp.turned]), tcp.offset
         self._own = slice(first, first + robot.dof)
         moving = {first + int(joint) for joint in self._tree.drivers}
-        moves = [bool(moving & {*np.r_[group.joints].tolist()}) for group in self.groups]
-        others = [drive for drive, own in zip(self.drives, moves, strict=True) if not own]
-        self.drives = [drive for drive in self.drives if drive not in others]
-        self.groups = [group for group, own in zip(self.groups, moves, strict=True) if own]
-        self.joints = np.concatenate([np.r_[group.joints] for group in self.groups])
+        self.grippers = [group for group in driven if is_gripper(group.name)]
+        arm = [group for group in driven if group not in self.grippers]
+        groups = [group for group in arm if moving & {*np.r_[group.joints].tolist()}]
+        self.others = [group for group in arm if group not in groups]
+        self.drives = [MotionDrive(group, task, moves=True) for group in groups]
+        self.joints = np.concatenate([np.r_[group.joints] for group in groups])
         self._free: list[int] = (self.joints - first).tolist()
-        self._rest = self.task.simulation.read().joint_positions[0, self.joints].astype(float)
-        self.turns = all(group.group.asks.turn for group in self.groups if group.group.asks.tcp)
+        self._rest = task.simulation.read().joint_positions[0, self.joints].astype(float)
+        self.turns = all(group.group.asks.turn for group in groups if group.group.asks.tcp)
         self.lead, self._fastest = (
-            np.concatenate([np.full(len(g.group.joints), by[g.group.unit]) for g in self.groups])
+            np.concatenate([np.full(len(g.group.joints), by[g.group.unit]) for g in groups])
             for by in (LEAD, JOINT_SPEED)
         )
-        return others
 
     def ahead(self, target: Floats, joints: Floats, state: State, seconds: float) -> Floats:
         """Return joints of all robots of which this arm's are a step nearer to a pose.
@@ -130,13 +119,15 @@ class Steering:
         if task.num_envs != 1:
             raise TaskError(f"people steer in 1 environment; the task has {task.num_envs}")
         self._task, self._seconds = task, 1 / task.scenario.control_frequency
-        self._arms = {full: _Arm(name, task) for name, full in task.layout.places.items()}
-        self._still: list[_Drive] = []
-        for driven in driven_groups(task.layout):
-            self._take(driven)
-        self._arms = {arm.name: arm for arm in self._arms.values() if arm.groups}
-        for arm in self._arms.values():
-            self._still += arm.prepare()
+        driven = [d for d in driven_groups(task.layout) if d.group.size and not d.group.asks.drive]
+        self._arms: dict[str, _Arm] = {}
+        for name, full in task.layout.places.items():
+            groups = [d for d in driven if d.arm == full]
+            if not all(is_gripper(group.name) for group in groups):
+                self._arms[name] = _Arm(name, task, groups)
+        still = [d for d in driven if d.arm is None]
+        still += [group for arm in self._arms.values() for group in arm.others]
+        self._still = [MotionDrive(group, task, moves=False) for group in still]
         self.arms = tuple(self._arms)
         self.with_gripper = tuple(name for name, arm in self._arms.items() if arm.grippers)
         self.turned = tuple(name for name, arm in self._arms.items() if arm.turns)
@@ -145,7 +136,7 @@ class Steering:
         self.begin_anew()
 
     def begin_anew(self) -> None:
-        """Take all joints where they are now, after somebody else has moved them."""
+        """Start from where all joints are now, after something else has moved them."""
         self._begun = self._task.simulation.read().joint_positions[0].astype(float)
         self.reference = self._begun.copy()
         self._speed = np.zeros_like(self.reference)
@@ -193,22 +184,9 @@ class Steering:
 
     # -- inside ------------------------------------------------------------------------------
 
-    def _take(self, driven: DrivenGroup) -> None:
-        """Note what drives a joint group: an arm that is steered, or what holds it still."""
-        if not driven.group.size or driven.group.asks.drive:
-            return
-        if driven.arm is None or is_gripper(driven.name):
-            if driven.arm is not None:
-                self._arms[driven.arm].grippers.append(driven)
-            else:
-                self._still.append(_drive_of(driven, self._task, moves=False))
-            return
-        self._arms[driven.arm].groups.append(driven)
-        self._arms[driven.arm].drives.append(_drive_of(driven, self._task, moves=True))
-
     def _drive(
         self,
-        drives: list[_Drive],
+        drives: list[MotionDrive],
         joints: NDArray[np.intp],
         here: Floats,
         then: Floats,
@@ -216,43 +194,16 @@ class Steering:
         action: NDArray[np.float32],
     ) -> None:
         """Fill in the numbers that drive joints as far as they go within bounds."""
+
+        def aim(share: float) -> Aim:
+            way = share * (then - here)
+            return Aim(here, way, way / self._seconds - self._speed)
+
         for drive in drives:
             drive.learn(state)
-        enough, too_much, share = 0.0, 1.0, 1.0
-        for _ in range(_HALVINGS):
-            if self._within(drives, self._aim(share, here, then), state, action):
-                enough = share
-            else:
-                too_much = share
-            if enough == 1.0:
-                break
-            share = (enough + too_much) / 2
-        aim = self._aim(enough, here, then)
-        self._within(drives, aim, state, action)
-        self.reference[joints] = (aim.here + aim.way)[joints]
-        self._speed[joints] = aim.way[joints] / self._seconds
-
-    def _aim(self, share: float, here: Floats, then: Floats) -> Aim:
-        way = share * (then - here)
-        return Aim(here, way, way / self._seconds - self._speed)
-
-    def _within(
-        self,
-        drives: list[_Drive],
-        aim: Aim,
-        state: State,
-        action: NDArray[np.float32],
-    ) -> bool:
-        every = True
-        for drive in drives:
-            action[drive.numbers], within = drive.towards(aim, state)
-            every = every and within
-        return every
-
-
-def _drive_of(driven: DrivenGroup, task: MultiRobotTask, *, moves: bool) -> _Drive:
-    kind = TcpDrive if driven.group.asks.tcp else JointDrive
-    return kind(driven, task, 1 / task.scenario.control_frequency, moves=moves)
+        aimed = aim(drive_within_bounds(drives, aim, state, action, _HALVINGS))
+        self.reference[joints] = (aimed.here + aimed.way)[joints]
+        self._speed[joints] = aimed.way[joints] / self._seconds
 
 
 def _gripper_number(gripper: DrivenGroup, closed: bool) -> Floats | float:

@@ -11,12 +11,12 @@ import pytest
 
 import tasks
 from experts import find_expert
-from experts.closed_loop import rehearse
 from experts.geometry import gripper_facing, nearest_quarter_turn, turn, yaw_of
 from experts.rehearsal import (
     Attempt,
     Rehearsal,
     first_success,
+    rehearse,
     rehearsed,
     rehearsing,
     search,

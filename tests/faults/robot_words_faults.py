@@ -11,7 +11,7 @@ from layouts import Layout, Placement, single
 from motion import Motion
 from robots import RobotDescriptor
 from robots.named import named_robot
-from rollouts.suite.included import read_layout
+from rollouts.suite.files import read_layout
 from tests.experts.free_motions import swing
 from tests.faults.fault import GOES_ON, Fault
 from tests.robots.urdf_parts import Parts

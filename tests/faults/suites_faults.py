@@ -305,7 +305,7 @@ def _another(folder: Path) -> None:
 
 
 def _verify(folder: Path, **how: Any) -> None:
-    from rollouts.suite.verifying import verify_run
+    from rollouts.suite.run import verify_run
 
     _play(folder)
     verify_run(folder / "run", workers=0, **how)

@@ -9,7 +9,7 @@ pytest.importorskip("matplotlib")
 
 from measurements import imitation, reinforcement
 from rollouts.receipts import Receipt
-from rollouts.receipts.sources import describe_task
+from rollouts.receipts.provenance import describe_task
 from tasks import get_task_class
 
 ROOT = Path(__file__).parents[2]

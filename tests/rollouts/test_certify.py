@@ -13,7 +13,7 @@ from robots import RecordingError
 from rollouts.__main__ import main
 from rollouts.dataset.certificate import Certificate, sentences
 from rollouts.dataset.certify import certify
-from rollouts.dataset.comparison import difference
+from rollouts.playing.comparison import first_difference
 from rollouts.playing.in_process import InProcessExecutor
 from rollouts.reading.recording import open_trajectories
 from rollouts.reading.trajectory import TrajectoryError
@@ -86,10 +86,10 @@ def test_a_zero_of_another_sign_is_a_difference(recorded):
     with open_trajectories(recorded) as file:
         episode = file[0]
     played = play(env, 0, episode.actions)
-    assert difference(episode, played) is None
+    assert first_difference(episode, played) is None
     speeds = played.states["actors"]["Tee"]
     speeds[0, 10] = -0.0
-    assert str(difference(episode, played)) == "at the start in env_states/actors/Tee"
+    assert str(first_difference(episode, played)) == "at the start in Tee, max |Δ| 0.0e+00"
 
 
 def test_a_damaged_episode_does_not_hide_the_others(copy):

@@ -12,7 +12,7 @@ from robots import RobotLayoutsError
 from rollouts.__main__ import main
 from rollouts.dataset.charts import histogram
 from rollouts.dataset.clearance import measure
-from rollouts.dataset.clips import chosen
+from rollouts.dataset.clips import chosen_places
 from rollouts.dataset.contents import numbers_of, read_contents
 from rollouts.dataset.report import make_report
 from rollouts.playing.replay import open_recording, task_for
@@ -52,7 +52,7 @@ def test_the_contents_are_read_from_all_files(recorded):
 
 
 def test_clips_are_of_episodes_that_differ(recorded):
-    found = chosen(read_contents(recorded), 4)
+    found = chosen_places(read_contents(recorded), 4)
     assert list(found) == [0, 5, 3, 1]
     assert found[5] == "the longest"
 

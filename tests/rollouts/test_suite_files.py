@@ -8,8 +8,7 @@ import pytest
 from layouts import Layout, face_to_face
 from robots import TaskError, UnknownNameError
 from rollouts.suite.files import SHIPPED, load_suite, save_suite
-from rollouts.suite.seeds import read_seeds, write_seeds
-from rollouts.suite.suite import Case, Suite
+from rollouts.suite.suite import Case, Suite, read_seeds, write_seeds
 from tasks import Randomization
 from tasks.registry import CATALOGUE
 from tests.rollouts.suites import written

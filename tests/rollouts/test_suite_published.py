@@ -11,7 +11,7 @@ from experts import find_expert
 from robots import RobotRegistry
 from rollouts.reading.guessed_robots import descriptor_digest
 from rollouts.receipts import Receipt
-from rollouts.receipts.sources import describe_expert, describe_task
+from rollouts.receipts.provenance import describe_expert, describe_task
 from rollouts.suite.files import load_suite
 from rollouts.suite.folder import expect_untouched, read_run
 from rollouts.suite.page import read_runs, render_markdown

@@ -17,10 +17,8 @@ from rollouts.playing.executor import WorkerError
 from rollouts.receipts.receipt import Receipt, ReceiptError
 from rollouts.suite.files import load_suite, save_suite
 from rollouts.suite.folder import begin_run, read_run, receipt_path
-from rollouts.suite.policies import chosen_cases, chosen_policies
-from rollouts.suite.run import run_suite
+from rollouts.suite.run import chosen_cases, chosen_policies, run_suite, verify_run
 from rollouts.suite.suite import Case, Suite
-from rollouts.suite.verifying import verify_run
 from tasks import Randomization
 from tests.rollouts.kills import Kill, Killed
 from tests.rollouts.policies import TASK, Leans, fails, still
@@ -128,12 +126,12 @@ def test_who_plays():
 
     def players(given, policies=None):
         suite_of_policies = replace(suite, policies=policies or {})
-        return [p.policy for p in chosen_policies(suite_of_policies, suite.cases, given).values()]
+        return list(chosen_policies(suite_of_policies, suite.cases, given).values())
 
     assert players(None) == ["expert", "expert"]
-    assert players(None, {"PushT-v1": STILL, "others": "expert"}) == [still, "expert"]
+    assert players(None, {"PushT-v1": STILL, "others": "expert"}) == [STILL, "expert"]
     assert players("expert", {"others": STILL}) == ["expert", "expert"]
-    assert players({"push_t": STILL, "pick_cube": fails}) == [still, fails]
+    assert players({"push_t": STILL, "pick_cube": fails}) == [STILL, fails]
     with pytest.raises(TaskError, match="nobody plays PickCube-v1; name its policy, or one for 'o"):
         players({"PushT-v1": STILL})
     with pytest.raises(TaskError, match="the policy of PushT-v1 is given twice"):

@@ -6,7 +6,7 @@ from math import comb
 import pytest
 from scipy.stats import binomtest
 
-from rollouts.suite.statistics import holm, mcnemar, paired_difference, wilson
+from rollouts.suite.results import holm, mcnemar, paired_difference, wilson
 
 
 @pytest.mark.parametrize("episodes", [1, 2, 10, 100])

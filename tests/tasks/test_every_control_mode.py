@@ -23,7 +23,7 @@ from robots import (
     TaskError,
     UnknownNameError,
 )
-from rollouts.playing.mode_conversion import converted
+from rollouts.playing.mode_conversion import converted_steps
 from simulation import PhysicsSettings, Simulation
 from tasks.episode import Episode, play
 from tasks.registry import make_scenario
@@ -51,7 +51,7 @@ def episodes(task_id, mode, steps):
         closing(tasks.make(task_id, obs_mode="none")) as source,
         closing(tasks.make(task_id, obs_mode="none", control_mode=mode)) as task,
     ):
-        actions = converted(source, 1, touching_episode(task_id, 1).actions, task)
+        actions, _ = converted_steps(source, 1, touching_episode(task_id, 1).actions, task)
     return [*found, Episode(1, actions)]
 
 

@@ -1,11 +1,11 @@
-"""Which code a task or a policy is: its name, where it can be imported, and checksums of files."""
+"""What an evaluation depends on: task and policy with their code and files, and the machine."""
 
 from __future__ import annotations
 
 import os
 import re
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
@@ -15,16 +15,75 @@ import torch
 
 from experts.registry import Expert
 from robots import UnreadableFileError
-from robots.common.files import open_regular
 from robots.common.rooms import ROOMS
-from rollouts.receipts.receipt import ReceiptError
-from rollouts.sources.actors import definition, name_of
+from rollouts.playing.evaluation_job import EvaluationJob, TracedScore
+from rollouts.playing.together import is_batched
+from rollouts.reading.guessed_robots import describe_guessed
+from rollouts.receipts.making import describe_making
+from rollouts.receipts.receipt import EpisodeReceipt, Receipt, ReceiptError
+from rollouts.sources.actors import checksum, definition, name_of
 from tasks import MultiRobotTask
+from tasks.episode import Score
 
 EXPERT, POLICY = "expert", "policy"
-_MAIN = "__main__"  # a script or a notebook, which nobody can import
-_CHUNK = 2**20  # bytes read at a time
+_MAIN = "__main__"  # a script or a notebook, which cannot be imported
 _VARIABLE = re.compile(r"""\b(?:environ(?:\.get\(|\[)|getenv\()\s*["'](\w+)["']""")
+
+
+def describe_job(job: EvaluationJob, name: str | None = None) -> dict[str, Any]:
+    """Return the parts of a receipt that describe what is played: ``task``, ``policy``, ``making``.
+
+    Args:
+        job: What is played.
+        name: Where its policy was imported from, ``module:name``; None: it is looked for.
+
+    Raises:
+        AssetError: If robot files cannot be found.
+        ReceiptError: If a file of the policy cannot be read.
+    """
+    cast = job.cast
+    at_once = job.scenario.num_envs if is_batched(cast.policy) else None
+    expert = cast.expert
+    return {
+        "task": describe_task(job.task),
+        "policy": describe_policy(cast.policy, name) if expert is None else describe_expert(expert),
+        "making": describe_making(job.task, job.scenario, at_once),
+    }
+
+
+def receipt_of(
+    described: Mapping[str, Any], job: EvaluationJob, scores: Mapping[int, Score]
+) -> Receipt:
+    """Return the receipt of episodes that were played.
+
+    Its environment is that of the first episode; in ``others`` are those that differ from it.
+
+    Args:
+        described: What `describe_job` returned before they were.
+        job: What was played.
+        scores: Seed → how it went, each a `TracedScore`.
+    """
+    traced = {seed: score for seed, score in scores.items() if isinstance(score, TracedScore)}
+    different: list[Mapping[str, Any]] = []
+    for score in traced.values():
+        if score.environment not in different:
+            different.append(score.environment)
+    first, *others = different
+    more = {
+        "others": others,
+        "guessed": describe_guessed(job.scenario.layout),
+        "variables": variables_read(job.cast.policy, described["policy"]["name"]),
+    }
+    return Receipt(
+        **described,
+        environment={**first, **{name: value for name, value in more.items() if value}},
+        episodes=tuple(
+            EpisodeReceipt(
+                seed, s.success, s.steps, s.total, s.trace.states, s.trace.trace, s.reason
+            )
+            for seed, s in traced.items()
+        ),
+    )
 
 
 def describe_task(cls: type[MultiRobotTask]) -> dict[str, Any]:
@@ -39,7 +98,7 @@ def describe_task(cls: type[MultiRobotTask]) -> dict[str, Any]:
         "id": cls.task_id,
         "class": f"{cls.__module__}:{cls.__qualname__}",
         "sha256": _module_checksum(cls.__module__),
-        **_also(outside),
+        **_filled(also={name: _module_checksum(name) for name in outside}),
     }
 
 
@@ -71,9 +130,11 @@ def describe_policy(policy: Any, name: str | None = None) -> dict[str, Any]:
         "name": found or name_of(policy),
         "importable": found is not None,
         "sha256": _module_checksum(module),
-        **_also([defining] if defining != module else []),
-        **_named("files", _files(policy)),
-        **_named("weights", _weights(policy)),
+        **_filled(
+            also={} if defining == module else {defining: _module_checksum(defining)},
+            files=_files(policy),
+            weights=_weights(policy),
+        ),
     }
 
 
@@ -94,19 +155,6 @@ def variables_read(policy: Any, name: str) -> str:
     return " ".join(sorted(found & {*os.environ}))
 
 
-def checksum(path: str | os.PathLike[str]) -> str:
-    """Return the SHA-256 of a file, in hex.
-
-    Raises:
-        UnreadableFileError: If it cannot be read.
-    """
-    digest = sha256()
-    with open_regular(path) as stream:
-        while chunk := stream.read(_CHUNK):
-            digest.update(chunk)
-    return digest.hexdigest()
-
-
 def _importable_name(policy: Any) -> str | None:
     """Return ``module:name`` by which another process finds this very thing, if there is one."""
     module = definition(policy).__module__
@@ -117,12 +165,9 @@ def _importable_name(policy: Any) -> str | None:
     return None if found is None else f"{module}:{found}"
 
 
-def _also(modules: Iterable[str]) -> dict[str, Any]:
-    return _named("also", {name: _module_checksum(name) for name in modules})
-
-
-def _named(name: str, checksums: Mapping[str, str | None]) -> dict[str, Any]:
-    return {name: dict(checksums)} if checksums else {}
+def _filled(**parts: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those parts that hold something."""
+    return {name: part for name, part in parts.items() if part}
 
 
 def _module_checksum(name: str) -> str | None:
@@ -153,11 +198,8 @@ def _weights(policy: Any) -> dict[str, str]:
     if isinstance(policy, torch.nn.Module):
         return {"self": _tensors(policy)}
     kept: dict[str, Any] = getattr(policy, "__dict__", {})
-    return {
-        name: _tensors(value)
-        for name, value in sorted(kept.items())
-        if isinstance(value, torch.nn.Module)
-    }
+    networks = {name: own for name, own in kept.items() if isinstance(own, torch.nn.Module)}
+    return {name: _tensors(network) for name, network in sorted(networks.items())}
 
 
 def _tensors(network: torch.nn.Module) -> str:
