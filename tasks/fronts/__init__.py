@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from robots import MissingPackageError
-from tasks.fronts.names import NAMESPACE
+from tasks.fronts.spec import NAMESPACE, TaskSpec
 from tasks.registry import list_own, list_tasks
 
 if TYPE_CHECKING:
@@ -32,8 +32,6 @@ def register() -> None:
     which imports the module and looks the id up, finds them.
     """
     from gymnasium import registry
-
-    from tasks.fronts.spec import TaskSpec
 
     names = {f"{NAMESPACE}/{task_id}": task_id for task_id in list_tasks()}
     names |= {task_id: task_id for task_id in list_own()}

@@ -18,7 +18,7 @@ from tasks.engine.arguments import checked_seeds, own_options
 from tasks.engine.columns import COLUMN_MODES
 from tasks.engine.observation import SEEN_COLUMNS, space_of
 from tasks.engine.remade import Remade
-from tasks.fronts.numbers import info_row, row, stepper
+from tasks.fronts.gymnasium import info_row, row, stepper
 from tasks.language.randomness import FirstSeeds
 from tasks.native.controllers import CONTROLLER
 from tasks.native.format import native_places, observation_keys

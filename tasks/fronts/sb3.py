@@ -20,9 +20,8 @@ from stable_baselines3.common.vec_env.base_vec_env import (
 from robots import SimulationError, TaskError
 from tasks.engine.arguments import RECONFIGURE, own_options
 from tasks.engine.remade import Remade
-from tasks.fronts.attributes import UnknownAttributeError
-from tasks.fronts.names import NAMESPACE
-from tasks.fronts.vector import VectorTask
+from tasks.fronts.spec import NAMESPACE
+from tasks.fronts.vector import UnknownAttributeError, VectorTask
 from tasks.registry import get_task_class
 
 
