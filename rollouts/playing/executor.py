@@ -86,7 +86,7 @@ class ProcessExecutor:
                 until its worker is ended, which counts as a death; None if it may take for ever.
 
         Raises:
-            TaskError: If a number makes no sense.
+            TaskError: If a number is not valid.
         """
         if workers is not None:
             check_count("workers", workers, 1)
@@ -139,7 +139,7 @@ def choose_executor(
         episode_timeout: See `ProcessExecutor`.
 
     Raises:
-        TaskError: If a number makes no sense, or contradicts the executor.
+        TaskError: If a number is not valid, or contradicts the executor.
     """
     if workers is not None:
         check_count("workers", workers, 0)
@@ -154,7 +154,7 @@ def choose_executor(
         if limited and episode_timeout is not None:
             raise TaskError(
                 f"episode_timeout is {episode_timeout!r}, but with workers=0 this process plays,"
-                " and nobody could end it; take workers=1"
+                " and nothing could end it; take workers=1"
             )
         from rollouts.playing.in_process import InProcessExecutor  # needs torch
 

@@ -100,7 +100,7 @@ class Cluster:
 
     @property
     def free_cpus(self) -> int:
-        """How many CPUs nobody uses."""
+        """How many CPUs are free."""
         return int(self._ask(self._ray.available_resources).get("CPU", 0))
 
     def nodes(self) -> dict[str, dict[str, float]]:
@@ -211,7 +211,7 @@ def _connect(address: str, own_host: str = "") -> None:
     """Open and close a connection.
 
     Raises:
-        OSError: If nobody listens there.
+        OSError: If nothing listens there.
     """
     found = _ADDRESS.fullmatch(address)
     if found is not None:

@@ -65,7 +65,7 @@ class RayExecutor:
 
         Raises:
             MissingPackageError: If Ray is not installed.
-            TaskError: If it cannot be an address, or a number makes no sense.
+            TaskError: If it cannot be an address, or a number is not valid.
         """
         self._ray = import_ray()
         check_address(address)

@@ -85,11 +85,7 @@ class SeedWorker(Protocol):
     """
 
     name: str
-
-    @property
-    def begun(self) -> float | None:
-        """See above."""
-        ...
+    begun: float | None
 
     def request(self, seed: int, /) -> Any:
         """Let it play a seed."""
@@ -146,7 +142,7 @@ class RetryPolicy:
             its worker is ended, which counts as a death; None if it may take for ever.
 
     Raises:
-        TaskError: If a number makes no sense.
+        TaskError: If a number is not valid.
     """
 
     attempts: int = DEATHS_ALLOWED
@@ -173,7 +169,7 @@ def check_timeout(value: float | None) -> None:
     """Refuse what is no limit in seconds.
 
     Raises:
-        TaskError: If it is none.
+        TaskError: If it is not one.
     """
     number = isinstance(value, int | float) and not isinstance(value, bool)
     if value is not None and not (number and 0 < value < math.inf):

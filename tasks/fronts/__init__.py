@@ -120,7 +120,7 @@ def lerobot_vec_env(
         num_envs: Number of environments.
         num_workers: Number of processes; None takes one per core, 0 this process.
         fields: ``obs_mode``, one of ``"lerobot"``, ``"lerobot+video"`` and ``"lerobot+cameras"``;
-            ``instruction``, what policies are told to do if it is not the task's own sentence;
+            ``instruction``, what policies are asked to do if it is not the task's own sentence;
             ``timeout`` and ``render_mode``, as ``gymnasium.make_vec`` takes them; and other
             arguments of `tasks.make`.
 

@@ -56,21 +56,6 @@ class Part:
         return range(self.start, self.stop)
 
 
-@dataclass(frozen=True)
-class Beginning:
-    """Which environments of a batch begin new episodes.
-
-    Attributes:
-        env_ids: Their numbers in the batch.
-        seeds: The seed of each; None lets its random streams run on.
-        reconfigure: Whether their worlds are rebuilt.
-    """
-
-    env_ids: list[int]
-    seeds: list[int | None]
-    reconfigure: bool
-
-
 class Batch:
     """Environments of one process; each call leaves what it found in their rows of arrays."""
 
@@ -111,18 +96,23 @@ class Batch:
         self._write(*self._task.start)
         self._rows[SEEDS][:] = self._task.seeds
 
-    def reset(self, beginning: Beginning) -> None:
-        """Begin new episodes."""
-        ids, seeds = beginning.env_ids, beginning.seeds
-        seeded = [i for i, seed in zip(ids, seeds, strict=True) if seed is not None]
-        running_on = [i for i in ids if i not in set(seeded)]
-        options = {"reconfigure": beginning.reconfigure}
+    def reset(self, env_ids: Sequence[int], seeds: Sequence[int | None], reconfigure: bool) -> None:
+        """Begin new episodes.
+
+        Args:
+            env_ids: The environments' numbers in the batch.
+            seeds: The seed of each; None lets its random streams run on.
+            reconfigure: Whether their worlds are rebuilt.
+        """
+        seeded = [i for i, seed in zip(env_ids, seeds, strict=True) if seed is not None]
+        running_on = [i for i in env_ids if i not in set(seeded)]
+        options = {RECONFIGURE: reconfigure}
         for some in (seeded, running_on):
             if some:
                 own = [s for s in seeds if s is not None] if some is seeded else None
                 self._write(*self._task.reset(own, options, some), some)
         self._rows[SEEDS][:] = self._task.seeds
-        self._clear_flags(ids)
+        self._clear_flags(env_ids)
 
     def step(self, env_ids: list[int] | None = None) -> None:
         """Advance environments by one control step with the actions in its rows.

@@ -77,7 +77,7 @@ class GymnasiumTask(Remade, gymnasium.Env[Any, NDArray[np.float32]]):
             Observation and info.
 
         Raises:
-            TaskError: If an argument makes no sense; nothing is reset then.
+            TaskError: If an argument is not valid; nothing is reset then.
         """
         known = own_options(options)
         own = self._first.fill(checked_seeds(seed, (0,)), (0,))
@@ -103,8 +103,8 @@ class GymnasiumTask(Remade, gymnasium.Env[Any, NDArray[np.float32]]):
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
         """Return a picture, (512, 512, 3) uint8.
 
-        Without ``render_mode="rgb_array"`` there is none, which a warning says: Gymnasium's
-        interface has it so, and trainers call this unasked.
+        Without ``render_mode="rgb_array"``, this warns and returns None, as Gymnasium's interface
+        asks: trainers call it whether pictures are wanted or not.
         """
         if self.render_mode is None:
             logger.warn("this task draws no pictures; make it with render_mode='rgb_array'")

@@ -21,7 +21,7 @@ from tasks.engine.actions import ActionReader
 from tasks.engine.arguments import RECONFIGURE, checked_options, checked_seeds
 from tasks.engine.observation import space_of
 from tasks.engine.remade import Remade
-from tasks.fronts.batch import Beginning, Part
+from tasks.fronts.batch import Part
 from tasks.fronts.gymnasium import RENDER_MODES
 from tasks.fronts.results import Results
 from tasks.fronts.workers import InProcess, WorkerError, Workers, shared_out
@@ -62,8 +62,8 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
     whatever the number of workers. Every worker holds some consecutive environments; actions and
     results go through memory that all processes share.
 
-    `step` waits for all environments. With a ``batch_size``, `send` and `recv` wait for nobody:
-    they give actions to any environments, and return the first ones that are ready.
+    `step` waits for all environments. `send` gives actions to any of them, and `recv` returns the
+    first ``batch_size`` that are ready.
 
     A worker that dies, hangs or fails is reported as a `WorkerError` with its environments and
     their seeds. The others are as if nothing had happened, and `restart` replaces it. If Ctrl-C
@@ -108,7 +108,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
                 step does, and ``info`` keeps ``final_obs`` and ``final_info``; with ``DISABLED``
                 nothing does, and stepping past the end is allowed.
             ignore_terminations: Whether nothing ends an episode but its last step, and
-                ``terminated`` is always false; ``info`` still tells of success. A policy that
+                ``terminated`` is always false; ``info`` still has ``success``. A policy that
                 learns from dense rewards, which success would cut short, else learns to avoid it.
             timeout: Seconds that workers may take for a step or a reset; None waits for ever.
             render_mode: ``"rgb_array"`` to draw pictures, which needs a Vulkan driver.
@@ -169,11 +169,11 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
                 ``{"reconfigure": True}`` rebuilds the worlds. Others are ignored.
 
         Returns:
-            Observation of all environments and info, which tells of those that were reset:
+            Observation of all environments and info, which is about those that were reset:
             ``info["seed"]`` is what their random streams began with, (N,) int64.
 
         Raises:
-            TaskError: If an argument makes no sense; nothing is reset then.
+            TaskError: If an argument is not valid; nothing is reset then.
             WorkerError: If workers die, hang or fail.
         """
         mask, reconfigure = self._checked_options(options)
@@ -220,7 +220,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
 
         Raises:
             ActionError: If the action has a wrong shape, type or number; nothing moves then.
-            TaskError: If an environment is none, or named twice.
+            TaskError: If there is no such environment, or one is named twice.
             SimulationError: If one was sent an action before and not received since.
             WorkerError: If workers are gone.
         """
@@ -241,7 +241,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
 
         Returns:
             Observation, reward, terminated, truncated and info as `step` returns them, with a row
-            for each environment that came back; ``info["env_id"]`` tells which those are, (n,).
+            for each environment that came back; ``info["env_id"]`` has their numbers, (n,).
 
         Raises:
             SimulationError: If fewer environments were sent actions.
@@ -270,7 +270,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             Observation and info of all environments; those that were not gone are as they were.
 
         Raises:
-            TaskError: If a seed is none, or of an environment that is not gone.
+            TaskError: If a seed is not valid, or of an environment that is not gone.
             WorkerError: If a worker ends before it is ready; another attempt is allowed.
         """
         self._expect_open()
@@ -343,16 +343,18 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
 
     def _beginnings(
         self, ids: list[int], seeds: list[int | None], reconfigure: bool
-    ) -> dict[int, tuple[Beginning]]:
-        beginnings: dict[int, tuple[Beginning]] = {}
-        for number, part in enumerate(self._holder.parts):
-            own = [i for i in ids if i in part.env_ids]
-            if own:
-                local = [i - part.start for i in own]
-                beginnings[number] = (Beginning(local, [seeds[i] for i in own], reconfigure),)
-        return beginnings
+    ) -> dict[int, tuple[Any, ...]]:
+        """Return what the parts that environments are in are reset with; see `Batch.reset`."""
+        return {
+            number: (
+                [i - self._holder.parts[number].start for i in own],
+                [seeds[i] for i in own],
+                reconfigure,
+            )
+            for number, own in self._by_part(ids)
+        }
 
-    def _by_part(self, env_ids: NDArray[np.intp]) -> Iterator[tuple[int, list[int]]]:
+    def _by_part(self, env_ids: Any) -> Iterator[tuple[int, list[int]]]:
         """Yield the parts that environments are in, by number, and which of them are in each."""
         chosen = np.zeros(self.num_envs, bool)
         chosen[env_ids] = True

@@ -110,7 +110,7 @@ class Pending:
 
     @property
     def env_ids(self) -> list[int]:
-        """The environments whose results nobody has taken."""
+        """The environments whose results were not taken yet."""
         return [i for _, env_ids in self._steps for i in env_ids]
 
     @property
@@ -368,7 +368,7 @@ class Workers:
         return {i: request.result for i, request in requests.items()}
 
     def _wait(self, over: Callable[[], bool], timeout: float | None) -> None:
-        """Read replies until something is so, or nobody is left who could change it.
+        """Read replies until a condition holds, or no worker is left that could change it.
 
         Raises:
             WorkerError: If workers died, hung or failed meanwhile.
@@ -457,8 +457,7 @@ class _Batches:
     def _call(self, place: int | None, method: str, arguments: tuple[Any, ...]) -> Any:
         """Call a method of a batch, or one of this object where there is no place.
 
-        After an error, all further calls end with that error: the first may have come when
-        nobody waited for it any more.
+        After an error, all further calls end with that error: its reply may have been missed.
         """
         if self._error is not None:
             raise self._error

@@ -229,7 +229,7 @@ def _start_all(calls: SimpleQueue[_Call]) -> None:
             result.set_result(call())
         except BaseException as error:
             result.set_exception(error)
-        del call, result  # held by nobody while this waits
+        del call, result  # not kept alive while this waits
 
 
 def _disown() -> None:

@@ -24,7 +24,7 @@ _HINT = (
 
 
 class RemoteError(WorkerError):
-    """An error that is none of ours, as it arrives here; says its kind, words and place."""
+    """An error that is not a `RobotLayoutsError`, as it arrives here, with its kind and place."""
 
 
 class WorkerTraceback(Exception):

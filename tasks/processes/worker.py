@@ -23,7 +23,7 @@ MAKE = 0  # the request that a worker begins with
 
 _HEAD = struct.Struct("!QII")  # the message's number, the packet's, and how many there are
 _PIECE = 2**15  # bytes of a message in one packet; well below Linux's default buffer of a socket
-_LOST_SERVER = 255  # what multiprocessing takes for an exit code if nobody says it
+_LOST_SERVER = 255  # multiprocessing's exit code of a process whose server has ended
 _IMPORT_FAILED = 1  # exit code of a worker that could not import the main module
 
 
@@ -76,7 +76,7 @@ class Channel:
         """Send a message.
 
         Raises:
-            OSError: If the other end is gone, or nobody reads there.
+            OSError: If the other end is gone, or does not read for too long.
         """
         count = max(1, -(-len(message) // _PIECE))
         for i in range(count):
@@ -149,7 +149,8 @@ class Worker:
             limit = struct.pack("ll", whole, int((timeout - whole) * 1e6))
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, limit)
         self.pid, self.sentinel = self._process.pid or 0, self._process.sentinel
-        self.name, self.begun = f"process {self.pid}", time.monotonic()
+        self.name = f"process {self.pid}"
+        self.begun: float | None = time.monotonic()
         self.ready, self.last = False, MAKE
         self._channel = Channel(self.socket)
         self._send(make)
@@ -264,7 +265,7 @@ class Pool:
 
         Raises:
             WorkerError: If a worker died.
-            RobotLayoutsError: What a request raised, a `RemoteError` if that was none of ours.
+            RobotLayoutsError: What a request raised, a `RemoteError` if that was another's.
         """
         results: dict[Worker, Any] = {}
         asked = list(workers)

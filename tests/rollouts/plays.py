@@ -202,13 +202,6 @@ class Here:
             yield Event(seed, result=play(seed))
 
 
-def blocked_signals():
-    """Return which signals this process holds back, as the kernel writes it."""
-    status = Path("/proc/self/status").read_text()
-    (mask,) = (line.split()[1] for line in status.splitlines() if line.startswith("SigBlk"))
-    return lambda seed: mask
-
-
 class CodeFolder:
     """Plays that tell where the code of the library lies, in a module that travels along."""
 

@@ -164,6 +164,7 @@ def test_a_worker_finds_the_libraries_loaded_and_everything_else_as_it_is_now(
     assert drawn != first  # forks of one process draw different numbers all the same
 
 
+@pytest.mark.long
 def test_a_program_that_is_read_from_standard_input_may_have_workers(monkeypatch):
     main = sys.modules["__main__"]
     monkeypatch.setattr(main, "__spec__", None)
@@ -237,6 +238,7 @@ def test_a_task_that_cannot_be_built_says_where_and_that_there_is_no_vector():
     assert "breaking.py" in cause
 
 
+@pytest.mark.long
 def test_an_error_of_ours_keeps_its_type_and_says_where_it_came_from():
     with pytest.raises(TaskError, match="no such goal") as caught:
         VectorTask("Refuses-v1", 2, num_workers=1)

@@ -117,6 +117,7 @@ def test_workers_change_nothing_in_any_task(task_id, num_workers):
         assert differences(play(env, mode, 12), together) == []
 
 
+@pytest.mark.long
 def test_it_begins_and_goes_on_as_the_batched_task_does():
     """PegInsertionSide draws its geometry at every reset."""
     task_id = "PegInsertionSide-v1"

@@ -221,6 +221,7 @@ def test_closing_leaves_nothing():
         env.step(ACTION[:2])
 
 
+@pytest.mark.long
 def test_what_cannot_be_built_raises_here_and_leaves_nothing():
     before = workers()
     two = face_to_face({"a": "panda", "b": "panda"}, spacing=1.0)
