@@ -21,7 +21,51 @@ from tasks.registry import make
 RENDER_MODES = ["rgb_array"]
 
 
-class GymnasiumTask(Remade, gymnasium.Env[Any, NDArray[np.float32]]):
+class OneEnvironment(Remade):
+    """What interfaces to a task with one environment share.
+
+    Attributes:
+        task: The task.
+        render_mode: ``"rgb_array"`` if it draws pictures.
+    """
+
+    def _make(self, task_id: str, render_mode: str | None, fields: Mapping[str, Any]) -> int:
+        """Make the task; returns how many control steps a second has, to the next integer."""
+        self.task = make(task_id, render_mode=render_mode, **fields)
+        self.render_mode = render_mode
+        self._step = stepper(self.task)
+        self._first = FirstSeeds(1)
+        self._seed = self.task.seeds[0]
+        return round(self.task.scenario.control_frequency)
+
+    def _begin(
+        self, seed: int | None, options: dict[str, Any] | None
+    ) -> tuple[Any, dict[str, Any], int | None]:
+        """Begin a new episode; returns the observation, the info and the seed that was drawn."""
+        known = own_options(options)
+        own = self._first.fill(checked_seeds(seed, (0,)), (0,))
+        obs, info = self.task.reset(own, known)
+        self._first.given((0,))
+        self._seed = self.task.seeds[0]
+        return obs, info_row(info, self._seed), own[0]
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a picture, (512, 512, 3) uint8.
+
+        Without ``render_mode="rgb_array"``, this warns and returns None, as Gymnasium's interface
+        asks: trainers call it whether pictures are wanted or not.
+        """
+        if self.render_mode is None:
+            logger.warn("this task draws no pictures; make it with render_mode='rgb_array'")
+            return None
+        return self.task.render()[0]
+
+    def close(self) -> None:
+        """Let the world go."""
+        self.task.close()
+
+
+class GymnasiumTask(OneEnvironment, gymnasium.Env[Any, NDArray[np.float32]]):
     """What ``gymnasium.make("RobotLayouts/PickCube-v1")`` gives.
 
     The first ``reset`` without a seed draws one from the system's entropy; later ones let the
@@ -54,12 +98,7 @@ class GymnasiumTask(Remade, gymnasium.Env[Any, NDArray[np.float32]]):
             raise TaskError("gymnasium.make makes one environment; make_vec takes num_envs")
         if "max_episode_steps" in fields:
             raise TaskError("time limits are gymnasium.make's: gymnasium.make(max_episode_steps=…)")
-        self.task = make(task_id, render_mode=render_mode, **fields)
-        self._step = stepper(self.task)
-        self._first = FirstSeeds(1)
-        self._seed = self.task.seeds[0]
-        self.render_mode = render_mode
-        frames = round(self.task.scenario.control_frequency)
+        frames = self._make(task_id, render_mode, fields)
         self.metadata = {**self.metadata, "render_fps": frames}  # type: ignore[misc]
         self.action_space = self.task.single_action_space
         self.observation_space = space_of(row(self.task.start[0]))
@@ -79,13 +118,9 @@ class GymnasiumTask(Remade, gymnasium.Env[Any, NDArray[np.float32]]):
         Raises:
             TaskError: If an argument is not valid; nothing is reset then.
         """
-        known = own_options(options)
-        own = self._first.fill(checked_seeds(seed, (0,)), (0,))
-        obs, info = self.task.reset(own, known)
-        self._first.given((0,))
-        self._seed = self.task.seeds[0]
-        super().reset(seed=own[0])
-        return row(obs), info_row(info, self._seed)
+        obs, info, own_seed = self._begin(seed, options)
+        super().reset(seed=own_seed)
+        return row(obs), info
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Advance by one control step.
@@ -99,21 +134,6 @@ class GymnasiumTask(Remade, gymnasium.Env[Any, NDArray[np.float32]]):
         obs, reward, terminated, _, info = self._step(action)
         ended = bool(terminated[0])
         return row(obs), reward[0].item(), ended, False, info_row(info, self._seed)
-
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
-        """Return a picture, (512, 512, 3) uint8.
-
-        Without ``render_mode="rgb_array"``, this warns and returns None, as Gymnasium's interface
-        asks: trainers call it whether pictures are wanted or not.
-        """
-        if self.render_mode is None:
-            logger.warn("this task draws no pictures; make it with render_mode='rgb_array'")
-            return None
-        return self.task.render()[0]
-
-    def close(self) -> None:
-        """Let the world go."""
-        self.task.close()
 
 
 # -- what a task returns, as arrays and numbers ---------------------------------------------------
