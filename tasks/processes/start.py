@@ -17,6 +17,7 @@ import sys
 from collections.abc import Callable, Generator
 from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager, suppress
+from importlib import reload
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.process import BaseProcess
 from queue import SimpleQueue
@@ -32,7 +33,6 @@ SERVER_OF = "ROBOT_LAYOUTS_SERVER_OF"  # variable of the server: the process tha
 
 _PR_SET_PDEATHSIG = 1  # of Linux's prctl
 _DESCRIPTORS = 12  # that starting a process takes for a moment, and the server as well
-_IMPORTED_BY = os.getpid()
 _WHAT_RAN_OUT = {
     errno.EMFILE: "; each takes three file descriptors: raise `ulimit -n` or take fewer",
     errno.ENFILE: "; this machine has too many files open",
@@ -44,6 +44,7 @@ _WHAT_RAN_OUT = {
 
 _Call: TypeAlias = "tuple[Callable[[], BaseProcess], Future[BaseProcess]]"
 _started: WeakSet[BaseProcess] = WeakSet()
+_server_is_inherited = False
 _lock = RLock()  # two threads that read an exit code at the same time get a wrong one
 
 
@@ -110,14 +111,15 @@ def _start(work: Callable[..., None], arguments: tuple[Any, ...]) -> BaseProcess
     _expect_descriptors()
     resource_tracker.ensure_running()  # unblocks SIGINT, so it comes first
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # so do those that this one starts
-    if os.getpid() == _IMPORTED_BY:
-        context: Any = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(["tasks.processes.server"])
-        with _server_environment():
-            forkserver.ensure_running()
-    else:  # a fork cannot use its parent's server
-        context = multiprocessing.get_context("spawn")
-    process: BaseProcess = context.Process(
+    global _server_is_inherited
+    if _server_is_inherited:  # a fork cannot use the server of its parent
+        reload(forkserver)
+        _server_is_inherited = False
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["tasks.processes.server"])
+    with _server_environment():
+        forkserver.ensure_running()
+    process = context.Process(
         target=_begin,
         args=(dict(os.environ), os.sched_getaffinity(0), work, arguments),
         daemon=True,
@@ -234,9 +236,9 @@ def _start_all(calls: SimpleQueue[_Call]) -> None:
 
 def _disown() -> None:
     """Let workers count as ended in a fork, which must neither use nor end those of its parent."""
-    global _lock
+    global _lock, _server_is_inherited
     _starter.cache_clear()  # threads do not survive a fork
-    _lock = RLock()
+    _lock, _server_is_inherited = RLock(), True
     null = os.open(os.devnull, os.O_RDONLY)
     for process in list(_started):
         with suppress(ValueError):  # it is closed
