@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
+from functools import partial
 from typing import Any
 
 from measurements.bench.measurement import BenchmarkError, Measurement, by_series
 from measurements.bench.processes import VECTOR, TimedVector, vector
 from measurements.bench.settings import Clock, Settings
 from simulation.rendering.pictures import vulkan_problem
-from tasks.processes import process as processes
-from tasks.processes.worker import Worker
+from tasks.processes.transport import packed
+from tasks.processes.worker import Pool
 
 DRAWING = "SAPIEN's drawing of everything"
 WORKERS = 2
@@ -76,17 +76,14 @@ class DrawingProcesses:
 
     def __init__(self, task_id: str, clock: Clock) -> None:
         """Start them."""
-        self._clock = clock
-        self._workers = [
-            Worker[Connection](processes.context.Pipe(), _draw, task_id, clock)
-            for _ in range(WORKERS)
-        ]
+        self._clock, self._pool = clock, Pool()
+        work = packed(partial(_drawing, task_id, clock))
+        self._workers = [self._pool.spawn(work) for _ in range(WORKERS)]
 
     def __enter__(self) -> DrawingProcesses:
         """Wait until all are ready."""
         try:
-            for worker in self._workers:
-                _answer(worker)
+            self._pool.results(self._workers)
         except BaseException:
             self.__exit__()
             raise
@@ -94,38 +91,27 @@ class DrawingProcesses:
 
     def __exit__(self, *_: object) -> None:
         """End them."""
-        for worker in self._workers:
-            worker.end()
+        self._pool.shutdown()
 
     def rate(self, number: int) -> float:
         """Return how many pictures they draw per second, together."""
         for worker in self._workers:
-            worker.line.send(DRAWN)
-        return self._clock.rate((DRAWN, _answer(worker)) for worker in self._workers)
+            worker.request(DRAWN)
+        return self._clock.rate((DRAWN, one) for one in self._pool.results(self._workers))
 
 
-def _draw(connection: Connection, task_id: str, clock: Clock) -> None:
-    """Draw as many pictures as is asked for, and answer with the seconds that it took."""
+def _drawing(task_id: str, clock: Clock) -> Callable[[int], float]:
+    """Return what draws so many pictures, and returns the seconds that it took."""
     import tasks
 
-    processes.end_with_parent()
     env = tasks.make(task_id, obs_mode=OBS_MODE)
     env.reset(0)
-    connection.send(0.0)
-    while True:
-        try:
-            count = connection.recv()
-        except EOFError:
-            return
+
+    def draw(count: int) -> float:
         start = clock.now()
         for _ in range(count):
             # With its markers a world is drawn at once, nothing left out.
             env.simulation.look(0, env.observer.cameras, (OBS_MODE,), markers=True)
-        connection.send(clock.now() - start)
+        return clock.now() - start
 
-
-def _answer(worker: Worker[Connection]) -> float:
-    try:
-        return worker.line.recv()
-    except (EOFError, OSError):
-        raise BenchmarkError(f"a process that only draws {worker.death()}") from None
+    return draw

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import multiprocessing
 from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import closing, contextmanager, suppress
-from multiprocessing.connection import Connection
+from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,8 @@ from measurements.bench.measurement import BenchmarkError, Measurement, by_serie
 from measurements.bench.settings import CORES, Clock, Settings
 from measurements.bench.steps import PHYSICS, random_actions
 from tasks import get_task_class
-from tasks.processes import process as processes
-from tasks.processes.worker import Worker
+from tasks.processes.transport import packed
+from tasks.processes.worker import Pool
 
 VECTOR = "vector"
 FEW, MANY = 4, 36  # environments in a worker whose memory is compared
@@ -152,17 +152,14 @@ class PhysicsProcesses:
         self, task_id: str, count: int, num_envs: int, making: Mapping[str, Any] | None = None
     ) -> None:
         """Start ``count`` processes, with ``num_envs`` environments each."""
-        self._num_envs = num_envs
-        self._workers: list[Worker[Connection]] = []
-        for _ in range(count):
-            arguments = task_id, num_envs, making or {}
-            self._workers.append(Worker(processes.context.Pipe(), _work, *arguments))
+        self._num_envs, self._pool = num_envs, Pool()
+        work = packed(partial(_physics, task_id, num_envs, dict(making or {})))
+        self._workers = [self._pool.spawn(work) for _ in range(count)]
 
     def __enter__(self) -> PhysicsProcesses:
         """Wait until all are ready."""
         try:
-            for worker in self._workers:
-                _answer(worker)
+            self._pool.results(self._workers)
         except BaseException:
             self.close()
             raise
@@ -184,40 +181,29 @@ class PhysicsProcesses:
         actions = timed.actions(number)
         for i, worker in enumerate(used):
             own = actions[:, i * size : (i + 1) * size]
-            with suppress(OSError):  # it died: that is found when it should answer
-                worker.line.send((own, number + i * size, timed.clock))
-        return timed.clock.rate((timed.steps * size, _answer(one)) for one in used)
+            worker.request(own, number + i * size, timed.clock)
+        seconds = self._pool.results(used)
+        return timed.clock.rate((timed.steps * size, one) for one in seconds)
 
     def close(self) -> None:
         """End them."""
-        for worker in self._workers:
-            worker.end()
+        self._pool.shutdown()
 
 
-def _work(connection: Connection, task_id: str, num_envs: int, making: Mapping[str, Any]) -> None:
-    """Do the physics of actions that are sent, and answer with the seconds that it took."""
+def _physics(task_id: str, num_envs: int, making: Mapping[str, Any]) -> Callable[..., float]:
+    """Return what does the physics of actions, and returns the seconds that it took."""
     import torch
 
     import tasks
 
-    processes.end_with_parent()
     torch.set_num_threads(1)
     env = tasks.make(task_id, num_envs=num_envs, **making)
-    connection.send(0.0)
-    while True:
-        try:
-            actions, seed, clock = connection.recv()
-        except EOFError:
-            return
+
+    def work(actions: NDArray[np.float32], seed: int, clock: Clock) -> float:
         env.reset(seed)
-        connection.send(sum(env.simulation.timed_step(action, clock.now) for action in actions))
+        return sum(env.simulation.timed_step(action, clock.now) for action in actions)
 
-
-def _answer(worker: Worker[Connection]) -> float:
-    try:
-        return worker.line.recv()
-    except (EOFError, OSError):
-        raise BenchmarkError(f"a process that only does physics {worker.death()}") from None
+    return work
 
 
 @contextmanager

@@ -19,8 +19,8 @@ from measurements.bench.processes import (
 )
 from measurements.bench.settings import Settings
 from measurements.bench.steps import PHYSICS
-from tasks.processes import process as processes
-from tasks.processes.worker import Worker
+from tasks.processes.transport import packed
+from tasks.processes.worker import Pool
 
 PROCESSES = 2  # of every vector
 HERE, ASYNCHRONOUS, NATIVE = "here", "asynchronous", "native"
@@ -102,19 +102,23 @@ class Disturber:
 @contextmanager
 def busy_core() -> Generator[Disturber]:
     """Give a process that can keep one of this process's cores busy, and end it."""
-    worker = Worker(processes.context.Pipe(), _turn)
+    pool = Pool()
+    worker = pool.spawn(packed(_turner))
     try:
-        worker.line.recv()
+        pool.results([worker])
+        worker.request()
         os.kill(worker.pid, signal.SIGSTOP)
         yield Disturber(worker.pid)
     finally:
-        worker.kill()
-        worker.end()
+        pool.remove(worker)
 
 
-def _turn(line: Any) -> None:
-    """Count for ever, on one core."""
+def _turner() -> Callable[[], None]:
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-    line.send(None)
+    return _turn
+
+
+def _turn() -> None:
+    """Count for ever, on one core."""
     while True:
         np.zeros(1000).sum()

@@ -12,7 +12,7 @@ from robots import RobotRegistry
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from rollouts import evaluate
-from rollouts.playing.events import Event
+from rollouts.playing.executor import Event
 from tasks import MultiRobotTask
 
 EPISODES = 25

@@ -15,8 +15,7 @@ from layouts.placement import RobotLike
 from rollouts.export.columns import ColumnReader
 from rollouts.export.pictures import Drawing
 from rollouts.export.shots import Channel, Frame, Picture, Shots
-from rollouts.playing.events import Event
-from rollouts.playing.executor import Executor, modules_of, play_all, report
+from rollouts.playing.executor import Event, Executor, modules_of, play_all, report
 from rollouts.reading.recorded_task import task_for
 from rollouts.reading.recording import open_trajectories
 from tasks import MultiRobotTask

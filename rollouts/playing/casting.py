@@ -50,7 +50,7 @@ def cast_of(policy: Policy | str, task: type[MultiRobotTask]) -> tuple[Cast, str
         task: What is played.
 
     Raises:
-        TaskError: If that is no policy, or the task has no expert.
+        TaskError: If that is not a policy, or the task has no expert.
     """
     name = policy if isinstance(policy, str) else None
     if name == EXPERT:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from robots import CONTROL_MODES, DescriptorError, TaskError
 from robots.control_modes import read_mode
-from rollouts.playing.dispatch import EPISODE_SECONDS, check_timeout
+from rollouts.playing.scheduler import EPISODE_SECONDS, check_timeout
 from rollouts.reading.manifest import FILE_SIZE
 
 if TYPE_CHECKING:

@@ -5,13 +5,22 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import closing
-from typing import Protocol
+from typing import Any, Protocol
 
 from robots import TaskError
-from rollouts.playing.dispatch import DEATHS_ALLOWED, EPISODE_SECONDS, Rules, Shift, check_count
-from rollouts.playing.events import Event, Play, WorkerError, WorkersDied
-from rollouts.playing.local_workers import LocalProcesses, report
-from rollouts.playing.transport import modules_of
+from rollouts.playing.scheduler import (
+    DEATHS_ALLOWED,
+    EPISODE_SECONDS,
+    Event,
+    Play,
+    RetryPolicy,
+    Scheduler,
+    WorkerError,
+    WorkersDied,
+    check_count,
+)
+from tasks.processes.transport import packed
+from tasks.processes.worker import Pool, Reply, Worker, report
 
 __all__ = [
     "DEATHS_ALLOWED",
@@ -27,6 +36,8 @@ __all__ = [
     "play_all",
     "report",
 ]
+
+_PATIENCE = 10.0  # s that a worker may take to end by itself
 
 
 class Executor(Protocol):
@@ -55,7 +66,7 @@ class Executor(Protocol):
 
 
 class ProcessExecutor:
-    """Spawned processes of this machine; none is left when `run` ends, whatever ends it."""
+    """Processes of this machine; none is left when `run` ends, whatever ends it."""
 
     def __init__(
         self,
@@ -75,16 +86,44 @@ class ProcessExecutor:
                 until its worker is ended, which counts as a death; None if it may take for ever.
 
         Raises:
-            TaskError: If a number makes no sense.
+            TaskError: If a number is not valid.
         """
         if workers is not None:
             check_count("workers", workers, 1)
         self.workers = len(os.sched_getaffinity(0)) if workers is None else workers
-        self._rules = Rules(attempts, fresh, episode_timeout)
+        self._policy = RetryPolicy(attempts, fresh, episode_timeout)
 
     def run(self, prepare: Callable[[], Play], seeds: Iterable[int]) -> Generator[Event]:
         """Play the episode of every seed; see `Executor`."""
-        return Shift(LocalProcesses(prepare), seeds, self.workers, self._rules).events()
+        return Scheduler(_Processes(prepare), seeds, self.workers, self._policy).events()
+
+
+class _Processes:
+    """The backend of this machine, whose workers all play the same."""
+
+    def __init__(self, prepare: Callable[[], Play]) -> None:
+        """Take what makes the plays.
+
+        Raises:
+            WorkerError: If it cannot be sent to processes.
+        """
+        self._job, self._pool = packed(prepare), Pool()
+
+    def spawn(self) -> Worker:
+        """Start a process."""
+        return self._pool.spawn(self._job, _PATIENCE)
+
+    def wait(self, seconds: float) -> list[tuple[Worker, Reply]]:
+        """Wait for replies for a while (s)."""
+        return self._pool.wait(seconds)
+
+    def remove(self, worker: Worker, *, kill: bool) -> None:
+        """End a process."""
+        self._pool.remove(worker, 0.0 if kill else _PATIENCE)
+
+    def status(self) -> str:
+        """Return nothing: the workers are all that there is."""
+        return ""
 
 
 def choose_executor(
@@ -100,7 +139,7 @@ def choose_executor(
         episode_timeout: See `ProcessExecutor`.
 
     Raises:
-        TaskError: If a number makes no sense, or contradicts the executor.
+        TaskError: If a number is not valid, or contradicts the executor.
     """
     if workers is not None:
         check_count("workers", workers, 0)
@@ -115,7 +154,7 @@ def choose_executor(
         if limited and episode_timeout is not None:
             raise TaskError(
                 f"episode_timeout is {episode_timeout!r}, but with workers=0 this process plays,"
-                " and nobody could end it; take workers=1"
+                " and nothing could end it; take workers=1"
             )
         from rollouts.playing.in_process import InProcessExecutor  # needs torch
 
@@ -143,3 +182,9 @@ def play_all(
             f"{type(executor).__name__} ended before {len(left)} of {len(seeds)} episodes were"
             " played"
         )
+
+
+def modules_of(*things: Any) -> tuple[str, ...]:
+    """Return the modules that define classes, functions, or the classes of other things."""
+    known = (thing if hasattr(thing, "__module__") else type(thing) for thing in things)
+    return tuple(dict.fromkeys(str(thing.__module__) for thing in known))

@@ -7,9 +7,9 @@ from typing import Any
 
 import torch
 
-from rollouts.playing.events import Event, Play
 from rollouts.playing.randomness import random_states, set_random_states
-from rollouts.playing.transport import as_ours
+from rollouts.playing.scheduler import Event, Play
+from tasks.processes.transport import as_ours
 
 
 class InProcessExecutor:

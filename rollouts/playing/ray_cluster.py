@@ -13,10 +13,10 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Generator, Iterable, Sequence
+from concurrent import futures
 from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
@@ -24,13 +24,12 @@ from robots import MissingPackageError, TaskError, UnknownNameError
 from robots.assets.manifest import load_manifest
 from robots.common.portable import inherited_variables
 from robots.common.rooms import PLAYING
-from rollouts.playing.events import WorkerError
-from rollouts.playing.transport import is_installed
+from tasks.processes.start import WorkerError
+from tasks.processes.transport import is_installed
 
 _CONNECT_SECONDS = 10.0  # that a port may take to accept
 _JOIN_SECONDS = 60.0  # that all of joining may take, the import of Ray included
 _ANSWER_SECONDS = 20.0  # that the head may take to answer a question
-_NEWS_SECONDS = 10.0  # that it may take to learn that a node is dead
 _AWAY_SECONDS = 30.0  # that it may be gone; Ray ends this process after 60
 _LOOK_SECONDS = 5.0  # between looks whether it is there
 _THIS_MACHINE = ("localhost", "127.0.0.1", "::1")  # for which Ray takes an address of its own
@@ -94,42 +93,25 @@ class Cluster:
     @property
     def cpus(self) -> int:
         """How many CPUs it has."""
-        alive = [about["Resources"] for about in self._nodes() if about["Alive"]]
-        cpus = sum(int(resources.get("CPU", 0)) for resources in alive)
+        cpus = sum(int(resources.get("CPU", 0)) for resources in self.nodes().values())
         if not cpus:
             raise WorkerError("no node of the Ray cluster offers a CPU; add one with `ray start`")
         return cpus
 
     @property
     def free_cpus(self) -> int:
-        """How many CPUs nobody uses."""
-        self.expect_head()
+        """How many CPUs are free."""
         return int(self._ask(self._ray.available_resources).get("CPU", 0))
 
-    @property
-    def nodes(self) -> frozenset[str]:
-        """Which nodes live; this process's own is one of them."""
-        alive = frozenset(about["NodeID"] for about in self._nodes() if about["Alive"])
+    def nodes(self) -> dict[str, dict[str, float]]:
+        """Return the resources of each node that lives; this process's own is one of them."""
+        alive = {n["NodeID"]: n["Resources"] for n in self._ask(self._ray.nodes) if n["Alive"]}
         if self._node not in alive:
             raise WorkerError(
                 "the Ray node of this machine has died, and with it all that was played for this"
                 " process; start it again with `ray start`, then the same command"
             )
         return alive
-
-    def lose(self, nodes: frozenset[str]) -> bool:
-        """Return whether one of the nodes is dead, which the head may learn only in a while."""
-        deadline = time.monotonic() + _NEWS_SECONDS
-        while nodes <= self.nodes:
-            if time.monotonic() > deadline:
-                return False
-            time.sleep(0.2)
-        return True
-
-    def expect_head(self) -> None:
-        """Do nothing if the head's port is open."""
-        if not self._answers():
-            raise WorkerError(f"the head of the Ray cluster, {self._head}, is gone")
 
     def look(self) -> None:
         """Look now and then whether the head is there; it may be away for a while."""
@@ -140,7 +122,7 @@ class Cluster:
         if self._answers():
             self._there = now
         elif now - self._there > _AWAY_SECONDS:
-            self.expect_head()
+            raise self._gone()
 
     def _answers(self) -> bool:
         try:
@@ -149,14 +131,15 @@ class Cluster:
             return False
         return True
 
-    def _nodes(self) -> list[dict[str, Any]]:
-        self.expect_head()
-        return self._ask(self._ray.nodes)
+    def _gone(self) -> WorkerError:
+        return WorkerError(f"the head of the Ray cluster, {self._head}, is gone")
 
     def _ask(self, question: Callable[[], _T]) -> _T:
+        if not self._answers():
+            raise self._gone()
         try:
             return _within(_ANSWER_SECONDS, question)
-        except TimeoutError:
+        except futures.TimeoutError:
             raise WorkerError(
                 f"the head of the Ray cluster, {self._head}, has not answered for"
                 f" {_ANSWER_SECONDS:g} s"
@@ -228,7 +211,7 @@ def _connect(address: str, own_host: str = "") -> None:
     """Open and close a connection.
 
     Raises:
-        OSError: If nobody listens there.
+        OSError: If nothing listens there.
     """
     found = _ADDRESS.fullmatch(address)
     if found is not None:
@@ -258,11 +241,11 @@ def _leave(ray: Any) -> None:
     """
     try:
         _within(_ANSWER_SECONDS, ray.shutdown)
-    except TimeoutError:
+    except futures.TimeoutError:
         atexit.unregister(ray.shutdown)
         atexit.register(_end_process)
         raise WorkerError(
-            "the head of the Ray cluster does not answer, not even a farewell"
+            "the head of the Ray cluster does not answer, and so cannot be left"
         ) from None
 
 
@@ -277,24 +260,18 @@ def _within(seconds: float, function: Callable[[], _T]) -> _T:
     """Return what a function returns or raise what it raises.
 
     Raises:
-        TimeoutError: If it takes longer; it goes on in a thread.
+        futures.TimeoutError: If it takes longer; it goes on in a thread.
     """
-    results: SimpleQueue[tuple[_T | None, BaseException | None]] = SimpleQueue()
+    result: futures.Future[_T] = futures.Future()
 
     def call() -> None:
         try:
-            results.put((function(), None))
+            result.set_result(function())
         except BaseException as error:
-            results.put((None, error))
+            result.set_exception(error)
 
     threading.Thread(target=call, daemon=True).start()
-    try:
-        result, error = results.get(timeout=seconds)
-    except Empty:
-        raise TimeoutError from None
-    if error is not None:
-        raise error
-    return result  # type: ignore[return-value]
+    return result.result(seconds)
 
 
 def gather_code(folder: Path, modules: Iterable[str] = ()) -> None:

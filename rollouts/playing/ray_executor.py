@@ -4,25 +4,26 @@ from __future__ import annotations
 
 import os
 import re
+import time
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from rollouts.playing.dispatch import (
+from rollouts.playing.environment import versions
+from rollouts.playing.ray_cluster import Cluster, check_address, import_ray, is_own, joined
+from rollouts.playing.scheduler import (
     DEATHS_ALLOWED,
     EPISODE_SECONDS,
-    Rules,
-    Shift,
-    Sign,
-    Worker,
+    Event,
+    Play,
+    RetryPolicy,
+    Scheduler,
+    WorkerError,
     check_count,
 )
-from rollouts.playing.events import Event, Play, WorkerError
-from rollouts.playing.ray_cluster import Cluster, check_address, import_ray, is_own, joined
-from rollouts.playing.transport import loaded, portable, unsendable
-from tasks.processes.process import Sendable
+from tasks.processes.transport import SentError, loaded, unsendable
+from tasks.processes.worker import Reply, Status
 
 PACKAGES = ("sapien", "torch", "numpy")  # which decide the bits of an episode
 
@@ -64,14 +65,14 @@ class RayExecutor:
 
         Raises:
             MissingPackageError: If Ray is not installed.
-            TaskError: If it cannot be an address, or a number makes no sense.
+            TaskError: If it cannot be an address, or a number is not valid.
         """
         self._ray = import_ray()
         check_address(address)
         if workers is not None:
             check_count("workers on a Ray cluster", workers, 1)
         self._address, self._workers, self._modules = address, workers, tuple(modules)
-        self._rules = Rules(attempts, fresh, episode_timeout)
+        self._policy = RetryPolicy(attempts, fresh, episode_timeout)
 
     def run(self, prepare: Callable[[], Play], seeds: Iterable[int]) -> Generator[Event]:
         """Play the episode of every seed; see `rollouts.playing.executor.Executor`."""
@@ -81,14 +82,20 @@ class RayExecutor:
         modules = [*self._modules, *filter(is_own, getattr(prepare, "modules", ()))]
         with joined(self._ray, self._address, modules):
             cluster = Cluster(self._ray)
-            crew = _Actors(self._ray, cluster, prepare)
-            yield from Shift(crew, seeds, self._workers or cluster.cpus, self._rules).events()
+            backend = _Actors(self._ray, cluster, prepare)
+            workers = self._workers or cluster.cpus
+            yield from Scheduler(backend, seeds, workers, self._policy).events()
 
 
 class _Actors:
-    """Actors of a cluster."""
+    """The backend of a cluster, whose workers are actors."""
 
     def __init__(self, ray: Any, cluster: Cluster, prepare: Callable[[], Play]) -> None:
+        """Take what makes the plays.
+
+        Raises:
+            WorkerError: If it cannot be sent to other machines.
+        """
         self._ray, self._cluster = ray, cluster
         try:
             self._prepare: bytes = ray.cloudpickle.dumps(prepare)
@@ -97,29 +104,59 @@ class _Actors:
         self._class = ray.remote(_Player).options(
             num_cpus=1, max_restarts=0, max_task_retries=0, scheduling_strategy="SPREAD"
         )
+        self._actors: list[_Actor] = []
 
-    def hire(self) -> _Actor:
+    def spawn(self) -> _Actor:
         """Ask for an actor, which begins when a node has room for it."""
-        nodes = self._cluster.nodes  # which raises if the head is gone, before it is asked
-        return _Actor(self._ray, self._cluster, self._class.remote(), self._prepare, nodes)
+        self._cluster.nodes()  # raises if the head is gone, before it is asked
+        self._actors.append(_Actor(self._class.remote()))
+        return self._actors[-1]
 
-    def wait(self, workers: Sequence[Worker], seconds: float) -> list[Worker]:
-        """Return the actors whose answers arrive within a while."""
+    def wait(self, seconds: float) -> list[tuple[_Actor, Reply]]:
+        """Wait for replies for a while (s)."""
         self._cluster.look()
-        waiting = {worker.answer: worker for worker in workers if isinstance(worker, _Actor)}
+        waiting = {actor.answer: actor for actor in self._actors}
         if not self._ray.wait(list(waiting), timeout=seconds)[0]:
             return []
         ready = self._ray.wait(list(waiting), num_returns=len(waiting), timeout=0)[0]
-        return [waiting[answer] for answer in ready]
+        replies = [(waiting[answer], self._receive(waiting[answer])) for answer in ready]
+        return [(actor, reply) for actor, reply in replies if reply is not None]
 
-    def remark(self) -> str:
+    def remove(self, worker: _Actor, *, kill: bool) -> None:
+        """End an actor."""
+        self._actors.remove(worker)
+        with suppress(self._ray.exceptions.RayError, ValueError):
+            self._ray.kill(worker.handle, no_restart=True)
+
+    def status(self) -> str:
         """Return how much room there is.
 
         Raises:
             WorkerError: If the cluster is gone, or the node of this machine.
         """
-        nodes, free = len(self._cluster.nodes), self._cluster.free_cpus
+        nodes, free = len(self._cluster.nodes()), self._cluster.free_cpus
         return f"{free} CPUs of the Ray cluster, of {nodes} nodes, are free"
+
+    def _receive(self, actor: _Actor) -> Reply | None:
+        try:
+            result, error = self._ray.get(actor.answer, timeout=_FETCH_SECONDS)
+        except self._ray.exceptions.RayError as death:
+            return self._died(actor, death)
+        if actor.home is None:
+            actor.settle(result, self._prepare)
+            return None
+        if error is None:
+            return Reply(0, Status.DONE, result)
+        if not actor.ready:
+            error.args = (f"{error} (on node {actor.home.address})", *error.args[1:])
+        return Reply(0, Status.FAILED, error)
+
+    def _died(self, actor: _Actor, error: Exception) -> Reply:
+        alive, reason = self._cluster.nodes(), _reason(error)
+        out_of_reach = isinstance(error, self._ray.exceptions.ActorUnavailableError)
+        if out_of_reach or "node" in reason or (actor.home and actor.home.node not in alive):
+            return Reply(0, Status.LOST, "was lost: out of reach")
+        return Reply(0, Status.DIED, f"was lost: {reason}")
 
 
 @dataclass(frozen=True)
@@ -143,88 +180,36 @@ class _Actor:
     """One actor, as seen from here; it plays one seed at a time.
 
     Attributes:
+        handle: What Ray knows it by.
+        name: What it is called in messages.
         answer: What it has been asked for last.
+        home: Where it lives; None while it waits for a place.
+        begun: When it got that place, by the monotonic clock (s).
+        ready: Whether it has been asked to play.
     """
 
-    def __init__(
-        self, ray: Any, cluster: Cluster, actor: Any, prepare: bytes, nodes: frozenset[str]
-    ) -> None:
-        self.seed: int | None = None
-        self.name = "actor"
-        self._ray, self._cluster, self._actor, self._prepare = ray, cluster, actor, prepare
-        self._nodes = nodes  # it will be on one of them
-        self._home: _Home | None = None
-        self._ready = False
-        self.answer: Any = actor.home.remote()
+    def __init__(self, handle: Any) -> None:
+        self.handle, self.name = handle, "actor"
+        self.home: _Home | None = None
+        self.begun: float | None = None
+        self.ready = False
+        self.answer: Any = handle.home.remote()
 
-    def send(self, seed: int) -> None:
+    def request(self, seed: int) -> None:
         """Let it play a seed."""
-        self.seed = seed
-        self.answer = self._actor.play.remote(seed)
+        self.ready, self.answer = True, self.handle.play.remote(seed)
 
-    def receive(self) -> Event | Sign:
-        """Return its next message.
-
-        Raises:
-            RobotLayoutsError: What it could not begin for.
-        """
-        try:
-            result, error = self._ray.get(self.answer, timeout=_FETCH_SECONDS)
-        except self._ray.exceptions.RayError as death:
-            return self._died(death)
-        if self._home is None:
-            self._settle(result)
-            return Sign.BEGUN
-        if not self._ready:
-            if error is not None:
-                error.args = (f"{error} (on node {self._home.address})", *error.args[1:])
-                raise error
-            self._ready = True
-            return Sign.READY
-        seed, self.seed = self.seed, None
-        return Event(seed, result=result, error=error, worker=self.name)
-
-    def late(self, seconds: float) -> Event:
-        """Return how it dies if it is ended because it took longer than so many seconds."""
-        if self._home is None:
-            return self._death(f"was given no place within {seconds:g} s", machine_lost=True)
-        what = "did not finish the episode" if self._ready else "was not ready"
-        return self._death(f"{what} within {seconds:g} s and was ended")
-
-    def dismiss(self) -> None:
-        """Let it go; it has nothing to do."""
-        self.kill()
-
-    def kill(self) -> None:
-        """End it at once."""
-        with suppress(self._ray.exceptions.RayError, ValueError):
-            self._ray.kill(self._actor, no_restart=True)
-
-    def _settle(self, home: _Home) -> None:
-        self._home, self.name = home, f"process {home.process} on node {home.address}"
-        self._nodes = frozenset({home.node})
-        here = _versions()
+    def settle(self, home: _Home, prepare: bytes) -> None:
+        """Let it make what plays, in its place."""
+        self.home, self.begun = home, time.monotonic()
+        self.name = f"process {home.process} on node {home.address}"
+        here = versions(PACKAGES)
         if home.packages != here:
             raise WorkerError(
                 f"node {home.address} has {_listing(home.packages)}, this machine {_listing(here)};"
                 " equal episodes need equal versions"
             )
-        self.answer = self._actor.begin.remote(self._prepare)
-
-    def _died(self, error: Exception) -> Event:
-        lost = isinstance(error, self._ray.exceptions.ActorUnavailableError)
-        if not isinstance(error, self._ray.exceptions.ActorDiedError):
-            self.kill()  # it may only be out of reach
-        if self._ready:
-            lost = lost or not self._nodes <= self._cluster.nodes
-        else:  # several of one node would be too many deaths
-            lost = lost or self._cluster.lose(self._nodes)
-        how = "out of reach" if lost else _reason(error)
-        return self._death(f"was lost: {how}", machine_lost=lost)
-
-    def _death(self, how: str, *, machine_lost: bool = False) -> Event:
-        died = f"worker {self.name} {how}"
-        return Event(self.seed, died=died, machine_lost=machine_lost, worker=self.name)
+        self.answer = self.handle.begin.remote(prepare)
 
 
 class _Player:
@@ -236,22 +221,22 @@ class _Player:
         """Return where this is."""
         ray = import_ray()
         node = ray.get_runtime_context().get_node_id()
-        return _Home(node, ray.util.get_node_ip_address(), os.getpid(), _versions()), None
+        return _Home(node, ray.util.get_node_ip_address(), os.getpid(), versions(PACKAGES)), None
 
-    def begin(self, prepare: bytes) -> tuple[None, Sendable | None]:
+    def begin(self, prepare: bytes) -> tuple[None, SentError | None]:
         """Make what plays; returns what went wrong."""
         try:
             self._play = loaded(prepare)()
         except Exception as error:
-            return None, portable(error)
+            return None, SentError(error)
         return None, None
 
-    def play(self, seed: int) -> tuple[Any, Sendable | None]:
+    def play(self, seed: int) -> tuple[Any, SentError | None]:
         """Play an episode; returns its result, and what went wrong."""
         try:
             return self._play(seed), None
         except Exception as error:
-            return None, portable(error)
+            return None, SentError(error)
 
 
 def _reason(error: Exception) -> str:
@@ -261,14 +246,6 @@ def _reason(error: Exception) -> str:
         return "its code could not be loaded"
     because = re.search(r" because (.+?)\.(?: |$)", text)
     return because[1] if because else text.partition(". ")[0]
-
-
-def _versions() -> dict[str, str]:
-    found: dict[str, str] = {}
-    for package in PACKAGES:
-        with suppress(PackageNotFoundError):
-            found[package] = version(package)
-    return found
 
 
 def _listing(packages: dict[str, str]) -> str:

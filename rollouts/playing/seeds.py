@@ -16,7 +16,7 @@ def checked_seeds(seeds: Iterable[int]) -> list[int]:
     """Return seeds as plain integers.
 
     Raises:
-        TaskError: If they are none, or one is there twice.
+        TaskError: If they are not seeds, or one is there twice.
     """
     try:
         checked = [operator.index(seed) for seed in seeds]
@@ -36,7 +36,7 @@ def seed_lines(what: str, reasons: Mapping[int, str]) -> list[str]:
 
     Args:
         what: What is to be said of them, such as ``"no success"``.
-        reasons: Seed → why, in words; empty if nobody says.
+        reasons: Seed → why, in words; empty if that is unknown.
     """
     if not reasons:
         return []

@@ -14,8 +14,8 @@ import torch
 from numpy.typing import NDArray
 
 from robots import ActionError, TaskError
-from rollouts.playing.events import Event
 from rollouts.playing.randomness import random_states, set_random_states
+from rollouts.playing.scheduler import Event
 from tasks import MultiRobotTask
 from tasks.engine.actions import ActionReader
 from tasks.episode import REBUILT, Moment, PlayedEpisode, Policy, Score, States

@@ -28,7 +28,6 @@ from rollouts.playing.executor import (
 )
 from rollouts.playing.seeds import checked_seeds
 from rollouts.playing.together import BatchError, grouped, one_by_one, record_together
-from rollouts.playing.transport import as_ours
 from rollouts.reading.provenance import describe_layout, differences, listing
 from rollouts.recording.episode_files import PartWriter
 from rollouts.recording.recorder import FILE_SIZE, Recorder
@@ -36,6 +35,7 @@ from rollouts.recording.signing import Actors
 from rollouts.sources.policies import EXPERT
 from tasks import MultiRobotTask, Scenario
 from tasks.episode import Policy, Score
+from tasks.processes.transport import as_ours
 from tasks.registry import make_scenario
 from tasks.varying.randomization import Randomization
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from robots import MissingPackageError
-from tasks.fronts.names import NAMESPACE
+from tasks.fronts.spec import NAMESPACE, TaskSpec
 from tasks.registry import list_own, list_tasks
 
 if TYPE_CHECKING:
@@ -32,8 +32,6 @@ def register() -> None:
     which imports the module and looks the id up, finds them.
     """
     from gymnasium import registry
-
-    from tasks.fronts.spec import TaskSpec
 
     names = {f"{NAMESPACE}/{task_id}": task_id for task_id in list_tasks()}
     names |= {task_id: task_id for task_id in list_own()}
@@ -122,7 +120,7 @@ def lerobot_vec_env(
         num_envs: Number of environments.
         num_workers: Number of processes; None takes one per core, 0 this process.
         fields: ``obs_mode``, one of ``"lerobot"``, ``"lerobot+video"`` and ``"lerobot+cameras"``;
-            ``instruction``, what policies are told to do if it is not the task's own sentence;
+            ``instruction``, what policies are asked to do if it is not the task's own sentence;
             ``timeout`` and ``render_mode``, as ``gymnasium.make_vec`` takes them; and other
             arguments of `tasks.make`.
 

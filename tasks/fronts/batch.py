@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import mmap
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,12 +17,17 @@ from tasks.engine.arguments import RECONFIGURE, SEED
 from tasks.engine.observation import observed_dtype
 from tasks.engine.scenario import Scenario
 from tasks.engine.task import MultiRobotTask
-from tasks.fronts.board import Arrays, Shapes
-from tasks.fronts.numbers import as_array, stepper
+from tasks.fronts.gymnasium import as_array, stepper
+
+Arrays = dict[str, NDArray[Any]]
+Shapes = Mapping[str, tuple[tuple[int, ...], str]]
+"""Name → shape of one environment's entry, and dtype."""
 
 OBSERVATION, INFO = "obs", "info"  # what the names of their arrays begin with
 SEEDS = f"{INFO}/{SEED}"  # which only a reset changes
 FINAL = "final_"  # and those of episodes that ended in a step and began anew in it
+
+_ALIGNMENT = 64  # bytes; two arrays never share a cache line
 
 
 @dataclass(frozen=True)
@@ -49,23 +56,8 @@ class Part:
         return range(self.start, self.stop)
 
 
-@dataclass(frozen=True)
-class Beginning:
-    """Which environments of a batch begin new episodes.
-
-    Attributes:
-        env_ids: Their numbers in the batch.
-        seeds: The seed of each; None lets its random streams run on.
-        reconfigure: Whether their worlds are rebuilt.
-    """
-
-    env_ids: list[int]
-    seeds: list[int | None]
-    reconfigure: bool
-
-
 class Batch:
-    """Environments of one process; each call leaves what it found in their rows of a board."""
+    """Environments of one process; each call leaves what it found in their rows of arrays."""
 
     def __init__(self, part: Part) -> None:
         """Make the task, with the first seeds that it has in one large batch.
@@ -82,7 +74,7 @@ class Batch:
         self._rows: Arrays = {}
 
     def shapes(self) -> Shapes:
-        """Return which arrays a board needs."""
+        """Return which arrays a vector needs."""
         shapes: dict[str, tuple[tuple[int, ...], str]] = {
             "action": (self._task.single_action_space.shape, "float32"),
             "reward": ((), "float32"),
@@ -97,28 +89,33 @@ class Batch:
             shapes.update({FINAL + name: entry for name, entry in shown.items()})
         return shapes
 
-    def attach(self, board: Arrays) -> None:
-        """Take its rows of a board, and write what the environments look like into them."""
-        self._rows = {name: x[self._part.start : self._part.stop] for name, x in board.items()}
+    def attach(self, arrays: Arrays) -> None:
+        """Take its rows of arrays, and write what the environments look like into them."""
+        self._rows = {name: x[self._part.start : self._part.stop] for name, x in arrays.items()}
         self._task.trust(self._rows["action"])  # the vector writes only what it has checked
         self._write(*self._task.start)
         self._rows[SEEDS][:] = self._task.seeds
 
-    def reset(self, beginning: Beginning) -> None:
-        """Begin new episodes."""
-        ids, seeds = beginning.env_ids, beginning.seeds
-        seeded = [i for i, seed in zip(ids, seeds, strict=True) if seed is not None]
-        running_on = [i for i in ids if i not in set(seeded)]
-        options = {"reconfigure": beginning.reconfigure}
+    def reset(self, env_ids: Sequence[int], seeds: Sequence[int | None], reconfigure: bool) -> None:
+        """Begin new episodes.
+
+        Args:
+            env_ids: The environments' numbers in the batch.
+            seeds: The seed of each; None lets its random streams run on.
+            reconfigure: Whether their worlds are rebuilt.
+        """
+        seeded = [i for i, seed in zip(env_ids, seeds, strict=True) if seed is not None]
+        running_on = [i for i in env_ids if i not in set(seeded)]
+        options = {RECONFIGURE: reconfigure}
         for some in (seeded, running_on):
             if some:
                 own = [s for s in seeds if s is not None] if some is seeded else None
                 self._write(*self._task.reset(own, options, some), some)
         self._rows[SEEDS][:] = self._task.seeds
-        self._clear_flags(ids)
+        self._clear_flags(env_ids)
 
     def step(self, env_ids: list[int] | None = None) -> None:
-        """Advance environments by one control step with the actions on the board.
+        """Advance environments by one control step with the actions in its rows.
 
         Args:
             env_ids: Their numbers in the batch; all if None. The rows of others stay.
@@ -145,7 +142,7 @@ class Batch:
         return self._task.render()
 
     def close(self) -> None:
-        """Let the worlds and the board go."""
+        """Let the worlds and the arrays go."""
         self._task.close()
         self._rows = {}
 
@@ -206,3 +203,52 @@ def _leaves(name: str, tree: Any) -> Iterator[tuple[str, NDArray[Any]]]:
     else:
         array = as_array(tree)
         yield name, array.astype(observed_dtype(array), copy=False)
+
+
+# -- the memory of a vector ----------------------------------------------------------------------
+
+
+def memory_size(shapes: Shapes, num_envs: int) -> int:
+    """Return how many bytes the arrays of a vector take."""
+    return sum(_bytes(shape, dtype, num_envs) for shape, dtype in shapes.values())
+
+
+def lay_out(memory: Any, shapes: Shapes, num_envs: int) -> Arrays:
+    """Return the arrays of a vector, each (N, …), in a writable buffer of `memory_size` bytes."""
+    arrays, start = Arrays(), 0
+    for name, (shape, dtype) in shapes.items():
+        full = (num_envs, *shape)
+        count = int(np.prod(full))
+        arrays[name] = np.frombuffer(memory, dtype, count, start).reshape(full)
+        start += _bytes(shape, dtype, num_envs)
+    return arrays
+
+
+def new_shared_memory(size: int) -> int:
+    """Return the file descriptor of new memory that processes can share.
+
+    It has no name: the kernel frees it with the last process that has it open, however that ends.
+
+    Raises:
+        OSError: If there is too little memory, now rather than when it is written to.
+    """
+    descriptor = os.memfd_create("robot-layouts")
+    try:
+        os.posix_fallocate(descriptor, 0, size)
+    except BaseException:
+        os.close(descriptor)
+        raise
+    return descriptor
+
+
+def map_memory(descriptor: int, size: int) -> mmap.mmap:
+    """Return shared memory as a buffer; closes the file descriptor."""
+    try:
+        return mmap.mmap(descriptor, size)
+    finally:
+        os.close(descriptor)
+
+
+def _bytes(shape: tuple[int, ...], dtype: str, num_envs: int) -> int:
+    exact = int(np.prod((num_envs, *shape))) * np.dtype(dtype).itemsize
+    return max(-(-exact // _ALIGNMENT), 1) * _ALIGNMENT

@@ -15,8 +15,7 @@ from robots import TaskError, unknown_name_message
 from tasks.description import instruction_of
 from tasks.engine.arguments import RECONFIGURE, SUCCESS
 from tasks.engine.remade import Remade
-from tasks.fronts.attributes import UnknownAttributeError
-from tasks.fronts.vector import VectorTask
+from tasks.fronts.vector import UnknownAttributeError, VectorTask
 from tasks.registry import get_task_class
 
 OBS_MODES = ("lerobot", "lerobot+video", "lerobot+cameras")
@@ -87,7 +86,7 @@ class LeRobotTask(Remade, VectorEnv[dict[str, Any], NDArray[np.float32], NDArray
             options: As those of `VectorTask.reset`; LeRobot's own are ignored.
 
         Raises:
-            TaskError: If an argument makes no sense; nothing is reset then.
+            TaskError: If an argument is not valid; nothing is reset then.
             WorkerError: If workers die, hang or fail.
         """
         if options is None or isinstance(options, Mapping):
@@ -110,7 +109,7 @@ class LeRobotTask(Remade, VectorEnv[dict[str, Any], NDArray[np.float32], NDArray
 
         Returns:
             Observation, reward (N,) float32, terminated (N,), truncated (N,) and info, whose
-            ``is_success`` tells which episodes have ended in success.
+            ``is_success`` says which episodes have ended in success.
 
         Raises:
             ActionError: If the action has a wrong shape, type or number; nothing moves then.
@@ -136,13 +135,13 @@ class LeRobotTask(Remade, VectorEnv[dict[str, Any], NDArray[np.float32], NDArray
         return self.vector.render()
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """Return what each environment says of itself, or ``"render"``: a picture of each.
+        """Return an attribute of each environment, or with ``"render"`` a picture of each.
 
-        LeRobot films the first episodes whether there is anything to be seen or not: without
+        LeRobot films the first episodes whether the task draws pictures or not: without
         ``render_mode``, the pictures are black.
 
         Raises:
-            UnknownAttributeError: If environments say nothing of that (also an
+            UnknownAttributeError: If environments have no such attribute (also an
                 ``AttributeError``).
         """
         if name == "render":
@@ -152,7 +151,7 @@ class LeRobotTask(Remade, VectorEnv[dict[str, Any], NDArray[np.float32], NDArray
         return (self._shared[name],) * self.num_envs
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
-        """Return what each environment says of itself; see `call`."""
+        """Return an attribute of each environment; see `call`."""
         return self.call(name)
 
     def close_extras(self, **kwargs: Any) -> None:

@@ -7,22 +7,17 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
-from gymnasium import logger
 from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from robots import TaskError, UnknownNameError
 from robots.common.bounds import shown
-from tasks.engine.arguments import checked_seeds, own_options
 from tasks.engine.columns import COLUMN_MODES
 from tasks.engine.observation import SEEN_COLUMNS, space_of
-from tasks.engine.remade import Remade
-from tasks.fronts.numbers import info_row, row, stepper
-from tasks.language.randomness import FirstSeeds
+from tasks.fronts.gymnasium import OneEnvironment, info_row, row
 from tasks.native.controllers import CONTROLLER
 from tasks.native.format import native_places, observation_keys
-from tasks.registry import make
 
 JOINTS = ("qpos", "qvel")
 
@@ -34,7 +29,7 @@ RobotReward = Callable[[str, Observation, float, dict[str, Any]], float]
 _Space = TypeVar("_Space", bound=Space[Any])
 
 
-class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
+class ParallelTask(OneEnvironment, ParallelEnv[str, Observation, NDArray[np.float32]]):
     """What `tasks.parallel_env` gives: every robot observes and acts for itself.
 
     The limbs of a robot that has several are agents of their own. A robot observes its own joint
@@ -74,16 +69,11 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
         mode = fields.get("obs_mode")
         if mode in ("none", *COLUMN_MODES, *SEEN_COLUMNS):
             raise TaskError(f"parallel_env takes no obs_mode={mode!r}; choices: 'state', 'rgb', …")
-        self.task = make(task_id, render_mode=render_mode, **fields)
-        self.render_mode = render_mode
-        frames = round(self.task.scenario.control_frequency)
+        frames = self._make(task_id, render_mode, fields)
         self.metadata = {**self.metadata, "name": self.task.task_id, "render_fps": frames}  # type: ignore[misc]
         if not (robot_reward is None or callable(robot_reward)):
             raise TaskError(f"robot_reward is {shown(robot_reward)}; a function is needed, or None")
         self._robot_reward = robot_reward
-        self._step = stepper(self.task)
-        self._first = FirstSeeds(1)
-        self._seed = self.task.seeds[0]
         split = self.task.action_split
         self.possible_agents = [name for name, part in split.items() if part.stop > part.start]
         self.agents: list[str] = []
@@ -122,15 +112,11 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
             Observation and info of every robot.
 
         Raises:
-            TaskError: If an argument makes no sense; nothing is reset then.
+            TaskError: If an argument is not valid; nothing is reset then.
         """
-        known = own_options(options)
-        own = self._first.fill(checked_seeds(seed, (0,)), (0,))
-        obs, info = self.task.reset(own, known)
-        self._first.given((0,))
-        self._seed = self.task.seeds[0]
+        obs, info, _ = self._begin(seed, options)
         self.agents = list(self.possible_agents)
-        return self._observations(obs), self._infos(info_row(info, self._seed))
+        return self._observations(obs), self._infos(info)
 
     def step(
         self, actions: Mapping[str, NDArray[np.float32]]
@@ -173,21 +159,6 @@ class ParallelTask(Remade, ParallelEnv[str, Observation, NDArray[np.float32]]):
     def state(self) -> NDArray[np.float32]:
         """Return what all robots together would observe as ``"state"``, flat, for critics."""
         return self.task.flat_state()[0]
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """Return a picture, (512, 512, 3) uint8.
-
-        Without ``render_mode="rgb_array"`` there is none, which a warning says: Gymnasium's
-        interface has it so, and trainers call this unasked.
-        """
-        if self.render_mode is None:
-            logger.warn("this task draws no pictures; make it with render_mode='rgb_array'")
-            return None
-        return self.task.render()[0]
-
-    def close(self) -> None:
-        """Let the world go."""
-        self.task.close()
 
     # -- inside ------------------------------------------------------------------------------
 

@@ -1,16 +1,16 @@
-"""What the board of a vector says of environments, as Gymnasium's vectors return it."""
+"""What the arrays of a vector say of environments, as Gymnasium's vectors return it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.engine.arguments import SUCCESS
 from tasks.fronts.batch import FINAL, INFO, OBSERVATION
-from tasks.fronts.board import Arrays
+from tasks.fronts.workers import InProcess, Workers
 
 _Flags = NDArray[np.bool_]
 Rows = slice | NDArray[np.intp]
@@ -19,26 +19,20 @@ Rows = slice | NDArray[np.intp]
 ALL = slice(None)
 
 
-class Board(Protocol):
-    """Who has the arrays."""
-
-    arrays: Arrays
-
-
 class Results:
-    """Reads a board; all that it returns is copied."""
+    """Reads the arrays; all that it returns is copied."""
 
-    def __init__(self, board: Board, num_envs: int) -> None:
+    def __init__(self, holder: InProcess | Workers, num_envs: int) -> None:
         """Take who has the arrays, and how many environments they are of."""
-        self._board = board
+        self._holder = holder
         self._everywhere = np.ones(num_envs, bool)
         self._names: dict[str, list[tuple[str, str]]] = {}
 
     def step(
         self, ids: Rows = ALL
     ) -> tuple[Any, NDArray[np.float32], _Flags, _Flags, dict[str, Any]]:
-        """Return what is on the board of some environments, as copies."""
-        arrays = self._board.arrays
+        """Return what a step has given for some environments."""
+        arrays = self._holder.arrays
         info = self.info(self._everywhere[ids], ids)
         restarted = arrays.get("restarted")
         if restarted is not None and restarted[ids].any():
@@ -48,7 +42,7 @@ class Results:
 
     def observation(self, ids: Rows = ALL, prefix: str = "") -> Any:
         """Return what is observed of some environments, or of those that ended (`FINAL`)."""
-        arrays = self._board.arrays
+        arrays = self._holder.arrays
         if prefix + OBSERVATION in arrays:
             return arrays[prefix + OBSERVATION][ids].copy()
         tree: dict[str, Any] = {}
@@ -62,34 +56,34 @@ class Results:
         return tree or np.empty((len(self._everywhere[ids]), 0), np.float32)
 
     def info(self, mask: _Flags, ids: Rows = ALL, prefix: str = INFO) -> dict[str, Any]:
-        """Return what is known of some environments, as Gymnasium's own vectors tell it.
+        """Return the info of some environments, as Gymnasium's own vectors return it.
 
         Args:
-            mask: Of which of these environments it is told.
+            mask: Which of these environments it is about.
             ids: The environments.
             prefix: What the names of the arrays begin with.
         """
         info: dict[str, Any] = {}
         everywhere = mask.all()
-        for key, array in self._told(prefix):
+        for key, array in self._entries(prefix):
             info[key] = array[ids].copy()
             if not everywhere:
                 info[key][~mask] = 0
             info[f"_{key}"] = mask.copy()
         return info
 
-    def _told(self, prefix: str) -> list[tuple[str, NDArray[Any]]]:
+    def _entries(self, prefix: str) -> list[tuple[str, NDArray[Any]]]:
         """Return the arrays whose names begin with a prefix, and what info calls them."""
         if prefix not in self._names:
             found = [
                 (called, name)
-                for name in self._board.arrays
+                for name in self._holder.arrays
                 for first, _, key in [name.partition("/")]
                 if first == prefix
                 for called in ((key, SUCCESS) if key == "success" else (key,))
             ]
             self._names[prefix] = found
-        arrays = self._board.arrays
+        arrays = self._holder.arrays
         return [(called, arrays[name]) for called, name in self._names[prefix]]
 
     def _final(self, ended: _Flags, ids: Rows) -> dict[str, Any]:

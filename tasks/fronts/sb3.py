@@ -20,9 +20,8 @@ from stable_baselines3.common.vec_env.base_vec_env import (
 from robots import SimulationError, TaskError
 from tasks.engine.arguments import RECONFIGURE, own_options
 from tasks.engine.remade import Remade
-from tasks.fronts.attributes import UnknownAttributeError
-from tasks.fronts.names import NAMESPACE
-from tasks.fronts.vector import VectorTask
+from tasks.fronts.spec import NAMESPACE
+from tasks.fronts.vector import UnknownAttributeError, VectorTask
 from tasks.registry import get_task_class
 
 
@@ -77,7 +76,7 @@ class SB3Task(Remade, VecEnv):
             Observation of all environments.
 
         Raises:
-            TaskError: If a seed or an option makes no sense; nothing is reset then.
+            TaskError: If a seed or an option is not valid; nothing is reset then.
             WorkerError: If workers die, hang or fail.
         """
         rebuilt = np.array([own_options(options)[RECONFIGURE] for options in self._options])
@@ -150,10 +149,10 @@ class SB3Task(Remade, VecEnv):
         return list(self.vector.render())
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """Return what some environments say of themselves; it is the same for all.
+        """Return an attribute of some environments; it is the same for all.
 
         Raises:
-            UnknownAttributeError: If environments say nothing of that (also an
+            UnknownAttributeError: If environments have no such attribute (also an
                 ``AttributeError``).
         """
         if attr_name not in self._shared:

@@ -1,10 +1,12 @@
-"""What Gymnasium's registry holds of a task."""
+"""What Gymnasium's registry holds of a task, and under which name."""
 
 from __future__ import annotations
 
 from gymnasium.envs.registration import EnvSpec
 
 from tasks.registry import get_task_class
+
+NAMESPACE = "RobotLayouts"  # Gymnasium ids are RobotLayouts/PickCube-v1
 
 
 class TaskSpec(EnvSpec):

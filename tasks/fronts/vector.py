@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import weakref
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import wraps
 from threading import Lock
 from typing import Any, ClassVar, Concatenate, ParamSpec, TypeVar
@@ -15,25 +15,26 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from robots import SimulationError, TaskError, unknown_name_message
+from robots import SimulationError, TaskError, UnknownNameError, unknown_name_message
 from robots.common.bounds import checked_whole
 from tasks.engine.actions import ActionReader
 from tasks.engine.arguments import RECONFIGURE, checked_options, checked_seeds
 from tasks.engine.observation import space_of
 from tasks.engine.remade import Remade
-from tasks.fronts.batch import Beginning, Part
+from tasks.fronts.batch import Part
 from tasks.fronts.gymnasium import RENDER_MODES
-from tasks.fronts.in_process import InProcess
-from tasks.fronts.lost import Failure, WorkerError, WorkersFailed
 from tasks.fronts.results import Results
-from tasks.fronts.shares import Sharing
-from tasks.fronts.workers import Workers
+from tasks.fronts.workers import InProcess, WorkerError, Workers, shared_out
 from tasks.language.randomness import FirstSeeds
 from tasks.registry import get_task_class, make_scenario
 
 _Flags = NDArray[np.bool_]
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
+
+
+class UnknownAttributeError(UnknownNameError, AttributeError):
+    """An attribute that environments of a batch do not have (also an ``AttributeError``)."""
 
 
 def _alone(
@@ -61,8 +62,8 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
     whatever the number of workers. Every worker holds some consecutive environments; actions and
     results go through memory that all processes share.
 
-    `step` waits for all environments. With a ``batch_size``, `send` and `recv` wait for nobody:
-    they give actions to any environments, and return the first ones that are ready.
+    `step` waits for all environments. `send` gives actions to any of them, and `recv` returns the
+    first ``batch_size`` that are ready.
 
     A worker that dies, hangs or fails is reported as a `WorkerError` with its environments and
     their seeds. The others are as if nothing had happened, and `restart` replaces it. If Ctrl-C
@@ -107,7 +108,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
                 step does, and ``info`` keeps ``final_obs`` and ``final_info``; with ``DISABLED``
                 nothing does, and stepping past the end is allowed.
             ignore_terminations: Whether nothing ends an episode but its last step, and
-                ``terminated`` is always false; ``info`` still tells of success. A policy that
+                ``terminated`` is always false; ``info`` still has ``success``. A policy that
                 learns from dense rewards, which success would cut short, else learns to avoid it.
             timeout: Seconds that workers may take for a step or a reset; None waits for ever.
             render_mode: ``"rgb_array"`` to draw pictures, which needs a Vulkan driver.
@@ -136,19 +137,16 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         self._first = FirstSeeds(num_envs)
         self._everywhere = np.ones(num_envs, bool)
         self.batch_size = _checked_batch_size(batch_size, num_envs)
-        self._sharing = Sharing(num_envs, workers, self.batch_size)
         shares = [
             [Part(cls, scenario, ids.start, ids.stop, mode, ignore_terminations) for ids in share]
-            for share in self._sharing.shares
+            for share in shared_out(num_envs, workers, self.batch_size)
         ]
         for placement in layout.values():  # fetched here, not by all workers at once
             placement.robot.urdf.locate(pictures=scenario.draws)
-        try:
-            self._crew = Workers(shares, timeout) if workers else InProcess(shares[0])
-        except WorkersFailed as failed:
-            raise self._error(failed.failures, None) from failed.where
-        self._close = weakref.finalize(self, self._crew.close)
-        self._results = Results(self._crew, num_envs)
+        self._process = os.getpid()
+        self._holder = Workers(shares, timeout, self._seeds) if workers else InProcess(shares[0])
+        self._close = weakref.finalize(self, self._holder.close)
+        self._results = Results(self._holder, num_envs)
         low, high = np.array(layout.action_bounds, np.float32).T
         self.single_action_space = Box(low, high, dtype=np.float32)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -171,11 +169,11 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
                 ``{"reconfigure": True}`` rebuilds the worlds. Others are ignored.
 
         Returns:
-            Observation of all environments and info, which tells of those that were reset:
+            Observation of all environments and info, which is about those that were reset:
             ``info["seed"]`` is what their random streams began with, (N,) int64.
 
         Raises:
-            TaskError: If an argument makes no sense; nothing is reset then.
+            TaskError: If an argument is not valid; nothing is reset then.
             WorkerError: If workers die, hang or fail.
         """
         mask, reconfigure = self._checked_options(options)
@@ -185,7 +183,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             super().reset(seed=seed)
         ids = np.flatnonzero(mask).tolist()
         self._call("reset", self._beginnings(ids, seeds, reconfigure), lambda: self._begun(mask))
-        self._crew.steps.forget(ids)
+        self._holder.pending.forget(ids)
         self._first.given(ids)
         self._note(ids, seeds)
         return self._begun(mask)
@@ -207,9 +205,9 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             WorkerError: If workers die, hang or fail; its ``results`` are what the others give.
         """
         self._expect_workers()
-        self._expect_idle(self._crew.steps.away)
-        self._crew.arrays["action"][:] = self._reader.read(actions)
-        self._call("step", {i: () for i in range(len(self._crew.parts))}, self._results.step)
+        self._expect_idle(self._holder.pending.env_ids)
+        self._holder.arrays["action"][:] = self._reader.read(actions)
+        self._call("step", {i: () for i in range(len(self._holder.parts))}, self._results.step)
         return self._results.step()
 
     @_alone
@@ -222,17 +220,17 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
 
         Raises:
             ActionError: If the action has a wrong shape, type or number; nothing moves then.
-            TaskError: If an environment is none, or named twice.
+            TaskError: If there is no such environment, or one is named twice.
             SimulationError: If one was sent an action before and not received since.
             WorkerError: If workers are gone.
         """
         self._expect_workers()
-        ids = self._sharing.checked(env_ids)
-        self._expect_idle(set(self._crew.steps.away).intersection(ids.tolist()))
+        ids = self._checked_ids(env_ids)
+        self._expect_idle(set(self._holder.pending.env_ids).intersection(ids.tolist()))
         rows = self._reader.read(actions, ids)
-        self._crew.arrays["action"][ids] = rows
-        for part, own in self._sharing.by_part(ids):
-            self._crew.send(part, own)
+        self._holder.arrays["action"][ids] = rows
+        for part, own in self._by_part(ids):
+            self._holder.send(part, own)
 
     @_alone
     def recv(self) -> tuple[Any, NDArray[np.float32], _Flags, _Flags, dict[str, Any]]:
@@ -243,7 +241,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
 
         Returns:
             Observation, reward, terminated, truncated and info as `step` returns them, with a row
-            for each environment that came back; ``info["env_id"]`` tells which those are, (n,).
+            for each environment that came back; ``info["env_id"]`` has their numbers, (n,).
 
         Raises:
             SimulationError: If fewer environments were sent actions.
@@ -251,15 +249,12 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
                 after `restart`.
         """
         self._expect_workers()
-        if (away := len(self._crew.steps.away)) < self.batch_size:
+        if (sent := len(self._holder.pending.env_ids)) < self.batch_size:
             raise SimulationError(
-                f"recv() returns {self.batch_size} environments, and {away} were sent actions;"
+                f"recv() returns {self.batch_size} environments, and {sent} were sent actions;"
                 " send() more, or make the vector with a smaller batch_size"
             )
-        try:
-            ids = np.array(self._crew.take(self.batch_size))
-        except WorkersFailed as failed:
-            raise self._error(failed.failures, None) from failed.where
+        ids = np.array(self._holder.take(self.batch_size))
         obs, reward, terminated, truncated, info = self._results.step(ids)
         return obs, reward, terminated, truncated, {**info, "env_id": ids}
 
@@ -275,23 +270,20 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             Observation and info of all environments; those that were not gone are as they were.
 
         Raises:
-            TaskError: If a seed is none, or of an environment that is not gone.
+            TaskError: If a seed is not valid, or of an environment that is not gone.
             WorkerError: If a worker ends before it is ready; another attempt is allowed.
         """
         self._expect_open()
-        gone = sorted(self._crew.failures)
-        ids = [i for worker in gone for i in self._crew.env_ids(worker)]
+        gone = sorted(self._holder.failures)
+        ids = [i for worker in gone for i in self._holder.env_ids(worker)]
         given = dict(seed or {})
         if wrong := [i for i in given if i not in ids]:
             raise TaskError(f"environments {wrong} are not gone; those that are: {ids}")
         wanted = [given.get(i, own) for i, own in enumerate(self._seeds)]
         seeds = checked_seeds(wanted, range(self.num_envs))
-        try:
-            if gone:
-                self._crew.start(gone)
-            self._crew.call("reset", self._beginnings(ids, seeds, reconfigure=False))
-        except WorkersFailed as failed:
-            raise self._error(failed.failures, None) from failed.where
+        if gone:
+            self._holder.restart(gone)
+        self._holder.call("reset", self._beginnings(ids, seeds, reconfigure=False))
         self._note(ids, seeds)
         return self._begun(self._everywhere)
 
@@ -305,7 +297,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         """
         if self.render_mode is None:
             raise TaskError("this task draws no pictures; make it with render_mode='rgb_array'")
-        everyone = {i: () for i in range(len(self._crew.parts))}
+        everyone = {i: () for i in range(len(self._holder.parts))}
         pictures = self._call("render", everyone, lambda: None)
         return tuple(picture for i in everyone for picture in pictures[i])
 
@@ -324,52 +316,52 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
     ) -> dict[int, Any]:
         self._expect_workers()
         try:
-            return self._crew.call(method, arguments)
-        except WorkersFailed as failed:
-            raise self._error(failed.failures, results()) from failed.where
+            return self._holder.call(method, arguments)
+        except WorkerError as error:
+            error.results = results()
+            raise
 
     def _expect_open(self) -> None:
         if self.closed:
             raise SimulationError("this vector is closed; make a new one")
-        self._crew.expect_owner()
+        if self.num_workers and os.getpid() != self._process:
+            raise SimulationError(
+                f"this vector belongs to process {self._process}, of which this one is a fork; make"
+                " one of its own here"
+            )
 
     def _expect_workers(self) -> None:
         self._expect_open()
-        if self._crew.failures:
-            raise self._error(list(self._crew.failures.values()), None)
+        if isinstance(self._holder, Workers) and self._holder.failures:
+            raise self._holder.error(list(self._holder.failures.values()))
 
-    def _expect_idle(self, away: Collection[int]) -> None:
-        if away:
+    def _expect_idle(self, sent: Collection[int]) -> None:
+        if sent:
             raise SimulationError(
-                f"environments {sorted(away)} were sent actions before; recv() them first"
+                f"environments {sorted(sent)} were sent actions before; recv() them first"
             )
-
-    def _error(self, failures: list[Failure], results: Any) -> WorkerError:
-        lines: list[str] = []
-        seeds: list[int] = []
-        for failure in failures:
-            own = [self._seeds[i] for i in failure.env_ids]
-            lines.append(
-                f"worker {failure.worker} with environments {list(failure.env_ids)} of seeds {own}:"
-                f" {failure.reason}"
-            )
-            seeds.extend(own)
-        if hasattr(self, "_crew"):
-            hint = "restart() replaces what is gone; the other environments are untouched"
-        else:
-            hint = "no vector was made"
-        return WorkerError("; ".join([*lines, hint]), failures, seeds, results)
 
     def _beginnings(
         self, ids: list[int], seeds: list[int | None], reconfigure: bool
-    ) -> dict[int, tuple[Beginning]]:
-        beginnings: dict[int, tuple[Beginning]] = {}
-        for number, part in enumerate(self._crew.parts):
-            own = [i for i in ids if i in part.env_ids]
-            if own:
-                local = [i - part.start for i in own]
-                beginnings[number] = (Beginning(local, [seeds[i] for i in own], reconfigure),)
-        return beginnings
+    ) -> dict[int, tuple[Any, ...]]:
+        """Return what the parts that environments are in are reset with; see `Batch.reset`."""
+        return {
+            number: (
+                [i - self._holder.parts[number].start for i in own],
+                [seeds[i] for i in own],
+                reconfigure,
+            )
+            for number, own in self._by_part(ids)
+        }
+
+    def _by_part(self, env_ids: Any) -> Iterator[tuple[int, list[int]]]:
+        """Yield the parts that environments are in, by number, and which of them are in each."""
+        chosen = np.zeros(self.num_envs, bool)
+        chosen[env_ids] = True
+        for number, part in enumerate(self._holder.parts):
+            own = chosen[part.start : part.stop].nonzero()[0]
+            if len(own):
+                yield number, (own + part.start).tolist()
 
     def _note(self, ids: list[int], seeds: list[int | None]) -> None:
         for i in ids:
@@ -381,6 +373,20 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         return self._results.observation(), self._results.info(mask)
 
     # -- checks ------------------------------------------------------------------------------
+
+    def _checked_ids(self, env_ids: Any) -> NDArray[np.intp]:
+        ids = np.asarray(env_ids)
+        if ids.ndim != 1 or ids.dtype.kind not in "iu" or not len(ids):
+            raise TaskError(
+                f"env_ids must be a list of integers, at least one, not {env_ids!r}; recv() returns"
+                " them in info['env_id']"
+            )
+        if ids.min() < 0 or ids.max() >= self.num_envs:
+            wrong = ids[(ids < 0) | (ids >= self.num_envs)].tolist()
+            raise TaskError(f"env_ids {wrong} must lie from 0 to {self.num_envs - 1}")
+        if len(np.unique(ids)) < len(ids):
+            raise TaskError(f"env_ids names environments more than once: {ids.tolist()}")
+        return ids.astype(np.intp, copy=False)
 
     def _checked_options(self, options: Mapping[str, Any] | None) -> tuple[_Flags, bool]:
         options = checked_options(options)

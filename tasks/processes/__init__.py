@@ -1,1 +1,1 @@
-"""Worker processes: how they start, how they end with this one, how their errors come home."""
+"""Worker processes of this machine: how they start, what they are asked for, how they end."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import time
@@ -16,6 +17,7 @@ from tests.faults.worker_processes import (
     PATIENCE,
     TASK,
     actions,
+    command,
     run_script,
     vector,
     wait_until,
@@ -64,11 +66,10 @@ def _parent_ends(
         task_id: What its vector plays.
         hold: Whether it ``steps`` a vector or ``plays`` episodes.
     """
-    from tasks.processes import process as processes
-
-    ours, theirs = processes.context.Pipe()
-    parent = processes.context.Process(target=_hold, args=(theirs, hold, task_id))
-    processes.start(parent)
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    parent = context.Process(target=_hold, args=(theirs, hold, task_id))
+    parent.start()
     theirs.close()
     pid = parent.pid or 0
     try:
@@ -79,11 +80,11 @@ def _parent_ends(
         else:
             time.sleep(seconds)
         others = _session(pid) - {pid}
-        server = {other for other in others if "fork_server" in _command(other)}
+        server = {other for other in others if "forkserver" in command(other)}
         server &= {other for other in others if _parent_of(other) == pid}
         victims = {"worker": _session(pid) - server - {pid}, "server": server, "": set[int]()}
         for victim in victims[stopped]:
-            if "resource_tracker" not in _command(victim):  # Python's own ends by itself
+            if "resource_tracker" not in command(victim):  # Python's own ends by itself
                 os.kill(victim, signal.SIGSTOP)
         os.kill(pid, signal.Signals[name])
         parent.join(PATIENCE)
@@ -116,12 +117,6 @@ def _hold(connection: Any, how: str, task_id: str) -> None:
         connection.send("has workers")
         while True:
             env.step(actions(env))
-
-
-def _command(pid: int) -> str:
-    with suppress(OSError):
-        return Path(f"/proc/{pid}/cmdline").read_text()
-    return ""
 
 
 def _session(number: int) -> set[int]:
@@ -169,7 +164,7 @@ MAINS = {
         "    class Mine(PushCube): pass\n"
         "    tasks.register_task('Mine-v1')(Mine)\n"
         "    gymnasium.make_vec('RobotLayouts/Mine-v1', num_envs=2, num_workers=2)\n",
-        "define its class in a module that they can import",
+        "define it in a module that they can import",
     ),
     "defines a task in a function": (
         "import gymnasium, tasks\n"
@@ -180,7 +175,7 @@ MAINS = {
         "if __name__ == '__main__':\n"
         "    tasks.register_task('Mine-v1')(mine())\n"
         "    gymnasium.make_vec('RobotLayouts/Mine-v1', num_envs=2, num_workers=2)\n",
-        "define its class in a module that they can import",
+        "define it in a module that they can import",
     ),
 }
 

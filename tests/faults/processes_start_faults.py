@@ -1,14 +1,13 @@
-"""Too little to start workers with, and a server of forks that is gone or stopped."""
+"""Too little to start workers with, and a server of forks that is gone."""
 
 from __future__ import annotations
 
 import os
 import resource
 import signal
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.worker_processes import (
@@ -135,15 +134,6 @@ def _little_memory(megabytes: int) -> None:
 def _servers() -> Iterator[Fault]:
     yield Fault(AREA, "the server is killed before a start", lambda _: _no_server(), GOES_ON)
     yield Fault(AREA, "the server is killed with a vector open", lambda _: _server_lost())
-    yield Fault(AREA, "the server is stopped before a start", lambda _: _server_stops(), GOES_ON)
-    yield Fault(
-        AREA,
-        "the server is stopped with a vector open",
-        lambda _: _server_reports_nothing(),
-        GOES_ON,
-    )
-    yield Fault(AREA, "a worker is stopped while it is started", lambda _: _reads_nothing())
-    yield Fault(AREA, "the server's libraries cannot be loaded", lambda _: _server_cannot_load())
 
 
 def _no_server() -> None:
@@ -165,60 +155,3 @@ def _server_lost() -> None:
         env.restart()
         assert env.step(actions(env))[0].tobytes() == play_own()
         raise error
-
-
-def _server_stops() -> None:
-    from tasks.processes import forks
-
-    patience, forks._FORK_SECONDS = forks._FORK_SECONDS, 1.0
-    try:
-        os.kill(server_pid(), signal.SIGSTOP)
-        play_own()
-    finally:
-        forks._FORK_SECONDS = patience
-
-
-def _server_cannot_load() -> None:
-    from tasks.processes import forks
-
-    os.kill(server_pid(), signal.SIGKILL)
-    command = forks._COMMAND
-    forks._COMMAND = command.replace("serve(", "raise SystemExit(")
-    try:
-        play_own()
-    finally:
-        forks._COMMAND = command
-
-
-def _server_reports_nothing() -> None:
-    from tasks.processes import forks
-
-    before, patience, forks._FORK_SECONDS = children(), forks._FORK_SECONDS, 1.0
-    try:
-        with vector(num_workers=2):
-            os.kill(server_pid(), signal.SIGSTOP)
-        assert children() == before
-        play_own()
-    finally:
-        forks._FORK_SECONDS = patience
-
-
-def _reads_nothing() -> None:
-    """Stop a worker before it has read all that it is to run, which no pipe holds at once."""
-    from tasks.processes import forks
-    from tasks.processes import process as processes
-
-    server_pid()  # is there already
-    fork, patience = forks._fork, forks._FORK_SECONDS
-
-    def fork_and_stop(descriptors: Sequence[int]) -> Any:
-        server, worker = fork(descriptors)
-        os.kill(worker[0], signal.SIGSTOP)
-        return server, worker
-
-    forks._fork, forks._FORK_SECONDS = fork_and_stop, 1.0
-    try:
-        processes.start(processes.context.Process(target=len, args=(bytes(2**20),)))
-    finally:
-        forks._fork, forks._FORK_SECONDS = fork, patience
-        play_own()

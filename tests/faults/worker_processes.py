@@ -13,6 +13,8 @@ from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from tests.process_trees import children_of
+
 AREA = "processes"
 ROOT = Path(__file__).parents[2]
 PATIENCE = 30.0  # s, for processes to be gone on a busy machine
@@ -55,13 +57,16 @@ def play_own() -> bytes:
 
 def server_pid() -> int:
     """Return the number of the server that forks this process's workers."""
-    from tasks.processes import forks
+    with vector(num_workers=1):
+        (server,) = [pid for pid in children_of(os.getpid()) if "forkserver" in command(pid)]
+    return server
 
-    if forks._server is None:
-        with vector(num_workers=1):
-            pass
-    assert forks._server is not None
-    return forks._server._pid  # pyright: ignore[reportPrivateUsage]
+
+def command(pid: int) -> str:
+    """Return the command line of a process; nothing if it is gone."""
+    with suppress(OSError):
+        return Path(f"/proc/{pid}/cmdline").read_text()
+    return ""
 
 
 @contextmanager
@@ -83,12 +88,12 @@ def actions(env: Any) -> Any:
 
 def worker_pid(env: Any, number: int) -> int:
     """Return the process of a vector's worker."""
-    return env._crew._crew[number].pid
+    return env._holder.workers[number].pid
 
 
 def living_workers(env: Any) -> list[int]:
     """Return the processes of a vector that live."""
-    return [worker.pid for worker in env._crew._crew.values() if session_of(worker.pid)]
+    return [worker.pid for worker in env._holder.workers.values() if session_of(worker.pid)]
 
 
 def session_of(pid: int) -> int:

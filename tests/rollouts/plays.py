@@ -1,8 +1,8 @@
 """What worker processes do in tests; they import this module."""
 
 import os
+import pickle
 import signal
-import struct
 import sys
 import time
 from collections.abc import Callable
@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from robots import TaskError
-from rollouts.playing import local_workers
 from rollouts.playing.executor import Event, report
+from tasks.processes import worker
 
 TASK = "PushT-v1"
 BARRIER = "TEST_BARRIER"  # environment variable: a folder where `at_random` waits, if it exists
@@ -99,16 +99,18 @@ class DiesAmidAnEpisode:
     folder: Path
 
     def __call__(self):
-        send = local_workers._send_note
+        send = worker.Channel.send
 
-        def send_or_die(note):
-            try:
-                (self.folder / "died").touch(exist_ok=False)
-            except FileExistsError:
-                return send(note)
-            os.kill(os.getpid(), signal.SIGKILL)
+        def send_or_die(channel, number, message):
+            if pickle.loads(message)[0] is worker.Status.NOTE:
+                try:
+                    (self.folder / "died").touch(exist_ok=False)
+                except FileExistsError:
+                    return send(channel, number, message)
+                os.kill(os.getpid(), signal.SIGKILL)
+            return send(channel, number, message)
 
-        local_workers._send_note = send_or_die
+        worker.Channel.send = send_or_die
         return self.prepare()
 
 
@@ -149,8 +151,8 @@ class StopsHalfWay:
     def play(self, seed: int):
         if not (self.folder / "hung").exists():
             (self.folder / "hung").touch()
-            (connection,) = (cell.cell_contents for cell in local_workers._send_note.__closure__)
-            os.write(connection.fileno(), struct.pack("!i", 1000) + b"half of an answer")
+            channel, number = worker._connection
+            channel.socket.send(worker._HEAD.pack(number, 0, 2) + b"half of a reply")
             os.kill(os.getpid(), signal.SIGSTOP)
         return os.getpid(), seed**2
 
@@ -198,13 +200,6 @@ class Here:
         play = prepare()
         for seed in reversed(seeds):
             yield Event(seed, result=play(seed))
-
-
-def blocked_signals():
-    """Return which signals this process holds back, as the kernel writes it."""
-    status = Path("/proc/self/status").read_text()
-    (mask,) = (line.split()[1] for line in status.splitlines() if line.startswith("SigBlk"))
-    return lambda seed: mask
 
 
 class CodeFolder:

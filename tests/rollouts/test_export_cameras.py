@@ -21,8 +21,7 @@ from rollouts.export.drawing_job import DrawingCrew, DrawnEpisode
 from rollouts.export.lerobot import LeRobotWriter, Limits
 from rollouts.export.pictures import Drawing
 from rollouts.export.shots import Channel, choose_shots
-from rollouts.playing.events import Event
-from rollouts.playing.executor import ProcessExecutor
+from rollouts.playing.executor import Event, ProcessExecutor
 from rollouts.reading.recorded_task import task_for
 from rollouts.reading.trajectory import TrajectoryFile
 from rollouts.recording.recorder import Recorder

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-import rollouts.playing.dispatch
 import rollouts.playing.ray_executor
+import rollouts.playing.scheduler
 from experts import registry
 from robots import MissingPackageError, TaskError, UnknownNameError
 from robots.common.rooms import PLAYING
@@ -69,7 +69,7 @@ def test_a_cluster_without_room(cluster, monkeypatch):
     cluster.shrink()
     with pytest.raises(WorkerError, match="no node of the Ray cluster offers a CPU"):
         run(cluster, Play(), range(3))
-    monkeypatch.setattr(rollouts.playing.dispatch, "QUIET_SECONDS", 3.0)
+    monkeypatch.setattr(rollouts.playing.scheduler, "QUIET_SECONDS", 3.0)
     events = RayExecutor(cluster.address, 1, modules=MODULES).run(Play(), range(3))
     said = next(events).note
     assert re.fullmatch(
@@ -222,7 +222,7 @@ def test_what_cannot_begin(nodes, monkeypatch):
         run(nodes, dies_before_it_is_ready, range(9), workers=1)
     with pytest.raises(WorkerError, match="cannot be sent to them: "):
         run(nodes, (lambda file: lambda: file)(sys.stderr), range(3))
-    monkeypatch.setattr(rollouts.playing.ray_executor, "_versions", lambda: {"sapien": "0.1"})
+    monkeypatch.setattr(rollouts.playing.ray_executor, "versions", lambda _: {"sapien": "0.1"})
     with pytest.raises(WorkerError, match=r"node 127.* has sapien 3.*, this machine sapien 0\.1;"):
         run(nodes, Play(), range(3))
 

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pytest
 
-import rollouts.playing.dispatch
 import rollouts.playing.ray_cluster
+import rollouts.playing.scheduler
 from robots import TaskError
 from rollouts.playing.executor import WorkerError
 from rollouts.playing.ray_executor import RayExecutor
@@ -91,7 +91,7 @@ def test_an_actor_that_is_stopped(nodes):
 
 @pytest.mark.long
 def test_an_actor_that_is_stopped_before_it_is_ready(nodes, monkeypatch, tmp_path):
-    monkeypatch.setattr(rollouts.playing.dispatch, "START_SECONDS", 30.0)
+    monkeypatch.setattr(rollouts.playing.scheduler, "START_SECONDS", 30.0)
     executor = RayExecutor(nodes.address, 1, modules=MODULES)
     played = list(executor.run(StopsItselfOnce(tmp_path), range(6)))
     (death,) = [event for event in played if event.died is not None]

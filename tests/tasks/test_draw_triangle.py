@@ -4,7 +4,7 @@ import torch
 import tasks
 from robots import SimulationError
 from tasks import MultiRobotTask
-from tasks.fronts.numbers import stepper
+from tasks.fronts.gymnasium import stepper
 from tasks.maniskill.draw_triangle import MAX_DOTS
 
 STILL = torch.zeros(1, 7)

@@ -9,7 +9,7 @@ import tasks
 from experts import find_expert
 from robots import TaskError
 from rollouts import evaluate
-from tasks.fronts.attributes import UnknownAttributeError
+from tasks.fronts.vector import UnknownAttributeError
 
 TASK = "TwoRobotPickCube-v1"
 SEEDS = [5, 6, 7]

@@ -117,6 +117,7 @@ def test_workers_change_nothing_in_any_task(task_id, num_workers):
         assert differences(play(env, mode, 12), together) == []
 
 
+@pytest.mark.long
 def test_it_begins_and_goes_on_as_the_batched_task_does():
     """PegInsertionSide draws its geometry at every reset."""
     task_id = "PegInsertionSide-v1"
@@ -155,7 +156,7 @@ def test_an_ended_episode_waits_for_its_reset():
 
 def test_an_ended_environment_stands_still_while_others_move(monkeypatch):
     env = make()
-    simulation = env._crew._batches[0]._task.simulation
+    simulation = env._holder.batches[0]._task.simulation
     moved, step = [], simulation.step
 
     def spy(action, joint_positions, env_ids=None):
@@ -178,7 +179,7 @@ def test_an_ended_environment_stands_still_while_others_move(monkeypatch):
 def test_terminations_may_be_ignored(ignored):
     env = make(ignore_terminations=ignored, autoreset_mode="SAME_STEP")
     env.reset(seed=0)
-    task = env._crew._batches[0]._task
+    task = env._holder.batches[0]._task
     state = task.get_state_dict()
     state["actors"]["cube"][1, :2] = state["actors"]["goal_region"][1, :2]
     task.set_state_dict(state)
@@ -225,8 +226,8 @@ def test_what_it_returns_stays_as_it_is():
 
 def test_an_action_is_checked_once():
     env = VectorTask("PickCube-v1", num_envs=2, num_workers=0)
-    checked = env._crew._batches[0]._task._reader.checked
-    assert np.shares_memory(checked, env._crew.arrays["action"])
+    checked = env._holder.batches[0]._task._reader.checked
+    assert np.shares_memory(checked, env._holder.arrays["action"])
     wrong = np.zeros((2, 8), np.float32)
     wrong[1, 2] = np.inf
     with pytest.raises(ActionError, match="action number 2 is inf in environment 1"):

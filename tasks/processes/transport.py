@@ -14,29 +14,55 @@ from typing import Any
 
 from robots import RobotLayoutsError
 from robots.common.rooms import ROOMS
-from rollouts.playing.events import Play, WorkerError
-from tasks.processes.process import Sendable
+from tasks.processes.start import WorkerError
 
 _CHECKOUT = Path(__file__).parents[2]
-
-HINT = "put it into a module that they can import, or pass workers=0, which plays in this process"
-
-
-def modules_of(*things: Any) -> tuple[str, ...]:
-    """Return the modules that define classes, functions, or the classes of other things."""
-    known = (thing if hasattr(thing, "__module__") else type(thing) for thing in things)
-    return tuple(dict.fromkeys(str(thing.__module__) for thing in known))
+_HINT = (
+    "define it in a module that they can import, or use this process alone: workers=0, and"
+    " num_workers=0 of a vector"
+)
 
 
-def packed(prepare: Callable[[], Play]) -> bytes:
-    """Return what makes the plays, pickled for processes of this machine.
+class RemoteError(WorkerError):
+    """An error that is not a `RobotLayoutsError`, as it arrives here, with its kind and place."""
+
+
+class WorkerTraceback(Exception):
+    """Where an error came up in another process: the ``__cause__`` of what is raised here."""
+
+    def __str__(self) -> str:
+        """Return the traceback as that process would have printed it."""
+        return f"\n\n{self.args[0]}" if self.args else ""
+
+
+class SentError:
+    """An error that arrives in another process together with where it came up.
+
+    It is pickled as the error itself if that is one of ours, else as a `RemoteError`; the
+    ``__cause__`` of what arrives is a `WorkerTraceback`.
+    """
+
+    def __init__(self, error: BaseException) -> None:
+        """Keep the error and its traceback, as text."""
+        lines = traceback.format_exception(type(error), error, error.__traceback__)
+        self._traceback = "".join(lines).rstrip()
+        ours = isinstance(error, RobotLayoutsError) and _survives_pickling(error)
+        self._error = error if ours else RemoteError(described(error))
+
+    def __reduce__(self) -> tuple[Callable[..., Exception], tuple[BaseException, str]]:
+        """Pickle as the error."""
+        return _arrived, (self._error, self._traceback)
+
+
+def packed(what: Any) -> bytes:
+    """Return what workers of this machine are to have, pickled.
 
     Raises:
         WorkerError: If they could not load it, or it cannot be pickled.
     """
     buffer = io.BytesIO()
     try:
-        _Pickler(buffer, pickle.HIGHEST_PROTOCOL).dump(prepare)
+        _Pickler(buffer, pickle.HIGHEST_PROTOCOL).dump(what)
     except WorkerError:
         raise
     except Exception as error:  # whatever a class of the user's own raises
@@ -44,8 +70,8 @@ def packed(prepare: Callable[[], Play]) -> bytes:
     return buffer.getvalue()
 
 
-def loaded(job: bytes) -> Callable[[], Play]:
-    """Return what makes the plays, in a worker.
+def loaded(job: bytes) -> Any:
+    """Return what was packed, in a worker.
 
     Raises:
         WorkerError: If something that it needs cannot be imported, say.
@@ -54,29 +80,23 @@ def loaded(job: bytes) -> Callable[[], Play]:
         return pickle.loads(job)
     except Exception as error:
         raise WorkerError(
-            f"a worker cannot load what it is to play: {_words(error)}{_users_line(error)}; {HINT}"
+            f"a worker cannot load what it needs: {_words(error)}{_users_line(error)}; {_HINT}"
         ) from error
 
 
 def unsendable(error: Exception) -> WorkerError:
-    """Return what to raise if pickling what the workers need raised ``error``."""
+    """Return what to raise if pickling what workers need raised ``error``."""
     return WorkerError(
-        f"what the workers need cannot be sent to them: {_words(error)}{_users_line(error)}; a"
-        " task, an expert or a policy must be defined in a module that they can import and hold"
-        " what can be pickled, or play in this process with workers=0"
+        f"what the workers need cannot be sent to them: {_words(error)}{_users_line(error)};"
+        f" a task, an expert or a policy must hold what can be pickled; {_HINT}"
     )
-
-
-def portable(error: Exception) -> Sendable:
-    """Return what arrives elsewhere as an error of ours, with its traceback as its cause."""
-    return Sendable(as_ours(error), WorkerError)
 
 
 def as_ours(error: Exception) -> RobotLayoutsError:
     """Return an error that was raised in this process as one of ours."""
     if isinstance(error, RobotLayoutsError):
         return error
-    ours = WorkerError(described(error))
+    ours = RemoteError(described(error))
     ours.__cause__ = error
     return ours
 
@@ -84,6 +104,12 @@ def as_ours(error: Exception) -> RobotLayoutsError:
 def described(error: BaseException) -> str:
     """Return an error's kind and words, and the line that it came from, if possible the user's."""
     return _words(error) + (_users_line(error) or _line(traceback.extract_tb(error.__traceback__)))
+
+
+def is_installed(path: Path) -> bool:
+    """Return whether a file is Python's own or of an installed package."""
+    kinds = ("stdlib", "platlib", "purelib")
+    return any(path.is_relative_to(sysconfig.get_path(kind)) for kind in kinds)
 
 
 def _words(error: BaseException) -> str:
@@ -104,16 +130,23 @@ def _line(frames: Sequence[traceback.FrameSummary]) -> str:
     return f" ({frames[-1].filename}:{frames[-1].lineno}, in {frames[-1].name})"
 
 
-def is_installed(path: Path) -> bool:
-    """Return whether a file is Python's own or of an installed package."""
-    kinds = ("stdlib", "platlib", "purelib")
-    return any(path.is_relative_to(sysconfig.get_path(kind)) for kind in kinds)
-
-
 def _is_users(file: str) -> bool:
     path = Path(file)
     library = any(path.is_relative_to(_CHECKOUT / room) for room in ROOMS)
     return not (library or is_installed(path) or file.startswith("<frozen "))
+
+
+def _arrived(error: Exception, text: str) -> Exception:
+    error.__cause__ = WorkerTraceback(text)
+    return error
+
+
+def _survives_pickling(error: BaseException) -> bool:
+    try:
+        arrived = pickle.loads(pickle.dumps(error))
+        return type(arrived) is type(error) and str(arrived) == str(error)
+    except Exception:  # whatever a class of the user's own does
+        return False
 
 
 class _Pickler(pickle.Pickler):
@@ -125,13 +158,13 @@ class _Pickler(pickle.Pickler):
         if named and obj.__module__ == "__main__" and not _others_can_load_main():
             raise WorkerError(
                 f"{obj.__qualname__} is defined in this notebook or interactive session, where"
-                f" worker processes cannot load it: {HINT}"
+                f" worker processes cannot load it: {_HINT}"
             )
         return NotImplemented
 
 
 def _others_can_load_main() -> bool:
-    """Return whether ``__main__`` comes from a file, which spawned processes read again."""
+    """Return whether ``__main__`` comes from a file, which workers read again."""
     main = sys.modules["__main__"]
     file = getattr(main, "__file__", None)
     return getattr(main, "__spec__", None) is not None or (

@@ -1,3 +1,0 @@
-"""Under which names other programs know a task."""
-
-NAMESPACE = "RobotLayouts"  # Gymnasium ids are RobotLayouts/PickCube-v1
