@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from robots import CONTROL_MODES
 from rollouts.reading.damage import damage_errors
-from rollouts.reading.hdf5_reading import MAX_BYTES
+from rollouts.reading.hdf5 import MAX_BYTES
 from rollouts.reading.summary import MAX_SEED, recorded_task
 from rollouts.reading.trajectory import (
     Trajectory,

@@ -18,7 +18,7 @@ from robots.common.files import open_regular
 from rollouts.reading.damage import damage_errors
 from rollouts.reading.episode_checksum import ARRAYS, CHECKSUM, STATES, TEXTS, checksum
 from rollouts.reading.guessed_robots import GUESSED
-from rollouts.reading.hdf5_file import Hdf5File, Shapes
+from rollouts.reading.hdf5 import Hdf5File, Shapes
 from rollouts.reading.provenance import (
     LAYOUT,
     SIMULATION,

@@ -24,7 +24,7 @@ from robots import RecordingError
 from robots.common.files import parse_json, read_regular
 from robots.common.writing import PARTIAL, written_whole
 from rollouts.reading.episode_checksum import STATES
-from rollouts.reading.hdf5_reading import MAX_BYTES
+from rollouts.reading.hdf5 import MAX_BYTES
 from rollouts.reading.json_fields import (
     ANYTHING,
     OBJECT,

@@ -24,7 +24,7 @@ from robots.common.files import parse_json
 from robots.common.writing import written_whole
 from rollouts.reading.damage import damage_errors
 from rollouts.reading.episode_checksum import CHECKSUM, checksum
-from rollouts.reading.hdf5_file import Hdf5File
+from rollouts.reading.hdf5 import Hdf5File
 from rollouts.reading.json_fields import FieldError
 from rollouts.reading.provenance import read_described
 from rollouts.reading.summary import OWN_EPISODE
