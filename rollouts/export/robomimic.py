@@ -12,10 +12,10 @@ import numpy as np
 
 from robots.control_modes import plain_mode
 from rollouts.export.columns import POSE, ColumnReader, Columns, Floats
-from rollouts.export.disk_file import DiskFile
 from rollouts.export.robomimic_pictures import PictureArrays
 from rollouts.export.shots import Channel, Frame
 from rollouts.export.writer import DatasetWriter
+from rollouts.recording.disk import DiskFile
 from tasks.engine.cameras import Size
 from tasks.engine.columns import robomimic_columns
 from tasks.episode import States

@@ -39,7 +39,6 @@ from rollouts.reading.summary import MAX_SEED, OWN_EPISODE
 from tasks.episode import REBUILT, PlayedEpisode
 
 _SUFFIX = ".part"
-_EARLIER = ".h5"
 _SEED = re.compile(r"seed-([0-9]{10,})")
 _OPENING = b"robot-layouts episode 1\n"
 _CHECKSUM = 4  # bytes
@@ -189,20 +188,14 @@ def list_parts(folder: Path) -> list[Path]:
     return sorted(path for path in folder.glob(f"seed-*{_SUFFIX}") if _is_part(path))
 
 
-def list_earlier_parts(folder: Path) -> list[Path]:
-    """Return the parts that an earlier version left in a folder, which are not read any more."""
-    return sorted(folder.glob(f"seed-*{_EARLIER}"))
-
-
 def refuse_foreign(folder: Path) -> None:
     """Refuse a folder of parts that holds something else, which nobody should delete.
 
     Raises:
         RecordingError: If so.
     """
-    earlier = list_earlier_parts(folder)
     for path in sorted(folder.iterdir()):
-        ours = path.suffix == PARTIAL or path in earlier or _is_part(path)
+        ours = path.suffix == PARTIAL or _is_part(path)
         if not ours or path.is_symlink() or not path.is_file():
             raise RecordingError(
                 f"{path} is no episode of this library, in a folder that is for such episodes only;"

@@ -17,8 +17,8 @@ from robots import RobotLayoutsError
 from rollouts.export.dataset import Export, export
 from rollouts.reading.trajectory import TrajectoryFile
 from rollouts.recording.episode_files import read_part
+from rollouts.recording.joined_files import read_joined
 from rollouts.recording.recorder import Recorder
-from rollouts.recording.trajectory_writer import read_joined
 from tasks.episode import play
 from tests.rollouts.recordings import edited
 

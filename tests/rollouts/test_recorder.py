@@ -376,21 +376,6 @@ def test_a_fifo_in_the_place_of_a_recording_is_not_waited_for(tmp_path, push_t, 
         Recorder(path, env, resume=True)
 
 
-def test_parts_of_an_earlier_version_are_refused_not_lost(tmp_path, push_t):
-    env, episodes = push_t
-    path = write(tmp_path / "old.h5", env, episodes[:1])
-    parts = path.with_suffix(".parts")
-    parts.mkdir()
-    old = parts / "seed-0000000007.h5"
-    with h5py.File(old, "w") as file:
-        file["traj_0/actions"] = episodes[1].actions
-    with pytest.raises(RecordingError, match=r"seed-0000000007\.h5 is one of 1 episodes that an e"):
-        Recorder(path, env, resume=True)
-    assert old.exists()
-    write(path, env, episodes[:2], overwrite=True)
-    assert not parts.exists()
-
-
 def test_one_episode_per_seed(tmp_path, push_t):
     env, episodes = push_t
     path = write(tmp_path / "once.h5", env, episodes[:1])
