@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from rollouts.dataset.contents import Contents
-from rollouts.reading.trajectory import Trajectory, TrajectoryFile
+from rollouts.reading.recording import Recording, Trajectory
 from rollouts.video import Picture, open_video
 from simulation.rendering.pictures import Cameras
 from tasks import MultiRobotTask
@@ -60,7 +60,7 @@ def chosen(contents: Contents, most: int) -> dict[int, str]:
 
 
 def film(
-    file: TrajectoryFile,
+    file: Recording,
     task: MultiRobotTask,
     places: dict[int, str],
     progress: Callable[[], None] = lambda: None,

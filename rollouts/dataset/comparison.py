@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experts.touching import ArmWatch
-from rollouts.reading.episode_checksum import STATES
-from rollouts.reading.trajectory import Trajectory, TrajectoryError
+from rollouts.reading.provenance import STATES
+from rollouts.reading.recording import Trajectory, TrajectoryError
 from tasks import MultiRobotTask
 from tasks.episode import PlayedEpisode, play
 

@@ -17,8 +17,7 @@ from rollouts.dataset.clips import Clip, chosen, film
 from rollouts.dataset.contents import Contents, read_contents
 from rollouts.dataset.page import Report
 from rollouts.playing.replay import open_recording, task_for
-from rollouts.reading.recording import all_files, first_file
-from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.reading.recording import Recording, TrajectoryError, all_files, first_file
 from rollouts.video import video_problem
 
 Progress = Callable[[float, float, str], None]
@@ -78,7 +77,7 @@ def make_report(
 
 
 def _near(
-    file: TrajectoryFile,
+    file: Recording,
     contents: Contents,
     count: int,
     cell: Mapping[str, Any],
@@ -100,7 +99,7 @@ def _near(
 
 
 def _films(
-    file: TrajectoryFile,
+    file: Recording,
     contents: Contents,
     count: int,
     cell: Mapping[str, Any],

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from robots import RobotDescriptor
 from rollouts.export.credits import Credits
-from rollouts.reading.trajectory import Trajectory, TrajectoryError
+from rollouts.reading.recording import Trajectory, TrajectoryError
 from tasks import MultiRobotTask
 from tasks.engine.columns import placed_bodies
 from tasks.episode import States
@@ -39,7 +39,7 @@ class Columns:
         rewards: Shape (T,), or None if the recording holds none.
         success: Shape (T,), or None if the recording holds none.
         done: Whether the episode ended with the step, (T,); always at its last step.
-        source: Who acted; see `rollouts.reading.trajectory.Trajectory`.
+        source: Who acted; see `rollouts.reading.recording.Trajectory`.
         actor: Who acted at each step, (T,): a number of `rollouts.export.credits.Credits.actors`;
             None if there are not several.
         corrections: What a corrector would have done, (T, A); None unless all episodes hold it.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollouts.reading.trajectory import Trajectory, TrajectoryFile
+from rollouts.reading.recording import Recording, Trajectory
 from rollouts.sources.actors import EXPERT
 
 _FIELDS = ("kind", "name", "sha256")
@@ -22,7 +22,7 @@ class Credits:
         corrected: Whether all episodes hold what a corrector would have done.
     """
 
-    def __init__(self, file: TrajectoryFile) -> None:
+    def __init__(self, file: Recording) -> None:
         """Read who it was in each episode."""
         said = [_acted(source) for source in file.sources] if any(file.sources) else []
         self.actors: list[dict[str, Any]] = []

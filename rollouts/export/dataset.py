@@ -15,8 +15,7 @@ from rollouts.export.folder import new_folder
 from rollouts.export.options import FORMATS, Export
 from rollouts.playing.executor import ProcessExecutor
 from rollouts.reading.recorded_task import task_class, task_for
-from rollouts.reading.recording import open_trajectories
-from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
+from rollouts.reading.recording import Recording, Trajectory, TrajectoryError
 from tasks.description import instruction_of
 
 if TYPE_CHECKING:
@@ -98,7 +97,7 @@ def export(
     """
     out, progress = Path(wanted.out), _rising(progress)
     wanted.check(here=executor is None or isinstance(executor, ProcessExecutor))
-    with open_trajectories(wanted.recording) as file:
+    with Recording(wanted.recording) as file:
         if not len(file):
             raise TrajectoryError(f"{file.path} holds no episodes; there is nothing to export")
         work = _Work(wanted, file, here=executor is None)
@@ -134,7 +133,7 @@ class _Work:
         seen: Whether there are pictures of the task's or its robots' cameras.
     """
 
-    def __init__(self, wanted: Export, file: TrajectoryFile, *, here: bool) -> None:
+    def __init__(self, wanted: Export, file: Recording, *, here: bool) -> None:
         """Make the task; it can be drawn if ``here`` says that this process draws."""
         task_class(file, wanted.task)
         names = wanted.camera_names
@@ -241,7 +240,7 @@ def _rising(progress: Progress) -> Progress:
     return show
 
 
-def _origin(file: TrajectoryFile, reader: ColumnReader) -> dict[str, Any]:
+def _origin(file: Recording, reader: ColumnReader) -> dict[str, Any]:
     actors = reader.credits.actors if reader.credits else []
     return {
         "task_id": file.task_id,

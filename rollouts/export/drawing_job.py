@@ -18,7 +18,7 @@ from rollouts.export.shots import Channel, Frame, Picture, Shots
 from rollouts.playing.events import Event
 from rollouts.playing.executor import Executor, modules_of, play_all, report
 from rollouts.reading.recorded_task import task_for
-from rollouts.reading.recording import open_trajectories
+from rollouts.reading.recording import Recording
 from tasks import MultiRobotTask
 
 
@@ -79,7 +79,7 @@ class _Drawer:
     """Draws episodes in one world, which is built anew for each."""
 
     def __init__(self, job: DrawingJob) -> None:
-        self._job, self._file = job, open_trajectories(job.recording)
+        self._job, self._file = job, Recording(job.recording)
         self._task = task_for(self._file, layout=job.layout, robots=job.robots, pictures=True)
         self._reader = ColumnReader(self._task)
 

@@ -49,6 +49,7 @@ _PIPELINES = [
     for pack in ([], [_GZIP])
     for check in ([], [_CHECK])
 ]
+_END_PLACES = {0: 40, 2: 28, 3: 28}  # where the first block has the file's size, by its version
 _CHECK_BYTES = 4  # that fletcher32 adds
 _UNKNOWN = "something in it is damaged, or is not read, such as links to other files"
 _FLAG = {"FALSE": 0, "TRUE": 1}  # the enumeration that h5py writes for bool
@@ -82,6 +83,7 @@ class Hdf5File:
         try:
             with self._reading() as root:
                 self._members = sorted(root)
+                self._stream.expect_end()
         except BaseException:
             self.close()
             raise
@@ -193,6 +195,13 @@ class _Stream:
 
     def close(self) -> None:
         self._file.close()
+
+    def expect_end(self) -> None:
+        """Refuse a file that is shorter than its first block says."""
+        start = os.pread(self._file.fileno(), 64, 0)
+        place = _END_PLACES.get(start[8])  # none if it begins with bytes of the user's own
+        if place is not None and int.from_bytes(start[place : place + 8], "little") > self.size:
+            raise ContentError("its end is missing")
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         self._position = offset + (self.size if whence == os.SEEK_END else 0)

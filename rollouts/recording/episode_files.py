@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from robots import RecordingError
 from robots.common.files import parse_json, read_regular
 from robots.common.writing import PARTIAL, written_whole
-from rollouts.reading.episode_checksum import STATES
 from rollouts.reading.hdf5 import MAX_BYTES
 from rollouts.reading.json_fields import (
     ANYTHING,
@@ -35,6 +34,7 @@ from rollouts.reading.json_fields import (
     items,
     whole,
 )
+from rollouts.reading.provenance import STATES
 from rollouts.reading.summary import MAX_SEED, OWN_EPISODE
 from tasks.episode import REBUILT, PlayedEpisode
 

@@ -20,7 +20,6 @@ from robots import RecordingError, UnreadableFileError
 from robots.common.files import open_regular, parse_json, read_text
 from robots.common.writing import write_whole, written_whole
 from rollouts.reading.damage import damage_errors
-from rollouts.reading.episode_checksum import CHECKSUM, checksum
 from rollouts.reading.hdf5 import Hdf5File
 from rollouts.reading.json_fields import FieldError
 from rollouts.reading.manifest import (
@@ -34,11 +33,18 @@ from rollouts.reading.manifest import (
     sized_file,
     spans_of,
 )
-from rollouts.reading.provenance import listing, read_described
+from rollouts.reading.provenance import (
+    CHECKSUM,
+    checksum,
+    header_differences,
+    header_hash,
+    listing,
+    numbered,
+    read_described,
+)
 from rollouts.reading.summary import MAX_JSON, OWN_EPISODE, TrajectoryError
 from rollouts.recording.disk import DiskFile, disk_errors
 from rollouts.recording.episode_files import Stored, read_part
-from rollouts.recording.header import header_differences, header_hash, numbered
 from rollouts.sources.header import Source, combined, source_of
 
 # From HDF5 1.8, the first in which attributes may be larger than 64 kB.

@@ -19,7 +19,13 @@ from typing import Any, NamedTuple
 from robots import RecordingError, TaskError
 from robots.common.writing import PARTIAL
 from rollouts.reading.manifest import FILE_SIZE
-from rollouts.reading.provenance import describe_layout, listing
+from rollouts.reading.provenance import (
+    describe_layout,
+    describe_task,
+    header_differences,
+    listing,
+    recorded_control_mode,
+)
 from rollouts.recording.disk import claim, disk_errors
 from rollouts.recording.episode_files import (
     PartWriter,
@@ -31,7 +37,6 @@ from rollouts.recording.episode_files import (
     refuse_foreign,
     seed_of,
 )
-from rollouts.recording.header import describe_task, header_differences, recorded_control_mode
 from rollouts.recording.joined_files import JoinedFiles, OpenFile
 from rollouts.sources.header import Source, combined, source_of
 from tasks import MultiRobotTask

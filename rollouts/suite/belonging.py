@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from robots.control_modes import plain_mode
-from rollouts.reading.recorded_layout import same_places
+from rollouts.reading.recorded_task import same_places
 from rollouts.receipts.making import make_again
 from rollouts.receipts.receipt import Receipt, ReceiptError
 from rollouts.suite.suite import Case

@@ -17,7 +17,7 @@ from robots import UnreadableFileError
 from rollouts.export.dataset import Export, export
 from rollouts.reading import hdf5
 from rollouts.reading.hdf5 import ContentError, Hdf5File, LimitError, limited
-from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.reading.recording import Recording, TrajectoryError
 from tests.rollouts.recordings import edited, record
 
 SECRET = b"root:x:0:0: a secret in another file\n" * 20
@@ -82,7 +82,7 @@ def test_an_array_that_is_larger_than_any_memory_is_refused(path, rows):
         del file["traj_0/actions"]
         chunks = (2**20, 7)
         file.create_dataset("traj_0/actions", (rows, 7), "f4", chunks=chunks, compression="gzip")
-    with TrajectoryFile(path) as file, pytest.raises(TrajectoryError, match="at most 1,073,741,8"):
+    with Recording(path) as file, pytest.raises(TrajectoryError, match="at most 1,073,741,8"):
         file[0]
 
 
@@ -91,7 +91,7 @@ def test_actions_must_be_of_the_steps_that_the_json_says(path):
     summary = json.loads(beside.read_text())
     summary["episodes"][0]["elapsed_steps"] = 2
     beside.write_text(json.dumps(summary))
-    with TrajectoryFile(path) as file:
+    with Recording(path) as file:
         with pytest.raises(TrajectoryError, match=r"shape \(3, 7\); the json .* says 2 steps"):
             file.expect("PushT-v1", 7)
         with pytest.raises(TrajectoryError, match=r"shape \(3, 7\); the json .* says 2 steps"):
@@ -116,7 +116,7 @@ def test_every_value_of_the_json_is_looked_at(path, where, value, why):
     holder[where] = value
     beside.write_text(json.dumps(summary))
     with pytest.raises(TrajectoryError, match=why):
-        TrajectoryFile(path)
+        Recording(path)
 
 
 @pytest.mark.parametrize(
@@ -131,7 +131,7 @@ def test_every_value_of_the_attributes_is_looked_at(path, layout, why):
     with edited(path) as file:
         file.attrs["layout"] = layout if isinstance(layout, str) else json.dumps(layout)
     with pytest.raises(TrajectoryError, match=why):
-        TrajectoryFile(path)
+        Recording(path)
 
 
 @pytest.mark.parametrize("name", ["trajectory.h5", "trajectory.json"])
@@ -139,7 +139,7 @@ def test_a_fifo_is_not_waited_for(path, name):
     path.with_name(name).unlink()
     os.mkfifo(path.with_name(name))
     with pytest.raises(TrajectoryError, match="it is a FIFO, not a regular file"):
-        TrajectoryFile(path)
+        Recording(path)
 
 
 def test_a_bit_that_flipped_is_not_played(path):
@@ -148,7 +148,7 @@ def test_a_bit_that_flipped_is_not_played(path):
     content = bytearray(path.read_bytes())
     content[place] ^= 1
     path.write_bytes(content)
-    with TrajectoryFile(path) as file:
+    with Recording(path) as file:
         assert len(file[0].actions) == 3
         with pytest.raises(TrajectoryError, match="traj_1 .* its checksum is another"):
             file[1]
@@ -157,7 +157,7 @@ def test_a_bit_that_flipped_is_not_played(path):
 def test_a_file_of_an_earlier_version_has_no_checksums_and_is_read(path, whole):
     with edited(path):
         pass
-    with TrajectoryFile(path) as earlier, TrajectoryFile(whole) as file:
+    with Recording(path) as earlier, Recording(whole) as file:
         for one, other in zip(earlier, file, strict=True):
             np.testing.assert_array_equal(one.actions, other.actions)
 
@@ -226,7 +226,7 @@ class TestLimits:
         content[block + 4 : block + 4 + len(onwards)] = onwards
         path.write_bytes(content)
         with pytest.raises(TrajectoryError, match="more time or memory"):
-            TrajectoryFile(path)
+            Recording(path)
 
     def test_lists_that_contain_themselves(self, path, monkeypatch):
         """pyfive would unfold lists of lists of lists, all the same one, without reading more."""
@@ -264,7 +264,7 @@ class TestOpenFiles:
         wrong = []
 
         def read(one):
-            with TrajectoryFile(one) as file:
+            with Recording(one) as file:
                 for _ in range(20):
                     if [len(episode.actions) for episode in file] != [3, 4]:
                         wrong.append(one)
