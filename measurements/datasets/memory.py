@@ -88,10 +88,10 @@ class Copies:
 
     def run(self, prepare: Callable[[], Any], seeds: Iterable[int]) -> Generator[Event]:
         """See `rollouts.playing.executor.Executor.run`."""
-        writer = prepare.writer  # pyright: ignore[reportFunctionMemberAccess]
+        encoder = prepare.encoder  # pyright: ignore[reportFunctionMemberAccess]
         for seed in seeds:
             episode = replace(self._episodes[seed % len(self._episodes)], seed=seed)
-            yield Event(seed, result={seed: (episode.score, writer.encode(episode))})
+            yield Event(seed, result={seed: (episode.score, encoder.encode(episode))})
 
 
 def measure(

@@ -199,7 +199,7 @@ class _Stream:
     def expect_end(self) -> None:
         """Refuse a file that is shorter than its first block says."""
         start = os.pread(self._file.fileno(), 64, 0)
-        place = _END_PLACES.get(start[8])  # none if it begins with bytes of the user's own
+        place = _END_PLACES.get(start[8]) if start.startswith(b"\x89HDF") else None
         if place is not None and int.from_bytes(start[place : place + 8], "little") > self.size:
             raise ContentError("its end is missing")
 

@@ -90,16 +90,14 @@ class Stored:
 
 
 @dataclass(frozen=True)
-class PartWriter:
-    """Writes finished episodes into a folder; worker processes each have a copy.
+class PartEncoder:
+    """Encodes finished episodes; worker processes each have a copy.
 
     Attributes:
-        folder: Where to write.
         header: What the episodes have in common; every part carries it.
         control_mode: Control mode as ManiSkill writes it: by robot where there are several.
     """
 
-    folder: Path
     header: Mapping[str, Any]
     control_mode: str | dict[str, str]
     _text: bytes = field(init=False, repr=False)
@@ -111,31 +109,8 @@ class PartWriter:
         object.__setattr__(self, "_text", json.dumps(self.header).encode())
         object.__setattr__(self, "_split", json.dumps(split))
 
-    def write(self, episode: PlayedEpisode) -> None:
-        """Write one episode; it is there, whole, when this returns, or not at all.
-
-        Raises:
-            RecordingError: If it cannot be written.
-        """
-        self.store(episode.seed, self.encode(episode))
-
-    def store(self, seed: int, part: bytes, *, sync: bool = False) -> None:
-        """Write an episode that was encoded, perhaps on another machine; else as `write`.
-
-        Args:
-            seed: Its seed.
-            part: What `encode` returned.
-            sync: Whether to wait until it is on the disk.
-
-        Raises:
-            RecordingError: If it cannot be written.
-        """
-        path = part_path(self.folder, seed)
-        with written_whole(path, RecordingError, parents=False, sync=sync) as partial:
-            partial.write_bytes(part)
-
     def encode(self, episode: PlayedEpisode) -> bytes:
-        """Return what `write` writes."""
+        """Return the part of an episode."""
         attributes = {"action_split": self._split, "episode": json.dumps(self._about(episode))}
         return self.encode_stored(Stored(attributes, _arrays(episode)))
 
@@ -163,6 +138,23 @@ class PartWriter:
             **({"source": dict(episode.source)} if episode.source is not None else {}),
             **({"drawn": dict(episode.drawn)} if episode.drawn is not None else {}),
         }
+
+
+def write_part(folder: Path, seed: int, part: bytes, *, sync: bool = False) -> None:
+    """Write an encoded episode; it is there, whole, when this returns, or not at all.
+
+    Args:
+        folder: Where to write.
+        seed: Its seed.
+        part: What `PartEncoder.encode` returned, perhaps on another machine.
+        sync: Whether to wait until it is on the disk.
+
+    Raises:
+        RecordingError: If it cannot be written.
+    """
+    path = part_path(folder, seed)
+    with written_whole(path, RecordingError, parents=False, sync=sync) as partial:
+        partial.write_bytes(part)
 
 
 def part_path(folder: Path, seed: int) -> Path:
@@ -235,7 +227,7 @@ def _parse(content: bytes) -> tuple[dict[str, Any], Stored]:
     """Return what a part says after its opening.
 
     Raises:
-        ValueError: If it is not as `PartWriter` writes it.
+        ValueError: If it is not as `PartEncoder` writes it.
     """
     header, about, numbers = content.split(b"\n", 2)
     described, listed = _parse_header(header), parse_json(about.decode())

@@ -8,13 +8,13 @@ import os
 import re
 import weakref
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from robots import RecordingError, TaskError
 from robots.common.writing import PARTIAL
@@ -28,14 +28,14 @@ from rollouts.reading.provenance import (
 )
 from rollouts.recording.disk import claim, disk_errors
 from rollouts.recording.episode_files import (
-    PartWriter,
-    Stored,
+    PartEncoder,
     list_parts,
     part_path,
     part_size,
     read_part,
     refuse_foreign,
     seed_of,
+    write_part,
 )
 from rollouts.recording.joined_files import JoinedFiles, OpenFile
 from rollouts.sources.header import Source, combined, source_of
@@ -75,7 +75,7 @@ class Recorder:
         parts: The folder of finished episodes that are not joined yet.
         damaged: Episodes that were there and are damaged, by their files or groups, in words;
             they do not count as recorded.
-        writer: Encodes one episode, or writes it; may be handed to worker processes.
+        encoder: Encodes one episode; may be handed to worker processes.
     """
 
     def __init__(
@@ -134,7 +134,7 @@ class Recorder:
                 raise
         self._release = weakref.finalize(self, os.close, lock)
         mode = recorded_control_mode(task)
-        self.writer = PartWriter(self.parts.absolute(), self._header, mode)
+        self.encoder = PartEncoder(self._header, mode)
         self._closed = False
 
     def __enter__(self) -> Recorder:
@@ -160,8 +160,8 @@ class Recorder:
 
     @property
     def seeds(self) -> set[int]:
-        """Seeds of all episodes recorded, those that worker processes wrote included."""
-        return {*self._files.seeds, *(seed_of(part) for part in list_parts(self.parts))}
+        """Seeds of all episodes recorded."""
+        return {*self._files.seeds, *self._waiting}
 
     def expect(self, seeds: Iterable[int]) -> None:
         """Say which episodes will come, so that files do not depend on their order."""
@@ -178,15 +178,15 @@ class Recorder:
             RecordingError: If it cannot be written; the episodes before it stay. Also if there
                 is one of that seed already, or the recording was closed.
         """
-        self.store(episode.seed, self.writer.encode(episode))
+        self.store(episode.seed, self.encoder.encode(episode))
 
     def store(self, seed: int, part: bytes) -> None:
-        """Write an episode that the `writer` encoded, perhaps elsewhere; else as `add`."""
+        """Write an episode that the `encoder` encoded, perhaps elsewhere; else as `add`."""
         if self._closed:
             raise RecordingError(f"cannot write {self.path}: the recording was closed")
-        if seed in self._files.seeds or part_path(self.parts, seed).exists():
+        if seed in self.seeds:
             raise RecordingError(f"{self.path} has an episode of seed {seed} already")
-        self.writer.store(seed, part)
+        write_part(self.parts, seed, part)
         self._waiting[seed] = _Part(part_size(part), source_of(self._header))
         while (full := self._full_file()) is not None:
             self._fill_last(full)
@@ -250,7 +250,7 @@ class Recorder:
         if seed_of(part) in self._files.seeds:
             part.unlink()
         else:
-            self._note(part, header, stored)
+            self._waiting[seed_of(part)] = _Part(stored.size, source_of(header))
 
     def _full_file(self, *, certain: bool = False) -> list[int] | None:
         """Return the seeds of the next full file; None if there is not enough for one.
@@ -285,10 +285,10 @@ class Recorder:
         """Write the last file with some episodes, and begin another one."""
         file = self._files.last
         header = {**self._header, **combined(file.sources)}
-        writer = replace(self.writer, header=header)
+        encoder = replace(self.encoder, header=header)
         spilt = [seed for seed in file.episodes if seed not in set(seeds)]
         for seed, stored in self._files.read_groups(file, spilt) if spilt else ():
-            writer.store(seed, writer.encode_stored(stored), sync=True)
+            write_part(self.parts, seed, encoder.encode_stored(stored), sync=True)
             self._waiting[seed] = _Part(stored.size, source_of(header))
         self._write(file, seeds, last=False)
 
@@ -304,9 +304,6 @@ class Recorder:
             self._waiting.pop(seed, None)
 
     def _join(self) -> None:
-        for part in list_parts(self.parts):
-            if seed_of(part) not in self._waiting:  # a worker process wrote it
-                self._note(part, *read_part(part))
         for file in self._files.mending.values():
             if again := file.lost & self._waiting.keys():
                 self._write(file, {*file.episodes, *again}, last=False)
@@ -321,6 +318,3 @@ class Recorder:
             self._files.write_empty()
         with suppress(OSError):  # something else was put there meanwhile, and is not ours to delete
             self.parts.rmdir()
-
-    def _note(self, part: Path, header: Mapping[str, Any], stored: Stored) -> None:
-        self._waiting[seed_of(part)] = _Part(stored.size, source_of(header))

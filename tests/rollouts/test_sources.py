@@ -194,7 +194,7 @@ def test_what_was_left_by_a_killed_recording_keeps_its_source(tmp_path):
     env = tasks.make(TASK)
     episode = play(env, 7, np.zeros((3, 7), np.float32))
     with Recorder(tmp_path / FILE, env, source="human", source_desc="browser") as recorder:
-        part = recorder.writer.encode(replace(episode, source={"kind": "person", "name": "me"}))
+        part = recorder.encoder.encode(replace(episode, source={"kind": "person", "name": "me"}))
     (tmp_path / FILE).unlink()
     (tmp_path / "trajectory.parts").mkdir()
     (tmp_path / "trajectory.parts" / "seed-0000000007.part").write_bytes(part)
