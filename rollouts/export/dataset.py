@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from robots import TaskError
 from rollouts.export.columns import ColumnReader, Columns, succeeded
@@ -21,32 +21,14 @@ from tasks.description import instruction_of
 if TYPE_CHECKING:
     from rollouts.export.drawing_job import DrawnEpisode
     from rollouts.export.pictures import Drawing
-    from rollouts.export.shots import Frame, Shots
+    from rollouts.export.shots import Shots
+    from rollouts.export.writer import DatasetWriter
     from rollouts.playing.executor import Executor
 
 __all__ = ["FORMATS", "Export", "Exported", "export"]
 
 Progress = Callable[[float, int], None]
 Draw = Callable[[Columns], "Drawing | DrawnEpisode | None"]
-
-
-class Writer(Protocol):
-    """Writes episodes one after the other."""
-
-    def add(
-        self,
-        columns: Columns,
-        frames: Iterable[Frame] = (),
-        watch: Callable[[int], None] = ...,
-        *,
-        text: str | None = None,
-    ) -> None:
-        """Write an episode, its pictures, and what is to be done in it."""
-        ...
-
-    def note(self, about: Mapping[str, Any]) -> None:
-        """Keep more about the last episode."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -160,32 +142,26 @@ class _Work:
         said = given or (trajectory.source or {}).get("instruction")
         return said if isinstance(said, str) else self._instruction if self.seen else None
 
-    @contextmanager
-    def writer(self, folder: Path) -> Generator[Writer]:
-        """Yield what writes the episodes."""
+    def writer(self, folder: Path) -> DatasetWriter:
+        """Return what writes the episodes."""
+        task, wanted = self.reader.task, self._wanted
         origin = _origin(self._file, self.reader)
         channels = self._shots.channels if self._shots else []
-        if self._wanted.format == "robomimic":
+        if wanted.format == "robomimic":
             from rollouts.export.robomimic import RobomimicWriter
 
-            size = self._wanted.size
-            with RobomimicWriter(
-                folder, self.reader, origin=origin, channels=channels, size=size
-            ) as robomimic:
-                yield robomimic
-            return
+            return RobomimicWriter(folder, self.reader, origin, channels, size=wanted.size)
         from rollouts.export.lerobot import LeRobotWriter
 
-        with LeRobotWriter(
+        return LeRobotWriter(
             folder,
             self.reader,
+            origin,
+            channels,
             task_text=self._instruction,
-            fps=self._wanted.fps or _whole(self.reader.task.scenario.control_frequency),
-            origin=origin,
-            channels=channels,
-            images=self._wanted.images,
-        ) as lerobot:
-            yield lerobot
+            fps=wanted.fps or _whole(task.scenario.control_frequency),
+            images=wanted.images,
+        )
 
     @contextmanager
     def artist(
