@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robots import TaskError
-from rollouts.export.columns import ColumnReader, Columns, succeeded
-from rollouts.export.credits import Credits
+from rollouts.export.columns import ColumnReader, Columns, Credits, succeeded
 from rollouts.export.folder import new_folder
 from rollouts.export.options import FORMATS, Export
 from rollouts.playing.executor import ProcessExecutor
@@ -182,13 +181,15 @@ class _Work:
 
             yield lambda columns: Drawing(task, columns, shots, last=last)
             return
-        from rollouts.export.drawing_job import DrawingCrew, DrawingJob
+        from rollouts.export.drawing_job import DrawingJob, draw_in_order
 
         path = Path(wanted.recording).absolute()
         job = DrawingJob(path, type(task), shots, last, wanted.layout, wanted.robots)
         numbers = [i for i in range(len(file)) if wanted.include_failures or succeeded(file[i])]
-        crew = DrawingCrew(job, executor, numbers, folder, lambda n: progress(n, len(file)), tell)
-        with closing(crew.episodes()) as drawn:
+        episodes = draw_in_order(
+            job, executor, numbers, folder, lambda n: progress(n, len(file)), tell
+        )
+        with closing(episodes) as drawn:
             yield lambda columns: next(drawn)
 
 

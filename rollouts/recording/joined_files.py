@@ -45,7 +45,7 @@ from rollouts.reading.provenance import (
 from rollouts.reading.summary import MAX_JSON, OWN_EPISODE, TrajectoryError
 from rollouts.recording.disk import DiskFile, disk_errors
 from rollouts.recording.episode_files import Stored, read_part
-from rollouts.sources.header import Source, combined, source_of
+from rollouts.sources.actors import Source, combined, source_of
 
 # From HDF5 1.8, the first in which attributes may be larger than 64 kB.
 _VERSIONS = "v108", "latest"

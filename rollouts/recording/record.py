@@ -34,8 +34,7 @@ from rollouts.reading.provenance import describe_layout, differences, listing
 from rollouts.recording.episode_files import PartEncoder
 from rollouts.recording.recorder import FILE_SIZE, Recorder
 from rollouts.sources import actors as kinds
-from rollouts.sources.actors import Actor, actor_of, episode_source
-from rollouts.sources.header import DESCRIPTION, TYPE, combined
+from rollouts.sources.actors import DESCRIPTION, TYPE, Actor, actor_of, combined, episode_source
 from rollouts.sources.policies import EXPERT, check_policy, find_policy
 from tasks import MultiRobotTask, Scenario
 from tasks.episode import PlayedEpisode, Policy, Score

@@ -38,7 +38,7 @@ from rollouts.recording.episode_files import (
     write_part,
 )
 from rollouts.recording.joined_files import JoinedFiles, OpenFile
-from rollouts.sources.header import Source, combined, source_of
+from rollouts.sources.actors import Source, combined, source_of
 from tasks import MultiRobotTask
 from tasks.episode import PlayedEpisode
 

@@ -17,7 +17,7 @@ from robots import TaskError, UnknownNameError
 from rollouts.__main__ import main
 from rollouts.export.columns import ColumnReader, state_row
 from rollouts.export.dataset import Export, export
-from rollouts.export.drawing_job import DrawingCrew, DrawnEpisode
+from rollouts.export.drawing_job import DrawnEpisode, draw_in_order
 from rollouts.export.lerobot import LeRobotWriter, Limits
 from rollouts.export.pictures import Drawing
 from rollouts.export.shots import Channel, choose_shots
@@ -234,9 +234,10 @@ class Job:
 
 def test_episodes_are_handed_out_in_their_order(tmp_path):
     parts, told = [], []
-    crew = DrawingCrew(Job, OutOfTurn(), [0, 2, 3, 5], tmp_path, parts.append, told.append)  # type: ignore[arg-type]
     values = []
-    for episode in crew.episodes():
+    for episode in draw_in_order(
+        Job, OutOfTurn(), [0, 2, 3, 5], tmp_path, parts.append, told.append
+    ):
         (frame, again) = episode
         (picture,) = frame.values()
         values.append((int(picture[0, 0, 0]), episode.exact))
