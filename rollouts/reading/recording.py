@@ -144,7 +144,8 @@ class Recording(Sequence[Trajectory]):
         self.control_mode, self.env_kwargs = first.summary.control_mode, first.summary.env_kwargs
         self.max_episode_steps = first.summary.max_episode_steps
         self.source_type = first.summary.source_type
-        self.layout, self.guessed, self.simulation = first.layout, first.guessed, first.simulation
+        self.layout, self.simulation = first.common["layout"], first.common["simulation"]
+        self.guessed = first.common["guessed"]
         self.action_split = first.action_split
         self.sources = tuple(entry.source for entry in first.entries)
         self.seeds, counts = first.seeds, [len(first.entries)]
@@ -306,17 +307,15 @@ class _File:
         with self._damage("this h5 file"):
             self.hdf5 = Hdf5File(path)
             described = self.hdf5.texts(names=("layout", "simulation", "guessed")) or {}
-            self.guessed = read_described(described, "guessed", GUESSED)
-            self.layout = read_described(described, "layout", LAYOUT)
-            self.simulation = read_described(described, "simulation", SIMULATION)
-            self.action_split = action_split(self.layout) if self.layout else None
-
-    @property
-    def common(self) -> dict[str, Any]:
-        """What the files of a recording have in common."""
-        about = {"task_id": self.summary.task_id, "control_mode": self.summary.control_mode}
-        names = ("layout", "simulation", "guessed")
-        return {**about, **{name: getattr(self, name) for name in names}}
+            layout = read_described(described, "layout", LAYOUT)
+            self.action_split = action_split(layout) if layout else None
+            self.common: dict[str, Any] = {  # to all files of a recording
+                "task_id": self.summary.task_id,
+                "control_mode": self.summary.control_mode,
+                "layout": layout,
+                "simulation": read_described(described, "simulation", SIMULATION),
+                "guessed": read_described(described, "guessed", GUESSED),
+            }
 
     def read(self, entry: Entry) -> Trajectory:
         texts = self.texts(entry)
