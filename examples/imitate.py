@@ -37,8 +37,7 @@ from layouts import Layout
 from robots import RobotLayoutsError, TaskError
 from rollouts import Evaluation, evaluate, record
 from rollouts.progress import LiveLine
-from rollouts.reading.recording import open_trajectories
-from rollouts.reading.trajectory import Trajectory
+from rollouts.reading.recording import Recording, Trajectory
 from tasks import Cube, Normal, Randomization
 from tasks.driving import DrivenGroup, driven_groups
 from tasks.episode import moments
@@ -175,7 +174,7 @@ def observe(recipe: Recipe, recording: Path, senses: Senses) -> tuple[Tensor, Te
         TrajectoryError: If it cannot be read, or is of another world.
     """
     observer, samples = Observer(recipe, senses), list[tuple[Floats, Floats]]()
-    with closing(observer.env), open_trajectories(recording) as file:
+    with closing(observer.env), Recording(recording) as file:
         file.expect(observer.env.task_id, observer.env.layout.action_dim)
         file.expect_world(observer.env)
         if len(file) < recipe.episodes:

@@ -32,7 +32,7 @@ from robots import TaskError
 from rollouts.export.dataset import Export, export
 from rollouts.playing.executor import choose_executor
 from rollouts.progress import LiveLine
-from rollouts.reading.recording import open_trajectories
+from rollouts.reading.recording import Recording
 from tasks.engine.cameras import by_place, cameras_of
 from tasks.engine.columns import ROBOMIMIC, picture_column
 
@@ -114,7 +114,7 @@ def load_pictures(file: Path, recording: Path, recipe: PictureRecipe, columns: l
         TaskError: If they are of other episodes than the recording's, or of another size.
     """
     pictures = list[NDArray[np.uint8]]()
-    with h5py.File(file) as dataset, open_trajectories(recording) as episodes:
+    with h5py.File(file) as dataset, Recording(recording) as episodes:
         demos = cast(Mapping[str, Any], dataset["data"])
         for number in range(recipe.episodes):
             if (episode := episodes[number]).solved:

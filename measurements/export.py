@@ -32,7 +32,7 @@ from rollouts.export.options import FORMATS
 from rollouts.export.shots import choose_shots
 from rollouts.progress import LiveLine
 from rollouts.reading.recorded_task import task_for
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from rollouts.recording.recorder import Recorder
 from simulation.rendering.pictures import Observers
 from tasks.episode import moments, open_loop, play
@@ -105,7 +105,7 @@ def drawing_alone(recording: Path, names: Sequence[str]) -> tuple[int, Cost]:
         names: The cameras, by place.
     """
     costs: list[Cost] = []
-    with TrajectoryFile(recording) as file:
+    with Recording(recording) as file:
         task = task_for(file, pictures=True)
         reader, shots = ColumnReader(task), choose_shots(task, names)
         for trajectory in file:

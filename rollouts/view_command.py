@@ -11,7 +11,7 @@ from rollouts.playing.replay_command import add_recording
 from tasks.cell_options import chosen_cell
 
 if TYPE_CHECKING:
-    from rollouts.reading.trajectory import Trajectory, TrajectoryFile
+    from rollouts.reading.recording import Recording, Trajectory
     from tasks import MultiRobotTask
 
 EPILOG = (
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
         return show(lambda: episode_cell(file, options.episode, **cell), options)
 
 
-def episode_cell(file: TrajectoryFile, number: int, **cell: Any) -> Cell:
+def episode_cell(file: Recording, number: int, **cell: Any) -> Cell:
     """Return what a page shows of an episode.
 
     Args:
@@ -55,7 +55,7 @@ def episode_cell(file: TrajectoryFile, number: int, **cell: Any) -> Cell:
         TrajectoryError: If there is no such episode, or it cannot be shown.
     """
     from rollouts.playing.replay import task_for
-    from rollouts.reading.trajectory import TrajectoryError
+    from rollouts.reading.recording import TrajectoryError
     from tasks.view import task_cell
 
     if not 0 <= number < len(file):
@@ -73,7 +73,7 @@ def episode_cell(file: TrajectoryFile, number: int, **cell: Any) -> Cell:
 
 def _motion(task: MultiRobotTask, trajectory: Trajectory) -> Motion:
     """Reset the task as the episode began, and return what happens in it."""
-    from rollouts.reading.trajectory import TrajectoryError
+    from rollouts.reading.recording import TrajectoryError
     from tasks.episode import REBUILT, play
     from tasks.view import recorded_motion
 

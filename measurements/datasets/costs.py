@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from rollouts.dataset.certify import certify
 from rollouts.playing.executor import choose_executor
-from rollouts.reading.recording import all_files, open_trajectories
+from rollouts.reading.recording import Recording, all_files
 from rollouts.recording.record import record
 from tasks import Randomization
 
@@ -169,5 +169,5 @@ def timed(work: Callable[[], Made]) -> tuple[Made, Cost]:
 
 
 def _open(folder: Path) -> None:
-    with open_trajectories(folder) as file:
+    with Recording(folder) as file:
         file[len(file) // 2]

@@ -15,7 +15,7 @@ from typing import Any
 from experts import find_expert
 from measurements.datasets.costs import Cost, timed
 from rollouts.playing.executor import Event
-from rollouts.reading.recording import open_trajectories
+from rollouts.reading.recording import Recording
 from rollouts.recording.record import record
 from tasks import make
 from tasks.episode import PlayedEpisode, play
@@ -88,10 +88,10 @@ class Copies:
 
     def run(self, prepare: Callable[[], Any], seeds: Iterable[int]) -> Generator[Event]:
         """See `rollouts.playing.executor.Executor.run`."""
-        writer = prepare.writer  # pyright: ignore[reportFunctionMemberAccess]
+        encoder = prepare.encoder  # pyright: ignore[reportFunctionMemberAccess]
         for seed in seeds:
             episode = replace(self._episodes[seed % len(self._episodes)], seed=seed)
-            yield Event(seed, result={seed: (episode.score, writer.encode(episode))})
+            yield Event(seed, result={seed: (episode.score, encoder.encode(episode))})
 
 
 def measure(
@@ -141,7 +141,7 @@ def _played(task_id: str) -> Iterator[PlayedEpisode]:
 
 
 def _read_some(folder: Path) -> None:
-    with open_trajectories(folder) as file:
+    with Recording(folder) as file:
         for number in range(0, len(file), 1000):
             file[number]
 

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from robots import CONTROL_MODES
 from rollouts.reading.damage import damage_errors
-from rollouts.reading.hdf5_reading import MAX_BYTES
-from rollouts.reading.summary import MAX_SEED, recorded_task
-from rollouts.reading.trajectory import (
+from rollouts.reading.hdf5 import MAX_BYTES
+from rollouts.reading.recording import (
+    Recording,
     Trajectory,
     TrajectoryError,
-    TrajectoryFile,
     expect_file,
 )
+from rollouts.reading.summary import MAX_SEED, recorded_task
 from tasks import MultiRobotTask
 from tasks.episode import Episode
 
@@ -116,7 +116,7 @@ def recorded_control_mode(path: Path) -> str | None:
     """
     if path.suffix != ".h5":
         return None
-    with TrajectoryFile(path) as file:
+    with Recording(path) as file:
         mode = file.control_mode
     if not isinstance(mode, str):
         raise TrajectoryError(
@@ -149,7 +149,7 @@ def _scaled(actions: NDArray[np.float64], bounds: Bounds | None) -> NDArray[np.f
 
 
 def _read_h5(path: Path, task_id: str, action_dim: int) -> list[Episode]:
-    with TrajectoryFile(path) as file:
+    with Recording(path) as file:
         file.expect(task_id, action_dim)
         return [Episode(_seed(path, trajectory), trajectory.actions) for trajectory in file]
 

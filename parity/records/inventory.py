@@ -17,8 +17,8 @@ from experts import list_experts
 from parity.compare.native_env import native_tasks
 from parity.compare.results import RESULTS, read
 from robots import MissingPackageError, RobotRegistry
+from rollouts.reading.recording import TrajectoryError
 from rollouts.reading.summary import recorded_task
-from rollouts.reading.trajectory import TrajectoryError
 from tasks import get_task_class, list_clones, list_tasks
 from tasks.description import UNKNOWN, TaskFacts, facts, short_modes
 from tasks.registry import other_names

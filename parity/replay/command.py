@@ -19,7 +19,7 @@ from robots import TaskError
 from rollouts.playing.executor import ProcessExecutor
 from rollouts.playing.replay import find_official, task_for
 from rollouts.progress import LiveLine
-from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.reading.recording import Recording, TrajectoryError
 from rollouts.recording.record import FILE, record
 from tasks import MultiRobotTask
 
@@ -86,7 +86,7 @@ def _find(cls: type[MultiRobotTask], episodes: int, out: Path) -> Path:
 def _run(cls: type[MultiRobotTask], path: Path, count: int) -> Run:
     episodes, mode = recorded_episodes(path, cls)
     if path.suffix == ".h5":
-        with TrajectoryFile(path) as file:
+        with Recording(path) as file:
             # Native has the layout of the task alone; a file of another one is refused.
             task_for(file, layout=cls.layout).close()
     return Run(

@@ -30,7 +30,7 @@ from parity.show.native_pictures import NativeScene
 from robots import CONTROL_MODES, RecordingError, RobotLayoutsError
 from robots.common.writing import written_whole
 from rollouts.progress import LiveLine
-from rollouts.reading.trajectory import TrajectoryError
+from rollouts.reading.recording import TrajectoryError
 from rollouts.video import open_video
 from tasks import MultiRobotTask
 from tasks.episode import Episode

@@ -19,8 +19,7 @@ from rollouts.playing.replay import open_recording, replay
 from rollouts.playing.seeds import checked_seeds
 from rollouts.reading.manifest import sized_file
 from rollouts.reading.recorded_task import task_class, task_for
-from rollouts.reading.recording import Recording, all_files, first_file
-from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.reading.recording import Recording, TrajectoryError, all_files, first_file
 from tasks import MultiRobotTask
 
 INTERVAL = 10.0  # s between writings of a certificate that is not complete
@@ -150,7 +149,7 @@ def certificate_path(path: Path) -> Path:
     return first.with_name(FILE) if first != path else path.with_suffix(f".{FILE}")
 
 
-def _seeds(file: TrajectoryFile) -> list[int]:
+def _seeds(file: Recording) -> list[int]:
     if not len(file):
         raise TrajectoryError(f"{file.path} holds no episodes")
     if lacking := [i for i, seed in enumerate(file.seeds) if seed is None]:
@@ -158,7 +157,7 @@ def _seeds(file: TrajectoryFile) -> list[int]:
     return checked_seeds(seed for seed in file.seeds if seed is not None)
 
 
-def _files(path: Path, file: TrajectoryFile) -> list[dict[str, Any]]:
+def _files(path: Path, file: Recording) -> list[dict[str, Any]]:
     """Return names, sizes and checksums of all files.
 
     Raises:
@@ -168,7 +167,7 @@ def _files(path: Path, file: TrajectoryFile) -> list[dict[str, Any]]:
     for number, h5 in enumerate(all_files(path)):
         beside = h5.with_suffix(".json")
         sized = {"h5": sized_file(h5), "json": sized_file(beside)}
-        if isinstance(file, Recording):
+        if file.manifest is not None:
             entry = file.manifest.files[number]
             if (entry.h5, entry.json) != (sized["h5"], sized["json"]):
                 raise TrajectoryError(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from layouts import Layout, Placement
 from rollouts.export.columns import ColumnReader
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from tasks import MultiRobotTask
 from tasks.native.format import articulation_keys
 
@@ -34,7 +34,7 @@ class Clearances:
 
 
 def measure(
-    file: TrajectoryFile,
+    file: Recording,
     task: MultiRobotTask,
     places: Sequence[int],
     progress: Callable[[], None] = lambda: None,

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from rollouts.dataset.contents import Contents
-from rollouts.reading.trajectory import Trajectory, TrajectoryFile
+from rollouts.reading.recording import Recording, Trajectory
 from rollouts.video import Picture, open_video, play_pictured
 from tasks import MultiRobotTask
 from tasks.episode import Episode
@@ -57,7 +57,7 @@ def chosen_places(contents: Contents, most: int) -> dict[int, str]:
 
 
 def film(
-    file: TrajectoryFile,
+    file: Recording,
     task: MultiRobotTask,
     places: dict[int, str],
     progress: Callable[[], None] = lambda: None,

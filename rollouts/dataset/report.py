@@ -18,8 +18,7 @@ from rollouts.dataset.clips import Clip, chosen_places, film
 from rollouts.dataset.contents import read_contents
 from rollouts.dataset.page import Report
 from rollouts.playing.replay import open_recording, task_for
-from rollouts.reading.recording import all_files, first_file
-from rollouts.reading.trajectory import TrajectoryError
+from rollouts.reading.recording import TrajectoryError, all_files, first_file
 from rollouts.video import video_problem
 
 Progress = Callable[[float, float, str], None]

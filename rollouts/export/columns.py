@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots import RobotDescriptor
-from rollouts.export.credits import Credits
-from rollouts.reading.trajectory import Trajectory, TrajectoryError
+from rollouts.reading.recording import Recording, Trajectory, TrajectoryError
+from rollouts.sources.actors import EXPERT
 from tasks import MultiRobotTask
 from tasks.engine.columns import placed_bodies
 from tasks.episode import States
@@ -21,7 +21,38 @@ Floats = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 
 POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")  # of a body, in the world frame (m, wxyz)
+_ACTOR = "kind", "name", "sha256"
 ROW = 13  # numbers of a body, and of a robot's root, in a state dict
+
+
+class Credits:
+    """Who acted in a recording.
+
+    Attributes:
+        actors: Everybody who acted, each once, as plain data; nobody if no episode says it.
+        corrected: Whether all episodes hold what a corrector would have done.
+    """
+
+    def __init__(self, file: Recording) -> None:
+        """Read who it was in each episode."""
+        said = [_acted(source) for source in file.sources] if any(file.sources) else []
+        self.actors: list[dict[str, Any]] = []
+        for actor in (actor for actors in said for actor in actors):
+            if actor not in self.actors:
+                self.actors.append(actor)
+        self.corrected = file.corrected
+
+    def numbers(self, trajectory: Trajectory) -> NDArray[np.int64] | None:
+        """Return which of the actors acted at each step, (T,); None if there are not several.
+
+        A converted recording may not know it for each step: then it is the first of its actors.
+        """
+        if len(self.actors) < 2:
+            return None
+        acted = [self.actors.index(actor) for actor in _acted(trajectory.source)]
+        if trajectory.actor is None:
+            return np.full(len(trajectory.actions), acted[0])
+        return np.array(acted)[trajectory.actor]
 
 
 @dataclass(frozen=True)
@@ -39,8 +70,8 @@ class Columns:
         rewards: Shape (T,), or None if the recording holds none.
         success: Shape (T,), or None if the recording holds none.
         done: Whether the episode ended with the step, (T,); always at its last step.
-        source: Who acted; see `rollouts.reading.trajectory.Trajectory`.
-        actor: Who acted at each step, (T,): a number of `rollouts.export.credits.Credits.actors`;
+        source: Who acted; see `rollouts.reading.recording.Trajectory`.
+        actor: Who acted at each step, (T,): a number of `Credits.actors`;
             None if there are not several.
         corrections: What a corrector would have done, (T, A); None unless all episodes hold it.
     """
@@ -214,3 +245,11 @@ def _done(trajectory: Trajectory) -> Flags:
             done |= flags
     done[-1] = True
     return done
+
+
+def _acted(source: Mapping[str, Any] | None) -> list[dict[str, Any]]:
+    """Return who acted in an episode; experts say it in the header alone."""
+    if source is None:
+        return [{"kind": EXPERT}]
+    said: list[Mapping[str, Any]] = source.get("actors") or [source.get("corrects") or source]
+    return [{name: actor[name] for name in _ACTOR if name in actor} for actor in said]

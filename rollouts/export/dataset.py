@@ -2,52 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from robots import TaskError
-from rollouts.export.columns import ColumnReader, Columns, succeeded
-from rollouts.export.credits import Credits
+from rollouts.export.columns import ColumnReader, Columns, Credits, succeeded
 from rollouts.export.folder import new_folder
 from rollouts.export.options import FORMATS, Export
 from rollouts.playing.executor import ProcessExecutor
 from rollouts.reading.recorded_task import task_class, task_for
-from rollouts.reading.recording import open_trajectories
-from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
+from rollouts.reading.recording import Recording, Trajectory, TrajectoryError
 from tasks.description import instruction_of
 
 if TYPE_CHECKING:
     from rollouts.export.drawing_job import DrawnEpisode
     from rollouts.export.pictures import Drawing
-    from rollouts.export.shots import Frame, Shots
+    from rollouts.export.shots import Shots
+    from rollouts.export.writer import DatasetWriter
     from rollouts.playing.executor import Executor
 
 __all__ = ["FORMATS", "Export", "Exported", "export"]
 
 Progress = Callable[[float, int], None]
 Draw = Callable[[Columns], "Drawing | DrawnEpisode | None"]
-
-
-class Writer(Protocol):
-    """Writes episodes one after the other."""
-
-    def add(
-        self,
-        columns: Columns,
-        frames: Iterable[Frame] = (),
-        watch: Callable[[int], None] = ...,
-        *,
-        text: str | None = None,
-    ) -> None:
-        """Write an episode, its pictures, and what is to be done in it."""
-        ...
-
-    def note(self, about: Mapping[str, Any]) -> None:
-        """Keep more about the last episode."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -98,7 +78,7 @@ def export(
     """
     out, progress = Path(wanted.out), _rising(progress)
     wanted.check(here=executor is None or isinstance(executor, ProcessExecutor))
-    with open_trajectories(wanted.recording) as file:
+    with Recording(wanted.recording) as file:
         if not len(file):
             raise TrajectoryError(f"{file.path} holds no episodes; there is nothing to export")
         work = _Work(wanted, file, here=executor is None)
@@ -134,7 +114,7 @@ class _Work:
         seen: Whether there are pictures of the task's or its robots' cameras.
     """
 
-    def __init__(self, wanted: Export, file: TrajectoryFile, *, here: bool) -> None:
+    def __init__(self, wanted: Export, file: Recording, *, here: bool) -> None:
         """Make the task; it can be drawn if ``here`` says that this process draws."""
         task_class(file, wanted.task)
         names = wanted.camera_names
@@ -161,32 +141,26 @@ class _Work:
         said = given or (trajectory.source or {}).get("instruction")
         return said if isinstance(said, str) else self._instruction if self.seen else None
 
-    @contextmanager
-    def writer(self, folder: Path) -> Generator[Writer]:
-        """Yield what writes the episodes."""
+    def writer(self, folder: Path) -> DatasetWriter:
+        """Return what writes the episodes."""
+        task, wanted = self.reader.task, self._wanted
         origin = _origin(self._file, self.reader)
         channels = self._shots.channels if self._shots else []
-        if self._wanted.format == "robomimic":
+        if wanted.format == "robomimic":
             from rollouts.export.robomimic import RobomimicWriter
 
-            size = self._wanted.size
-            with RobomimicWriter(
-                folder, self.reader, origin=origin, channels=channels, size=size
-            ) as robomimic:
-                yield robomimic
-            return
+            return RobomimicWriter(folder, self.reader, origin, channels, size=wanted.size)
         from rollouts.export.lerobot import LeRobotWriter
 
-        with LeRobotWriter(
+        return LeRobotWriter(
             folder,
             self.reader,
+            origin,
+            channels,
             task_text=self._instruction,
-            fps=self._wanted.fps or _whole(self.reader.task.scenario.control_frequency),
-            origin=origin,
-            channels=channels,
-            images=self._wanted.images,
-        ) as lerobot:
-            yield lerobot
+            fps=wanted.fps or _whole(task.scenario.control_frequency),
+            images=wanted.images,
+        )
 
     @contextmanager
     def artist(
@@ -207,13 +181,15 @@ class _Work:
 
             yield lambda columns: Drawing(task, columns, shots, last=last)
             return
-        from rollouts.export.drawing_job import DrawingCrew, DrawingJob
+        from rollouts.export.drawing_job import DrawingJob, draw_in_order
 
         path = Path(wanted.recording).absolute()
         job = DrawingJob(path, type(task), shots, last, wanted.layout, wanted.robots)
         numbers = [i for i in range(len(file)) if wanted.include_failures or succeeded(file[i])]
-        crew = DrawingCrew(job, executor, numbers, folder, lambda n: progress(n, len(file)), tell)
-        with closing(crew.episodes()) as drawn:
+        episodes = draw_in_order(
+            job, executor, numbers, folder, lambda n: progress(n, len(file)), tell
+        )
+        with closing(episodes) as drawn:
             yield lambda columns: next(drawn)
 
 
@@ -241,7 +217,7 @@ def _rising(progress: Progress) -> Progress:
     return show
 
 
-def _origin(file: TrajectoryFile, reader: ColumnReader) -> dict[str, Any]:
+def _origin(file: Recording, reader: ColumnReader) -> dict[str, Any]:
     actors = reader.credits.actors if reader.credits else []
     return {
         "task_id": file.task_id,

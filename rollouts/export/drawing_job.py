@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +15,9 @@ from layouts.placement import RobotLike
 from rollouts.export.columns import ColumnReader
 from rollouts.export.pictures import Drawing
 from rollouts.export.shots import Channel, Frame, Picture, Shots
-from rollouts.playing.executor import Event, Executor, modules_of, play_all, report
+from rollouts.playing.executor import Executor, modules_of, play_all, report
 from rollouts.reading.recorded_task import task_for
-from rollouts.reading.recording import open_trajectories
+from rollouts.reading.recording import Recording
 from tasks import MultiRobotTask
 
 
@@ -78,7 +78,7 @@ class _Drawer:
     """Draws episodes in one world, which is built anew for each."""
 
     def __init__(self, job: DrawingJob) -> None:
-        self._job, self._file = job, open_trajectories(job.recording)
+        self._job, self._file = job, Recording(job.recording)
         self._task = task_for(self._file, layout=job.layout, robots=job.robots, pictures=True)
         self._reader = ColumnReader(self._task)
 
@@ -102,71 +102,67 @@ class _Drawer:
         self._file.close()
 
 
-@dataclass
-class DrawingCrew:
-    """Workers that draw some episodes of a recording; what comes out of turn waits on the disk.
+def draw_in_order(
+    job: DrawingJob,
+    executor: Executor,
+    numbers: Sequence[int],
+    folder: Path,
+    watch: Callable[[float], None],
+    tell: Callable[[str], None],
+) -> Generator[DrawnEpisode]:
+    """Draw episodes in workers, and yield them in their order.
 
-    Attributes:
-        job: What they do.
-        executor: Who they are.
-        numbers: Which episodes, in the order in which they are taken.
-        folder: A folder of the dataset's, where those wait that come out of turn; it is left empty.
+    Args:
+        job: What the workers do.
+        executor: Starts the workers.
+        numbers: Which episodes, in the order in which they are yielded.
+        folder: Where those wait that are drawn before their turn; nothing of them is left there.
         watch: Called with the episodes drawn so far, fractions included.
         tell: Called with what happens to workers, in words.
+
+    Raises:
+        RobotLayoutsError: If one cannot be drawn, or workers died of it again and again.
     """
-
-    job: DrawingJob
-    executor: Executor
-    numbers: Sequence[int]
-    folder: Path
-    watch: Callable[[float], None]
-    tell: Callable[[str], None]
-    _parts: dict[int, float] = field(default_factory=dict[int, float])
-
-    def episodes(self) -> Generator[DrawnEpisode]:
-        """Give the episodes in their order.
-
-        Raises:
-            RobotLayoutsError: If one cannot be drawn, or workers died of it again and again.
-        """
-        turn = iter(self.numbers)
-        wanted = next(turn, None)
-        with closing(play_all(self.executor, self.job, self.numbers)) as events:
-            for event in events:
-                self._follow(event)
-                if event.result is None or event.seed is None:
-                    continue
+    parts: dict[int, float] = {}
+    turn = iter(numbers)
+    wanted = next(turn, None)
+    with closing(play_all(executor, job, numbers)) as events:
+        for event in events:
+            if event.error is not None:
+                raise event.error
+            if event.died is not None:
+                at = "" if event.seed is None else f" at episode {event.seed}"
+                tell(f"{event.died}{at}; another takes its place")
+            elif event.seed is None:
+                tell(str(event.note))
+            elif event.result is None:
+                parts[event.seed] = event.note
+                watch(sum(parts.values()))
+            else:
+                parts[event.seed] = 1.0
+                watch(sum(parts.values()))
                 if event.seed != wanted:
-                    self._put_aside(event.seed, event.result)
+                    _put_aside(_waiting(folder, event.seed), event.result)
                     continue
                 yield event.result
                 wanted = next(turn, None)
-                while wanted is not None and self._waiting(wanted).exists():
-                    yield self._take_back(wanted)
+                while wanted is not None and (path := _waiting(folder, wanted)).exists():
+                    yield _take_back(path, job.shots.channels)
                     wanted = next(turn, None)
 
-    def _follow(self, event: Event) -> None:
-        if event.error is not None:
-            raise event.error
-        if event.died is not None:
-            at = "" if event.seed is None else f" at episode {event.seed}"
-            self.tell(f"{event.died}{at}; another takes its place")
-        elif event.seed is None:
-            self.tell(str(event.note))
-        else:
-            self._parts[event.seed] = 1.0 if event.result is not None else event.note
-            self.watch(sum(self._parts.values()))
 
-    def _waiting(self, number: int) -> Path:
-        return self.folder / f".drawn_{number}.npz"
+def _waiting(folder: Path, number: int) -> Path:
+    return folder / f".drawn_{number}.npz"
 
-    def _put_aside(self, number: int, episode: DrawnEpisode) -> None:
-        pictures = {str(i): pictures for i, pictures in enumerate(episode.pictures.values())}
-        np.savez(self._waiting(number), exact=episode.exact, **pictures)  # pyright: ignore[reportArgumentType]
 
-    def _take_back(self, number: int) -> DrawnEpisode:
-        with np.load(self._waiting(number)) as file:
-            pictures = {c: file[str(i)] for i, c in enumerate(self.job.shots.channels)}
-            episode = DrawnEpisode(pictures, bool(file["exact"]))
-        self._waiting(number).unlink()
-        return episode
+def _put_aside(path: Path, episode: DrawnEpisode) -> None:
+    pictures = {str(i): pictures for i, pictures in enumerate(episode.pictures.values())}
+    np.savez(path, exact=episode.exact, **pictures)  # pyright: ignore[reportArgumentType]
+
+
+def _take_back(path: Path, channels: Sequence[Channel]) -> DrawnEpisode:
+    with np.load(path) as file:
+        pictures = {channel: file[str(i)] for i, channel in enumerate(channels)}
+        episode = DrawnEpisode(pictures, bool(file["exact"]))
+    path.unlink()
+    return episode

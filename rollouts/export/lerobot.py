@@ -39,32 +39,31 @@ class LeRobotWriter(DatasetWriter):
         self,
         folder: Path,
         reader: ColumnReader,
+        origin: Mapping[str, Any],
+        channels: Sequence[Channel] = (),
         *,
         task_text: str,
         fps: int,
-        origin: Mapping[str, Any],
-        channels: Sequence[Channel] = (),
         images: bool = False,
         limits: Limits | None = None,
     ) -> None:
         """Begin a dataset.
 
         Args:
-            folder: An empty folder.
-            reader: Names the columns.
+            folder: See `DatasetWriter`.
+            reader: See `DatasetWriter`.
+            origin: See `DatasetWriter`.
+            channels: Which pictures there are of every moment.
             task_text: What is to be done, in a sentence, where an episode does not say it.
             fps: Control steps per second.
-            origin: What is kept of where the episodes come from; anything that json can hold.
-            channels: Which pictures there are of every step.
             images: Whether pictures are png images, and not videos.
             limits: How much goes into one file.
 
         Raises:
             TaskError: If no video can have a picture's size.
         """
-        self._folder, self._reader, self._fps = folder, reader, fps
-        self._task_text, self._origin = task_text, origin
-        self._limits = limits or Limits()
+        super().__init__(folder, reader, origin)
+        self._task_text, self._fps, self._limits = task_text, fps, limits or Limits()
         self._data = ParquetFiles(folder, DATA_PATH, self._limits)
         self._episodes = ParquetFiles(folder, EPISODES_PATH, self._limits)
         self._pictures = PictureWriter(folder, channels, fps, self._limits, images=images)
@@ -83,14 +82,7 @@ class LeRobotWriter(DatasetWriter):
         *,
         text: str | None = None,
     ) -> None:
-        """Write one episode.
-
-        Args:
-            columns: The episode, of T steps.
-            frames: The pictures of each step; of T steps if the dataset has channels.
-            watch: Called with the number of steps whose pictures are written.
-            text: What is to be done in it; None: as in the others.
-        """
+        """See `DatasetWriter.add`."""
         number, steps = len(self._origins), len(columns)
         text = self._task_text if text is None else text
         task = self._texts.setdefault(text, len(self._texts))
@@ -120,7 +112,7 @@ class LeRobotWriter(DatasetWriter):
         self._frames += steps
 
     def note(self, about: Mapping[str, Any]) -> None:
-        """Keep more about where the last episode comes from; anything that json can hold."""
+        """See `DatasetWriter.note`."""
         self._origins[-1] |= about
 
     def _frame_features(

@@ -16,9 +16,15 @@ from robots import TaskError
 from rollouts.export.lerobot_files import MEGABYTE, VIDEO_PATH, Limits, Place
 from rollouts.export.shots import DEPTH, RGB, Channel, Frame, Picture
 from rollouts.export.statistics import DEPTH_LEVELS, PictureStatistics, Statistics
-from rollouts.export.video_file import CODEC, PIXEL_FORMAT, SIDES, VideoFile
 from tasks.engine.columns import LEROBOT, picture_column
 
+CODEC = "h264"
+PIXEL_FORMAT = "yuv420p"
+# A keyframe every second frame, as LeRobot has them, so that any frame is near one; no frames
+# that refer to later ones, so that frame k is shown at k / fps exactly.
+ENCODING = ["-g", "2", "-bf", "0", "-crf", "23", "-preset", "veryfast", "-movflags", "+faststart"]
+PIXELS_PER_BYTE = 8  # of small pictures; large ones take less
+SIDES = 2  # widths and heights are multiples of it: colour is stored for four pixels at once
 SIDE_NAMES = ["height", "width", "channels"]
 PNG_LEVEL = 1  # of zlib: drawing takes long, not this
 _IMAGE = pa.struct([("bytes", pa.binary()), ("path", pa.string())])
@@ -113,33 +119,43 @@ class _Videos:
         self.key = picture_column(LEROBOT, channel.camera, channel.texture)
         self.total = _statistics(channel)
         self._folder, self._channel, self._fps, self._limits = folder, channel, fps, limits
-        self._place, self._begin = Place(), 0.0
-        self._video: VideoFile | None = None
+        self._place, self._begin, self._frames = Place(), 0, 0
+        self._writer: Any = None
 
     def begin(self) -> None:
         """Take the file of the next episode."""
-        if self._video is not None and self._video.size >= self._limits.video_megabytes * MEGABYTE:
-            self._video.close()
-            self._video = None
+        height, width, _ = self._channel.shape
+        size = self._frames * height * width // PIXELS_PER_BYTE  # on disk, it may come later
+        if self._writer is not None and size >= self._limits.video_megabytes * MEGABYTE:
+            self.close()
             self._place.advance(self._limits.files)
-        if self._video is None:
+        if self._writer is None:
+            import imageio.v2 as imageio
+
             path = self._folder / VIDEO_PATH.format(video_key=self.key, **vars(self._place))
-            height, width, _ = self._channel.shape
-            self._video = VideoFile(path, self._fps, height * width)
-        self._begin = self._video.seconds
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._writer = imageio.get_writer(
+                path,
+                fps=self._fps,
+                codec="libx264",
+                quality=None,
+                pixelformat=PIXEL_FORMAT,
+                macro_block_size=SIDES,
+                output_params=ENCODING,
+            )
+        self._begin = self._frames
 
     def add(self, picture: Picture) -> None:
         """Write a frame."""
-        assert self._video is not None
-        self._video.add(picture.astype(np.uint8, copy=False))
+        self._writer.append_data(picture.astype(np.uint8, copy=False))
+        self._frames += 1
 
     def finish(self, episode: EpisodePictures) -> None:
         """Say where the episode is."""
-        assert self._video is not None
         prefix = f"videos/{self.key}"
         episode.where |= self._place.keys(prefix)
-        episode.where[f"{prefix}/from_timestamp"] = self._begin
-        episode.where[f"{prefix}/to_timestamp"] = self._video.seconds
+        episode.where[f"{prefix}/from_timestamp"] = self._begin / self._fps
+        episode.where[f"{prefix}/to_timestamp"] = self._frames / self._fps
 
     def feature(self) -> dict[str, Any]:
         """Return LeRobot's description."""
@@ -162,8 +178,9 @@ class _Videos:
 
     def close(self) -> None:
         """Finish the file."""
-        if self._video is not None:
-            self._video.close()
+        if self._writer is not None:
+            self._writer.close()
+        self._writer, self._frames = None, 0
 
 
 class _Images:

@@ -10,7 +10,7 @@ import numpy as np
 from robots import MissingPackageError, SimulationError
 from rollouts.export.columns import Columns, state_row
 from rollouts.export.shots import RGB, Channel, Frame, Picture, Shots
-from rollouts.reading.trajectory import TrajectoryError
+from rollouts.reading.recording import TrajectoryError
 from rollouts.video import INSTALL
 from simulation import Simulation
 from simulation.rendering.pictures import SIZE, Cameras, Observers, vulkan_problem

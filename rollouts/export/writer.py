@@ -3,17 +3,32 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from pathlib import Path
 from types import TracebackType
-from typing import TypeVar
+from typing import Any
 
-_Writer = TypeVar("_Writer", bound="DatasetWriter")
+from typing_extensions import Self
+
+from rollouts.export.columns import ColumnReader, Columns
+from rollouts.export.shots import Frame
 
 
 class DatasetWriter(ABC):
     """Writes episodes one after the other; the dataset is complete when the block ends."""
 
-    def __enter__(self: _Writer) -> _Writer:
+    def __init__(self, folder: Path, reader: ColumnReader, origin: Mapping[str, Any]) -> None:
+        """Begin a dataset.
+
+        Args:
+            folder: An empty folder.
+            reader: Names the columns.
+            origin: What is kept of where the episodes come from; anything that json can hold.
+        """
+        self._folder, self._reader, self._origin = folder, reader, origin
+
+    def __enter__(self) -> Self:
         """Return itself."""
         return self
 
@@ -32,6 +47,32 @@ class DatasetWriter(ABC):
             self._complete()
         finally:
             self._let_go()
+
+    @abstractmethod
+    def add(
+        self,
+        columns: Columns,
+        frames: Iterable[Frame] = (),
+        watch: Callable[[int], None] = lambda frame: None,
+        *,
+        text: str | None = None,
+    ) -> None:
+        """Write one episode.
+
+        Args:
+            columns: The episode, of T steps.
+            frames: The pictures of T moments, or of T + 1 where the dataset holds what is seen
+                after a step, too; none without channels.
+            watch: Called with the number of moments whose pictures are written.
+            text: What is to be done in it, in words; None if nobody says it.
+
+        Raises:
+            OSError: If it cannot be written.
+        """
+
+    @abstractmethod
+    def note(self, about: Mapping[str, Any]) -> None:
+        """Keep more about where the last episode comes from: numbers, flags or texts by name."""
 
     @abstractmethod
     def _complete(self) -> None:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollouts.reading.episode_checksum import STATES
-from rollouts.reading.trajectory import Trajectory
+from rollouts.reading.provenance import STATES
+from rollouts.reading.recording import Trajectory
 from tasks.episode import PlayedEpisode, States
 
 COLUMNS = ("rewards", "success", "terminated", "truncated")

@@ -11,8 +11,7 @@ from typing import Literal
 from robots import TaskError
 from rollouts.playing.comparison import Difference, first_difference
 from rollouts.reading.recorded_task import task_class, task_for
-from rollouts.reading.recording import FILE, open_trajectories
-from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
+from rollouts.reading.recording import FILE, Recording, Trajectory, TrajectoryError
 from tasks import MultiRobotTask, get_task_class
 from tasks.episode import play
 
@@ -65,7 +64,7 @@ class Replayed:
         return not (self.exact and self.difference)
 
 
-def open_recording(path: Path | None, task_id: str | None) -> TrajectoryFile:
+def open_recording(path: Path | None, task_id: str | None) -> Recording:
     """Open a recording: a file, all files in a folder, or else the official one of a task.
 
     Raises:
@@ -76,7 +75,7 @@ def open_recording(path: Path | None, task_id: str | None) -> TrajectoryFile:
         if task_id is None:
             raise TaskError("neither a file nor a task is given to replay")
         path = find_official(get_task_class(task_id).task_id)
-    file = open_trajectories(path)
+    file = Recording(path)
     try:
         task_class(file, task_id)
     except BaseException:
@@ -103,7 +102,7 @@ def find_official(task_id: str) -> Path:
     reasons: list[str] = []
     for path in sorted(folder.rglob("*.h5")):
         try:
-            with TrajectoryFile(path) as file:
+            with Recording(path) as file:
                 other = file.env_kwargs.get("sim_backend", "physx_cpu") != "physx_cpu"
                 playable.append((other, path))
         except TrajectoryError as error:

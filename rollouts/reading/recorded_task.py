@@ -1,22 +1,25 @@
-"""Makes the task of a recording: its class, its robots where they stood, its control mode."""
+"""Makes the task and the layout of what a recording or a receipt says of them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
-from layouts import Layout
+from layouts import Layout, Placement
 from layouts.placement import RobotLike
-from robots import RobotLayoutsError, UnknownNameError
-from rollouts.reading.recorded_layout import layout_again, same_places
-from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from robots import LayoutError, RobotLayoutsError, RobotRegistry, UnknownNameError
+from rollouts.reading.guessed_robots import guess_again
+from rollouts.reading.recording import Recording
+from rollouts.reading.summary import TrajectoryError
 from tasks import MultiRobotTask, get_task_class, make
 from tasks.language.needs import ACT, HOLD
 from tasks.native.format import mode_by_arm
 from tasks.varying.randomization import Randomization
 
+MOST_ROBOTS = 64  # each takes memory, whoever wrote the file
 
-def task_class(file: TrajectoryFile, task_id: str | None = None) -> type[MultiRobotTask]:
+
+def task_class(file: Recording, task_id: str | None = None) -> type[MultiRobotTask]:
     """Return the class of the task that a file was recorded in.
 
     Args:
@@ -47,7 +50,7 @@ def task_class(file: TrajectoryFile, task_id: str | None = None) -> type[MultiRo
 
 
 def task_for(
-    file: TrajectoryFile,
+    file: Recording,
     *,
     layout: Layout | None = None,
     robots: RobotLike | Mapping[str, RobotLike] | None = None,
@@ -90,7 +93,7 @@ def task_for(
     return task
 
 
-def _varied(file: TrajectoryFile) -> Randomization | None:
+def _varied(file: Recording) -> Randomization | None:
     """Return what varied in the worlds of a recording."""
     described = (file.simulation or {}).get("randomization")
     try:
@@ -102,7 +105,7 @@ def _varied(file: TrajectoryFile) -> Randomization | None:
 
 
 def _recorded(
-    file: TrajectoryFile, cls: type[MultiRobotTask], robots: Mapping[str, RobotLike]
+    file: Recording, cls: type[MultiRobotTask], robots: Mapping[str, RobotLike]
 ) -> dict[str, Any]:
     """Return the layout of a recording as arguments of `tasks.make`, none if it is the task's."""
     layout = layout_again(file.layout or {}, file.guessed or {}, cls.layout, robots, file.path)
@@ -113,7 +116,7 @@ def _recorded(
     return {"layout": layout, "robots": None, "bystanders": bystanders, "check_layout": False}
 
 
-def _holds(file: TrajectoryFile, layout: Layout) -> bool:
+def _holds(file: Recording, layout: Layout) -> bool:
     """Return whether robots or limbs of a recording took fewer numbers than they can."""
     acting = layout.in_control_mode(mode_by_arm(file.control_mode, layout)).robot_actions
     recorded = {place: about["action"] for place, about in (file.layout or {}).items()}
@@ -121,3 +124,77 @@ def _holds(file: TrajectoryFile, layout: Layout) -> bool:
         last - first < acting[place].stop - acting[place].start
         for place, (first, last) in recorded.items()
     )
+
+
+def layout_again(
+    described: Mapping[str, Mapping[str, Any]],
+    guessed: Mapping[str, Mapping[str, str]],
+    own: Layout,
+    robots: Mapping[str, RobotLike],
+    source: object,
+) -> Layout:
+    """Return a layout that `rollouts.reading.provenance.describe_layout` described.
+
+    Args:
+        described: The description; ``control_mode`` of a place counts where it is there.
+        guessed: Robots that were guessed from a URDF or MJCF; see `guess_again`.
+        own: The layout that the task declares: its robots are taken where their names fit.
+        robots: Which robots to take, by place, where the description cannot say it.
+        source: The file, for errors.
+
+    Raises:
+        UnknownNameError: If a robot is given for a place that there is not.
+        TrajectoryError: If a robot cannot be had here, or it is no layout.
+    """
+    for place in robots:
+        if place not in described:
+            raise UnknownNameError("place", place, described)
+    if len(described) > MOST_ROBOTS:
+        raise TrajectoryError(
+            f"{source} has a layout of {len(described)} robots; {MOST_ROBOTS} are the most that"
+            " are built for a recording"
+        )
+    placements: dict[str, Placement] = {}
+    for place, about in described.items():
+        try:
+            if place in robots:
+                robot: RobotLike = robots[place]
+            elif place in guessed:
+                robot = guess_again(place, guessed[place], about["robot"])
+            elif place in own and own[place].robot.name == about["robot"]:
+                robot = own[place].robot
+            else:
+                robot = RobotRegistry.load(about["robot"])
+            placements[place] = Placement(
+                robot,
+                tuple(about["position"]),  # pyright: ignore[reportArgumentType]
+                tuple(about["quaternion"]),  # pyright: ignore[reportArgumentType]
+                about["keyframe"],
+                about["qpos_noise"],
+                control_mode=about.get("control_mode"),
+            )
+        except TrajectoryError:
+            raise
+        except RobotLayoutsError as error:
+            raise TrajectoryError(
+                f"{source} has a robot at {place!r} that cannot be had here:"
+                f" {str(error).rstrip('.')}; name the robot, with --robots {place}=… or"
+                f" robots={{{place!r}: …}}"
+            ) from error
+    try:
+        return Layout(placements)
+    except LayoutError as error:
+        raise TrajectoryError(f"{source} has no layout that can be used: {error}") from error
+
+
+def same_places(first: Layout, second: Layout) -> bool:
+    """Return whether two layouts put the same robots at the same places of the world."""
+    return [_outline(*item) for item in first.items()] == [
+        _outline(*item) for item in second.items()
+    ]
+
+
+def _outline(place: str, placement: Placement) -> tuple[Any, ...]:
+    pose = placement.base_pose
+    start = placement.start_keyframe, placement.qpos_noise
+    return place, placement.robot, pose.position, pose.quaternion, *start

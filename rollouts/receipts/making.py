@@ -26,7 +26,7 @@ from rollouts.reading.json_fields import (
     whole,
 )
 from rollouts.reading.provenance import LAYOUT, describe_layout
-from rollouts.reading.recorded_layout import layout_again, same_places
+from rollouts.reading.recorded_task import layout_again, same_places
 from rollouts.receipts.receipt import ReceiptError
 from simulation import Camera, PhysicsSettings
 from simulation.physics import Friction

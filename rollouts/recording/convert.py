@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rollouts.playing.mode_conversion import converted_steps, why_lost
 from rollouts.playing.replay import FILE, task_for
-from rollouts.reading.trajectory import Trajectory, TrajectoryFile
+from rollouts.reading.recording import Recording, Trajectory
 from rollouts.recording.recorder import Recorder
 from tasks.episode import PlayedEpisode, play
 
@@ -55,7 +55,7 @@ class Conversion:
 
 
 def convert(
-    file: TrajectoryFile,
+    file: Recording,
     mode: str | Mapping[str, str],
     folder: Path,
     count: int | None = None,

@@ -1,11 +1,14 @@
-"""The only right to a folder, and what the disk refuses, in words."""
+"""What several writers of recordings and data sets need of the disk."""
 
 from __future__ import annotations
 
 import fcntl
 import os
-from contextlib import AbstractContextManager, suppress
+from collections.abc import Generator
+from contextlib import AbstractContextManager, contextmanager, suppress
+from io import FileIO
 from pathlib import Path
+from typing import Any
 
 from robots import RecordingError
 from robots.common.writing import writing_errors
@@ -44,3 +47,49 @@ def claim(folder: Path, *, certain: bool = False) -> int | None:
             if os.path.samestat(os.fstat(descriptor), folder.stat()):
                 return descriptor
         os.close(descriptor)  # its owner removed it meanwhile
+
+
+class DiskFile(FileIO):
+    """A file for HDF5 to write to, which crashes the process where a disk refuses a write to it.
+
+    HDF5 is given it as a file object. It keeps the first refusal of the disk for `refusals`, and
+    then writes no more. It takes no memory, however large the file becomes.
+    """
+
+    _refusal: OSError | None = None
+
+    def write(self, data: Any, /) -> int:
+        """Write all of ``data``, unless the disk has refused something."""
+        rest = memoryview(data).cast("B")
+        size = len(rest)
+        with self._kept_refusal():
+            while rest and self._refusal is None:
+                rest = rest[super().write(rest) :]
+        return size
+
+    def truncate(self, size: int | None = None, /) -> int:
+        """Change the size, unless the disk has refused something."""
+        with self._kept_refusal():
+            if self._refusal is None:
+                super().truncate(size)
+        return self.tell() if size is None else size
+
+    @contextmanager
+    def refusals(self) -> Generator[None]:
+        """Raise at the end of the block what the disk refused; it explains whatever HDF5 says.
+
+        Raises:
+            OSError: If it did.
+        """
+        try:
+            yield
+        finally:
+            if self._refusal is not None:
+                raise self._refusal
+
+    @contextmanager
+    def _kept_refusal(self) -> Generator[None]:
+        try:
+            yield
+        except OSError as refusal:
+            self._refusal = refusal

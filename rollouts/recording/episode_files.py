@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 from robots import RecordingError
 from robots.common.files import parse_json, read_regular
 from robots.common.writing import PARTIAL, written_whole
-from rollouts.reading.episode_checksum import STATES
-from rollouts.reading.hdf5_reading import MAX_BYTES
+from rollouts.reading.hdf5 import MAX_BYTES
 from rollouts.reading.json_fields import (
     ANYTHING,
     OBJECT,
@@ -35,11 +34,11 @@ from rollouts.reading.json_fields import (
     items,
     whole,
 )
+from rollouts.reading.provenance import STATES
 from rollouts.reading.summary import MAX_SEED, OWN_EPISODE
 from tasks.episode import REBUILT, PlayedEpisode
 
 _SUFFIX = ".part"
-_EARLIER = ".h5"
 _SEED = re.compile(r"seed-([0-9]{10,})")
 _OPENING = b"robot-layouts episode 1\n"
 _CHECKSUM = 4  # bytes
@@ -91,16 +90,14 @@ class Stored:
 
 
 @dataclass(frozen=True)
-class PartWriter:
-    """Writes finished episodes into a folder; worker processes each have a copy.
+class PartEncoder:
+    """Encodes finished episodes; worker processes each have a copy.
 
     Attributes:
-        folder: Where to write.
         header: What the episodes have in common; every part carries it.
         control_mode: Control mode as ManiSkill writes it: by robot where there are several.
     """
 
-    folder: Path
     header: Mapping[str, Any]
     control_mode: str | dict[str, str]
     _text: bytes = field(init=False, repr=False)
@@ -112,31 +109,8 @@ class PartWriter:
         object.__setattr__(self, "_text", json.dumps(self.header).encode())
         object.__setattr__(self, "_split", json.dumps(split))
 
-    def write(self, episode: PlayedEpisode) -> None:
-        """Write one episode; it is there, whole, when this returns, or not at all.
-
-        Raises:
-            RecordingError: If it cannot be written.
-        """
-        self.store(episode.seed, self.encode(episode))
-
-    def store(self, seed: int, part: bytes, *, sync: bool = False) -> None:
-        """Write an episode that was encoded, perhaps on another machine; else as `write`.
-
-        Args:
-            seed: Its seed.
-            part: What `encode` returned.
-            sync: Whether to wait until it is on the disk.
-
-        Raises:
-            RecordingError: If it cannot be written.
-        """
-        path = part_path(self.folder, seed)
-        with written_whole(path, RecordingError, parents=False, sync=sync) as partial:
-            partial.write_bytes(part)
-
     def encode(self, episode: PlayedEpisode) -> bytes:
-        """Return what `write` writes."""
+        """Return the part of an episode."""
         attributes = {"action_split": self._split, "episode": json.dumps(self._about(episode))}
         return self.encode_stored(Stored(attributes, _arrays(episode)))
 
@@ -166,6 +140,23 @@ class PartWriter:
         }
 
 
+def write_part(folder: Path, seed: int, part: bytes, *, sync: bool = False) -> None:
+    """Write an encoded episode; it is there, whole, when this returns, or not at all.
+
+    Args:
+        folder: Where to write.
+        seed: Its seed.
+        part: What `PartEncoder.encode` returned, perhaps on another machine.
+        sync: Whether to wait until it is on the disk.
+
+    Raises:
+        RecordingError: If it cannot be written.
+    """
+    path = part_path(folder, seed)
+    with written_whole(path, RecordingError, parents=False, sync=sync) as partial:
+        partial.write_bytes(part)
+
+
 def part_path(folder: Path, seed: int) -> Path:
     """Return the part of a seed; names sort as seeds do."""
     return folder / f"seed-{seed:010d}{_SUFFIX}"
@@ -189,20 +180,14 @@ def list_parts(folder: Path) -> list[Path]:
     return sorted(path for path in folder.glob(f"seed-*{_SUFFIX}") if _is_part(path))
 
 
-def list_earlier_parts(folder: Path) -> list[Path]:
-    """Return the parts that an earlier version left in a folder, which are not read any more."""
-    return sorted(folder.glob(f"seed-*{_EARLIER}"))
-
-
 def refuse_foreign(folder: Path) -> None:
     """Refuse a folder of parts that holds something else, which nobody should delete.
 
     Raises:
         RecordingError: If so.
     """
-    earlier = list_earlier_parts(folder)
     for path in sorted(folder.iterdir()):
-        ours = path.suffix == PARTIAL or path in earlier or _is_part(path)
+        ours = path.suffix == PARTIAL or _is_part(path)
         if not ours or path.is_symlink() or not path.is_file():
             raise RecordingError(
                 f"{path} is no episode of this library, in a folder that is for such episodes only;"
@@ -242,7 +227,7 @@ def _parse(content: bytes) -> tuple[dict[str, Any], Stored]:
     """Return what a part says after its opening.
 
     Raises:
-        ValueError: If it is not as `PartWriter` writes it.
+        ValueError: If it is not as `PartEncoder` writes it.
     """
     header, about, numbers = content.split(b"\n", 2)
     described, listed = _parse_header(header), parse_json(about.decode())

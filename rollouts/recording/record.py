@@ -11,6 +11,7 @@ from typing import Any
 import torch
 
 import tasks
+from experts import find_expert
 from layouts import Layout
 from layouts.placement import RobotLike
 from robots import RecordingError, TaskError
@@ -29,22 +30,83 @@ from rollouts.playing.executor import (
 from rollouts.playing.seeds import checked_seeds
 from rollouts.playing.together import BatchError, grouped, one_by_one, record_together
 from rollouts.reading.provenance import describe_layout, differences, listing
-from rollouts.recording.episode_files import PartWriter
+from rollouts.recording.episode_files import PartEncoder
 from rollouts.recording.recorder import FILE_SIZE, Recorder
-from rollouts.recording.signing import Actors
-from rollouts.sources.policies import EXPERT
+from rollouts.sources import actors as kinds
+from rollouts.sources.actors import DESCRIPTION, TYPE, Actor, actor_of, combined, episode_source
+from rollouts.sources.policies import EXPERT, check_policy, find_policy
 from tasks import MultiRobotTask, Scenario
-from tasks.episode import Policy, Score
+from tasks.episode import PlayedEpisode, Policy, Score
 from tasks.processes.transport import as_ours
 from tasks.registry import make_scenario
 from tasks.varying.randomization import Randomization
 
 FILE = "trajectory.h5"
+_TYPES = {kinds.EXPERT: "scripted", kinds.POLICY: "policy", kinds.PERSON: "human"}
 LOST_IN_A_ROW = 10  # episodes that workers died of, and none that was played, until all ends
 
 
 Recorded = tuple[Score, bytes]
 """How an episode went, and what is to be stored of it."""
+
+
+@dataclass(frozen=True)
+class Actors:
+    """Who acts in the episodes of a recording.
+
+    Attributes:
+        actors: The policy, and who may take over.
+        corrector: Who says what would have been right, or None.
+    """
+
+    actors: tuple[Actor, ...]
+    corrector: Actor | None = None
+
+    @staticmethod
+    def cast(
+        task: type[MultiRobotTask],
+        policy: Policy | str,
+        takeover: Policy | str | None,
+        corrector: Policy | str | None,
+    ) -> tuple[Cast, Actors]:
+        """Return who plays, and who that is.
+
+        Raises:
+            TaskError: If the task has no expert, something cannot be imported or called, or
+                somebody is to take over from an expert, who does not look.
+            RecordingError: If a policy's file cannot be read.
+        """
+        if isinstance(policy, str) and policy == EXPERT:
+            if not takeover is corrector is None:
+                raise TaskError(
+                    "an expert's plan is made for what it does itself; a takeover or a corrector"
+                    " needs a policy"
+                )
+            expert = find_expert(task.task_id)
+            module, name = (getattr(expert, n, "") for n in ("__module__", "__qualname__"))
+            described = Actor(kinds.EXPERT, f"{module}:{name or expert}")
+            return Cast(expert=expert, to_the_end=True), Actors((described,))
+        acting, who = _found(policy, "policy")
+        taking, taker = _found(takeover, "takeover")
+        correcting, right = _found(corrector, "corrector")
+        cast = Cast(acting, takeover=taking, corrector=correcting)
+        return cast, Actors(tuple(actor for actor in (who, taker) if actor is not None), right)
+
+    @property
+    def header(self) -> dict[str, Any]:
+        """What the recording says of all its episodes, as arguments of `Recorder`."""
+        everyone = (*self.actors, *((self.corrector,) if self.corrector else ()))
+        said = combined((_TYPES[actor.kind], actor.name) for actor in everyone)
+        return {"source": said[TYPE] or "", "source_desc": said[DESCRIPTION]}
+
+    def sign(self, episode: PlayedEpisode) -> PlayedEpisode:
+        """Write into an episode who acted in it; an expert's says so in the header alone."""
+        if self.actors[0].kind == kinds.EXPERT:
+            return replace(episode, actor=None)
+        turns = episode.actor
+        assert turns is not None  # whoever plays keeps them
+        source, actor = episode_source(self.actors, turns, self.corrector)
+        return replace(episode, source=source, actor=actor)
 
 
 @dataclass(frozen=True)
@@ -56,7 +118,7 @@ class EpisodeJob:
         scenario: How to make it.
         cast: Who plays.
         actors: Who that is, as the recording keeps it.
-        writer: What encodes finished episodes.
+        encoder: What encodes finished episodes.
         together: Seeds that are played at once, by the first of them.
     """
 
@@ -64,7 +126,7 @@ class EpisodeJob:
     scenario: Scenario
     cast: Cast
     actors: Actors
-    writer: PartWriter
+    encoder: PartEncoder
     together: Mapping[int, tuple[int, ...]]
 
     @property
@@ -116,7 +178,7 @@ class _Play:
         with torch.no_grad():
             episodes = record_together(self._env, players)
         return {
-            player.seed: (player.score, self._job.writer.encode(self._job.actors.sign(episode)))
+            player.seed: (player.score, self._job.encoder.encode(self._job.actors.sign(episode)))
             for player, episode in zip(players, episodes, strict=True)
         }
 
@@ -127,7 +189,7 @@ class _Play:
             return str(as_ours(error))
 
     def _expect_same_robots(self) -> None:
-        header = self._job.writer.header
+        header = self._job.encoder.header
         found = differences(header["layout"], describe_layout(self._env.layout))
         if found:
             raise RecordingError(
@@ -253,7 +315,7 @@ def record(
         recorder.expect(missing)
         together = grouped(missing, num_envs)
         at_once = replace(scenario, num_envs=max(map(len, together.values()), default=1))
-        job = EpisodeJob(cls, at_once, cast, actors, recorder.writer, together)
+        job = EpisodeJob(cls, at_once, cast, actors, recorder.encoder, together)
         try:
             with closing(play_all(executor, job, list(together))) as events:
                 for event in _of_episodes(events, together):
@@ -301,3 +363,12 @@ def _note(summary: Summary, event: Event, recorder: Recorder) -> None:
         summary.played[event.seed] = played
         summary.recorded += 1
         summary.workers.add(event.worker)
+
+
+def _found(policy: Policy | str | None, what: str) -> tuple[Any, Actor | None]:
+    """Return what is named or given, and who it is."""
+    if policy is None:
+        return None, None
+    name = policy if isinstance(policy, str) else None
+    found = check_policy(policy if name is None else find_policy(name, what), what)
+    return found, actor_of(found, name)

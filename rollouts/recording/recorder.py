@@ -18,23 +18,27 @@ from typing import NamedTuple
 
 from robots import RecordingError, TaskError
 from robots.common.writing import PARTIAL
-from rollouts.reading.manifest import FILE_SIZE, file_path
-from rollouts.reading.provenance import describe_layout, listing
+from rollouts.reading.manifest import FILE_SIZE
+from rollouts.reading.provenance import (
+    describe_layout,
+    describe_task,
+    header_differences,
+    listing,
+    recorded_control_mode,
+)
 from rollouts.recording.disk import claim, disk_errors
 from rollouts.recording.episode_files import (
-    PartWriter,
-    list_earlier_parts,
+    PartEncoder,
     list_parts,
     part_path,
     part_size,
     read_part,
     refuse_foreign,
     seed_of,
+    write_part,
 )
-from rollouts.recording.header import describe_task, header_differences, recorded_control_mode
 from rollouts.recording.joined_files import JoinedFiles, OpenFile
-from rollouts.recording.trajectory_writer import read_groups
-from rollouts.sources.header import Source, combined, source_of
+from rollouts.sources.actors import Source, combined, source_of
 from tasks import MultiRobotTask
 from tasks.episode import PlayedEpisode
 
@@ -71,7 +75,7 @@ class Recorder:
         parts: The folder of finished episodes that are not joined yet.
         damaged: Episodes that were there and are damaged, by their files or groups, in words;
             they do not count as recorded.
-        writer: Encodes one episode, or writes it; may be handed to worker processes.
+        encoder: Encodes one episode; may be handed to worker processes.
     """
 
     def __init__(
@@ -110,7 +114,6 @@ class Recorder:
         self.parts = self.path.with_suffix(".parts")
         self.damaged: list[str] = []
         self._header, self._limit = describe_task(task, source, source_desc), file_size * 1e6
-        self._files = JoinedFiles(self.path, self._header)
         self._waiting: dict[int, _Part] = {}  # by seed
         self._coming: deque[int] = deque()
         self._given_up = set[int]()
@@ -122,6 +125,7 @@ class Recorder:
             if lock is None:
                 raise RecordingError(f"another process is recording into {self.parts}")
             try:
+                self._files = JoinedFiles(self.path, self._header)
                 self._begin(overwrite=overwrite, resume=resume)
             except BaseException:
                 with suppress(OSError):  # not empty
@@ -130,7 +134,7 @@ class Recorder:
                 raise
         self._release = weakref.finalize(self, os.close, lock)
         mode = recorded_control_mode(task)
-        self.writer = PartWriter(self.parts.absolute(), self._header, mode)
+        self.encoder = PartEncoder(self._header, mode)
         self._closed = False
 
     def __enter__(self) -> Recorder:
@@ -156,8 +160,8 @@ class Recorder:
 
     @property
     def seeds(self) -> set[int]:
-        """Seeds of all episodes recorded, those that worker processes wrote included."""
-        return {*self._files.seeds, *(seed_of(part) for part in list_parts(self.parts))}
+        """Seeds of all episodes recorded."""
+        return {*self._files.seeds, *self._waiting}
 
     def expect(self, seeds: Iterable[int]) -> None:
         """Say which episodes will come, so that files do not depend on their order."""
@@ -174,15 +178,15 @@ class Recorder:
             RecordingError: If it cannot be written; the episodes before it stay. Also if there
                 is one of that seed already, or the recording was closed.
         """
-        self.store(episode.seed, self.writer.encode(episode))
+        self.store(episode.seed, self.encoder.encode(episode))
 
     def store(self, seed: int, part: bytes) -> None:
-        """Write an episode that the `writer` encoded, perhaps elsewhere; else as `add`."""
+        """Write an episode that the `encoder` encoded, perhaps elsewhere; else as `add`."""
         if self._closed:
             raise RecordingError(f"cannot write {self.path}: the recording was closed")
-        if seed in self._files.seeds or part_path(self.parts, seed).exists():
+        if seed in self.seeds:
             raise RecordingError(f"{self.path} has an episode of seed {seed} already")
-        self.writer.store(seed, part)
+        write_part(self.parts, seed, part)
         self._waiting[seed] = _Part(part_size(part), source_of(self._header))
         while (full := self._full_file()) is not None:
             self._fill_last(full)
@@ -204,9 +208,8 @@ class Recorder:
     def _begin(self, *, overwrite: bool, resume: bool) -> None:
         """Check and tidy what is there."""
         refuse_foreign(self.parts)
-        earlier = list_earlier_parts(self.parts)
-        joined = (*self._files.paths(), self._files.manifest, self.json_path)
-        there = [p for p in (*joined[:-1], *list_parts(self.parts), *earlier) if p.exists()]
+        parts, files = list_parts(self.parts), self._files
+        there = [p for p in (*files.paths, files.manifest, *parts) if p.exists()]
         if there and not (overwrite or resume):
             raise RecordingError(
                 f"{there[0]} is there already; choose another name, or pass overwrite=True to"
@@ -215,17 +218,11 @@ class Recorder:
         for left_over in self._left_over():
             left_over.unlink(missing_ok=True)
         if overwrite:
-            self._files.remove()
-            for path in there:
-                path.unlink(missing_ok=True)
-        elif earlier:
-            raise RecordingError(
-                f"{earlier[0]} is one of {len(earlier)} episodes that an earlier version of this"
-                " library left when it was interrupted; go on with that version until it ends, or"
-                " choose another folder, or delete them to have them recorded again"
-            )
-        self._files.read()
-        self.damaged += self._files.damaged
+            files.remove()
+            for part in parts:
+                part.unlink(missing_ok=True)
+        files.read()
+        self.damaged += files.damaged
         for part in list_parts(self.parts):
             self._check_part(part)
 
@@ -245,8 +242,7 @@ class Recorder:
             self.damaged.append(str(part))
             part.unlink()
             return
-        found = header_differences(header, self._header)
-        if found:
+        if found := header_differences(header, self._header):
             raise RecordingError(
                 f"{part} was recorded with something else, so this recording cannot go on there"
                 f" ({listing(found)}); choose another folder"
@@ -263,8 +259,8 @@ class Recorder:
             certain: Whether not to wait for those that are expected before.
         """
         lost = {seed for file in self._files.mending.values() for seed in file.lost}
-        waiting = {seed: part.size for seed, part in self._waiting.items() if seed not in lost}
-        sizes = {**self._files.last.sizes, **waiting}
+        sizes = {seed: held.size for seed, held in self._files.last.episodes.items()}
+        sizes |= {seed: part.size for seed, part in self._waiting.items() if seed not in lost}
         if sum(sizes.values()) <= self._limit:
             return None
         missing = math.inf if certain else self._first_missing()
@@ -287,20 +283,19 @@ class Recorder:
 
     def _fill_last(self, seeds: list[int]) -> None:
         """Write the last file with some episodes, and begin another one."""
-        file, chosen = self._files.last, set(seeds)
-        spilt = [seed for seed in file.groups if seed not in chosen]
-        groups = [file.groups[seed] for seed in spilt]
-        path, about = file_path(self.path, file.number), combined(file.sources)
-        writer = replace(self.writer, header={**self._header, **about})
-        for seed, stored in zip(spilt, read_groups(path, groups) if spilt else (), strict=True):
-            writer.store(seed, writer.encode_stored(stored), sync=True)
-            self._waiting[seed] = _Part(stored.size, source_of(writer.header))
+        file = self._files.last
+        header = {**self._header, **combined(file.sources)}
+        encoder = replace(self.encoder, header=header)
+        spilt = [seed for seed in file.episodes if seed not in set(seeds)]
+        for seed, stored in self._files.read_groups(file, spilt) if spilt else ():
+            write_part(self.parts, seed, encoder.encode_stored(stored), sync=True)
+            self._waiting[seed] = _Part(stored.size, source_of(header))
         self._write(file, seeds, last=False)
 
     def _write(self, file: OpenFile, seeds: Iterable[int], *, last: bool) -> None:
         """Write a file and the manifest; then the parts that it was joined from are deleted."""
-        parts = {s: part_path(self.parts, s) for s in seeds if s not in file.groups}
-        places = {s: parts[s] if s in parts else file.groups[s] for s in sorted(seeds)}
+        parts = {s: part_path(self.parts, s) for s in seeds if s not in file.episodes}
+        places = {s: parts.get(s) or file.episodes[s].group for s in sorted(seeds)}
         sources = {self._waiting[seed].source for seed in parts}
         self._files.write(file, places, sources, last=last)
         self._files.write_manifest()
@@ -309,21 +304,15 @@ class Recorder:
             self._waiting.pop(seed, None)
 
     def _join(self) -> None:
-        for part in list_parts(self.parts):
-            if seed_of(part) not in self._waiting:  # a worker process wrote it
-                header, stored = read_part(part)
-                self._waiting[seed_of(part)] = _Part(stored.size, source_of(header))
         for file in self._files.mending.values():
-            again = file.lost & self._waiting.keys()
-            if again:
-                self._write(file, {*file.groups, *again}, last=False)
-        certain = (
-            sum(part.size for part in self._waiting.values()) > 2 * self._limit
-        )  # not much waits for few that lack
+            if again := file.lost & self._waiting.keys():
+                self._write(file, {*file.episodes, *again}, last=False)
+        waiting = sum(part.size for part in self._waiting.values())
+        certain = waiting > 2 * self._limit  # not much waits for few that lack
         while (full := self._full_file(certain=certain)) is not None:
             self._fill_last(full)
         last = self._files.last
-        if seeds := {*last.groups, *self._waiting}:
+        if seeds := {*last.episodes, *self._waiting}:
             self._write(last, seeds, last=True)
         else:
             self._files.write_empty()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from hashlib import sha256
@@ -20,11 +20,16 @@ from robots.common.files import open_regular
 EXPERT, POLICY, PERSON = "expert", "policy", "person"
 MIXED, CORRECTION = "mixed", "correction"
 
+TYPE, DESCRIPTION = "source_type", "source_desc"  # ManiSkill's fields of a recording's header
+_BETWEEN = "; "  # sources in the latter
+
 MOST_ACTORS = 255  # of an episode: who acted is kept in one byte for each step
 
 _CHUNK = 2**20  # bytes read at a time
 
 Turns = NDArray[np.uint8]
+Source = tuple[str | None, str | None]
+"""What a recording says of its source as a whole: ``source_type`` and ``source_desc``."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +104,26 @@ def episode_source(
 
 def _listing(acted: Sequence[dict[str, Any]]) -> str:
     return ", ".join(dict.fromkeys(actor["name"] for actor in acted))
+
+
+def source_of(header: Mapping[str, Any]) -> Source:
+    """Return what a header says of its source."""
+    return header.get(TYPE), header.get(DESCRIPTION)
+
+
+def combined(sources: Iterable[Source]) -> dict[str, str | None]:
+    """Return what the header of a recording says whose episodes are of these sources.
+
+    It does not depend on their order.
+    """
+    found = set(sources)
+    kinds = {kind for kind, _ in found}
+    texts = {part for _, text in found for part in (text or "").split(_BETWEEN) if part}
+    alone = len(kinds - {None}) <= 1 and len(texts) <= 1
+    if alone:
+        kind, text = next(iter(kinds - {None}), None), next(iter(texts), None)
+        return {TYPE: kind, DESCRIPTION: text}
+    return {TYPE: MIXED, DESCRIPTION: _BETWEEN.join(sorted(texts))}
 
 
 def definition(policy: Any) -> Any:

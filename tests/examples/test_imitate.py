@@ -19,7 +19,7 @@ pytest.importorskip("matplotlib")
 import tasks
 from kinematics.rotations import multiply
 from rollouts import evaluate
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 
 ROOT = Path(__file__).parent.parent.parent
 EXAMPLE = ROOT / "examples" / "imitate.py"
@@ -104,7 +104,7 @@ def test_a_killed_run_goes_on_to_the_same_weights(example, learned, recording, t
 def observed(example, recording):
     """An episode as it was recorded, and what the network learns from it."""
     observer = example.Observer(example.Recipe(TASK), example.Senses(TASK))
-    with TrajectoryFile(recording / "trajectory.h5") as file:
+    with Recording(recording / "trajectory.h5") as file:
         episode = file[0]
     seen, positions = observer(episode)
     observer.env.close()

@@ -15,7 +15,7 @@ pytest.importorskip("matplotlib")
 import tasks
 from robots import TaskError
 from rollouts import evaluate, record
-from rollouts.reading.recording import open_trajectories
+from rollouts.reading.recording import Recording
 from tests.examples.learning import examples, finish, start
 
 __all__ = ["examples"]
@@ -68,7 +68,7 @@ def test_what_it_learned_from_is_what_it_gets_when_it_plays(example, learned):
     training = policy.training(policy.recipe, learned / "recording", 0, learned)
     sights = training._observations
     env = tasks.make(TASK, **policy.making)
-    with closing(env), open_trajectories(learned / "recording") as recording:
+    with closing(env), Recording(learned / "recording") as recording:
         first = 0
         for episode in recording:
             observation, _ = env.reset(seed=episode.seed, options={"reconfigure": True})

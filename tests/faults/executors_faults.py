@@ -225,12 +225,12 @@ def _with_executor(what: str, folder: Path) -> None:
 
 
 def _recording_with_forgetful_executor(folder: Path) -> None:
-    from rollouts.reading.trajectory import TrajectoryFile
+    from rollouts.reading.recording import Recording
 
     executor = Nobody()
     executor.what = "forgets one"
     try:
         recorded(folder=folder, seeds=[4, 5], executor=executor, workers=None)
     finally:
-        with TrajectoryFile(folder / "trajectory.h5") as file:
+        with Recording(folder / "trajectory.h5") as file:
             assert file.seeds == (5,)

@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 
 if TYPE_CHECKING:
-    from rollouts.reading.trajectory import Trajectory
+    from rollouts.reading.recording import Trajectory
     from rollouts.recording.recorder import Recorder
     from tasks import MultiRobotTask
 
@@ -90,9 +90,9 @@ def edit_json(path: Path, edit: Callable[[dict[str, Any]], None]) -> None:
 
 def read(path: Path) -> list[Trajectory]:
     """Read all that a replay or an export would."""
-    from rollouts.reading.trajectory import TrajectoryFile
+    from rollouts.reading.recording import Recording
 
-    with TrajectoryFile(path) as file:
+    with Recording(path) as file:
         file.expect(TASK, ACTIONS)
         return list(file)
 

@@ -243,6 +243,7 @@ _FILES: dict[str, Callable[[Path], None]] = {
         f"cut to {share:.1%}": _write(lambda content, s=share: content[: int(s * len(content))])
         for share in (0.01, 0.1, 0.3, 0.5, 0.9, 0.999)
     },
+    "behind a script": _write(lambda content: b"#!/bin/sh\n".ljust(512) + content),
     "cut at its front": _write(lambda content: content[1:]),
     "the numbers of another": _write(lambda content: content[:2000] + content[2008:] + bytes(8)),
     "of texts without end": _write(_endless_texts),
@@ -267,13 +268,9 @@ def _repack(**how: Any) -> Callable[[Path], None]:
     return change
 
 
-def _userblock(path: Path) -> None:
-    path.write_bytes(b"#!/bin/sh\n".ljust(512) + path.read_bytes())
-
-
 def _bystander(path: Path) -> None:
     with edited(path) as file:
-        file["elsewhere"] = h5py.ExternalLink("/etc/passwd", "/")
+        file["elsewhere"] = h5py.SoftLink("/traj_0")
         file["traj_0/obs"] = h5py.SoftLink("/nowhere")
 
 
@@ -284,7 +281,6 @@ _HARMLESS: dict[str, Callable[[Path], None]] = {
     ),
     "arrays are in chunks": _repack(chunks=True),
     "arrays may grow": _repack(maxshape=None, chunks=True),
-    "a script stands before the h5 file": _userblock,
-    "there are links to other files that nothing reads": _bystander,
+    "there are links that nothing reads": _bystander,
     "the h5 file has no checksums, as those of earlier versions": _repack(),
 }

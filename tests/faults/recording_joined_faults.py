@@ -150,10 +150,10 @@ _JOINED: dict[str, Callable[[Path], None]] = {
     "an array is renamed": _h5(lambda file: file["traj_1"].move("success", "failure")),
     "an attribute is deleted": _h5(lambda file: file["traj_1"].attrs.__delitem__("action_split")),
     "an attribute is a number": _h5(lambda file: file["traj_1"].attrs.__setitem__("episode", 3)),
-    "an episode is a link to another file": _h5(
+    "an episode is a link to another one": _h5(
         lambda file: (
             file.__delitem__("traj_1"),
-            file.__setitem__("traj_1", h5py.ExternalLink("/etc/passwd", "/")),
+            file.__setitem__("traj_1", h5py.SoftLink("/traj_0")),
         )
     ),
     "an array is in another file": _h5(

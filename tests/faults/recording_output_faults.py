@@ -89,9 +89,9 @@ def _record(folder: Path, redirection: str) -> str:
         f" {redirection}"
     )
     assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
-    from rollouts.reading.trajectory import TrajectoryFile
+    from rollouts.reading.recording import Recording
 
-    with TrajectoryFile(folder / "r" / "trajectory.h5") as file:
+    with Recording(folder / "r" / "trajectory.h5") as file:
         assert [episode.seed for episode in file] == [0, 1, 2]
     return "all episodes are recorded, and it ends with 0"
 

@@ -15,7 +15,7 @@ import numpy as np
 
 import tasks
 from robots import RecordingError, TaskError
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from rollouts.recording.record import FILE
 from rollouts.recording.recorder import Recorder
 from rollouts.teleop.session import Session
@@ -116,7 +116,7 @@ def _goes_on(folder: Path) -> None:
             session.take_over()
         session.step()
         session.keep()
-    with TrajectoryFile(folder / FILE) as file:
+    with Recording(folder / FILE) as file:
         assert [len(episode.actions) for episode in file] == [4]
 
 
@@ -136,7 +136,7 @@ def _full_disk(folder: Path) -> str:
             signal.signal(signal.SIGXFSZ, before)
         assert len(session.actions) == 1
         session.keep()
-    with TrajectoryFile(folder / FILE) as file:
+    with Recording(folder / FILE) as file:
         assert len(file) == 1
     return f"{said}; the episode is there, and kept once there is room"
 

@@ -13,7 +13,7 @@ from robots import ActionError, RobotRegistry, TaskError
 from rollouts import evaluate
 from rollouts.__main__ import main
 from rollouts.playing.replay import open_recording, replay, task_for
-from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.reading.recording import Recording, TrajectoryError
 from rollouts.recording.record import record
 from rollouts.recording.recorder import Recorder
 from tasks import Needs
@@ -55,7 +55,7 @@ def record_at_random(path: Path, task: tasks.MultiRobotTask, steps: int = 4) -> 
 
 
 def replayed(path: Path, **options):
-    with TrajectoryFile(path) as file:
+    with Recording(path) as file:
         return replay(task_for(file, **options), file[0])
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from tests.outside.lab import CHECKOUT, PACKAGE, TRAY, add_metadata, make_folder, row, run, words
 from tests.rollouts.clusters import running_cluster
 
@@ -123,7 +123,7 @@ def test_a_recording_that_is_killed_goes_on(tmp_path):
     codes, printed = run(lab, line, f"replay data --task {TRAY}")
     assert codes == [0, 0], printed
     assert "episodes were recorded before" in printed
-    with TrajectoryFile(lab / "data" / "trajectory.h5") as file:
+    with Recording(lab / "data" / "trajectory.h5") as file:
         assert sorted(file.seeds) == list(range(8))
         assert file.module == "mylab.tray"
 

@@ -13,7 +13,7 @@ from parity.compare.episodes import (
     random_episodes,
     recorded_episodes,
 )
-from rollouts.reading.trajectory import TrajectoryError
+from rollouts.reading.recording import TrajectoryError
 
 TASK = "PickCube-v1"
 

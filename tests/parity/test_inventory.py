@@ -12,7 +12,7 @@ import tasks
 from parity.__main__ import main
 from parity.compare.native_env import native_tasks
 from parity.records.inventory import NO_REASON, find_files, missing_tasks, reason
-from rollouts.reading.trajectory import TrajectoryError
+from rollouts.reading.recording import TrajectoryError
 from tests.native import NATIVE
 
 ROOT = Path(__file__).parents[2]

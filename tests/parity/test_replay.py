@@ -18,7 +18,7 @@ from parity.compare.runs import Run, RunResult
 from parity.replay.command import sentences, table
 from rollouts.playing.plan_conversion import as_positions
 from rollouts.playing.replay import replay, task_for
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from rollouts.recording.recorder import Recorder
 from tasks.episode import play
 from tests.motions import touching_episode
@@ -84,7 +84,7 @@ def replayed_by_native(path: Path, *words: str) -> tuple[Path, str]:
 
 
 def expect_same_states(one: Path, other: Path) -> None:
-    with TrajectoryFile(one) as first, TrajectoryFile(other) as second:
+    with Recording(one) as first, Recording(other) as second:
         assert len(first) == len(second) == len(SEEDS)
         for ours, natives in zip(first, second, strict=True):
             np.testing.assert_array_equal(ours.actions, natives.actions)
@@ -122,7 +122,7 @@ class TestNative:
         path = recorded_here(tmp_path, "PickCube-v1", MODES[0])
         made, said = replayed_by_native(path, *words)
         assert "2/2=100.00% demos saved" in said
-        with TrajectoryFile(path) as ours, TrajectoryFile(made) as natives:
+        with Recording(path) as ours, Recording(made) as natives:
             for one, other in zip(ours, natives, strict=True):
                 np.testing.assert_array_equal(one.actions, other.actions)
 
@@ -131,7 +131,7 @@ class TestNative:
     )
     def test_what_native_records_is_played_here(self, tmp_path, task_id, mode):
         path = recorded_by_native(tmp_path, task_id, mode, {"reconfigure": True})
-        with TrajectoryFile(path) as file:
+        with Recording(path) as file:
             assert (file.task_id, file.control_mode) == (task_id, mode)
             assert file.layout is None
             env = task_for(file)
@@ -144,7 +144,7 @@ class TestNative:
 
     def test_worlds_that_native_reused(self, tmp_path):
         path = recorded_by_native(tmp_path, "PickCube-v1", MODES[0], None)
-        with TrajectoryFile(path) as file:
+        with Recording(path) as file:
             first, second = (replay(task_for(file), episode) for episode in file)
         assert first.difference is None
         assert [first.exact, second.exact] == [False, False]

@@ -20,7 +20,7 @@ from parity.replay.rollout import (
     load,
 )
 from robots import TaskError
-from rollouts.reading.trajectory import TrajectoryError
+from rollouts.reading.recording import TrajectoryError
 from rollouts.recording.recorder import Recorder
 from tasks.episode import play
 from tests.native import NATIVE

@@ -15,8 +15,7 @@ from rollouts.dataset.certificate import Certificate, sentences
 from rollouts.dataset.certify import certify
 from rollouts.playing.comparison import first_difference
 from rollouts.playing.in_process import InProcessExecutor
-from rollouts.reading.recording import open_trajectories
-from rollouts.reading.trajectory import TrajectoryError
+from rollouts.reading.recording import Recording, TrajectoryError
 from rollouts.recording.recorder import Recorder
 from tasks.episode import play
 from tests.rollouts.recordings import edited
@@ -83,7 +82,7 @@ def test_the_first_difference_is_named(copy, capsys):
 
 def test_a_zero_of_another_sign_is_a_difference(recorded):
     env = tasks.make("PushT-v1")
-    with open_trajectories(recorded) as file:
+    with Recording(recorded) as file:
         episode = file[0]
     played = play(env, 0, episode.actions)
     assert first_difference(episode, played) is None

@@ -17,13 +17,13 @@ from robots import TaskError, UnknownNameError
 from rollouts.__main__ import main
 from rollouts.export.columns import ColumnReader, state_row
 from rollouts.export.dataset import Export, export
-from rollouts.export.drawing_job import DrawingCrew, DrawnEpisode
+from rollouts.export.drawing_job import DrawnEpisode, draw_in_order
 from rollouts.export.lerobot import LeRobotWriter, Limits
 from rollouts.export.pictures import Drawing
 from rollouts.export.shots import Channel, choose_shots
 from rollouts.playing.executor import Event, ProcessExecutor
 from rollouts.reading.recorded_task import task_for
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from rollouts.recording.recorder import Recorder
 from simulation import Camera
 from simulation.rendering.pictures import Observers, vulkan_problem
@@ -64,7 +64,7 @@ def seen(recording, driver) -> list[list[dict[str, np.ndarray]]]:
     """Return what an environment with cameras sees in every moment of every episode."""
     fields = {"obs_mode": "rgb+depth", "robots": ROBOTS, "camera_size": SIZE}
     env = tasks.make(TASK, **fields)
-    with TrajectoryFile(recording) as file:
+    with Recording(recording) as file:
         return [list(observed(env, episode)) for episode in file]
 
 
@@ -150,7 +150,7 @@ def test_images_of_lerobot_are_what_the_environment_sees(recording, seen, tmp_pa
 @pytest.mark.parametrize("form", ["lerobot", "robomimic"])
 def test_the_columns_of_such_an_export_step_by_step(recording, seen, form):
     env = tasks.make(TASK, obs_mode=f"{form}+cameras+depth", robots=ROBOTS, camera_size=SIZE)
-    with TrajectoryFile(recording) as file:
+    with Recording(recording) as file:
         obs, _ = env.reset(seed=file[0].seed, options=REBUILT)
     for key, picture in seen[0][0].items():
         name, texture = key.split()
@@ -168,7 +168,7 @@ def test_where_no_replay_ends_pictures_are_of_the_recorded_states(tmp_path):
     path = record(tmp_path / "push.h5", "PushT-v1", [3])
     with edited(path) as file:
         file["traj_0/env_states/actors/Tee"][1:, 0] += 0.05
-    with TrajectoryFile(path) as file:
+    with Recording(path) as file:
         task = task_for(file, pictures=True)
         columns = ColumnReader(task).read(file[0])
         shots = choose_shots(task, ["base_camera"], size=SIZE)
@@ -197,7 +197,7 @@ def test_worlds_that_vary_are_drawn_as_they_were(tmp_path):
     with Recorder(tmp_path / "varied.h5", task) as recorder:
         recorder.add(play(task, 3, np.full((2, task.layout.action_dim), 0.5, np.float32)))
     env = tasks.make(TASK, obs_mode="rgb+depth", camera_size=SIZE, randomization=varied)
-    with TrajectoryFile(tmp_path / "varied.h5") as file:
+    with Recording(tmp_path / "varied.h5") as file:
         moments = list(observed(env, file[0]))
         task = task_for(file, pictures=True)
         shots = choose_shots(task, ["all"], size=SIZE, depth=True)
@@ -233,9 +233,10 @@ class Job:
 
 def test_episodes_are_handed_out_in_their_order(tmp_path):
     parts, told = [], []
-    crew = DrawingCrew(Job, OutOfTurn(), [0, 2, 3, 5], tmp_path, parts.append, told.append)  # type: ignore[arg-type]
     values = []
-    for episode in crew.episodes():
+    for episode in draw_in_order(
+        Job, OutOfTurn(), [0, 2, 3, 5], tmp_path, parts.append, told.append
+    ):
         (frame, again) = episode
         (picture,) = frame.values()
         values.append((int(picture[0, 0, 0]), episode.exact))
@@ -248,7 +249,7 @@ def test_episodes_are_handed_out_in_their_order(tmp_path):
 
 def test_full_video_files_are_followed_by_others(tmp_path):
     path = record(tmp_path / "push.h5", "PushT-v1", [2, 2, 2])
-    with TrajectoryFile(path) as file:
+    with Recording(path) as file:
         reader = ColumnReader(task_for(file))
         channels = [flat("a", 0)[0], flat("b", 0)[0]]
         limits = Limits(video_megabytes=3 * 16 * 16 / 8 / 2**20)  # three frames

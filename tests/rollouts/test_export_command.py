@@ -22,7 +22,7 @@ from rollouts.__main__ import main
 from rollouts.export.columns import ColumnReader
 from rollouts.export.dataset import Export, export
 from rollouts.export.shots import choose_shots
-from rollouts.reading.trajectory import Trajectory, TrajectoryError, TrajectoryFile
+from rollouts.reading.recording import Recording, Trajectory, TrajectoryError
 from rollouts.recording.recorder import Recorder
 from tasks.episode import play
 from tests.rollouts.recordings import edited, record, succeed
@@ -259,7 +259,7 @@ def test_pictures_follow_the_recorded_states(recording, monkeypatch):
     monkeypatch.setattr(pictures, "Cameras", Blind)
     with edited(recording) as file:
         file["traj_2/env_states/actors/Tee"][1:, 0] += 0.05  # no replay ends there
-    with TrajectoryFile(recording) as file:
+    with Recording(recording) as file:
         task = tasks.make(TASK)
         columns = ColumnReader(task).read(file[2])
         shots = choose_shots(task, ["overview"])
@@ -275,7 +275,7 @@ def test_pictures_follow_the_recorded_states(recording, monkeypatch):
 
 def test_pictures_of_an_exact_replay_need_no_help(recording, monkeypatch):
     monkeypatch.setattr(pictures, "Cameras", Blind)
-    with TrajectoryFile(recording) as file:
+    with Recording(recording) as file:
         task = tasks.make(TASK)
         monkeypatch.setattr(task, "set_state_dict", lambda state: pytest.fail("put into a state"))
         columns = ColumnReader(task).read(file[2])

@@ -16,7 +16,7 @@ from rollouts.export.dataset import Export, export
 from rollouts.export.lerobot import LeRobotWriter, Limits
 from rollouts.export.statistics import PictureStatistics
 from rollouts.reading.recorded_task import task_for
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from rollouts.video import video_problem
 from tests.rollouts.recordings import (
     FINGERS,
@@ -215,7 +215,7 @@ def test_picture_statistics_are_those_of_the_pixels():
 
 
 def test_full_files_are_followed_by_others(recording, tmp_path):
-    with TrajectoryFile(recording) as file:
+    with Recording(recording) as file:
         reader = ColumnReader(task_for(file))
         limits = Limits(data_megabytes=1e-6, files=2)
         with LeRobotWriter(

@@ -14,7 +14,7 @@ from rollouts.export.dataset import Export, export
 from rollouts.export.pictures import Drawing
 from rollouts.export.shots import choose_shots
 from rollouts.reading.recorded_task import task_for
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from simulation.rendering.pictures import vulkan_problem
 from tests.rollouts.recordings import SECOND, TWO_ROBOTS, record
 
@@ -86,7 +86,7 @@ def test_the_pictures_that_an_export_films(task_id, tmp_path):
         pytest.skip(problem)
     task = tasks.make(task_id, obs_mode="lerobot+video")
     task.reset(seed=99)  # as another world it draws the same
-    with TrajectoryFile(record(tmp_path / "one.h5", task_id, [4, 3])) as file:
+    with Recording(record(tmp_path / "one.h5", task_id, [4, 3])) as file:
         drawn = task_for(file, pictures=True)
         for trajectory in file:
             columns = ColumnReader(drawn).read(trajectory)

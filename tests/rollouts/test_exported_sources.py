@@ -13,7 +13,7 @@ import tasks
 from experts import find_expert, registry
 from rollouts import record
 from rollouts.export.dataset import Export, export
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from rollouts.recording.convert import convert
 from tests.rollouts.plays import at_random
 from tests.rollouts.policies import TASK, Leans, meddles, still
@@ -71,7 +71,7 @@ def test_several_sources_become_one_dataset(several, form):
     demos, about = saved(several, form)
     names = [actor.get("name", "").rpartition(":")[2] for actor in about["actors"]]
     assert [about["actors"][0], names] == [{"kind": "expert"}, ["", "Leans", "meddles", "still"]]
-    with TrajectoryFile(several / FILE) as file:
+    with Recording(several / FILE) as file:
         assert [demo["source"] for demo in demos] == list(file.sources)
         assert (demos[0]["actor"] == 0).all()
         assert np.array_equal(demos[1]["actor"], file[1].actor + 1)
@@ -84,7 +84,7 @@ def test_corrections_become_a_column(tmp_path, form):
     record(TASK, [2, 3], tmp_path, workers=0, policy=still, corrector=Leans())
     demos, about = saved(tmp_path, form)
     assert [actor["name"] for actor in about["actors"]] == ["tests.rollouts.policies:still"]
-    with TrajectoryFile(tmp_path / FILE) as file:
+    with Recording(tmp_path / FILE) as file:
         for demo, episode in zip(demos, file, strict=True):
             assert np.array_equal(demo["corrections"], episode.corrections)
             assert "actor" not in demo
@@ -113,11 +113,11 @@ def test_a_converted_recording_knows_who_acted(tmp_path):
     all_of_it, some = range(len(plan)), range(2, 5)
     given = {"policy": Plays(plan, all_of_it), "takeover": Plays(plan, some)}
     record(task_id, [0], tmp_path, workers=0, corrector=Plays(plan, all_of_it), **given)
-    with TrajectoryFile(tmp_path / FILE) as file:
+    with Recording(tmp_path / FILE) as file:
         before = file[0]
         assert np.flatnonzero(before.actor).tolist() == list(some)
         assert convert(file, "pd_joint_vel", tmp_path / "other").complete
-    with TrajectoryFile(tmp_path / "other" / FILE) as file:
+    with Recording(tmp_path / "other" / FILE) as file:
         after = file[0]
     assert after.source == before.source
     assert after.corrections is None

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 import tasks
 from robots import RobotLayoutsError
 from rollouts.export.dataset import Export, export
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from rollouts.recording.episode_files import read_part
+from rollouts.recording.joined_files import read_joined
 from rollouts.recording.recorder import Recorder
-from rollouts.recording.trajectory_writer import read_joined
 from tasks.episode import play
 from tests.rollouts.recordings import edited
 
@@ -86,7 +86,7 @@ def changed(content: bytes, changes: list[Edit]) -> bytes:
 
 def read(path: Path) -> None:
     """Read all of a file as a replay, and then as going on with a recording does."""
-    for reading in (lambda: list(TrajectoryFile(path)), lambda: read_joined(path)):
+    for reading in (lambda: list(Recording(path)), lambda: read_joined(path)):
         with suppress(RobotLayoutsError):
             reading()
 

@@ -20,7 +20,7 @@ from rollouts.__main__ import main
 from rollouts.playing.executor import WorkerError, WorkersDied
 from rollouts.playing.ray_cluster import gather_code
 from rollouts.playing.ray_executor import RayExecutor
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from rollouts.receipts import verify
 from rollouts.recording.record import FILE, record
 from tests.rollouts.clusters import Nodes, running_cluster
@@ -144,7 +144,7 @@ def test_a_recording_on_a_cluster_is_stopped_and_goes_on(nodes, tmp_path):
     assert (stopped.returncode, "Traceback" in said) == (130, False)
     assert "recorded" not in printed  # Ray itself may tell there of nodes that are gone
     nodes.wait_for_no_player()
-    with TrajectoryFile(out / FILE) as file:
+    with Recording(out / FILE) as file:
         count = len(file)
     assert count >= 3
     assert said.splitlines()[-1] == (
@@ -156,7 +156,7 @@ def test_a_recording_on_a_cluster_is_stopped_and_goes_on(nodes, tmp_path):
     printed, said = interrupted.communicate(timeout=PATIENCE)
     assert (interrupted.returncode, "Traceback" in said) == (130, False)
     nodes.wait_for_no_player()
-    with TrajectoryFile(out / FILE) as file:
+    with Recording(out / FILE) as file:
         assert len(file) >= count + 3
         count = len(file)
     killed = start(*arguments(out, 10**6), *words)

@@ -12,8 +12,7 @@ from rollouts.__main__ import main
 from rollouts.export.dataset import Export, export
 from rollouts.playing.replay import open_recording, task_for
 from rollouts.reading.manifest import manifest_path
-from rollouts.reading.recording import Recording, all_files, open_trajectories
-from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.reading.recording import Recording, TrajectoryError, all_files
 from rollouts.recording.recorder import Recorder
 from tests.rollouts.test_recorder import short_episode
 
@@ -45,8 +44,8 @@ def copy(several, tmp_path) -> Path:
 
 
 def test_a_folder_is_one_sequence(several, played):
-    with open_trajectories(several) as file:
-        assert isinstance(file, Recording)
+    with Recording(several) as file:
+        assert file.manifest is not None
         assert file.seeds == tuple(range(COUNT))
         assert len(file) == COUNT
         for number, (trajectory, episode) in enumerate(zip(file, played[1], strict=True)):
@@ -62,14 +61,14 @@ def test_one_file_of_it_is_a_recording_too(several):
     files = all_files(several)
     assert len(files) == len(list(several.glob("*.h5"))) >= 3
     assert all_files(files[1]) == [files[1]]
-    with open_trajectories(files[1]) as file:
-        assert type(file) is TrajectoryFile
+    with Recording(files[1]) as file:
+        assert type(file) is Recording
         assert file[0].episode_id == 0
         assert file[0].seed == file.seeds[0] > 0
 
 
 def test_its_manifest_opens_it_as_well(several):
-    with open_trajectories(manifest_path(several / "trajectory.h5")) as file:
+    with Recording(manifest_path(several / "trajectory.h5")) as file:
         assert len(file) == COUNT
 
 
@@ -93,7 +92,7 @@ def test_a_file_of_another_recording_is_refused(copy, played, tmp_path):
     for suffix in (".h5", ".json"):
         shutil.copy(other.with_name(f"trajectory_0001{suffix}"), copy)
     with (
-        open_trajectories(copy) as file,
+        Recording(copy) as file,
         pytest.raises(
             TrajectoryError, match=r"0001\.h5 does not belong.*control_mode and layout are"
         ),
@@ -107,10 +106,10 @@ def test_a_manifest_of_other_episodes_is_refused(copy):
     first = text.index('"seeds"')
     manifest.write_text(text[:first] + text[first:].replace("0,", "4294967290,", 1))
     with pytest.raises(TrajectoryError, match=r"seeds are not ascending ranges"):
-        open_trajectories(copy)
+        Recording(copy)
     manifest.write_text(text.replace("trajectory_0001.h5", "../other.h5"))
     with pytest.raises(TrajectoryError, match=r"must be 'trajectory_0001\.h5'"):
-        open_trajectories(copy)
+        Recording(copy)
 
 
 def test_a_manifest_of_very_many_episodes_takes_no_memory(copy):
@@ -119,14 +118,14 @@ def test_a_manifest_of_very_many_episodes_takes_no_memory(copy):
     about["files"][1] |= {"episodes": 2**32 - 9, "seeds": [[9, 2**32 - 1]]}
     manifest.write_text(json.dumps(about))
     with pytest.raises(TrajectoryError, match=r"lists 4,294,967,\d+ episodes; 10,000,000 are"):
-        open_trajectories(copy)
+        Recording(copy)
 
 
 def test_a_file_that_is_not_as_listed(copy):
     for suffix in (".h5", ".json"):
         shutil.copy(copy / f"trajectory_0002{suffix}", copy / f"trajectory_0001{suffix}")
     with (
-        open_trajectories(copy) as file,
+        Recording(copy) as file,
         pytest.raises(TrajectoryError, match="does not hold the episodes that .* lists; if"),
     ):
         list(file)

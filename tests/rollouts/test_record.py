@@ -21,7 +21,7 @@ from experts.rehearsal import Plan
 from rollouts.__main__ import main
 from rollouts.playing.executor import WorkerError
 from rollouts.playing.in_process import InProcessExecutor
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from rollouts.recording.record import record
 from rollouts.recording.recorder import Recorder
 from tasks import MultiRobotTask
@@ -94,7 +94,7 @@ def test_workers_make_no_difference(tmp_path, capsys):
     one, two = (tmp_path / workers / FILE for workers in "12")
     assert same_files(one, two)
     assert same_files(one, recorded_directly(tmp_path / FILE, range(4, 11)))
-    with TrajectoryFile(one) as file:
+    with Recording(one) as file:
         assert file.seeds == tuple(range(4, 11))
         file.expect_world(tasks.make(TASK))
 
@@ -118,8 +118,8 @@ def test_joint_positions_are_recorded_from_an_expert_that_speaks_deltas(tmp_path
     assert main(arguments(tmp_path / "deltas", 2)) == 0
     assert main(arguments(tmp_path / "positions", 2, control_mode="pd_joint_pos")) == 0
     with (
-        TrajectoryFile(tmp_path / "deltas" / FILE) as deltas,
-        TrajectoryFile(tmp_path / "positions" / FILE) as positions,
+        Recording(tmp_path / "deltas" / FILE) as deltas,
+        Recording(tmp_path / "positions" / FILE) as positions,
     ):
         assert positions.control_mode == "pd_joint_pos"
         for one, other in zip(deltas, positions, strict=True):
@@ -157,7 +157,7 @@ def test_failures_are_named_with_their_reasons(tmp_path, capsys, monkeypatch, mo
     ]
     listed = json.loads((tmp_path / "trajectory.json").read_text())["episodes"]
     assert [episode["reason"] for episode in listed] == [reason] * 2
-    with TrajectoryFile(tmp_path / FILE) as file:
+    with Recording(tmp_path / FILE) as file:
         assert [episode.reason for episode in file] == [reason] * 2
 
 
@@ -196,7 +196,7 @@ def test_an_executor_that_forgets_episodes(tmp_path):
 
     with pytest.raises(WorkerError, match="Forgets ended before 1 of 3 episodes were played"):
         record(TASK, range(3), tmp_path, Forgets())
-    with TrajectoryFile(tmp_path / FILE) as file:
+    with Recording(tmp_path / FILE) as file:
         assert file.seeds == (1, 2)
 
 
@@ -221,7 +221,7 @@ def test_a_seed_without_a_plan_is_told_and_tried_again(tmp_path, capsys):
         captured = capsys.readouterr()
         assert f"seed {NO_PLAN} is not recorded: no plan for seed {NO_PLAN}" in captured.err
         assert f"not recorded: seed {NO_PLAN}\nseed {NO_PLAN}: no plan for" in captured.out
-        with TrajectoryFile(tmp_path / FILE) as file:
+        with Recording(tmp_path / FILE) as file:
             assert file.seeds == (NO_PLAN - 1, NO_PLAN + 1)
 
 
@@ -299,7 +299,7 @@ def test_a_recording_that_is_interrupted(tmp_path, how):
     assert printed == ""
     assert "Traceback" not in said
     wait_until_nobody_is_left(process)
-    with TrajectoryFile(tmp_path / FILE) as file:
+    with Recording(tmp_path / FILE) as file:
         assert len(file) >= 3
         last = said.splitlines()[-1]
         assert last == f"stopped; {len(file)} episodes are recorded; the same command goes on" + (

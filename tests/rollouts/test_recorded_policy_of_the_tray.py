@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from tests.rollouts.test_record import wait_for_parts, wait_until_nobody_is_left
 from tests.rollouts.test_recorder import same_files
 
@@ -56,7 +56,7 @@ def test_it_is_killed_goes_on_and_replays(tmp_path):
     assert f"{16 - left} new episodes, {16 - left} with success" in printed
     finished(*record(tmp_path / "whole", 16, "--workers=0"))
     assert same_files(tmp_path / "killed" / FILE, tmp_path / "whole" / FILE)
-    with TrajectoryFile(tmp_path / "whole" / FILE) as file:
+    with Recording(tmp_path / "whole" / FILE) as file:
         assert all(episode.solved for episode in file)
         assert {episode.source["name"] for episode in file} == {"carry:carry"}
     printed = finished("replay", str(tmp_path / "killed"), f"--task={TASK}")

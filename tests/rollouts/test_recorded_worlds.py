@@ -12,7 +12,7 @@ from rollouts import evaluate, record
 from rollouts.__main__ import main
 from rollouts.playing.ray_executor import RayExecutor
 from rollouts.playing.replay import replay, task_for
-from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.reading.recording import Recording, TrajectoryError
 from rollouts.recording.record import FILE
 from tasks.varying.axes import AXES
 from tests.rollouts.clusters import running_cluster
@@ -32,7 +32,7 @@ def recorded(folder: Path, seeds: Sequence[int], **arguments: object) -> Path:
 
 def test_a_recording_brings_its_worlds_back(tmp_path: Path) -> None:
     path = recorded(tmp_path, SOLVED, workers=0)
-    with TrajectoryFile(path) as file, closing(task_for(file)) as env:
+    with Recording(path) as file, closing(task_for(file)) as env:
         assert env.scenario.randomization == VARIED
         for episode in file:
             assert episode.solved
@@ -49,7 +49,7 @@ def test_what_was_drawn_is_compared(tmp_path: Path) -> None:
     summary = json.loads(path.with_suffix(".json").read_text())
     summary["episodes"][0]["drawn"]["mass"]["cube"] += 1e-9
     path.with_suffix(".json").write_text(json.dumps(summary))
-    with TrajectoryFile(path) as file, closing(task_for(file)) as env:
+    with Recording(path) as file, closing(task_for(file)) as env:
         replayed = replay(env, file[0])
         assert replayed.difference is None
         assert not replayed.agrees
@@ -69,7 +69,7 @@ def test_a_header_that_makes_no_sense_is_refused(tmp_path: Path) -> None:
         about = json.loads(str(file.attrs["simulation"]))
         about["randomization"]["mass"]["cube"] = {"uniform": [2, 1]}
         file.attrs["simulation"] = json.dumps(about)
-    with TrajectoryFile(path) as file, pytest.raises(TrajectoryError, match="wrong way round"):
+    with Recording(path) as file, pytest.raises(TrajectoryError, match="wrong way round"):
         task_for(file)
 
 
@@ -119,6 +119,6 @@ def test_worlds_are_the_same_whoever_plays(tmp_path: Path) -> None:
         nodes.grow(2)
         executor = RayExecutor(str(nodes.address))
         assert same_files(recorded(tmp_path / "ray", seeds, executor=executor, **worlds), expected)
-    with TrajectoryFile(expected) as file, closing(task_for(file)) as env:
+    with Recording(expected) as file, closing(task_for(file)) as env:
         replays = [replay(env, episode) for episode in file]
     assert all(played.agrees and played.difference is None for played in replays)

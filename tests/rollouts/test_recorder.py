@@ -17,7 +17,7 @@ import pytest
 
 import tasks
 from robots import ActionError, RecordingError, TaskError
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from rollouts.recording.episode_files import part_path, read_part
 from rollouts.recording.recorder import Recorder
 from tasks.episode import PlayedEpisode, play
@@ -136,7 +136,7 @@ KILLED = """
 import sys, numpy as np, tasks
 from tasks.episode import play
 from rollouts.recording.recorder import Recorder
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 env = tasks.make("PushT-v1")
 with Recorder(sys.argv[1], env) as recorder:
     for seed in range(10**6):
@@ -158,7 +158,7 @@ def test_a_killed_recording_keeps_its_finished_episodes(tmp_path):
     assert not path.exists()
     with Recorder(path, tasks.make("PushT-v1"), resume=True) as recorder:
         assert set(finished) <= recorder.seeds <= {*finished, len(finished)}
-    with TrajectoryFile(path) as file:
+    with Recording(path) as file:
         assert list(file.seeds) == list(range(len(file)))
         assert len(file) == len(recorder)
         for episode in file:
@@ -376,21 +376,6 @@ def test_a_fifo_in_the_place_of_a_recording_is_not_waited_for(tmp_path, push_t, 
         Recorder(path, env, resume=True)
 
 
-def test_parts_of_an_earlier_version_are_refused_not_lost(tmp_path, push_t):
-    env, episodes = push_t
-    path = write(tmp_path / "old.h5", env, episodes[:1])
-    parts = path.with_suffix(".parts")
-    parts.mkdir()
-    old = parts / "seed-0000000007.h5"
-    with h5py.File(old, "w") as file:
-        file["traj_0/actions"] = episodes[1].actions
-    with pytest.raises(RecordingError, match=r"seed-0000000007\.h5 is one of 1 episodes that an e"):
-        Recorder(path, env, resume=True)
-    assert old.exists()
-    write(path, env, episodes[:2], overwrite=True)
-    assert not parts.exists()
-
-
 def test_one_episode_per_seed(tmp_path, push_t):
     env, episodes = push_t
     path = write(tmp_path / "once.h5", env, episodes[:1])
@@ -470,7 +455,7 @@ import sys, numpy as np, tasks
 from robots import RecordingError
 from tasks.episode import play
 from rollouts.recording.recorder import Recorder
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 env = tasks.make("PushT-v1")
 try:
     with Recorder(sys.argv[1], env) as recorder:
@@ -493,7 +478,7 @@ def expect_resumable(path: Path, finished: list[int]) -> None:
     shutil.copytree(path.parent, copy)
     with Recorder(copy / path.name, tasks.make("PushT-v1"), resume=True) as recorder:
         assert recorder.seeds == set(finished)
-    with TrajectoryFile(copy / path.name) as file:
+    with Recording(copy / path.name) as file:
         assert [episode.seed for episode in file] == finished
 
 
@@ -537,7 +522,7 @@ def test_a_read_only_folder(tmp_path, push_t):
             Recorder(path, env, resume=True)
         with pytest.raises(RecordingError, match=r"cannot write .*: Read-only file system"):
             Recorder(place / "new.h5", env)
-        with TrajectoryFile(path) as file:
+        with Recording(path) as file:
             assert [episode.seed for episode in file] == [0, 1]
     finally:
         subprocess.run(["umount", place], check=True)

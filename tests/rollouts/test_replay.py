@@ -12,7 +12,7 @@ from robots import UnknownNameError
 from rollouts.__main__ import main
 from rollouts.playing.plan_conversion import as_positions
 from rollouts.playing.replay import find_official, open_recording, replay, task_for
-from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.reading.recording import Recording, TrajectoryError
 from rollouts.recording.recorder import Recorder
 from tasks.episode import play
 from tests.rollouts.plays import at_random
@@ -143,7 +143,7 @@ def test_a_file_without_states(capsys, path):
 
 
 def test_a_replay_from_the_wrong_state_is_seen(recording):
-    with TrajectoryFile(recording) as file:
+    with Recording(recording) as file:
         first, second = file
         env = task_for(file)
         swapped = replace(first, states=second.states, seed=first.seed, actions=second.actions)

@@ -18,7 +18,7 @@ from rollouts import evaluate, record
 from rollouts.__main__ import main
 from rollouts.playing.executor import WorkerError
 from rollouts.playing.replay import replay, task_for
-from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.reading.recording import Recording, TrajectoryError
 from rollouts.recording.recorder import Recorder
 from rollouts.sources.actors import Actor, actor_of, episode_source
 from tasks.episode import play
@@ -39,7 +39,7 @@ def recorded(folder, **arguments):
     chosen = {"workers": 0, "policy": Wanders(0.5), **arguments}
     summary = record(TASK, seeds, folder, **chosen)
     assert not summary.failed
-    with TrajectoryFile(folder / FILE) as file:
+    with Recording(folder / FILE) as file:
         return list(file)
 
 
@@ -66,7 +66,7 @@ def test_worlds_that_vary_are_recorded(tmp_path):
     episodes = recorded(tmp_path / "one", randomization=varied)
     drawn = [episode.drawn["mass"]["Tee"] for episode in episodes]
     assert len(set(drawn)) == 3
-    with TrajectoryFile(tmp_path / "one" / FILE) as file, closing(task_for(file)) as env:
+    with Recording(tmp_path / "one" / FILE) as file, closing(task_for(file)) as env:
         assert all(replay(env, episode).difference is None for episode in file)
         assert env.drawn() == episodes[-1].drawn
     recorded(tmp_path / "at once", randomization=varied, num_envs=2)
@@ -178,7 +178,7 @@ def test_several_sources_in_one_data_set(tmp_path, monkeypatch, capsys):
     assert header["source_desc"] == "; ".join(
         f"tests.rollouts.{name}" for name in (*names, "policies:still")
     )
-    with TrajectoryFile(tmp_path / "there" / FILE) as file:
+    with Recording(tmp_path / "there" / FILE) as file:
         kinds = [(episode.source or {}).get("kind") for episode in file]
     assert kinds == [None, "mixed", "correction", None]
     assert main(["replay", str(tmp_path / "there")]) == 0
@@ -194,7 +194,7 @@ def test_what_was_left_by_a_killed_recording_keeps_its_source(tmp_path):
     env = tasks.make(TASK)
     episode = play(env, 7, np.zeros((3, 7), np.float32))
     with Recorder(tmp_path / FILE, env, source="human", source_desc="browser") as recorder:
-        part = recorder.writer.encode(replace(episode, source={"kind": "person", "name": "me"}))
+        part = recorder.encoder.encode(replace(episode, source={"kind": "person", "name": "me"}))
     (tmp_path / FILE).unlink()
     (tmp_path / "trajectory.parts").mkdir()
     (tmp_path / "trajectory.parts" / "seed-0000000007.part").write_bytes(part)
@@ -230,7 +230,7 @@ def test_one_that_ends_its_workers_does_not_cost_the_others(tmp_path):
     assert len(summary.deaths) == 3 * len(failed)
     for seed, error in summary.failed.items():
         assert f"the episode of seed {seed} ended 3 worker processes; the last" in str(error)
-    with TrajectoryFile(tmp_path / FILE) as file:
+    with Recording(tmp_path / FILE) as file:
         assert file.seeds == tuple(seed for seed in range(6) if seed not in failed)
     again = record(TASK, range(6), tmp_path, workers=2, policy=died)  # it is tried again
     assert again.failed.keys() == failed.keys()
@@ -319,7 +319,7 @@ def test_the_command_records_a_policy(tmp_path, capsys):
     words += [f"--{what}=tests.rollouts.policies:{name}" for what, name in names]
     assert main([*words, f"--out={tmp_path}", "--obs-mode=state"]) == 0
     assert "2 new episodes" in capsys.readouterr().out
-    with TrajectoryFile(tmp_path / FILE) as file:
+    with Recording(tmp_path / FILE) as file:
         assert [actor["name"].partition(":")[2] for actor in file[0].source["actors"]] == [
             "still",
             "meddles",
@@ -378,7 +378,7 @@ def test_a_file_that_says_nonsense(mixed, tmp_path, name, rows, words):
     with edited(tmp_path / FILE) as file:
         file["traj_0"].pop(name, None)
         file[f"traj_0/{name}"] = rows
-    with TrajectoryFile(tmp_path / FILE) as file, pytest.raises(TrajectoryError, match=words):
+    with Recording(tmp_path / FILE) as file, pytest.raises(TrajectoryError, match=words):
         _ = file[0]
 
 

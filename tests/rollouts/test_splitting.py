@@ -12,7 +12,7 @@ import pytest
 import tasks
 from robots import RecordingError, TaskError
 from rollouts.reading.manifest import manifest_path, read_manifest, spans_of
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from rollouts.recording import joined_files
 from rollouts.recording.recorder import Recorder
 from tests.rollouts.kills import Kill, Killed
@@ -48,7 +48,7 @@ def contents(path: Path) -> dict[str, bytes]:
 def seeds_by_file(path: Path) -> list[tuple[int, ...]]:
     found = []
     for file in sorted(path.parent.glob("*.h5")):
-        with TrajectoryFile(file) as opened:
+        with Recording(file) as opened:
             found.append(opened.seeds)
             assert [episode.seed for episode in opened] == list(opened.seeds)
     return found

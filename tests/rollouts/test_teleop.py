@@ -11,7 +11,7 @@ from kinematics.rotations import inverse, multiply
 from layouts import Layout, Placement
 from robots import RecordingError, TaskError, UnknownNameError
 from rollouts.playing.replay import replay
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from rollouts.recording.record import FILE
 from rollouts.recording.recorder import Recorder
 from rollouts.teleop.pace import MOST_BEHIND, Pace
@@ -138,7 +138,7 @@ def test_an_episode_is_steered_taken_back_and_kept(pick, tmp_path):
         assert session.seed == 2
         assert Session(pick, recorder).seed == 1
     assert states["actors"].keys() == episode.states["actors"].keys()
-    with TrajectoryFile(tmp_path / FILE) as file:
+    with Recording(tmp_path / FILE) as file:
         assert file[0].source == {"kind": "person", "name": "browser"}
         replayed = replay(pick, file[0])
         assert replayed.exact
@@ -252,7 +252,7 @@ def test_a_person_takes_over_from_a_policy_and_gives_back(pick, tmp_path):
         assert session.keep().source["kind"] == "policy"
     with pytest.raises(TaskError, match="there is no policy to give the arms to"):
         Session(pick).give_back()
-    with TrajectoryFile(tmp_path / FILE) as file:
+    with Recording(tmp_path / FILE) as file:
         mixed = file[0]
         assert mixed.source["kind"] == "mixed"
         assert [actor["name"] for actor in mixed.source["actors"]] == ["mylab:rises", "browser"]

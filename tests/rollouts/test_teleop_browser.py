@@ -11,7 +11,7 @@ import tasks
 from measurements.browser import served
 from rollouts.playing.replay import replay
 from rollouts.reading.recorded_task import task_for
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from rollouts.recording.record import FILE
 from rollouts.teleop.session import Session
 from tests.pages import browser_page
@@ -51,7 +51,7 @@ def hands_on(task_id, folder):
 
 
 def expect_replay(folder, task_id):
-    with TrajectoryFile(folder / FILE) as file:
+    with Recording(folder / FILE) as file:
         trajectory = file[0]
         assert trajectory.source == {"kind": "person", "name": "browser"}
         task = task_for(file)

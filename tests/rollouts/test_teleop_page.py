@@ -10,7 +10,7 @@ import pytest
 
 import tasks
 from layouts.viewer.server import REST, serving
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from rollouts.recording.record import FILE
 from rollouts.recording.recorder import Recorder
 from rollouts.teleop.pace import MOST_BEHIND
@@ -271,6 +271,6 @@ def test_a_minute_of_steering_loses_no_step(tmp_path):
         assert (cell.worked - worked) / steps < session.seconds / 2  # idle ones need not
         press(one, "Keep (M)")
         wait_until(lambda: session.kept)
-    with TrajectoryFile(tmp_path / FILE) as file:
+    with Recording(tmp_path / FILE) as file:
         assert len(file[0].actions) >= first + steps
     task.close()

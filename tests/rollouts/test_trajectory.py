@@ -11,7 +11,7 @@ import pytest
 import tasks
 from layouts import Layout
 from robots import LocalUrdf, RobotRegistry
-from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.reading.recording import Recording, TrajectoryError
 from rollouts.recording.recorder import Recorder
 from tasks.episode import play
 from tests.rollouts.recordings import edited
@@ -45,12 +45,12 @@ def edit_json(path, edit):
 
 
 def read_all(path):
-    with TrajectoryFile(path) as file:
+    with Recording(path) as file:
         return list(file)
 
 
 def test_what_was_recorded_is_read(episodes, path):
-    with TrajectoryFile(path) as file:
+    with Recording(path) as file:
         assert (file.task_id, file.control_mode, file.max_episode_steps) == (
             *(TASK, "pd_joint_delta_pos", 100),
         )
@@ -82,7 +82,7 @@ def test_what_a_file_lacks_is_none(path):
         for name in ("env_states", "rewards", "success", "terminated", "truncated"):
             del file[f"traj_0/{name}"]
         del file.attrs["layout"], file.attrs["simulation"]
-    with TrajectoryFile(path) as file:
+    with Recording(path) as file:
         assert (file.layout, file.action_split, file.simulation) == (None, None, None)
         file.expect_world(tasks.make(TASK))
         first = file[0]
@@ -103,7 +103,7 @@ def test_damaged_inside(path):
         place = h5py.h5o.get_info(file["traj_1/rewards"].id).addr
     whole[place : place + 8] = b"12345678"
     path.write_bytes(whole)
-    with TrajectoryFile(path) as file:
+    with Recording(path) as file:
         assert len(file[0].actions) == 4
         with pytest.raises(TrajectoryError, match=r"traj_1 is of another kind, truncated or dam"):
             file[1]
@@ -151,7 +151,7 @@ def change(name, value, episode=0):
 )
 def test_an_episode_that_cannot_be_played(path, edit, complaint):
     edit(path)
-    with TrajectoryFile(path) as file, pytest.raises(TrajectoryError, match=complaint):  # noqa: PT012
+    with Recording(path) as file, pytest.raises(TrajectoryError, match=complaint):  # noqa: PT012
         file.expect(TASK, 7)
         list(file)
 
@@ -198,17 +198,17 @@ def test_the_environment_names_the_control_mode_if_episodes_do_not(path):
     assert {t.control_mode for t in read_all(path)} == {"pd_joint_pos"}
     edit_json(path, lambda summary: summary["env_info"].pop("env_kwargs"))
     with pytest.raises(TrajectoryError, match="in no control mode that it names"):
-        TrajectoryFile(path)
+        Recording(path)
 
 
 def test_another_task_or_no_episodes(path):
     with (
-        TrajectoryFile(path) as file,
+        Recording(path) as file,
         pytest.raises(TrajectoryError, match=r"recorded in PushT-v1, not in PickCube-v1"),
     ):
         file.expect("PickCube-v1", 8)
     edit_json(path, lambda summary: summary["episodes"].clear())
-    with TrajectoryFile(path) as file, pytest.raises(TrajectoryError, match="holds no episodes"):
+    with Recording(path) as file, pytest.raises(TrajectoryError, match="holds no episodes"):
         file.expect(TASK, 7)
 
 
@@ -216,12 +216,12 @@ class TestOtherWorlds:
     """A replay where anything that physics depends on differs is refused, and it is named."""
 
     def refusal(self, path, env):
-        with TrajectoryFile(path) as file, pytest.raises(TrajectoryError) as caught:
+        with Recording(path) as file, pytest.raises(TrajectoryError) as caught:
             file.expect_world(env)
         return str(caught.value)
 
     def test_the_same_world(self, path):
-        with TrajectoryFile(path) as file:
+        with Recording(path) as file:
             file.expect_world(tasks.make(TASK))
 
     def test_another_robot(self, path):
@@ -257,7 +257,7 @@ class TestOtherWorlds:
         )
         urdf = folder / "panda_stick.urdf"
         copied = replace(RobotRegistry.load("panda_stick"), urdf=LocalUrdf(urdf))
-        with TrajectoryFile(path) as file:
+        with Recording(path) as file:
             file.expect_world(tasks.make(TASK, robots=copied))  # the place makes no difference
         urdf.write_text(urdf.read_text().replace("</robot>", "<!-- changed --></robot>"))
         said = self.refusal(path, tasks.make(TASK, robots=copied))
@@ -285,7 +285,7 @@ def test_a_json_of_an_earlier_moment(path):
 
 def test_a_json_or_a_file_that_is_not_there(path):
     with pytest.raises(TrajectoryError, match=r"no file .*trajectry.h5; did you mean .*tory.h5"):
-        TrajectoryFile(path.with_name("trajectry.h5"))
+        Recording(path.with_name("trajectry.h5"))
     path.with_suffix(".json").rename(path.with_name("other.json"))
     with pytest.raises(TrajectoryError, match=r"cannot read .*trajectory.json, which belongs"):
-        TrajectoryFile(path)
+        Recording(path)

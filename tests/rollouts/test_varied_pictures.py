@@ -9,7 +9,7 @@ import pytest
 import tasks
 from rollouts import record
 from rollouts.playing.replay import replay, task_for
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from rollouts.recording.record import FILE
 from simulation.rendering.pictures import Observers
 from tasks import (
@@ -37,7 +37,7 @@ VARIED = Randomization(
 def test_a_recording_brings_back_what_cameras_saw(tmp_path: Path) -> None:
     summary = record(TASK, [SEED], tmp_path, workers=0, randomization=VARIED)
     assert not summary.failed
-    with TrajectoryFile(tmp_path / FILE) as file, closing(task_for(file, pictures=True)) as env:
+    with Recording(tmp_path / FILE) as file, closing(task_for(file, pictures=True)) as env:
         (episode,) = file
         assert {"cameras", "lights", "colors", "textures", "distractors"} == {
             *(episode.drawn or {})

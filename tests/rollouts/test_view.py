@@ -8,7 +8,7 @@ import pytest
 
 from measurements.browser import served
 from rollouts.__main__ import main
-from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.reading.recording import Recording, TrajectoryError
 from rollouts.view_command import episode_cell
 from tests.pages import browser_page, changed, settled
 from tests.rollouts.recordings import LEFT_KEY, TWO_ROBOTS, edited, read, record
@@ -22,7 +22,7 @@ def recording(tmp_path_factory):
 
 
 def test_the_motion_is_the_recorded_one(recording):
-    with TrajectoryFile(recording) as file:
+    with Recording(recording) as file:
         cell = episode_cell(file, 1)
     recorded = read(recording)[1]
     motion = cell.motion
@@ -43,7 +43,7 @@ def test_a_file_without_states_is_played_again(recording, tmp_path):
     with edited(path) as file:
         for episode in file.values():
             del episode["env_states"]
-    with TrajectoryFile(path) as bare, TrajectoryFile(recording) as whole:
+    with Recording(path) as bare, Recording(recording) as whole:
         played, recorded = episode_cell(bare, 0).motion, episode_cell(whole, 0).motion
     for name in ("left", "right"):
         np.testing.assert_array_equal(played.qpos[name], recorded.qpos[name])
@@ -51,7 +51,7 @@ def test_a_file_without_states_is_played_again(recording, tmp_path):
 
 def test_an_episode_that_is_not_there(recording):
     with (
-        TrajectoryFile(recording) as file,
+        Recording(recording) as file,
         pytest.raises(TrajectoryError, match="has no episode 2; it has 2, from 0 to 1"),
     ):
         episode_cell(file, 2)

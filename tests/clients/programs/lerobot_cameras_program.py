@@ -27,7 +27,7 @@ from tray_recording import (
 )
 
 from rollouts.export.dataset import Export, export
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 
 sys.path.insert(0, str(ROOT / "integrations" / "lerobot_env_robot_layouts"))
 
@@ -40,7 +40,7 @@ def main(folder: Path) -> None:
         export(Export(recording, "lerobot", folder / name, **options))
 
     env = environment("lerobot+cameras+depth")
-    with TrajectoryFile(recording) as file:
+    with Recording(recording) as file:
         rows = [row for episode in file for row in list(observed(env, episode))[:-1]]
 
     images = LeRobotDataset("local/tray", root=folder / "images")

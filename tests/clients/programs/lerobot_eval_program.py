@@ -10,7 +10,7 @@ from lerobot_env_robot_layouts import LeRobotPolicy, RobotLayoutsEnv
 
 from rollouts import evaluate
 from rollouts.export.dataset import Export, export
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 from rollouts.recording.record import record
 from tasks.fronts.lerobot import STATES
 
@@ -22,7 +22,7 @@ EVAL = ("--env.type=robot_layouts", f"--env.task={TASK}", "--env.render_mode=nul
 def plans(recording: Path, path: Path) -> Path:
     """Write how recorded episodes begin, as policies see it, and their actions."""
     arrays = {}
-    with TrajectoryFile(recording) as file:
+    with Recording(recording) as file:
         vector = RobotLayoutsEnv(TASK, render_mode=None).create_envs(1)[TASK][0]
         for i, episode in enumerate(file):
             observation, _ = vector.reset(seed=[episode.seed])

@@ -25,7 +25,7 @@ from tray_recording import (
 )
 
 from rollouts.export.dataset import Export, export
-from rollouts.reading.trajectory import TrajectoryFile
+from rollouts.reading.recording import Recording
 
 FAR = 3000.0  # mm, that counts as 1 in what the network sees
 KEYS = [camera.replace(".", "_") for camera in CAMERAS]
@@ -56,7 +56,7 @@ def main(folder: Path) -> None:
     obs_utils.DepthModality.set_obs_processor(near)
 
     env = environment("robomimic+cameras+depth")
-    with TrajectoryFile(recording) as file:
+    with Recording(recording) as file:
         episodes = [list(observed(env, episode)) for episode in file]
     data = SequenceDataset(
         path, obs_keys=config.all_obs_keys, dataset_keys=("actions", "rewards", "dones"),

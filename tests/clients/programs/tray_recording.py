@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import tasks
-from rollouts.reading.trajectory import Trajectory
+from rollouts.reading.recording import Trajectory
 from rollouts.recording.recorder import Recorder
 from tasks.episode import play
 
