@@ -2,98 +2,97 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from robots import RecordingError
+from robots.common.cli import Count, Folder, Seed, Word
 from robots.common.pages import plural
-from rollouts.playing import command_options as workers
-from rollouts.playing.command_options import INTERRUPTED, one_or_more, stop_signals, zero_or_more
+from rollouts.playing.command_options import (
+    INTERRUPTED,
+    ControlMode,
+    PictureSize,
+    Players,
+    Policy,
+    file_size,
+    stop_signals,
+)
 from rollouts.playing.seeds import seed_lines
-from tasks.cell_options import add_cell_options, chosen_cell
+from rollouts.reading.manifest import FILE_SIZE
+from tasks.cell_options import Cell
 
 if TYPE_CHECKING:
     from rollouts.playing.executor import Event
     from rollouts.progress import LiveLine
     from rollouts.recording.record import Summary
 
-EPILOG = (
-    "The same command goes on where it was stopped or killed. Exit code: 0 if every episode was"
-    " recorded, 1 if not, 2 for bad usage, 130 if interrupted. A policy maps an observation to an"
-    " action; see rollouts.record. Episodes of other seeds may come from others: each says who"
-    " acted."
-)
 
+def record(
+    *,
+    task: str,
+    episodes: Count,
+    out: Folder,
+    players: Players,
+    seed: Seed = 0,
+    policy: Policy = "expert",
+    takeover: Policy | None = None,
+    corrector: Policy | None = None,
+    obs_mode: Annotated[str, Word("MODE")] = "state",
+    camera_size: PictureSize | None = None,
+    num_envs: Count = 1,
+    cell: Cell,
+    control_mode: ControlMode | None = None,
+    file_size: Annotated[float, Word("MB", file_size)] = FILE_SIZE,
+) -> int:
+    """Let an expert or a policy play episodes in worker processes, and record them.
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
-    parser.epilog = EPILOG
-    add = parser.add_argument
-    add("--task", required=True, help="task id; MODULE:ID for one of your own")
-    add("--episodes", type=one_or_more, required=True, metavar="N", help="number of episodes")
-    workers.add_arguments(parser)
-    add("--seed", type=zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
-    add("--out", type=Path, required=True, metavar="DIR", help="folder of trajectory.h5 and .json")
-    add(
-        "--policy",
-        default="expert",
-        metavar="MODULE:NAME",
-        help="a policy that can be imported, asked at every step; by default the task's expert",
-    )
-    add(
-        "--takeover",
-        metavar="MODULE:NAME",
-        help="policy that acts instead at every step for which it returns an action, not None",
-    )
-    add(
-        "--corrector",
-        metavar="MODULE:NAME",
-        help="policy whose action is recorded at every step beside the one that is played",
-    )
-    workers.add_observed(parser)
-    add(
-        "--num-envs",
-        type=one_or_more,
-        default=1,
-        metavar="N",
-        help="episodes that each process plays at once (%(default)s)",
-    )
-    add_cell_options(parser)
-    workers.add_control_mode(parser)
-    workers.add_file_size(parser)
+    The same command goes on where it was stopped or killed. Exit code: 0 if every episode was
+    recorded, 1 if not, 2 for bad usage, 130 if interrupted. A policy maps an observation to an
+    action; see rollouts.record. Episodes of other seeds may come from others: each says who acted.
 
-
-def run(options: argparse.Namespace) -> int:
-    """Run the command; returns its exit code.
+    Args:
+        task: Task id; MODULE:ID for one of your own.
+        episodes: Number of episodes.
+        out: Folder of trajectory.h5 and .json.
+        players: Who plays.
+        seed: Seeds S … S + N - 1.
+        policy: A policy that can be imported, asked at every step; by default the task's expert.
+        takeover: Policy that acts instead at every step for which it returns an action, not None.
+        corrector: Policy whose action is recorded at every step beside the one that is played.
+        obs_mode: What policies observe: state, state_dict, rgb and others.
+        camera_size: Width and height in pixels of the pictures observed (each camera's own).
+        num_envs: Episodes that each process plays at once.
+        cell: The task's robots, and what varies.
+        control_mode: What actions ask for (as the layout says, else pd_joint_delta_pos).
+        file_size: Begin another file, trajectory_0001.h5 and so on, when one is so large.
 
     Raises:
         RobotLayoutsError: If it makes no sense, or cannot go on; finished episodes are kept.
     """
     from rollouts.playing.executor import WorkerError
     from rollouts.progress import LiveLine
-    from rollouts.recording.record import FILE, record
+    from rollouts.recording import record as recording
 
-    seeds = range(options.seed, options.seed + options.episodes)
-    executor, line = workers.chosen_executor(options), LiveLine(len(seeds), "episodes")
+    seeds = range(seed, seed + episodes)
+    executor, line = players.executor(), LiveLine(len(seeds), "episodes")
     status = _Status(line)
     try:
         with stop_signals(), line:
-            summary = record(
-                options.task,
+            summary = recording.record(
+                task,
                 seeds,
-                options.out,
+                out,
                 executor,
-                control_mode=options.control_mode,
-                policy=options.policy,
-                takeover=options.takeover,
-                corrector=options.corrector,
-                obs_mode=options.obs_mode,
-                camera_size=options.camera_size,
-                num_envs=options.num_envs,
-                file_size=options.file_size,
-                **chosen_cell(options),
+                control_mode=control_mode,
+                policy=policy,
+                takeover=takeover,
+                corrector=corrector,
+                obs_mode=obs_mode,
+                camera_size=camera_size,
+                num_envs=num_envs,
+                file_size=file_size,
+                **cell.making(),
                 on_event=status.show,
             )
     except KeyboardInterrupt:
@@ -102,7 +101,7 @@ def run(options: argparse.Namespace) -> int:
     except (RecordingError, WorkerError):
         print(f"stopped; {status.kept}", file=sys.stderr)
         raise
-    _report(summary, options.out / FILE)
+    _report(summary, out / recording.FILE)
     return 1 if summary.failed else 0
 
 

@@ -7,7 +7,7 @@ import pytest
 from layouts import face_to_face
 from motion import Motion
 from motion.__main__ import main
-from robots.common.console import main as console
+from robot_layouts.__main__ import main as console
 from tests.experts.free_motions import swing
 
 WORDS = ["plan", "face_to_face", "left=so100", "right=so100", "--spacing", "0.6"]

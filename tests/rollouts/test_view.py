@@ -8,8 +8,8 @@ import pytest
 
 from measurements.browser import served
 from rollouts.__main__ import main
+from rollouts.commands import episode_cell
 from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
-from rollouts.view_command import episode_cell
 from tests.pages import browser_page, changed, settled
 from tests.rollouts.recordings import LEFT_KEY, TWO_ROBOTS, edited, read, record
 
