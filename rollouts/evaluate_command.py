@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from robots.common.cli import Count, Seed, Word
-from rollouts.playing.command_options import (
-    INTERRUPTED,
-    ControlMode,
-    PictureSize,
-    Players,
-    Policy,
-    stop_signals,
-)
+from rollouts.playing.command_options import Acting, Players, stoppable
 from tasks.cell_options import Cell
 
 if TYPE_CHECKING:
@@ -25,16 +17,13 @@ if TYPE_CHECKING:
 def evaluate(
     *,
     task: str,
-    policy: Policy = "expert",
     episodes: Count = 100,
     players: Players,
     seed: Seed = 0,
     receipt: Annotated[Path, Word("JSON")] | None = None,
-    obs_mode: Annotated[str, Word("MODE")] = "state",
-    camera_size: PictureSize | None = None,
-    control_mode: ControlMode | None = None,
+    acting: Acting,
     cell: Cell,
-) -> int:
+) -> None:
     """Let a policy or an expert play episodes, and print how well it does.
 
     A policy maps an observation to an action; see rollouts.evaluate. Exit code: 0 if all was
@@ -42,14 +31,11 @@ def evaluate(
 
     Args:
         task: Task id; MODULE:ID for one of your own.
-        policy: A policy that can be imported; by default the task's expert.
         episodes: Number of episodes.
         players: Who plays.
         seed: Seeds S … S + N - 1.
         receipt: Write a receipt, which `verify` plays again.
-        obs_mode: What policies observe: state, state_dict, rgb and others.
-        camera_size: Width and height in pixels of the pictures observed (each camera's own).
-        control_mode: What actions ask for (as the layout says, else pd_joint_delta_pos).
+        acting: Who acts, and how.
         cell: The task's robots, and what varies.
 
     Raises:
@@ -59,27 +45,19 @@ def evaluate(
     from rollouts.progress import LiveLine
 
     executor, line = players.executor(), LiveLine(episodes, "episodes")
-    try:
-        with stop_signals(), line:
-            found = evaluation.evaluate(
-                policy,
-                task,
-                range(seed, seed + episodes),
-                executor=executor,
-                receipt=receipt,
-                on_event=_Status(line).show,
-                obs_mode=obs_mode,
-                camera_size=camera_size,
-                control_mode=control_mode,
-                **cell.making(),
-            )
-    except KeyboardInterrupt:
-        print("stopped", file=sys.stderr)
-        return INTERRUPTED
+    with stoppable(), line:
+        found = evaluation.evaluate(
+            task=task,
+            seeds=range(seed, seed + episodes),
+            executor=executor,
+            receipt=receipt,
+            on_event=_Status(line).show,
+            **vars(acting),
+            **cell.making(),
+        )
     print(found)
     if found.receipt is not None:
         print(f"{receipt}: receipt {found.receipt.hash}")
-    return 0
 
 
 class _Status:

@@ -20,7 +20,7 @@ from measurements.datasets.large import FIVE, make_large
 from robots.common.cli import at_least
 from robots.common.commands import exit_code, start
 from robots.common.writing import write_whole
-from rollouts.playing.command_options import file_size, stop_signals
+from rollouts.playing.command_options import megabytes, stop_signals
 from rollouts.playing.executor import ProcessExecutor
 from rollouts.progress import LiveLine
 from rollouts.reading.manifest import FILE_SIZE
@@ -48,7 +48,7 @@ def main(arguments: list[str] | None = None) -> int:
         add("--episodes", type=at_least(1), default=count, metavar="N", help="(%(default)s)")
         add("--record", type=Path, metavar="FILE", help="add the figures to a JSON file")
         add("--folder", type=Path, metavar="DIR", help="where recordings go and stay (temporary)")
-        add("--file-size", type=file_size, default=FILE_SIZE, metavar="MB", help="(%(default)g)")
+        add("--file-size", type=megabytes, default=FILE_SIZE, metavar="MB", help="(%(default)g)")
 
     large = commands.add_parser("large", help="a large data set, certified and reported")
     add = large.add_argument

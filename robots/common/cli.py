@@ -279,17 +279,15 @@ def _add(parser: argparse.ArgumentParser, function: Any) -> None:
             if hint is bool:
                 flag = f"no-{flag}" if default else flag
                 options = {"action": "store_false" if default else "store_true"}
-            options |= {"dest": name, "required": needed}
+            options |= {"dest": name, "required": needed, "default": argparse.SUPPRESS}
             word = f"--{flag}"
         else:
             options.setdefault("metavar", name.upper())
             if not needed and options.get("nargs") != "...":
-                options["nargs"] = "*" if "nargs" in options else "?"
+                options |= {"nargs": "*" if "nargs" in options else "?", "default": ()}
             word = name
         text = about.rstrip(".") + _remark(parameter)
-        parser.add_argument(
-            word, default=argparse.SUPPRESS, help=text.replace("%", "%%"), **options
-        )
+        parser.add_argument(word, help=text.replace("%", "%%"), **options)
 
 
 def _arguments(function: Any, options: argparse.Namespace) -> dict[str, Any]:
@@ -299,8 +297,10 @@ def _arguments(function: Any, options: argparse.Namespace) -> dict[str, Any]:
         if is_dataclass(kind):
             make: Any = kind
             found[parameter.name] = make(**_arguments(make, options))
-        elif hasattr(options, parameter.name):
+        elif parameter.name in vars(options):
             value = getattr(options, parameter.name)
+            if value == () and parameter.kind is not parameter.KEYWORD_ONLY:
+                continue  # a word that is not there
             found[parameter.name] = tuple(value) if isinstance(value, list) else value
     return found
 

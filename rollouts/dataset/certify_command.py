@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from robots import TaskError
 from robots.common.cli import Word
 from robots.common.commands import printable
-from rollouts.playing.command_options import INTERRUPTED, Players, Recording, stop_signals
+from rollouts.playing.command_options import GOES_ON, Players, Recording, stoppable
 
 if TYPE_CHECKING:
     from rollouts.dataset.certificate import Certificate
@@ -50,20 +49,15 @@ def certify(
             raise TaskError("neither a recording nor a task is given to certify")
         path = find_official(get_task_class(recording.task).task_id)
     executor, line = players.executor(), LiveLine(unit="episodes")
-    status = _Status(line)
-    try:
-        with stop_signals(), line:
-            certificate = certifying.certify(
-                path,
-                executor,
-                out,
-                task_id=recording.task,
-                cell=recording.cell.making(),
-                on_event=status.show,
-            )
-    except KeyboardInterrupt:
-        print("stopped; the same command goes on from there", file=sys.stderr)
-        return INTERRUPTED
+    with stoppable(lambda: GOES_ON), line:
+        certificate = certifying.certify(
+            path,
+            executor,
+            out,
+            task_id=recording.task,
+            cell=recording.cell.making(),
+            on_event=_Status(line).show,
+        )
     print(printable(f"{out or certifying.certificate_path(path)}: {certificate.task_id}"))
     for sentence in sentences(certificate):
         print(printable(sentence))

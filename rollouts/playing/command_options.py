@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import signal
-from collections.abc import Generator
+import sys
+from collections.abc import Callable, Generator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from rollouts.reading.trajectory import TrajectoryFile
 
 INTERRUPTED = 130  # exit code, as shells have it
+GOES_ON = "stopped; the same command goes on from there"
 
 
 def _timeout(text: str) -> float | None:
@@ -32,7 +34,7 @@ def _timeout(text: str) -> float | None:
     return seconds
 
 
-def file_size(text: str) -> float:
+def megabytes(text: str) -> float:
     """Return how large a file may be (MB)."""
     try:
         size = float(text)
@@ -63,6 +65,23 @@ ControlMode = Annotated[
         f" left={CONTROL_MODES[0]},right={CONTROL_MODES[1]}",
     ),
 ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Acting:
+    """Who acts, on what it observes, and what its actions ask for.
+
+    Attributes:
+        policy: A policy that can be imported; by default the task's expert.
+        obs_mode: What policies observe: state, state_dict, rgb and others.
+        camera_size: Width and height in pixels of the pictures observed (each camera's own).
+        control_mode: What actions ask for (as the layout says, else pd_joint_delta_pos).
+    """
+
+    policy: Policy = "expert"
+    obs_mode: Annotated[str, Word("MODE")] = "state"
+    camera_size: PictureSize | None = None
+    control_mode: ControlMode | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,6 +136,17 @@ class Recording:
         from rollouts.playing.replay import open_recording
 
         return open_recording(self.file, self.task)
+
+
+@contextmanager
+def stoppable(message: Callable[[], str] = lambda: "stopped") -> Generator[None]:
+    """Let Ctrl-C, or a request to end, end the process with a message and 130."""
+    try:
+        with stop_signals():
+            yield
+    except KeyboardInterrupt:
+        print(message(), file=sys.stderr)
+        raise SystemExit(INTERRUPTED) from None
 
 
 @contextmanager

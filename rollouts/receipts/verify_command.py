@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from robots import RobotDescriptor
 from robots.common.cli import Count, Word
 from robots.common.commands import printable
-from rollouts.playing.command_options import INTERRUPTED, Players, Policy, stop_signals
+from rollouts.playing.command_options import Players, Policy, stoppable
 from tasks.cell_options import PlacedRobot, chosen_robots
 
 if TYPE_CHECKING:
@@ -54,20 +53,16 @@ def verify(
     if isinstance(known, RobotDescriptor):
         known = dict.fromkeys(read.making["layout"], known)
     executor, line = players.executor(), LiveLine(len(read.episodes), "episodes")
-    try:
-        with stop_signals(), line:
-            found = verification.verify(
-                read,
-                executor,
-                _Status(line, read).show,
-                policy=policy,
-                task=task,
-                robots=known,
-                num_envs=num_envs,
-            )
-    except KeyboardInterrupt:
-        print("stopped", file=sys.stderr)
-        return INTERRUPTED
+    with stoppable(), line:
+        found = verification.verify(
+            read,
+            executor,
+            _Status(line, read).show,
+            policy=policy,
+            task=task,
+            robots=known,
+            num_envs=num_envs,
+        )
     print(printable(repr(found)))
     print(_VERDICT[found.equal])
     return 0 if found.equal else 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,13 +11,11 @@ from robots import RecordingError
 from robots.common.cli import Count, Folder, Seed, Word
 from robots.common.pages import plural
 from rollouts.playing.command_options import (
-    INTERRUPTED,
-    ControlMode,
-    PictureSize,
+    Acting,
     Players,
     Policy,
-    file_size,
-    stop_signals,
+    megabytes,
+    stoppable,
 )
 from rollouts.playing.seeds import seed_lines
 from rollouts.reading.manifest import FILE_SIZE
@@ -28,6 +27,23 @@ if TYPE_CHECKING:
     from rollouts.recording.record import Summary
 
 
+@dataclass(frozen=True, kw_only=True)
+class RecordOptions(Acting):
+    """Who acts, and what is written.
+
+    Attributes:
+        takeover: Policy that acts instead at every step for which it returns an action, not None.
+        corrector: Policy whose action is recorded at every step beside the one that is played.
+        num_envs: Episodes that each process plays at once.
+        file_size: Begin another file, trajectory_0001.h5 and so on, when one is so large.
+    """
+
+    takeover: Policy | None = None
+    corrector: Policy | None = None
+    num_envs: Count = 1
+    file_size: Annotated[float, Word("MB", megabytes)] = FILE_SIZE
+
+
 def record(
     *,
     task: str,
@@ -35,15 +51,8 @@ def record(
     out: Folder,
     players: Players,
     seed: Seed = 0,
-    policy: Policy = "expert",
-    takeover: Policy | None = None,
-    corrector: Policy | None = None,
-    obs_mode: Annotated[str, Word("MODE")] = "state",
-    camera_size: PictureSize | None = None,
-    num_envs: Count = 1,
+    options: RecordOptions,
     cell: Cell,
-    control_mode: ControlMode | None = None,
-    file_size: Annotated[float, Word("MB", file_size)] = FILE_SIZE,
 ) -> int:
     """Let an expert or a policy play episodes in worker processes, and record them.
 
@@ -57,15 +66,8 @@ def record(
         out: Folder of trajectory.h5 and .json.
         players: Who plays.
         seed: Seeds S … S + N - 1.
-        policy: A policy that can be imported, asked at every step; by default the task's expert.
-        takeover: Policy that acts instead at every step for which it returns an action, not None.
-        corrector: Policy whose action is recorded at every step beside the one that is played.
-        obs_mode: What policies observe: state, state_dict, rgb and others.
-        camera_size: Width and height in pixels of the pictures observed (each camera's own).
-        num_envs: Episodes that each process plays at once.
+        options: Who acts, and what is written.
         cell: The task's robots, and what varies.
-        control_mode: What actions ask for (as the layout says, else pd_joint_delta_pos).
-        file_size: Begin another file, trajectory_0001.h5 and so on, when one is so large.
 
     Raises:
         RobotLayoutsError: If it makes no sense, or cannot go on; finished episodes are kept.
@@ -77,27 +79,21 @@ def record(
     seeds = range(seed, seed + episodes)
     executor, line = players.executor(), LiveLine(len(seeds), "episodes")
     status = _Status(line)
+
+    def goes_on() -> str:
+        return f"stopped; {status.kept}; the same command goes on from there"
+
     try:
-        with stop_signals(), line:
+        with stoppable(goes_on), line:
             summary = recording.record(
                 task,
                 seeds,
                 out,
                 executor,
-                control_mode=control_mode,
-                policy=policy,
-                takeover=takeover,
-                corrector=corrector,
-                obs_mode=obs_mode,
-                camera_size=camera_size,
-                num_envs=num_envs,
-                file_size=file_size,
-                **cell.making(),
                 on_event=status.show,
+                **vars(options),
+                **cell.making(),
             )
-    except KeyboardInterrupt:
-        print(f"stopped; {status.kept}; the same command goes on from there", file=sys.stderr)
-        return INTERRUPTED
     except (RecordingError, WorkerError):
         print(f"stopped; {status.kept}", file=sys.stderr)
         raise

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from robots.common.cli import Word
 from robots.common.commands import printable
-from rollouts.playing.command_options import INTERRUPTED, Players, stop_signals
+from rollouts.playing.command_options import GOES_ON, Players, stoppable
 
 if TYPE_CHECKING:
     from rollouts.playing.executor import Event
@@ -47,7 +46,7 @@ def run(
     policy: Policies = (),
     only: Sequence[Annotated[str, Word("CASE")]] = (),
     players: Players,
-) -> int:
+) -> None:
     """Play a suite in worker processes; a receipt for each case.
 
     The same command goes on where it was stopped: what has a receipt is not played again. Exit
@@ -72,22 +71,17 @@ def run(
 
     loaded = load_suite(suite, import_tasks=True)
     episodes = sum(len(case.seeds) for case in chosen_cases(loaded, only))
-    try:
-        with stop_signals(), LiveLine(episodes, "episodes") as line:
-            found = run_suite(
-                loaded,
-                out,
-                _policies(policy),
-                only=only,
-                executor=players.executor(),
-                on_event=_Status(line).show,
-            )
-    except KeyboardInterrupt:
-        print("stopped; the same command goes on from there", file=sys.stderr)
-        return INTERRUPTED
+    with stoppable(lambda: GOES_ON), LiveLine(episodes, "episodes") as line:
+        found = run_suite(
+            loaded,
+            out,
+            _policies(policy),
+            only=only,
+            executor=players.executor(),
+            on_event=_Status(line).show,
+        )
     for sentence in summary(found):
         print(printable(sentence))
-    return 0
 
 
 def report(
@@ -140,17 +134,13 @@ def verify(folder: RunFolder, *, policy: Policies = (), task: Tasks = (), player
     _import_tasks(task)
     played = read_run(folder)
     episodes = sum(len(receipt.episodes) for receipt in played.receipts.values())
-    try:
-        with stop_signals(), LiveLine(episodes, "episodes") as line:
-            found = verify_run(
-                played,
-                _policies(policy),
-                executor=players.executor(),
-                on_event=_Status(line).show,
-            )
-    except KeyboardInterrupt:
-        print("stopped", file=sys.stderr)
-        return INTERRUPTED
+    with stoppable(), LiveLine(episodes, "episodes") as line:
+        found = verify_run(
+            played,
+            _policies(policy),
+            executor=players.executor(),
+            on_event=_Status(line).show,
+        )
     for name, verification in found.items():
         print(printable(f"{name}: {verification}"))
     equal = sum(verification.equal for verification in found.values())

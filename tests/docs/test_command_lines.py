@@ -104,7 +104,7 @@ def _understand(line: Sequence[str]) -> None:
 
 
 def _of_module(name: str, words: Sequence[str]) -> None:
-    if name.partition(".")[0] in (*ROOMS, "robot_layouts"):
+    if name.partition(".")[0] in ROOMS:
         found = find_spec(name)
         if found is None:
             raise LookupError(f"there is no module {name}")
