@@ -14,7 +14,7 @@ from layouts.maniskill import TASKS, from_maniskill
 from layouts.presets import FACING, PRESETS
 from robots import LayoutError, UnknownNameError
 from robots.common.bounds import shown
-from robots.common.cli import Corners, File, Word
+from robots.common.cli import Corners, File, Word, by_name
 from robots.common.commands import LOOPBACK, UsageError
 from robots.named import FORMS, named_robot
 
@@ -129,20 +129,7 @@ def _build(preset: str, robots: Sequence[str], options: Mapping[str, Any]) -> La
 
 
 def _named_robots(words: Sequence[str]) -> dict[str, str]:
-    """Return robots by name from words ``name=robot``.
-
-    Raises:
-        LayoutError: If a word is malformed, or a name is given twice.
-    """
-    robots: dict[str, str] = {}
-    for word in words:
-        name, equals, robot = word.partition("=")
-        if not (name and equals and robot):
-            raise LayoutError(f"{word!r} should be name=robot, for example left=panda")
-        if name in robots:
-            raise LayoutError(f"name {name!r} is given twice; each robot needs its own name")
-        robots[name] = robot
-    return robots
+    return by_name(words, "name=robot", "left=panda", LayoutError, "name")
 
 
 @dataclass(frozen=True, kw_only=True)

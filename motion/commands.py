@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Annotated, TypeVar
+from collections.abc import Sequence
+from typing import Annotated
 
 from layouts.commands import LayoutWords, Page
 from motion import planning
 from motion.goals import Goal, TcpGoal
 from motion.motion import Motion
 from motion.obstacles import Obstacle, box
-from robots.common.cli import Corners, File, Word
+from robots.common.cli import Corners, File, Word, by_name
 from robots.common.commands import FAILED
 from robots.common.errors import MotionError
 from robots.control_modes import read_mode
 
 JOINTS = "joints:"
-BOX = "wall=0.1,1,0.5,0.4,0,0.25"
-
-_T = TypeVar("_T")
 
 
 def plan(
@@ -60,8 +57,8 @@ def plan(
     motion = planning.plan(
         layout.layout(),
         None if after is None else Motion.load(after).end,
-        _named("--goal", "left=0.4,0,0.3", goal, _goal),
-        obstacles=list(_named("--box", BOX, box, _box).values()),
+        _goals(goal),
+        obstacles=_boxes(box),
         table=tabletop,
         clearance=clearance,
         seed=seed,
@@ -148,35 +145,15 @@ def export(
             print(f"trajectory: {path}")
 
 
-def _named(
-    option: str, example: str, words: Sequence[str], read: Callable[[str, str, str], _T]
-) -> dict[str, _T]:
-    """Return what words ``name=…`` say by name.
-
-    Args:
-        option: The option.
-        example: What it may be.
-        words: The words.
-        read: Returns a value; takes the option with its word, the name, and the rest of the word.
-
-    Raises:
-        MotionError: If a word is malformed, or a name is given twice.
-    """
-    found: dict[str, _T] = {}
-    for word in words:
-        name, equals, value = word.partition("=")
-        if not (name and equals):
-            raise MotionError(f"{option} {word!r} lacks a name; for example {option} {example}")
-        if name in found:
-            raise MotionError(f"{option} {name!r} is given twice")
-        found[name] = read(f"{option} {word!r}", name, value)
-    return found
+def _goals(words: Sequence[str]) -> dict[str, Goal]:
+    goals = by_name(words, "PLACE=X,Y,Z", "left=0.4,0,0.3", MotionError, "--goal")
+    return {place: _goal(f"--goal '{place}={text}'", text) for place, text in goals.items()}
 
 
-def _goal(word: str, _: str, value: str) -> Goal:
-    if value.startswith(JOINTS):
-        return _numbers(word, value.removeprefix(JOINTS))
-    numbers = _numbers(word, value)
+def _goal(word: str, text: str) -> Goal:
+    if text.startswith(JOINTS):
+        return _numbers(word, text.removeprefix(JOINTS))
+    numbers = _numbers(word, text)
     if len(numbers) not in (3, 7):
         raise MotionError(
             f"{word} has {len(numbers)} numbers; x, y, z (m), or these and the wxyz orientation,"
@@ -185,11 +162,16 @@ def _goal(word: str, _: str, value: str) -> Goal:
     return TcpGoal(numbers[:3], numbers[3:] or None)
 
 
-def _box(word: str, name: str, value: str) -> Obstacle:
-    numbers = _numbers(word, value)
-    if len(numbers) != 6:
-        raise MotionError(f"--box {name!r} has {len(numbers)} numbers; for example --box {BOX}")
-    return box(name, numbers[:3], numbers[3:])
+def _boxes(words: Sequence[str]) -> list[Obstacle]:
+    form = "NAME=WIDTH,DEPTH,HEIGHT,X,Y,Z"
+    boxes = by_name(words, form, "wall=0.1,1,0.5,0.4,0,0.25", MotionError, "--box")
+    found: list[Obstacle] = []
+    for name, text in boxes.items():
+        numbers = _numbers(f"--box '{name}={text}'", text)
+        if len(numbers) != 6:
+            raise MotionError(f"--box {name!r} has {len(numbers)} numbers; it takes {form}")
+        found.append(box(name, numbers[:3], numbers[3:]))
+    return found
 
 
 def _numbers(word: str, value: str) -> list[float]:

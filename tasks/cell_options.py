@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from layouts import Layout
 from robots import RobotDescriptor, TaskError
-from robots.common.cli import File, Word
+from robots.common.cli import File, Word, by_name
 from robots.common.commands import notice
 from robots.named import FORMS, is_path, named_robot
 from tasks.language.needs import ACT, HOLD
@@ -76,16 +76,9 @@ def chosen_robots(words: Sequence[str]) -> RobotDescriptor | dict[str, RobotDesc
     """
     if len(words) == 1 and "=" not in words[0].partition("?")[0]:
         return _robot(words[0])
-    robots: dict[str, RobotDescriptor] = {}
-    known: dict[str, RobotDescriptor] = {}  # guessing one takes a while
-    for word in words:
-        place, equals, name = word.partition("=")
-        if not (place and equals and name):
-            raise TaskError(f"{word!r} should be PLACE=ROBOT, for example left=panda")
-        if place in robots:
-            raise TaskError(f"the place {place!r} is given twice")
-        robots[place] = known[name] = known.get(name) or _robot(name)
-    return robots
+    names = by_name(words, "PLACE=ROBOT", "left=panda", TaskError, "the place")
+    known = {name: _robot(name) for name in dict.fromkeys(names.values())}  # guessing takes a while
+    return {place: known[name] for place, name in names.items()}
 
 
 def _robot(name: str) -> RobotDescriptor:

@@ -20,7 +20,7 @@ import numpy as np
 from kinematics.rotations import rotate
 from layouts import Layout, face_to_face, ring, single
 from robots import RobotDescriptor, TaskError
-from robots.common.cli import Folder, main_of
+from robots.common.cli import Folder, by_name, main_of
 from robots.common.commands import notice, start
 from robots.common.new_files import check_module_name, write_new
 from robots.common.paths import absolute
@@ -253,14 +253,9 @@ def _written(robot: str, folder: Path) -> str:
 
 
 def _robots(words: Sequence[str]) -> dict[str, str]:
-    robots: dict[str, str] = {}
-    for word in words:
-        place, equals, robot = word.partition("=")
-        if not (place.isidentifier() and equals and robot):
-            raise TaskError(f"{word!r} should be PLACE=ROBOT, for example left=panda")
-        if place in robots:
-            raise TaskError(f"the place {place!r} is given twice")
-        robots[place] = robot
+    robots = by_name(words, "PLACE=ROBOT", "left=panda", TaskError, "the place")
+    if wrong := [place for place in robots if not place.isidentifier()]:
+        raise TaskError(f"the place {wrong[0]!r} should be a name as in Python, such as left")
     return robots
 
 

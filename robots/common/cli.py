@@ -68,6 +68,32 @@ def at_least(least: int) -> Callable[[str], int]:
     return read
 
 
+def by_name(
+    words: Sequence[str], form: str, example: str, error: type[RobotLayoutsError], kind: str
+) -> dict[str, str]:
+    """Return what words ``NAME=VALUE`` say, by name.
+
+    Args:
+        words: The words.
+        form: How they are written, for messages.
+        example: One that is right.
+        error: What is raised.
+        kind: What the names are of.
+
+    Raises:
+        RobotLayoutsError: If a word is malformed, or a name is given twice.
+    """
+    found: dict[str, str] = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        if not (name and equals and value):
+            raise error(f"{word!r} should be {form}, for example {example}")
+        if name in found:
+            raise error(f"{kind} {name!r} is given twice; each needs its own name")
+        found[name] = value
+    return found
+
+
 Count = Annotated[int, Word("N", at_least(1))]
 Natural = Annotated[int, Word("N", at_least(0))]
 Seed = Annotated[int, Word("S", at_least(0))]
