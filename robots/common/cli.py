@@ -17,6 +17,7 @@ import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, is_dataclass
+from functools import cache
 from importlib import import_module, metadata
 from importlib.util import find_spec
 from pathlib import Path
@@ -132,14 +133,7 @@ class Command(NamedTuple):
         if not isinstance(self.target, str):
             return _documentation(inspect.getdoc(self.target)).summary
         module, _, name = self.target.partition(":")
-        room, *path = module.split(".")
-        spec = find_spec(room)
-        assert spec is not None
-        assert spec.origin is not None
-        source = Path(spec.origin).parent.joinpath(*path).with_suffix(".py")
-        tree = ast.parse(source.read_text(encoding="utf-8"))
-        functions = {one.name: one for one in tree.body if isinstance(one, ast.FunctionDef)}
-        return _documentation(ast.get_docstring(functions[name] if name else tree)).summary
+        return _documentation(_docstrings(module)[name]).summary
 
     def parser(self, prog: str) -> argparse.ArgumentParser:
         """Return what reads its command line."""
@@ -257,6 +251,19 @@ def main_of(function: Callable[..., int | None], prog: str) -> Callable[..., int
         return Command(function).parse(words, f"robot-layouts {prog}").run()
 
     return main
+
+
+@cache
+def _docstrings(module: str) -> dict[str, str | None]:
+    """Return the docstrings of a module's functions, and its own as that of ``""``."""
+    room, *path = module.split(".")
+    spec = find_spec(room)
+    assert spec is not None
+    assert spec.origin is not None
+    source = Path(spec.origin).parent.joinpath(*path).with_suffix(".py")
+    tree = ast.parse(source.read_text(encoding="utf-8"))
+    functions = [one for one in tree.body if isinstance(one, ast.FunctionDef)]
+    return {"": ast.get_docstring(tree), **{f.name: ast.get_docstring(f) for f in functions}}
 
 
 class _Documentation(NamedTuple):
