@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -42,7 +42,7 @@ Distance = Annotated[float | str, Word("M|auto", _distance)]
 Target = Annotated[Sequence[str], Word("[NAME=]X,Y,Z", action="append")]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LayoutWords:
     """Which layout a command is about.
 
@@ -59,9 +59,8 @@ class LayoutWords:
         keyframe: Keyframe with the joint positions to start from.
     """
 
-    what: Annotated[str, Word("WHAT", about=", ".join(PRESETS))]
-    robots: Sequence[NamedRobot] = ()
-    _: KW_ONLY
+    what: Annotated[str, Word("WHAT", about=", ".join(PRESETS))] = field(kw_only=False)
+    robots: Sequence[NamedRobot] = field(default=(), kw_only=False)
     spacing: Distance | None = None
     radius: Distance | None = None
     inset: Distance | None = None

@@ -7,7 +7,7 @@ import signal
 import sys
 from collections.abc import Callable, Generator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
@@ -115,7 +115,7 @@ class Players:
         return choose_executor(self.workers, episode_timeout=self.episode_timeout)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Recording:
     """Which recording a command is about.
 
@@ -126,8 +126,7 @@ class Recording:
         cell: Which robots stood where, where the recording cannot say it.
     """
 
-    file: RecordingPath | None = None
-    _: KW_ONLY
+    file: RecordingPath | None = field(default=None, kw_only=False)
     task: str | None = None
     cell: RecordedCell
 

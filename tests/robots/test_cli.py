@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -15,7 +15,7 @@ from robots.common.cli import Command, Count, Program, Word
 from robots.common.commands import UsageError
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Place:
     """Where.
 
@@ -24,8 +24,7 @@ class Place:
         height: How high (m).
     """
 
-    what: str = "table"
-    _: KW_ONLY
+    what: str = field(default="table", kw_only=False)
     height: float = 0.5
 
 
