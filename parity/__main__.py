@@ -1,7 +1,7 @@
 """``python -m parity COMMAND``: the same as ``robot-layouts parity COMMAND``."""
 
+from robot_layouts.__main__ import main_of
 from robots.common.commands import start
-from robots.common.console import main_of
 
 main = main_of("parity")
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
+from typing import Annotated
 
 from robots.assets import scenery
 from robots.assets.fetching import default_sources, ensure
@@ -20,8 +20,8 @@ from robots.assets.sources import (
     PackageWheel,
 )
 from robots.assets.store import AssetStore, FileState
-from robots.common.commands import print_error, printable, start
-from robots.common.console import main_of
+from robots.common.cli import Word, main_of
+from robots.common.commands import UsageError, print_error, printable, start
 from robots.common.errors import RobotLayoutsError
 from robots.common.paths import absolute, default_root
 from robots.descriptor import RobotDescriptor
@@ -32,30 +32,52 @@ SOURCES = ("local", "hf", *(package.name for package in INDEX_PACKAGES), "wheel"
 ONLINE_SOURCES = ("hf", "wheel")
 
 
-def run(options: argparse.Namespace) -> int:
-    """Run the command; returns 0 if every file is there and right, 1 if not.
+def fetch(
+    robots: Sequence[Annotated[str, Word("ROBOT", about=FORMS)]] = (),
+    *,
+    check: bool = False,
+    offline: bool = False,
+    source: Annotated[str, Word(choices=SOURCES)] | None = None,
+    dest: Annotated[str, Word("DIR")] | None = None,
+    physics_only: bool = False,
+    trust_source: bool = False,
+    revision: Annotated[str, Word("REV")] | None = None,
+) -> int:
+    """Bring the files of robots to this machine, or check them.
+
+    Exit code: 0 if every file is there and right, 1 if not, 2 for bad usage.
+
+    Args:
+        robots: Robots to fetch (default: all, or all that --source has).
+        check: Fetch nothing, only list what is missing or wrong.
+        offline: Never use the network.
+        source: Use this source alone.
+        dest: Folder to fill, instead of the usual local copy.
+        physics_only: Leave out what only pictures need.
+        trust_source: Accept files that differ from the manifest, and mark them.
+        revision: Branch, tag or commit of the Hub's dataset (default: $ROBOT_LAYOUTS_HF_REVISION,
+            or main).
 
     Raises:
         RobotLayoutsError: If a robot does not exist, or a file cannot be had.
     """
-    if options.offline and options.source in ONLINE_SOURCES:
-        options.refuse(f"--source {options.source} needs the network, which --offline rules out")
-    pictures = not options.physics_only
+    if offline and source in ONLINE_SOURCES:
+        raise UsageError(f"--source {source} needs the network, which --offline rules out")
+    pictures = not physics_only
     failures: list[RobotLayoutsError] = []
-    if options.robots:
-        robots = [named_robot(name) for name in options.robots]
+    if robots:
+        chosen = [named_robot(name) for name in robots]
     else:
-        robots, failures = RobotRegistry.load_all()
-    needs = {robot.name: robot_files(robot, pictures=pictures) for robot in robots}
-    if pictures and not options.robots:
+        chosen, failures = RobotRegistry.load_all()
+    needs = {robot.name: robot_files(robot, pictures=pictures) for robot in chosen}
+    if pictures and not robots:
         needs["scenery"] = load_manifest().package(scenery.PACKAGE).files
-    chosen = options.dest
-    store = AssetStore(default_root() if chosen is None else absolute(chosen, "--dest"))
-    sources = _sources(options, store)
-    if options.source and not options.robots:
+    store = AssetStore(default_root() if dest is None else absolute(dest, "--dest"))
+    sources = _sources(source, store, offline=offline, revision=revision, trust=trust_source)
+    if source and not robots:
         needs = {name: files for name, files in needs.items() if _holds_all(sources, files)}
-    if not options.check:
-        ensure(_union(needs), store, sources, trust=options.trust_source)
+    if not check:
+        ensure(_union(needs), store, sources, trust=trust_source)
     code = _report(needs, store)
     for failure in failures:
         print_error(failure)
@@ -90,43 +112,21 @@ def describe_file(file: AssetFile, store: AssetStore) -> str:
     return f"{state.value}: {file} ({size(file.bytes)}, {use}{f'; {source}' if source else ''})"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
-    parser.epilog = "Exit code: 0 if every file is there and right, 1 if not, 2 for bad usage."
-    parser.set_defaults(refuse=parser.error)
-    add = parser.add_argument
-    which = f"robots to fetch; if none is named, all, or all that --source has; ROBOT: {FORMS}"
-    add("robots", nargs="*", metavar="ROBOT", help=which)
-    add("--check", action="store_true", help="fetch nothing, only list what is missing or wrong")
-    add("--offline", action="store_true", help="never use the network")
-    add("--source", choices=SOURCES, help="use this source alone")
-    add("--dest", metavar="DIR", help="folder to fill, instead of the usual local copy")
-    add("--physics-only", action="store_true", help="leave out what only pictures need")
-    add(
-        "--trust-source",
-        action="store_true",
-        help="accept files that differ from the manifest, and mark them",
-    )
-    add(
-        "--revision",
-        metavar="REV",
-        help=f"branch, tag or commit of the Hub's dataset (default ${REVISION_VARIABLE} or main)",
-    )
-
-
-def _sources(options: argparse.Namespace, store: AssetStore) -> list[AssetSource]:
-    if options.source is None:
+def _sources(
+    source: str | None, store: AssetStore, *, offline: bool, revision: str | None, trust: bool
+) -> list[AssetSource]:
+    if source is None:
         elsewhere = [LocalCopy(default_root())] if store.root != default_root() else []
-        return elsewhere + default_sources(offline=options.offline, revision=options.revision)
-    states = FileState if options.trust_source else (FileState.VERIFIED,)
+        return elsewhere + default_sources(offline=offline, revision=revision)
+    states = FileState if trust else (FileState.VERIFIED,)
     present = [state for state in states if state is not FileState.MISSING]
     chosen: dict[str, list[AssetSource]] = {
         "local": [LocalCopy(default_root(), states=present)],
-        "hf": [HubSource(revision=options.revision)],
+        "hf": [HubSource(revision=revision)],
         "wheel": [PackageWheel(package) for package in INDEX_PACKAGES],
         **{package.name: [InstalledPackage(package)] for package in INDEX_PACKAGES},
     }
-    return chosen[options.source]
+    return chosen[source]
 
 
 def _union(needs: dict[str, tuple[AssetFile, ...]]) -> list[AssetFile]:
@@ -150,7 +150,7 @@ def _report(needs: dict[str, tuple[AssetFile, ...]], store: AssetStore) -> int:
     return 1 if store.unusable(files) else 0
 
 
-main = main_of("robots fetch")
+main = main_of(fetch, "robots fetch")
 
 if __name__ == "__main__":
     start(main)

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import redirect_stdout
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from robots.assets.locator import LocalUrdf
+from robots.common.cli import Word, main_of
 from robots.common.commands import start
-from robots.common.console import main_of
 from robots.common.errors import (
     AssetError,
     DescriptorError,
@@ -89,47 +88,36 @@ def _semantics(source: LocalUrdf, srdf: str | os.PathLike[str]) -> Hints:
     return hints_of(read_semantics(file, model), file.name)
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
-    parser.add_argument(
-        "urdf",
-        metavar="PATH",
-        help="a URDF or an MJCF (.xml) on this machine, or a name of the package"
-        " robot_descriptions, such as panda_description or panda_mj_description",
-    )
-    parser.add_argument("--name", help="registry name of the robot (the name in its file)")
-    parser.add_argument("--module", action="store_true", help="print the data module to paste")
-    parser.add_argument(
-        "--xacro",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        type=_argument,
-        help="argument of a xacro template; may be given again",
-    )
-    parser.add_argument(
-        "--srdf", metavar="FILE", help="SRDF with the robot's groups, states and disabled pairs"
-    )
+def _argument(text: str) -> tuple[str, str]:
+    key, equals, value = text.partition("=")
+    if not key or not equals:
+        raise ValueError(f"{text!r} is not KEY=VALUE, such as prefix=left_")
+    return key, value
 
 
-def run(options: argparse.Namespace) -> int:
-    """Print the guess, or with ``--module`` the data module to paste; returns 0.
+def print_guess(
+    urdf: Annotated[str, Word("PATH")],
+    *,
+    name: str | None = None,
+    module: bool = False,
+    xacro: Annotated[Sequence[tuple[str, str]], Word("KEY=VALUE", _argument, action="append")] = (),
+    srdf: Annotated[str, Word("FILE")] | None = None,
+) -> None:
+    """Guess a robot's descriptor from its URDF or MJCF, and say why.
+
+    Args:
+        urdf: A URDF or an MJCF (.xml) on this machine, or a name of the package
+            robot_descriptions, such as panda_description or panda_mj_description.
+        name: Registry name of the robot (the name in its file).
+        module: Print the data module to paste.
+        xacro: Argument of a xacro template; may be given again.
+        srdf: SRDF with the robot's groups, states and disabled pairs.
 
     Raises:
         RobotLayoutsError: If the file is unusable, or there is no robot of that name.
     """
-    found = guess_descriptor(
-        options.urdf, options.name, xacro=dict(options.xacro), srdf=options.srdf
-    )
-    print(found.module().rstrip("\n") if options.module else found)
-    return 0
-
-
-def _argument(text: str) -> tuple[str, str]:
-    key, equals, value = text.partition("=")
-    if not key or not equals:
-        raise argparse.ArgumentTypeError(f"{text!r} is not KEY=VALUE, such as prefix=left_")
-    return key, value
+    found = guess_descriptor(urdf, name, xacro=dict(xacro), srdf=srdf)
+    print(found.module().rstrip("\n") if module else found)
 
 
 def _find(path_or_name: str | os.PathLike[str], form: str | None) -> Path:
@@ -169,7 +157,7 @@ def _described(name: str, form: str | None) -> Path:
     return Path(path)
 
 
-main = main_of("robots guess")
+main = main_of(print_guess, "robots guess")
 
 if __name__ == "__main__":
     start(main)

@@ -1,12 +1,10 @@
-"""``robot-layouts robots inspect``: joints, action numbers, gripper, cameras, files of a robot."""
+"""``robot-layouts robots inspect`` and ``robots list``: what there is to know about robots."""
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterable, Iterator, Sequence
-from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
@@ -15,56 +13,55 @@ from robots.assets.manifest import AssetFile, AssetPackage, load_manifest
 from robots.assets.packages import SourceError, find_package
 from robots.assets.progress import size
 from robots.assets.store import AssetStore, FileState
-from robots.common.commands import start
-from robots.common.console import main_of
+from robots.common.cli import Word, main_of
+from robots.common.commands import print_error, start
 from robots.common.paths import default_root
 from robots.descriptor import JointGroup, RobotDescriptor
 from robots.fetch_assets import describe_file
-from robots.listing import table
 from robots.mjcf.locator import LocalMjcf
 from robots.named import FORMS, named_robot
+from robots.registry import RobotRegistry
 from robots.urdf.model import ModelJoint
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_cleaned, read_urdf
 from robots.urdf.tcp import find_tcp
 from robots.urdf.tree import kinematic_tree
 
-TRY_COMMAND = "simulation.checks.try_command"  # with run(robots)
 
+def inspect(robots: Sequence[Annotated[str, Word("ROBOT", about=FORMS)]]) -> None:
+    """Print everything about robots: joints, action numbers, gripper, cameras and files.
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
-    parser.epilog = "Exit code: 0, or 1 if a robot that is tried does not work, or 2 for bad usage."
-    parser.add_argument(
-        "robots",
-        nargs="+",
-        metavar="ROBOT",
-        help=FORMS,
-    )
-    parser.add_argument(
-        "--try",
-        action="store_true",
-        dest="tries",
-        help="stand the robots, step them and move them in physics, and print what was seen",
-    )
+    Fetches nothing.
 
-
-def run(options: argparse.Namespace) -> int:
-    """Print reports; fetches nothing.
-
-    Returns:
-        0, or 1 if a robot that is tried does not work.
+    Args:
+        robots: The robots.
 
     Raises:
         RobotLayoutsError: If a robot does not exist, or its files cannot be read.
     """
-    robots = map(named_robot, options.robots)
-    if options.tries:
-        command: Any = import_module(TRY_COMMAND)
-        return command.run(list(robots))
-    for robot in robots:
+    for robot in map(named_robot, robots):
         print(report(robot, AssetStore(default_root())))
-    return 0
+
+
+def list_robots() -> int:
+    """List the robots: joints, action numbers, reach, source of the numbers.
+
+    Exit code: 0, or 1 if a robot of another package cannot be loaded.
+    """
+    robots, failures = RobotRegistry.load_all()
+    rows = [("robot", "joints", "action", "reach (m)", "numbers from")]
+    rows += [(r.name, str(r.dof), str(r.action_dim), f"{r.reach:g}", r.source) for r in robots]
+    print("\n".join(_table(rows)))
+    for failure in failures:
+        print_error(failure)
+    return 1 if failures else 0
+
+
+def _table(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
+    """Yield a line for each row, with columns of equal width."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        yield "  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip()
 
 
 def report(robot: RobotDescriptor, store: AssetStore) -> str:
@@ -152,7 +149,7 @@ def _joints(robot: RobotDescriptor, urdf: Path | None) -> Iterable[str]:
         driven = groups.get(joint.name, "nothing")
         mimics = f" (URDF: mimics {joint.mimics})" if joint.mimics else ""
         rows.append((joint.name, joint.type, _limits(joint), *_bounds(joint), driven + mimics))
-    return table(rows)
+    return _table(rows)
 
 
 def _limits(joint: ModelJoint) -> str:
@@ -184,7 +181,7 @@ def _drives(robot: RobotDescriptor) -> Iterator[str]:
                 f"{_numbers(group.armature)} {'kg' if group.unit == 'm' else 'kg·m²'}",
             )
         )
-    return table(rows)
+    return _table(rows)
 
 
 def _how_driven(group: JointGroup) -> str:
@@ -290,7 +287,7 @@ def _row(values: Iterable[float]) -> str:
     return "(" + ", ".join(f"{round(value, 6) + 0.0:.4g}" for value in values) + ")"
 
 
-main = main_of("robots inspect")
+main = main_of(inspect, "robots inspect")
 
 if __name__ == "__main__":
     start(main)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from robots.assets.locator import LocalUrdf
+from robots.common.cli import Folder, main_of
 from robots.common.commands import notice, start
-from robots.common.console import main_of
 from robots.common.errors import DescriptorError
 from robots.common.new_files import check_module_name, write_new
 from robots.data_module import write_module
@@ -44,22 +43,18 @@ def test_every_action_number_moves_its_own_joints():
 '''
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
-    parser.add_argument("urdf", metavar="URDF", help="URDF or MJCF, or name in robot_descriptions")
-    parser.add_argument("--name", help="name of the robot (the name in its URDF)")
-    parser.add_argument(
-        "--out", type=Path, default=Path(), metavar="DIR", help="folder of the files (this one)"
-    )
+def new_robot(urdf: str, *, name: str | None = None, out: Folder = Path()) -> None:
+    """Write the file of a new robot from its URDF, and a test.
 
-
-def run(options: argparse.Namespace) -> int:
-    """Guess a robot from its URDF, and write its file and its test; returns 0.
+    Args:
+        urdf: URDF or MJCF, or name in robot_descriptions.
+        name: Name of the robot (the name in its URDF).
+        out: Folder of the files.
 
     Raises:
         RobotLayoutsError: If the URDF is unusable, or a file is there already.
     """
-    found = guess_descriptor(options.urdf, options.name)
+    found = guess_descriptor(urdf, name)
     name = found.descriptor.name
     module, constant = name.lower(), name.upper()
     better = f"--name my_{module}"
@@ -67,18 +62,17 @@ def run(options: argparse.Namespace) -> int:
         words = f"there is a robot {name} already; choose another name, such as {better}"
         raise DescriptorError(words)
     check_module_name(module, better, DescriptorError)
-    robot = replace(found.descriptor, urdf=_seen_from(options.out, found.descriptor.urdf))
+    robot = replace(found.descriptor, urdf=_seen_from(out, found.descriptor.urdf))
     source = write_module(robot, found.reasons, also=["RobotRegistry"])
     declared = source + _REGISTERED.format(constant=constant, name=name)
     test = _TEST.format(module=module, constant=constant, name=name)
-    for path in write_new(options.out, {f"{module}.py": declared, f"test_{module}.py": test}):
+    for path in write_new(out, {f"{module}.py": declared, f"test_{module}.py": test}):
         print(path)
     notice(
         f"The comments in {module}.py say what was guessed: correct it, and delete them. Test it:"
-        f" python -m pytest {options.out / f'test_{module}.py'}\n"
-        f"In {options.out.absolute()} it goes wherever a robot goes, as {module}:{constant}"
+        f" python -m pytest {out / f'test_{module}.py'}\n"
+        f"In {out.absolute()} it goes wherever a robot goes, as {module}:{constant}"
     )
-    return 0
 
 
 def _seen_from(folder: Path, source: Any) -> LocalUrdf | LocalMjcf:
@@ -86,7 +80,7 @@ def _seen_from(folder: Path, source: Any) -> LocalUrdf | LocalMjcf:
     return replace(source, path=Path(os.path.relpath(source.path, folder.absolute())))
 
 
-main = main_of("new robot")
+main = main_of(new_robot, "new robot")
 
 if __name__ == "__main__":
     start(main)

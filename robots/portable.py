@@ -6,41 +6,33 @@ be settled before. Processes that the program begins inherit it.
 
 from __future__ import annotations
 
-import argparse
 import os
 import shutil
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import Annotated, NoReturn
 
+from robots.common.cli import Word, main_of
 from robots.common.commands import start
-from robots.common.console import main_of
 from robots.common.errors import RobotLayoutsError, SimulationError
 from robots.common.portable import portable_variables
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
-    parser.epilog = "For example: robot-layouts portable python train.py"
-    parser.add_argument(
-        "program",
-        nargs=argparse.REMAINDER,
-        metavar="PROGRAM",
-        help="the program and its arguments; without one, the variables that it would get in its"
-        " environment are printed",
-    )
+def portable(program: Annotated[Sequence[str], Word("PROGRAM", nargs="...")] = ()) -> None:
+    """Run a program so that physics has the same bits on every x86-64 processor.
 
+    For example: robot-layouts portable python train.py
 
-def run(options: argparse.Namespace) -> int:
-    """Become the program, or print the variables; returns 0 in the latter case.
+    Args:
+        program: The program and its arguments; without one, the variables that it would get in its
+            environment are printed.
 
     Raises:
         RobotLayoutsError: If there is no such program.
     """
-    if options.program:
-        _become(options.program)
+    if program:
+        _become(program)
     for name, value in _variables().items():
         print(f"{name}={value}")
-    return 0
 
 
 def _become(words: Sequence[str]) -> NoReturn:
@@ -76,7 +68,7 @@ def numpy_versions() -> tuple[str, ...]:
     return tuple(__cpu_dispatch__)
 
 
-main = main_of("portable")
+main = main_of(portable, "portable")
 
 if __name__ == "__main__":
     start(main)

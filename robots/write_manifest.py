@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import os
 import posixpath
@@ -28,8 +27,8 @@ from robots.assets.packages import (
     SourceError,
     find_package,
 )
+from robots.common.cli import main_of
 from robots.common.commands import start
-from robots.common.console import main_of
 from robots.common.errors import AssetError
 from robots.common.files import read_regular, read_text
 from robots.common.paths import CHECKOUT_CACHE
@@ -52,22 +51,18 @@ TERMS = {
 }
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
-    parser.add_argument(
-        "--check", action="store_true", help="write nothing, and exit with 1 if it is stale"
-    )
+def write_manifest(*, check: bool = False) -> int:
+    """Write the manifest of robot files from installed packages, when a robot is added.
 
-
-def run(options: argparse.Namespace) -> int:
-    """Write the manifest, or with ``--check`` say whether it is up to date; returns 1 if not.
+    Args:
+        check: Write nothing, and exit with 1 if it is stale.
 
     Raises:
         RobotLayoutsError: If a package cannot be read, or the manifest not be written.
     """
     path = CHECKOUT_CACHE / "manifest.json"
     text = build_manifest().to_json()
-    if options.check:
+    if check:
         fresh = path.is_file() and read_text(path, LARGEST_FILE) == text
         print(f"{path} is {'up to date' if fresh else 'stale; run robot-layouts robots manifest'}")
         return 0 if fresh else 1
@@ -281,7 +276,7 @@ def _asset_file(
     )
 
 
-main = main_of("robots manifest")
+main = main_of(write_manifest, "robots manifest")
 
 if __name__ == "__main__":
     start(main)

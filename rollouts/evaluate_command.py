@@ -2,82 +2,62 @@
 
 from __future__ import annotations
 
-import argparse
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from rollouts.playing import command_options as workers
-from rollouts.playing.command_options import INTERRUPTED, one_or_more, stop_signals, zero_or_more
-from tasks.cell_options import add_cell_options, chosen_cell
+from robots.common.cli import Count, Seed, Word
+from rollouts.playing.command_options import Acting, Players, stoppable
+from tasks.cell_options import Cell
 
 if TYPE_CHECKING:
     from rollouts.playing.executor import Event
     from rollouts.progress import LiveLine
 
-EPILOG = (
-    "A policy maps an observation to an action; see rollouts.evaluate. Exit code: 0 if all was"
-    " played, 1 if not, 2 for bad usage, 130 if interrupted."
-)
 
+def evaluate(
+    *,
+    task: str,
+    episodes: Count = 100,
+    players: Players,
+    seed: Seed = 0,
+    receipt: Annotated[Path, Word("JSON")] | None = None,
+    acting: Acting,
+    cell: Cell,
+) -> None:
+    """Let a policy or an expert play episodes, and print how well it does.
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
-    parser.epilog = EPILOG
-    add = parser.add_argument
-    add("--task", required=True, help="task id; MODULE:ID for one of your own")
-    add(
-        "--policy",
-        default="expert",
-        metavar="MODULE:NAME",
-        help="a policy that can be imported; by default the task's expert",
-    )
-    add(
-        "--episodes",
-        type=one_or_more,
-        default=100,
-        metavar="N",
-        help="number of episodes (%(default)s)",
-    )
-    workers.add_arguments(parser)
-    add("--seed", type=zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
-    add("--receipt", type=Path, metavar="JSON", help="write a receipt, which `verify` plays again")
-    workers.add_observed(parser)
-    workers.add_control_mode(parser)
-    add_cell_options(parser)
+    A policy maps an observation to an action; see rollouts.evaluate. Exit code: 0 if all was
+    played, 1 if not, 2 for bad usage, 130 if interrupted.
 
-
-def run(options: argparse.Namespace) -> int:
-    """Run the command; returns its exit code.
+    Args:
+        task: Task id; MODULE:ID for one of your own.
+        episodes: Number of episodes.
+        players: Who plays.
+        seed: Seeds S … S + N - 1.
+        receipt: Write a receipt, which `verify` plays again.
+        acting: Who acts, and how.
+        cell: The task's robots, and what varies.
 
     Raises:
         RobotLayoutsError: If it makes no sense, or the policy fails.
     """
-    from rollouts.evaluation import evaluate
+    from rollouts import evaluation
     from rollouts.progress import LiveLine
 
-    executor, line = workers.chosen_executor(options), LiveLine(options.episodes, "episodes")
-    try:
-        with stop_signals(), line:
-            found = evaluate(
-                options.policy,
-                options.task,
-                range(options.seed, options.seed + options.episodes),
-                executor=executor,
-                receipt=options.receipt,
-                on_event=_Status(line).show,
-                obs_mode=options.obs_mode,
-                camera_size=options.camera_size,
-                control_mode=options.control_mode,
-                **chosen_cell(options),
-            )
-    except KeyboardInterrupt:
-        print("stopped", file=sys.stderr)
-        return INTERRUPTED
+    executor, line = players.executor(), LiveLine(episodes, "episodes")
+    with stoppable(), line:
+        found = evaluation.evaluate(
+            task=task,
+            seeds=range(seed, seed + episodes),
+            executor=executor,
+            receipt=receipt,
+            on_event=_Status(line).show,
+            **vars(acting),
+            **cell.making(),
+        )
     print(found)
     if found.receipt is not None:
-        print(f"{options.receipt}: receipt {found.receipt.hash}")
-    return 0
+        print(f"{receipt}: receipt {found.receipt.hash}")
 
 
 class _Status:

@@ -5,7 +5,6 @@ Writes one file with a task to go on with and its expert, and one with their tes
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import re
@@ -21,15 +20,16 @@ import numpy as np
 from kinematics.rotations import rotate
 from layouts import Layout, face_to_face, ring, single
 from robots import RobotDescriptor, TaskError
+from robots.common.cli import Folder, by_name, main_of
 from robots.common.commands import notice, start
-from robots.common.console import main_of
 from robots.common.new_files import check_module_name, write_new
 from robots.common.paths import absolute
-from robots.named import FORMS, is_path, named_robot
+from robots.named import is_path, named_robot
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from robots.urdf.tcp import find_tcp
 from robots.urdf.tree import kinematic_tree
+from tasks.cell_options import PlacedRobot
 from tasks.registry import TASKS
 
 RADIUS = 0.03  # of a goal (m)
@@ -133,40 +133,34 @@ def test_rewards_stay_below_their_largest():
 '''
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
-    parser.add_argument("name", metavar="NAME", help="name of the task, such as TwoArmTray")
-    parser.add_argument(
-        "--robots",
-        nargs="+",
-        required=True,
-        metavar="PLACE=ROBOT",
-        help=f"robot of each place: left=panda right=arm.urdf; ROBOT: {FORMS}",
-    )
-    parser.add_argument(
-        "--out", type=Path, default=Path(), metavar="DIR", help="folder of the files (this one)"
-    )
+def new_task(
+    name: str,
+    *,
+    robots: Sequence[PlacedRobot],
+    out: Folder = Path(),
+) -> None:
+    """Write the file of a new task and its expert, and a test.
 
-
-def run(options: argparse.Namespace) -> int:
-    """Write a task's file and its test; returns 0.
+    Args:
+        name: Name of the task, such as TwoArmTray.
+        robots: Robot of each place, as in left=panda right=arm.urdf.
+        out: Folder of the files.
 
     Raises:
         RobotLayoutsError: If a word makes no sense, or a file is there already.
     """
-    module, task_id = _names(options.name)
+    module, task_id = _names(name)
     texts = {
-        f"{module}.py": task_source(task_id, _robots(options.robots), options.out),
+        f"{module}.py": task_source(task_id, _robots(robots), out),
         f"test_{module}.py": _TEST.format(module=module, task_id=task_id),
     }
-    for path in write_new(options.out, texts):
+    for path in write_new(out, texts):
         print(path)
     notice(
-        f"Try it: python -m pytest {options.out / f'test_{module}.py'}\n"
-        f"In {options.out.absolute()}: robot-layouts record --task {module}:{task_id}"
+        f"Try it: python -m pytest {out / f'test_{module}.py'}\n"
+        f"In {out.absolute()}: robot-layouts record --task {module}:{task_id}"
         " --episodes 10 --out data"
     )
-    return 0
 
 
 def task_source(task_id: str, robots: Mapping[str, str], folder: Path) -> str:
@@ -259,14 +253,9 @@ def _written(robot: str, folder: Path) -> str:
 
 
 def _robots(words: Sequence[str]) -> dict[str, str]:
-    robots: dict[str, str] = {}
-    for word in words:
-        place, equals, robot = word.partition("=")
-        if not (place.isidentifier() and equals and robot):
-            raise TaskError(f"{word!r} should be PLACE=ROBOT, for example left=panda")
-        if place in robots:
-            raise TaskError(f"the place {place!r} is given twice")
-        robots[place] = robot
+    robots = by_name(words, "PLACE=ROBOT", "left=panda", TaskError, "the place")
+    if wrong := [place for place in robots if not place.isidentifier()]:
+        raise TaskError(f"the place {wrong[0]!r} should be a name as in Python, such as left")
     return robots
 
 
@@ -297,7 +286,7 @@ def _names(name: str) -> tuple[str, str]:
     return module, task_id
 
 
-main = main_of("new task")
+main = main_of(new_task, "new task")
 
 if __name__ == "__main__":
     start(main)

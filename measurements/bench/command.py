@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robots import MissingPackageError
-from rollouts.playing.command_options import INTERRUPTED, one_or_more, stop_signals, zero_or_more
-from tasks.cell_options import add_cell_options, chosen_cell
+from robots.common.cli import at_least
+from rollouts.playing.command_options import INTERRUPTED, stop_signals
+from tasks.cell_options import Cell
+from tasks.language.needs import ACT, HOLD
 
 if TYPE_CHECKING:
     from measurements.bench.report import Report
@@ -30,13 +32,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--only", nargs="+", metavar="NAME", help="these benchmarks; all if left out")
     add("--out", type=Path, metavar="DIR", help="write bench.json, bench.md and bench.png there")
     add("--task", nargs="+", metavar="TASK", help="task ids; what takes one takes the first")
-    add("--rounds", type=one_or_more, metavar="N", help="samples of each measurement (12)")
+    add("--rounds", type=at_least(1), metavar="N", help="samples of each measurement (12)")
     add(
         "--processor-time",
         action="store_true",
         help="measure processor time, on a machine that does other things as well",
     )
-    add_cell_options(parser, robots=False)
+    add("--layout", metavar="FILE", help="stand the robots as in this layout (.yaml)")
+    words = "what robots without a place in the task do (without this, they are refused)"
+    add("--bystanders", choices=(HOLD, ACT), help=words)
+    add("--randomization", metavar="FILE", help="a tasks.Randomization in YAML or json")
     add(
         "--robots",
         type=_number_or_robot,
@@ -50,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("cubes", "0 8 16 32 64", "numbers of cubes that touch"),
     ):
         help_text = f"{about} ({values})"
-        add(f"--{name}", type=zero_or_more, nargs="+", metavar="N", help=help_text)
+        add(f"--{name}", type=at_least(0), nargs="+", metavar="N", help=help_text)
     add("--kinds", nargs="+", metavar="ROBOT", help="robots, in turn (panda so100 panda_stick)")
 
 
@@ -105,7 +110,7 @@ def run_benchmarks(
 
 
 def _number_or_robot(text: str) -> int | str:
-    return text if "=" in text else zero_or_more(text)
+    return text if "=" in text else at_least(0)(text)
 
 
 def settings_of(options: argparse.Namespace) -> Settings:
@@ -126,7 +131,12 @@ def settings_of(options: argparse.Namespace) -> Settings:
         RobotRegistry.load(kind)
     words = [word for word in options.robots or () if isinstance(word, str)]
     options.robots = [word for word in options.robots or () if not isinstance(word, str)]
-    making = chosen_cell(argparse.Namespace(**{**vars(options), "robots": words}))
+    making = Cell(
+        layout=options.layout,
+        robots=words,
+        bystanders=options.bystanders,
+        randomization=options.randomization,
+    ).making()
     if making and not options.task:
         raise BenchmarkError(f"--{' and --'.join(making)}: of which task? Name it with --task")
     for name, least in (("environments", 1), ("robots", 1)):

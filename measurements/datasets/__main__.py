@@ -17,11 +17,13 @@ import torch
 
 from measurements.datasets import costs, memory
 from measurements.datasets.large import FIVE, make_large
+from robots.common.cli import at_least
 from robots.common.commands import exit_code, start
 from robots.common.writing import write_whole
-from rollouts.playing.command_options import add_file_size, one_or_more, stop_signals, zero_or_more
+from rollouts.playing.command_options import megabytes, stop_signals
 from rollouts.playing.executor import ProcessExecutor
 from rollouts.progress import LiveLine
+from rollouts.reading.manifest import FILE_SIZE
 from tasks import Randomization
 
 TASK = "TwoRobotPickCube-v1"
@@ -36,26 +38,26 @@ def main(arguments: list[str] | None = None) -> int:
     bench = commands.add_parser("bench", help="record and certify; what more would take")
     bench.add_argument("--varied", action="store_true", help="in worlds that vary in five axes")
     words = "processes that play (0: this one, whose processor time is known)"
-    bench.add_argument("--workers", type=zero_or_more, default=0, metavar="W", help=words)
+    bench.add_argument("--workers", type=at_least(0), default=0, metavar="W", help=words)
     bench.set_defaults(run=_bench)
     copies = commands.add_parser("memory", help="memory and time of many copies")
     copies.set_defaults(run=_memory)
     for command, count in ((bench, 300), (copies, 100_000)):
         add = command.add_argument
         add("--task", default=TASK, help="(%(default)s)")
-        add("--episodes", type=one_or_more, default=count, metavar="N", help="(%(default)s)")
+        add("--episodes", type=at_least(1), default=count, metavar="N", help="(%(default)s)")
         add("--record", type=Path, metavar="FILE", help="add the figures to a JSON file")
         add("--folder", type=Path, metavar="DIR", help="where recordings go and stay (temporary)")
-        add_file_size(command)
+        add("--file-size", type=megabytes, default=FILE_SIZE, metavar="MB", help="(%(default)g)")
 
     large = commands.add_parser("large", help="a large data set, certified and reported")
     add = large.add_argument
     add("--tasks", nargs="+", default=LARGE, metavar="TASK", help=f"({' '.join(LARGE)})")
-    add("--episodes", type=one_or_more, default=10_000, metavar="N", help="of each (%(default)s)")
+    add("--episodes", type=at_least(1), default=10_000, metavar="N", help="of each (%(default)s)")
     words = "numbers of the layouts of each task (0 to 9)"
-    add("--layouts", nargs="+", type=zero_or_more, default=range(10), metavar="K", help=words)
-    add("--workers", type=one_or_more, default=2, metavar="W", help="(%(default)s)")
-    add("--clips", type=zero_or_more, default=4, metavar="N", help="of each layout (%(default)s)")
+    add("--layouts", nargs="+", type=at_least(0), default=range(10), metavar="K", help=words)
+    add("--workers", type=at_least(1), default=2, metavar="W", help="(%(default)s)")
+    add("--clips", type=at_least(0), default=4, metavar="N", help="of each layout (%(default)s)")
     add("--out", type=Path, required=True, metavar="DIR", help="folder of all")
     large.set_defaults(run=_large)
     options = parser.parse_args(arguments)

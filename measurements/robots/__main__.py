@@ -11,9 +11,9 @@ from measurements.robots.record import Record, SurveyError, versions_of
 from measurements.robots.sources import PACKAGES, Robot, find_robots, named_folder, package_folder
 from measurements.robots.survey import survey_into
 from measurements.robots.table import markdown
+from robot_layouts.__main__ import main_of
 from robots import MissingPackageError
 from robots.common.commands import notice, start
-from robots.common.console import main_of
 from robots.common.writing import write_whole
 
 RECORD = Path("docs/robots.json")

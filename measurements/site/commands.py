@@ -7,26 +7,20 @@ import re
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from robots.common.console import (
-    FOR_DEVELOPERS,
-    FOR_USERS,
-    NAME,
-    HelpFormatter,
-    parser_of,
-    sentence,
-)
+from robot_layouts.__main__ import PROGRAM
 
 
 def markdown() -> str:
     """Return every command of `robot-layouts`: what it does, how it is used, and its options."""
-    users = (line for name in FOR_USERS for line in _command(name, "##"))
-    developers = (line for name in FOR_DEVELOPERS for line in _command(name, "###"))
+    users = (line for name in PROGRAM.for_users for line in _command(name, "##"))
+    developers = (line for name in PROGRAM.for_developers for line in _command(name, "###"))
     return "\n".join([*users, "", "## Commands for developers of the library", *developers])
 
 
 def _command(name: str, level: str) -> Iterator[str]:
+    prog = f"{PROGRAM.name} {name}"
     yield from ("", f"{level} {name}", "")
-    yield from _parser(parser_of(name), f"{NAME} {name}", f"{level}#")
+    yield from _parser(PROGRAM.commands[name].parser(prog), prog, f"{level}#")
 
 
 def _parser(parser: argparse.ArgumentParser, heading: str, level: str) -> Iterator[str]:
@@ -34,7 +28,7 @@ def _parser(parser: argparse.ArgumentParser, heading: str, level: str) -> Iterat
     if parser.prog != heading:
         yield from ("", f"{level} {parser.prog}", "")
     if parser.description:
-        yield from (sentence(_markdown_text(parser.description)), "")
+        yield from (_sentence(_markdown_text(parser.description)), "")
     below = _Below()
     parser.description, parser.formatter_class = None, below.formatter
     yield from (parser.format_help(), "")
@@ -52,7 +46,7 @@ class _Below:
         return _Markdown(prog, self.parsers)
 
 
-class _Markdown(HelpFormatter):
+class _Markdown(argparse.HelpFormatter):
     """Writes a parser's help as Markdown: the usage in a block, then a list of definitions."""
 
     def __init__(self, prog: str, below: list[argparse.ArgumentParser]) -> None:
@@ -65,7 +59,7 @@ class _Markdown(HelpFormatter):
 
     def add_text(self, text: str | None) -> None:
         if text:
-            self._lines += [sentence(_markdown_text(text)), ""]
+            self._lines += [_sentence(_markdown_text(text)), ""]
 
     def start_section(self, heading: str | None) -> None:
         """Nothing: usage says what is an option."""
@@ -82,7 +76,7 @@ class _Markdown(HelpFormatter):
                 about = self._expand_help(action) if action.help else ""
                 self._lines += [
                     f"`{self._format_action_invocation(action)}`",
-                    f":   {sentence(_markdown_text(about))}",
+                    f":   {_sentence(_markdown_text(about))}",
                     "",
                 ]
 
@@ -93,3 +87,9 @@ class _Markdown(HelpFormatter):
 def _markdown_text(text: str) -> str:
     """Return a text of a parser without reST's double backticks, and with nothing that is HTML."""
     return re.sub(r"``(.+?)``", r"`\1`", " ".join(text.split())).replace("<", "&lt;")
+
+
+def _sentence(text: str) -> str:
+    """Return a text with a capital letter and a full stop."""
+    text = text if text[:1] in "`" else f"{text[:1].upper()}{text[1:]}"
+    return f"{text.rstrip('.')}." if text else "–"

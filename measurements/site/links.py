@@ -13,7 +13,8 @@ from urllib.parse import unquote, urlsplit
 # Of the repository. What programs write into it, such as runs/demo, is not there yet.
 FOLDERS = (
     *(".ci", "constraints", "docs", "examples", "experts", "integrations", "kinematics", "layouts"),
-    *("measurements", "motion", "parity", "robots", "rollouts", "simulation", "tasks", "tests"),
+    *("measurements", "motion", "parity", "robot_layouts", "robots", "rollouts", "simulation"),
+    *("tasks", "tests"),
 )
 LOADED = {"img": "src", "script": "src", "link": "href", "source": "src", "iframe": "src"}
 NEEDS_NOTHING_LOADED = {"canonical", "next", "prev"}  # <link rel=…> that browsers do not load

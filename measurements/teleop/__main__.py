@@ -16,9 +16,9 @@ from pathlib import Path
 
 from measurements.robots.record import versions_of
 from measurements.teleop.latency import measure
+from robots.common.cli import at_least
 from robots.common.commands import exit_code, start
 from robots.common.writing import write_whole
-from rollouts.playing.command_options import one_or_more
 from rollouts.progress import LiveLine
 from rollouts.teleop.stopwatch import MOST
 
@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add = parser.add_argument
     add("--task", default=TASK, help="task id (%(default)s)")
     words = f"how many, at most {MOST} (%(default)s)"
-    add("--drags", type=one_or_more, default=MOST, metavar="N", help=words)
+    add("--drags", type=at_least(1), default=MOST, metavar="N", help=words)
     add("--picture", type=Path, metavar="FILE", help="save the page as it looks at the end")
     add("--out", type=Path, metavar="FILE", help="write the numbers as json, too")
     options = parser.parse_args(arguments)

@@ -19,6 +19,10 @@ LOOPBACK = "127.0.0.1"  # where a server is reached from this machine alone
 _NOBODY_READS = (errno.EPIPE, errno.EIO)  # the end of a pipe, or of a terminal
 
 
+class UsageError(RobotLayoutsError, ValueError):
+    """Words of a command line that contradict each other."""
+
+
 class OutputError(RobotLayoutsError, OSError):
     """What a command prints cannot be written, to a full disk, say."""
 
@@ -29,11 +33,11 @@ def exit_code(run: Callable[[], int | None], *, failed: int = FAILED) -> int:
     Args:
         run: The command; returns its exit code, or None for 0.
         failed: The exit code after an error of this library; that of a name which is in no
-            catalogue is 2.
+            catalogue is 2, and so is that of contradicting options.
     """
     try:
         return run() or 0
-    except UnknownNameError as error:
+    except (UnknownNameError, UsageError) as error:
         print_error(error)
         return MEANINGLESS
     except RobotLayoutsError as error:
@@ -69,7 +73,11 @@ def start(main: Callable[[], int]) -> NoReturn:
     Output that nobody reads any more, or that was closed from the start, is dropped; the command
     goes on and ends with its own exit code. Ctrl-C ends it with 130.
     """
-    open_streams()
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:  # closed ones, which others inherit
+        os.set_inheritable(descriptor, True)
+    os.close(descriptor)
+    sys.stdin = sys.stdin or open(os.devnull, encoding="utf-8")  # noqa: SIM115
+    sys.stdout, sys.stderr = _stream(sys.stdout, 1), _stream(sys.stderr, 2)
     try:
         code = main()
         code = exit_code(sys.stdout.flush) or code
@@ -80,52 +88,27 @@ def start(main: Callable[[], int]) -> NoReturn:
     sys.exit(code)
 
 
-def open_streams() -> None:
-    """Make stdin, stdout and stderr streams that are there and never fail for want of a reader."""
-    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:  # closed ones, which others inherit
-        os.set_inheritable(descriptor, True)
-    os.close(descriptor)
-    sys.stdin = sys.stdin or open(os.devnull, encoding="utf-8")  # noqa: SIM115
-    sys.stdout = _stream(sys.stdout, 1, needed=True)
-    sys.stderr = _stream(sys.stderr, 2, needed=False)
-
-
-def _stream(present: TextIO | None, descriptor: int, *, needed: bool) -> TextIO:
+def _stream(present: TextIO | None, descriptor: int) -> TextIO:
     if present is None:
         return open(os.devnull, "w", encoding="utf-8")
     present.flush()
-    return _Output(
-        io.BufferedWriter(io.FileIO(descriptor, "w", closefd=False)),
-        needed=needed,
+    return io.TextIOWrapper(
+        io.BufferedWriter(_Output(descriptor, "w", closefd=False)),
         encoding=present.encoding,
         errors="backslashreplace",  # where a terminal is not UTF-8
-        line_buffering=not needed or present.isatty(),
+        line_buffering=descriptor == 2 or present.isatty(),
     )
 
 
-class _Output(io.TextIOWrapper):
+class _Output(io.FileIO):
     """Stdout or stderr; what cannot be written there is dropped from then on."""
 
-    def __init__(self, buffer: io.BufferedWriter, *, needed: bool, **options: Any) -> None:
-        super().__init__(buffer, **options)
-        self._needed = needed
-
-    def write(self, text: str, /) -> int:
+    def write(self, data: Any, /) -> int:
         try:
-            return super().write(text)
+            return super().write(data)
         except OSError as error:
-            self._drop(error)
-            return len(text)
-
-    def flush(self) -> None:
-        try:
-            super().flush()
-        except OSError as error:
-            self._drop(error)
-
-    def _drop(self, error: OSError) -> None:
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, self.fileno())
-        os.close(nowhere)
-        if self._needed and error.errno not in _NOBODY_READS:
-            raise OutputError(f"cannot write what is to be printed: {error.strerror}") from error
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self.fileno())
+            if self.fileno() == 1 and error.errno not in _NOBODY_READS:
+                words = f"cannot write what is to be printed: {error.strerror}"
+                raise OutputError(words) from error
+            return len(data)

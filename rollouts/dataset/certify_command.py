@@ -2,74 +2,63 @@
 
 from __future__ import annotations
 
-import argparse
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
+from robots import TaskError
+from robots.common.cli import Word
 from robots.common.commands import printable
-from rollouts.playing import command_options as workers
-from rollouts.playing.command_options import INTERRUPTED, stop_signals
-from rollouts.playing.replay_command import add_recording
-from tasks.cell_options import chosen_cell
+from rollouts.playing.command_options import GOES_ON, Players, Recording, stoppable
 
 if TYPE_CHECKING:
     from rollouts.dataset.certificate import Certificate
     from rollouts.playing.executor import Event
     from rollouts.progress import LiveLine
 
-EPILOG = (
-    "Compares states, rewards and flags of every step, and counts contacts between arms in every"
-    " step of physics. The same command goes on where it was stopped. With --ray, every machine"
-    " must find the recording at the same place. Exit code: 0 if everything is equal, 1 if not, 2"
-    " for bad usage, 130 if interrupted."
-)
 
+def certify(
+    recording: Recording,
+    *,
+    players: Players,
+    out: Annotated[Path, Word("JSON")] | None = None,
+) -> int:
+    """Play every episode of a recording again, and certify that every bit is the same.
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
-    parser.epilog = EPILOG
-    add_recording(parser)
-    workers.add_arguments(parser)
-    parser.add_argument(
-        "--out", type=Path, metavar="JSON", help="the certificate (certificate.json beside it)"
-    )
+    Compares states, rewards and flags of every step, and counts contacts between arms in every step
+    of physics. The same command goes on where it was stopped. With --ray, every machine must find
+    the recording at the same place. Exit code: 0 if everything is equal, 1 if not, 2 for bad usage,
+    130 if interrupted.
 
-
-def run(options: argparse.Namespace) -> int:
-    """Run the command; returns its exit code.
+    Args:
+        recording: The recording.
+        players: Who plays.
+        out: The certificate (certificate.json beside it).
 
     Raises:
         RobotLayoutsError: If it cannot be certified.
     """
-    from robots import TaskError
+    from rollouts.dataset import certify as certifying
     from rollouts.dataset.certificate import sentences
-    from rollouts.dataset.certify import certificate_path, certify
     from rollouts.playing.replay import find_official
     from rollouts.progress import LiveLine
     from tasks import get_task_class
 
-    path: Path | None = options.file
+    path = recording.file
     if path is None:
-        if options.task is None:
+        if recording.task is None:
             raise TaskError("neither a recording nor a task is given to certify")
-        path = find_official(get_task_class(options.task).task_id)
-    executor, line = workers.chosen_executor(options), LiveLine(unit="episodes")
-    status = _Status(line)
-    try:
-        with stop_signals(), line:
-            certificate = certify(
-                path,
-                executor,
-                options.out,
-                task_id=options.task,
-                cell=chosen_cell(options),
-                on_event=status.show,
-            )
-    except KeyboardInterrupt:
-        print("stopped; the same command goes on from there", file=sys.stderr)
-        return INTERRUPTED
-    print(printable(f"{options.out or certificate_path(path)}: {certificate.task_id}"))
+        path = find_official(get_task_class(recording.task).task_id)
+    executor, line = players.executor(), LiveLine(unit="episodes")
+    with stoppable(lambda: GOES_ON), line:
+        certificate = certifying.certify(
+            path,
+            executor,
+            out,
+            task_id=recording.task,
+            cell=recording.cell.making(),
+            on_event=_Status(line).show,
+        )
+    print(printable(f"{out or certifying.certificate_path(path)}: {certificate.task_id}"))
     for sentence in sentences(certificate):
         print(printable(sentence))
     return 0 if certificate.holds else 1

@@ -2,81 +2,67 @@
 
 from __future__ import annotations
 
-import argparse
-import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
+from robots import RobotDescriptor
+from robots.common.cli import Count, Word
 from robots.common.commands import printable
-from rollouts.playing import command_options as workers
-from rollouts.playing.command_options import INTERRUPTED, one_or_more, stop_signals
+from rollouts.playing.command_options import Players, Policy, stoppable
+from tasks.cell_options import PlacedRobot, chosen_robots
 
 if TYPE_CHECKING:
     from rollouts.playing.executor import Event
     from rollouts.progress import LiveLine
     from rollouts.receipts.receipt import Receipt
 
-EPILOG = (
-    "Tells the first seed and step whose states differ, and which robot files, sources, versions"
-    " and parts of the processor are not those of the receipt. Exit code: 0 if every bit and file"
-    " is the same, whatever the versions; 1 if not; 2 for bad usage, 130 if interrupted."
-)
 
+def verify(
+    receipt: Annotated[Path, Word("RECEIPT")],
+    *,
+    policy: Policy | None = None,
+    task: Annotated[str, Word("MODULE:ID")] | None = None,
+    robots: Sequence[PlacedRobot] = (),
+    num_envs: Count = 1,
+    players: Players,
+) -> int:
+    """Play the episodes of a receipt again, and compare every bit.
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
-    parser.epilog = EPILOG
-    add = parser.add_argument
-    add("receipt", type=Path, metavar="RECEIPT", help="what `evaluate --receipt` wrote")
-    add("--policy", metavar="MODULE:NAME", help="the policy, unless it is an expert")
-    add("--task", metavar="MODULE:ID", help="the task, if no installed package lists it")
-    add(
-        "--robots",
-        nargs="+",
-        metavar="PLACE=ROBOT",
-        help="which robots these were, where the receipt cannot say it",
-    )
-    add(
-        "--num-envs",
-        type=one_or_more,
-        default=1,
-        metavar="N",
-        help="episodes that play at once (1)",
-    )
-    workers.add_arguments(parser)
+    Tells the first seed and step whose states differ, and which robot files, sources, versions and
+    parts of the processor are not those of the receipt. Exit code: 0 if every bit and file is the
+    same, whatever the versions; 1 if not; 2 for bad usage, 130 if interrupted.
 
-
-def run(options: argparse.Namespace) -> int:
-    """Run the command; returns its exit code.
+    Args:
+        receipt: What `evaluate --receipt` wrote.
+        policy: The policy, unless it is an expert.
+        task: The task, if no installed package lists it.
+        robots: Which robots these were, where the receipt cannot say it.
+        num_envs: Episodes that play at once.
+        players: Who plays.
 
     Raises:
         RobotLayoutsError: If it cannot be played again.
     """
-    from robots import RobotDescriptor
     from rollouts.progress import LiveLine
+    from rollouts.receipts import verification
     from rollouts.receipts.receipt import Receipt
-    from rollouts.receipts.verification import verify
-    from tasks.cell_options import chosen_robots
 
-    receipt = Receipt.read(options.receipt)
-    robots = chosen_robots(options.robots) if options.robots else {}
-    if isinstance(robots, RobotDescriptor):
-        robots = dict.fromkeys(receipt.making["layout"], robots)
-    executor, line = workers.chosen_executor(options), LiveLine(len(receipt.episodes), "episodes")
-    try:
-        with stop_signals(), line:
-            found = verify(
-                receipt,
-                executor,
-                _Status(line, receipt).show,
-                policy=options.policy,
-                task=options.task,
-                robots=robots,
-                num_envs=options.num_envs,
-            )
-    except KeyboardInterrupt:
-        print("stopped", file=sys.stderr)
-        return INTERRUPTED
+    read = Receipt.read(receipt)
+    known = chosen_robots(robots) if robots else {}
+    if isinstance(known, RobotDescriptor):
+        known = dict.fromkeys(read.making["layout"], known)
+    executor, line = players.executor(), LiveLine(len(read.episodes), "episodes")
+    with stoppable(), line:
+        found = verification.verify(
+            read,
+            executor,
+            _Status(line, read).show,
+            policy=policy,
+            task=task,
+            robots=known,
+            num_envs=num_envs,
+        )
     print(printable(repr(found)))
     print(_VERDICT[found.equal])
     return 0 if found.equal else 1

@@ -2,107 +2,102 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from robots import RecordingError
+from robots.common.cli import Count, Folder, Seed, Word
 from robots.common.pages import plural
-from rollouts.playing import command_options as workers
-from rollouts.playing.command_options import INTERRUPTED, one_or_more, stop_signals, zero_or_more
+from rollouts.playing.command_options import (
+    Acting,
+    Players,
+    Policy,
+    megabytes,
+    stoppable,
+)
 from rollouts.playing.seeds import seed_lines
-from tasks.cell_options import add_cell_options, chosen_cell
+from rollouts.reading.manifest import FILE_SIZE
+from tasks.cell_options import Cell
 
 if TYPE_CHECKING:
     from rollouts.playing.executor import Event
     from rollouts.progress import LiveLine
     from rollouts.recording.record import Summary
 
-EPILOG = (
-    "The same command goes on where it was stopped or killed. Exit code: 0 if every episode was"
-    " recorded, 1 if not, 2 for bad usage, 130 if interrupted. A policy maps an observation to an"
-    " action; see rollouts.record. Episodes of other seeds may come from others: each says who"
-    " acted."
-)
+
+@dataclass(frozen=True, kw_only=True)
+class RecordOptions(Acting):
+    """Who acts, and what is written.
+
+    Attributes:
+        takeover: Policy that acts instead at every step for which it returns an action, not None.
+        corrector: Policy whose action is recorded at every step beside the one that is played.
+        num_envs: Episodes that each process plays at once.
+        file_size: Begin another file, trajectory_0001.h5 and so on, when one is so large.
+    """
+
+    takeover: Policy | None = None
+    corrector: Policy | None = None
+    num_envs: Count = 1
+    file_size: Annotated[float, Word("MB", megabytes)] = FILE_SIZE
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
-    parser.epilog = EPILOG
-    add = parser.add_argument
-    add("--task", required=True, help="task id; MODULE:ID for one of your own")
-    add("--episodes", type=one_or_more, required=True, metavar="N", help="number of episodes")
-    workers.add_arguments(parser)
-    add("--seed", type=zero_or_more, default=0, metavar="S", help="seeds S … S + N - 1 (0)")
-    add("--out", type=Path, required=True, metavar="DIR", help="folder of trajectory.h5 and .json")
-    add(
-        "--policy",
-        default="expert",
-        metavar="MODULE:NAME",
-        help="a policy that can be imported, asked at every step; by default the task's expert",
-    )
-    add(
-        "--takeover",
-        metavar="MODULE:NAME",
-        help="policy that acts instead at every step for which it returns an action, not None",
-    )
-    add(
-        "--corrector",
-        metavar="MODULE:NAME",
-        help="policy whose action is recorded at every step beside the one that is played",
-    )
-    workers.add_observed(parser)
-    add(
-        "--num-envs",
-        type=one_or_more,
-        default=1,
-        metavar="N",
-        help="episodes that each process plays at once (%(default)s)",
-    )
-    add_cell_options(parser)
-    workers.add_control_mode(parser)
-    workers.add_file_size(parser)
+def record(
+    *,
+    task: str,
+    episodes: Count,
+    out: Folder,
+    players: Players,
+    seed: Seed = 0,
+    options: RecordOptions,
+    cell: Cell,
+) -> int:
+    """Let an expert or a policy play episodes in worker processes, and record them.
 
+    The same command goes on where it was stopped or killed. Exit code: 0 if every episode was
+    recorded, 1 if not, 2 for bad usage, 130 if interrupted. A policy maps an observation to an
+    action; see rollouts.record. Episodes of other seeds may come from others: each says who acted.
 
-def run(options: argparse.Namespace) -> int:
-    """Run the command; returns its exit code.
+    Args:
+        task: Task id; MODULE:ID for one of your own.
+        episodes: Number of episodes.
+        out: Folder of trajectory.h5 and .json.
+        players: Who plays.
+        seed: Seeds S … S + N - 1.
+        options: Who acts, and what is written.
+        cell: The task's robots, and what varies.
 
     Raises:
         RobotLayoutsError: If it makes no sense, or cannot go on; finished episodes are kept.
     """
     from rollouts.playing.executor import WorkerError
     from rollouts.progress import LiveLine
-    from rollouts.recording.record import FILE, record
+    from rollouts.recording import record as recording
 
-    seeds = range(options.seed, options.seed + options.episodes)
-    executor, line = workers.chosen_executor(options), LiveLine(len(seeds), "episodes")
+    seeds = range(seed, seed + episodes)
+    executor, line = players.executor(), LiveLine(len(seeds), "episodes")
     status = _Status(line)
+
+    def goes_on() -> str:
+        return f"stopped; {status.kept}; the same command goes on from there"
+
     try:
-        with stop_signals(), line:
-            summary = record(
-                options.task,
+        with stoppable(goes_on), line:
+            summary = recording.record(
+                task,
                 seeds,
-                options.out,
+                out,
                 executor,
-                control_mode=options.control_mode,
-                policy=options.policy,
-                takeover=options.takeover,
-                corrector=options.corrector,
-                obs_mode=options.obs_mode,
-                camera_size=options.camera_size,
-                num_envs=options.num_envs,
-                file_size=options.file_size,
-                **chosen_cell(options),
                 on_event=status.show,
+                **vars(options),
+                **cell.making(),
             )
-    except KeyboardInterrupt:
-        print(f"stopped; {status.kept}; the same command goes on from there", file=sys.stderr)
-        return INTERRUPTED
     except (RecordingError, WorkerError):
         print(f"stopped; {status.kept}", file=sys.stderr)
         raise
-    _report(summary, options.out / FILE)
+    _report(summary, out / recording.FILE)
     return 1 if summary.failed else 0
 
 

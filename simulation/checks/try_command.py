@@ -1,11 +1,13 @@
-"""What `python -m robots.inspect ROBOT --try` prints: a robot as it was seen to stand and move."""
+"""``robot-layouts robots inspect``, whose ``--try`` prints how a robot stands and moves."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from robots import RobotDescriptor
+from robots import inspect as reports
+from robots.common.cli import Word
+from robots.named import FORMS, named_robot
 from simulation.checks.trial import HELD, Fastest, NumberTrial, Trial, in_itself, percent, try_robot
 
 if TYPE_CHECKING:
@@ -17,21 +19,29 @@ MOST_OVERLAPS = 4  # that are shown
 WIDTH = 120  # characters of a table, at least
 
 
-def run(robots: Sequence[RobotDescriptor]) -> int:
-    """Try robots and print what was seen of each.
+def inspect(
+    robots: Sequence[Annotated[str, Word("ROBOT", about=FORMS)]], *, try_: bool = False
+) -> int:
+    """Print everything about robots, or try them in physics.
 
-    Returns:
-        0 if they work, 1 if something is wrong with one.
+    Exit code: 0, or 1 if a robot that is tried does not work, or 2 for bad usage.
+
+    Args:
+        robots: The robots.
+        try_: Stand the robots, step them and move them in physics, and print what was seen.
 
     Raises:
-        RobotLayoutsError: If a robot cannot be built.
+        RobotLayoutsError: If a robot does not exist, or cannot be read or built.
     """
+    if not try_:
+        reports.inspect(robots)
+        return 0
     from rich.console import Console
 
     console = Console(markup=False, highlight=False, soft_wrap=True)
     console.width = max(console.width, WIDTH)
     trials: list[Trial] = []
-    for robot in robots:
+    for robot in [named_robot(name) for name in robots]:
         trials.append(try_robot(robot, STEPS))
         _print(trials[-1], console)
     return 1 if any(trial.problems for trial in trials) else 0

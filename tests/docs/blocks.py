@@ -102,7 +102,7 @@ def play_apart(page: Path, folder: Path) -> subprocess.CompletedProcess[str]:
     """Play a page in another process and an empty folder, where our commands are found."""
     own = folder / "bin"
     own.mkdir()
-    script = "from robots.common.console import run; run()"
+    script = "from robot_layouts.__main__ import run; run()"
     for name, words in (("python", ""), ("robot-layouts", f"-c '{script}'")):
         (own / name).write_text(f'#!/bin/sh\nexec "{sys.executable}" {words} "$@"\n')
         (own / name).chmod(0o755)

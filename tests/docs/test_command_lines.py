@@ -7,7 +7,7 @@ import runpy
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
@@ -16,15 +16,17 @@ from unittest.mock import patch
 
 import pytest
 
-from robots.common import console
+from robot_layouts.__main__ import PROGRAM
+from robots.common.cli import Call
+from robots.common.rooms import ROOMS
 from tests.docs.blocks import ROOT
 from tests.outside.lab import tomllib
 
 FENCED = re.compile(r"^( *)(```+)\{?\.?(\w*)[^\n]*\n(.*?)^\1\2$", re.MULTILINE | re.DOTALL)
 INDENTED = re.compile(r"^ {4,}\S.*$", re.MULTILINE)
 SPAN = re.compile(r"`([^`]+)`")
-PROGRAM = r"(?:\w+=\S+ +)*(?:\S*/)?(?:robot-layouts|python[\d.]*|make|pip install)\b"
-TYPED = re.compile(rf"^ *(?:\w*\$ +)?({PROGRAM}.*)$", re.MULTILINE)
+PREFIX = r"(?:\w+=\S+ +)*(?:\S*/)?(?:robot-layouts|python[\d.]*|make|pip install)\b"
+TYPED = re.compile(rf"^ *(?:\w*\$ +)?({PREFIX}.*)$", re.MULTILINE)
 SENT = re.compile(r"'([^']*robot-layouts [^']*)'")  # to another machine
 NO_COMMAND = re.compile(r" (COMMAND|ROOM|help|--version|recording 1)\b")
 ENDS = {"|", ">", "&", "&&", ";"}  # of a command, in a line of several
@@ -54,12 +56,12 @@ def named(text: str) -> Iterator[str]:
     """Yield the command lines in the text of a page; a command's mere name is none."""
     for span in SPAN.findall(FENCED.sub("", text)):
         line = " ".join(span.split())
-        if re.match(PROGRAM, line) and not _is_name(line):
+        if re.match(PREFIX, line) and not _is_name(line):
             yield line
 
 
 def _is_name(line: str) -> bool:
-    return any(f"robot-layouts {name} ".startswith(f"{line} ") for name in console.COMMANDS)
+    return any(f"robot-layouts {name} ".startswith(f"{line} ") for name in PROGRAM.commands)
 
 
 @cache
@@ -83,8 +85,8 @@ def problem(line: str) -> str:
 def _understand(line: Sequence[str]) -> None:
     program, *words = dropwhile(re.compile(r"\w+=").match, line)  # settings of its environment
     if program.endswith("robot-layouts"):
-        options = console.parse(words)
-        if begun := getattr(options, "program", None):
+        call = PROGRAM.parse(words)
+        if begun := call.arguments.get("program"):
             _understand(begun)
     elif "python" in program and words[:1] == ["-m"]:
         _of_module(words[1], words[2:])
@@ -102,16 +104,13 @@ def _understand(line: Sequence[str]) -> None:
 
 
 def _of_module(name: str, words: Sequence[str]) -> None:
-    if name.partition(".")[0] in {module.module.partition(".")[0] for module in _COMMANDS}:
+    if name.partition(".")[0] in ROOMS:
         found = find_spec(name)
         if found is None:
             raise LookupError(f"there is no module {name}")
         is_package = found.submodule_search_locations is not None
         main = import_module(f"{name}.__main__" if is_package else name).main
         parsed(lambda: main(words))
-
-
-_COMMANDS = console.COMMANDS.values()
 
 
 class UnderstoodError(Exception):
@@ -126,11 +125,15 @@ def parsed(run: Callable[[], object]) -> None:
         read(parser, *words, **options)
         raise UnderstoodError
 
+    def understood(call):
+        raise UnderstoodError
+
     with (
         patch.object(argparse.ArgumentParser, "parse_args", parse_args),
-        pytest.raises(UnderstoodError),
+        patch.object(Call, "run", understood),
+        suppress(UnderstoodError),
     ):
-        run()
+        raise SystemExit(run())
 
 
 def lines_of(*pages) -> list[str]:
@@ -206,9 +209,9 @@ make = "robot-layouts demo"
             ("robot-layouts telop", "Did you mean 'teleop'"),
             ("robot-layouts evaluate expert --task X-v1", "unrecognized arguments: expert"),
             ("A=1 robot-layouts record --task X-v1", "required: --episodes, --out"),
-            ("robot-layouts portable robot-layouts demo --sedes 1", "unrecognized arguments"),
+            ("robot-layouts portable robot-layouts demo --sedes 1", "Did you mean --seeds"),
             ("python -m rollouts demo --sedes 1", "unrecognized arguments: --sedes"),
-            ("python -m tasks lost", "invalid choice: 'lost'"),
+            ("python -m tasks lost", "Did you mean 'list'"),
             ("python -m measurements.placings", "no module measurements.placings"),
             ("make benhc", "no target benhc"),
             ('make bench ARGS="--recrod"', "unrecognized arguments: --recrod"),

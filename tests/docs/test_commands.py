@@ -7,7 +7,7 @@ import pytest
 from measurements.site.commands import _parser
 from measurements.site.hooks import COMMANDS as PLACE
 from measurements.site.hooks import on_page_markdown, on_post_page
-from robots.common.console import FOR_DEVELOPERS, FOR_USERS
+from robot_layouts.__main__ import PROGRAM
 from tests.docs.blocks import ROOT
 
 
@@ -17,10 +17,10 @@ def test_every_command_is_there():
     text = on_page_markdown(page, page=None)
     assert PLACE in page
     assert PLACE not in text
-    assert all(f"\n## {name}\n" in text for name in FOR_USERS)
+    assert all(f"\n## {name}\n" in text for name in PROGRAM.for_users)
     users, developers = text.split("\n## Commands for developers of the library\n")
-    assert all(f"\n### {name}\n" in developers for name in FOR_DEVELOPERS)
-    assert "\n### robot-layouts layouts validate\n" in users
+    assert all(f"\n### {name}\n" in developers for name in PROGRAM.for_developers)
+    assert "\n## layouts validate\n" in users
     assert "`--episodes N`\n:   Number of episodes (required).\n" in users
 
 

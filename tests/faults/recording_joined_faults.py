@@ -96,8 +96,8 @@ def _export(path: Path, format_name: str) -> None:
 
 
 def _view(path: Path) -> None:
+    from rollouts.commands import episode_cell
     from rollouts.playing.replay import open_recording
-    from rollouts.view_command import episode_cell
 
     with open_recording(path, None) as file:
         episode_cell(file, 1)

@@ -7,7 +7,7 @@ import pytest
 from layouts import face_to_face
 from motion import Motion
 from motion.__main__ import main
-from robots.common.console import main as console
+from robot_layouts.__main__ import main as console
 from tests.experts.free_motions import swing
 
 WORDS = ["plan", "face_to_face", "left=so100", "right=so100", "--spacing", "0.6"]
@@ -57,13 +57,13 @@ def test_a_motion_is_exported(file, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--goal", "left"], "--goal 'left' lacks a name; for example --goal left=0.4,0,0.3"),
+        (["--goal", "left"], "'left' should be PLACE=X,Y,Z, for example left=0.4,0,0.3"),
         (["--goal", "left=1,2"], "--goal 'left=1,2' has 2 numbers; x, y, z (m), or these and"),
         (["--goal", "left=1,2,x"], "'left=1,2,x' should be numbers with commas between them"),
         (["--goal", "lefd=0,0,0"], "'lefd'. Did you mean 'left'"),
         (["--goal", "left=0,0,0", "--goal", "left=0,0,1"], "--goal 'left' is given twice"),
         (["--goal", "left=3,0,0"], "left does not get to its goal"),
-        (["--box", "wall=1,1"], "--box 'wall' has 2 numbers; for example --box wall=0.1,1,0.5"),
+        (["--box", "wall=1,1"], "--box 'wall' has 2 numbers; it takes NAME=WIDTH,DEPTH"),
         (["--control-mode", "pd_joint_pso"], "Did you mean 'pd_joint_pos'"),
         (["--after", "none.json"], "none.json"),
     ],

@@ -19,7 +19,7 @@ PACKAGE = Path(__file__).parent / "package"
 TRAY = "mylab.tray:TwoArmTray-v1"
 SCRIPT = """\
 import shlex, sys
-from robots.common.console import main
+from robot_layouts.__main__ import main
 if __name__ == "__main__":
     for line in sys.argv[1:]:
         try:

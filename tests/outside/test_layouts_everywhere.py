@@ -9,9 +9,9 @@ import torch
 
 import tasks
 from layouts import Layout, Placement, ring
+from robot_layouts.__main__ import main
 from robots import ActionError, RobotRegistry, TaskError
 from rollouts import evaluate
-from rollouts.__main__ import main
 from rollouts.playing.replay import open_recording, replay, task_for
 from rollouts.reading.recording import Recording, TrajectoryError
 from rollouts.recording.record import record

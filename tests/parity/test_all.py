@@ -18,15 +18,23 @@ from parity.compare.task_summary import (
     summarise,
     summary_table,
 )
-from robots.common.console import parse
+from robot_layouts.__main__ import PROGRAM
 from tests.native import NATIVE
 
 TASK = "TwoRobotPickCube-v1"
 COMPARE = ("parity", "compare")
 
 
+def parse(words: list[str]):
+    return PROGRAM.parse(words).arguments["options"]
+
+
 def planned(*options: str) -> list:
-    return plan(parse([*COMPARE, "--all", "--seeds", "2", "--steps", "5", *options]))
+    return plan(
+        PROGRAM.parse([*COMPARE, "--all", "--seeds", "2", "--steps", "5", *options]).arguments[
+            "options"
+        ]
+    )
 
 
 class TestPlan:
@@ -46,7 +54,11 @@ class TestPlan:
         assert {run.history for run in planned("--reward-mode", "sparse")} == {"fresh"}
 
     def test_one_task_is_played_as_before(self):
-        runs = plan(parse([*COMPARE, "--task", TASK, "--seeds", "1", "--steps", "2"]))
+        runs = plan(
+            PROGRAM.parse([*COMPARE, "--task", TASK, "--seeds", "1", "--steps", "2"]).arguments[
+                "options"
+            ]
+        )
         assert [(run.source, run.history) for run in runs] == [("random", "fresh")]
 
 

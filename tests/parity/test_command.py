@@ -12,8 +12,8 @@ import torch
 
 import tasks
 from parity.__main__ import main
+from robot_layouts.__main__ import PROGRAM
 from robots import TaskError
-from robots.common.console import parse
 from tests.native import NATIVE, TASKS
 
 ROOT = Path(__file__).parents[2]
@@ -228,7 +228,7 @@ def test_importing_the_room_loads_no_native():
 
 
 def asked(*words):
-    return parse(["parity", "compare", *words])
+    return PROGRAM.parse(["parity", "compare", *words]).arguments["options"]
 
 
 def test_all_means_every_task(monkeypatch):

@@ -20,7 +20,7 @@ from parity.report.figures import COLUMNS, RECORDED_COLUMNS, UNKNOWN, cells, is_
 from parity.report.gaps import grouped
 from parity.show.embedding import ClipError, fit, poster, share, size
 from parity.sweep.entries import SUMMARY, blank, write_summary
-from robots.common.console import parse
+from robot_layouts.__main__ import PROGRAM
 
 DESKTOP, PHONE = (1280, 900), (390, 844)
 INJECTION = '</p><script>document.title = "taken over"</script><img src=x onerror=alert(1)>'
@@ -426,7 +426,7 @@ class TestInABrowser:
         for line in lines:
             name, *words = shlex.split(line)
             assert name == "robot-layouts"
-            parse(words)
+            PROGRAM.parse(words)
 
     def test_headline_figures(self, visit):
         page = visit().page

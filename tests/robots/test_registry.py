@@ -153,7 +153,7 @@ def test_a_robot_that_cannot_be_loaded_is_named_and_leaves_the_others_alone(
 @pytest.mark.parametrize("command", ["robots list", "robots fetch --check"])
 def test_commands_for_all_robots_name_those_that_cannot_be_loaded(other_package, command):
     done = subprocess.run(
-        [sys.executable, "-c", "from robots.common.console import run; run()", *command.split()],
+        [sys.executable, "-c", "from robot_layouts.__main__ import run; run()", *command.split()],
         env={**os.environ, "PYTHONPATH": f"{other_package}{os.pathsep}{CHECKOUT}"},
         capture_output=True,
         text=True,

@@ -7,7 +7,7 @@ import re
 import subprocess
 import sys
 import textwrap
-from argparse import ArgumentParser
+import time
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ import torch
 
 import rollouts.playing.scheduler
 from robots import TaskError
-from rollouts.playing.command_options import add_arguments, chosen_executor
+from rollouts.playing.command_options import Players
 from rollouts.playing.executor import (
     Event,
     ProcessExecutor,
@@ -355,9 +355,8 @@ def test_who_is_chosen():
 
 
 def test_commands_use_all_cores_unless_they_are_told_otherwise():
-    add_arguments(parser := ArgumentParser())
-    assert chosen_executor(parser.parse_args([])).workers == len(os.sched_getaffinity(0))
-    assert chosen_executor(parser.parse_args(["--workers", "3"])).workers == 3
+    assert Players().executor().workers == len(os.sched_getaffinity(0))
+    assert Players(workers=3).executor().workers == 3
 
 
 def test_an_executor_that_forgets_episodes():

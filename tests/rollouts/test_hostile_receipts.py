@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from robots.common import console
+from robot_layouts import __main__ as console
 from rollouts.__main__ import main
 from rollouts.receipts import ReceiptError
 from tests.rollouts.receipt_files import NAMED, again, edit, written

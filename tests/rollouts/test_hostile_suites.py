@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from layouts import single
+from robot_layouts import __main__ as console
 from robots import TaskError
-from robots.common import console
 from rollouts.suite.files import load_suite
 from rollouts.suite.folder import receipt_path
 from rollouts.suite.suite import Case, Suite

@@ -8,8 +8,8 @@ import pytest
 
 from measurements.browser import served
 from rollouts.__main__ import main
+from rollouts.commands import episode_cell
 from rollouts.reading.recording import Recording, TrajectoryError
-from rollouts.view_command import episode_cell
 from tests.pages import browser_page, changed, settled
 from tests.rollouts.recordings import LEFT_KEY, TWO_ROBOTS, edited, read, record
 

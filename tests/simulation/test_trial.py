@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from layouts import Layout, Placement
+from robot_layouts.__main__ import main
 from robots import RobotDescriptor, RobotRegistry
-from robots.inspect import main
 from simulation import Simulation
 from simulation.checks.overlaps import Causes, empty, stand, starting_overlaps
 from simulation.checks.trial import TCP_ERROR, tcp_error, try_robot
@@ -97,7 +97,7 @@ def test_the_cause_is_a_drive_where_nothing_overlaps(small):
 
 class TestCommand:
     def test_it_prints_what_it_saw(self, tmp_path, capsys):
-        assert main(["--try", "panda", str(save(tmp_path, arm()))]) == 0
+        assert main(["robots", "inspect", "--try", "panda", str(save(tmp_path, arm()))]) == 0
         printed = capsys.readouterr().out
         assert "panda: 9 joints, 8 action numbers" in printed
         assert "small: 3 joints, 3 action numbers" in printed
@@ -106,21 +106,21 @@ class TestCommand:
         assert "0.1 rad per step" in printed
 
     def test_what_is_wrong_is_its_exit_code(self, tmp_path, capsys, monkeypatch, small):
-        monkeypatch.setattr("robots.inspect.named_robot", lambda name: folded(small))
-        assert main(["--try", "folded"]) == 1
+        monkeypatch.setattr("simulation.try_command.named_robot", lambda name: folded(small))
+        assert main(["robots", "inspect", "--try", "folded"]) == 1
         printed = capsys.readouterr().out
         assert "WRONG: the likely cause: at the start l" in printed
 
     def test_a_urdf_is_reported_on_without_physics(self, tmp_path, capsys):
-        assert main([str(save(tmp_path, arm()))]) == 0
+        assert main(["robots", "inspect", str(save(tmp_path, arm()))]) == 0
         assert "j3" in capsys.readouterr().out
 
     def test_nothing_to_try_makes_no_sense(self, capsys):
         with pytest.raises(SystemExit) as ended:
-            main(["--try"])
+            main(["robots", "inspect", "--try"])
         assert ended.value.code == 2
         assert "the following arguments are required: ROBOT" in capsys.readouterr().err
 
     def test_a_file_that_is_not_there(self, tmp_path, capsys):
-        assert main([str(tmp_path / "nowhere.urdf"), "--try"]) == 1
+        assert main(["robots", "inspect", str(tmp_path / "nowhere.urdf"), "--try"]) == 1
         assert "nowhere.urdf" in capsys.readouterr().err
