@@ -11,8 +11,8 @@ from typing import Any, TypedDict
 
 from robots.assets.progress import say
 from robots.common.errors import AssetError, UnreadableFileError
-from robots.common.fields import settle
 from robots.common.files import read_json
+from robots.common.schema import check
 
 _LIMIT = 2**24  # bytes
 _ABSENT = (errno.ENOENT, errno.ENOTDIR)
@@ -93,6 +93,6 @@ class FetchRecord:
             return
         for name, entry in value.items():
             try:
-                self.files[name] = settle(entry, FetchedFile, repr(name), AssetError)
+                self.files[name] = check(entry, FetchedFile, repr(name), AssetError)
             except AssetError as error:
                 self.damage = str(error)

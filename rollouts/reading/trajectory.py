@@ -29,7 +29,7 @@ from rollouts.reading.provenance import (
     listing,
     read_described,
 )
-from rollouts.reading.summary import MAX_STEPS, OWN_EPISODE, Entry, TrajectoryError, read_summary
+from rollouts.reading.summary import MAX_STEPS, Entry, OwnEpisode, TrajectoryError, read_summary
 from tasks import MultiRobotTask
 from tasks.episode import States
 from tasks.native.controllers import CONTROLLER
@@ -264,7 +264,7 @@ class TrajectoryFile(Sequence[Trajectory]):
             texts = self._file.texts(entry.group, (*TEXTS, CHECKSUM))
             if texts is None:
                 self._refuse(entry, "the json beside it lists it, but it is not in the file")
-            own = read_described(texts, "episode", OWN_EPISODE)
+            own = read_described(texts, "episode", OwnEpisode)
         if own is not None and own["episode_seed"] != entry.episode_seed:
             self._refuse(
                 entry,

@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 
 from robots import RecordingError
 from robots.common.files import parse_json
+from robots.common.schema import FieldError
 from robots.common.writing import written_whole
 from rollouts.reading.damage import damage_errors
 from rollouts.reading.episode_checksum import CHECKSUM, checksum
 from rollouts.reading.hdf5_file import Hdf5File
-from rollouts.reading.json_fields import FieldError
 from rollouts.reading.provenance import read_described
-from rollouts.reading.summary import OWN_EPISODE
+from rollouts.reading.summary import OwnEpisode
 from rollouts.recording.disk import disk_errors
 from rollouts.recording.episode_files import Stored, read_part
 
@@ -230,7 +230,7 @@ def _read_episode(file: Hdf5File, name: str) -> Stored:
     own = attributes.pop(CHECKSUM, None)  # an earlier version wrote none
     if own not in (None, checksum(attributes, arrays)):
         raise FieldError(f"the checksum of {name} is another")
-    if read_described(attributes, "episode", OWN_EPISODE) is None:
+    if read_described(attributes, "episode", OwnEpisode) is None:
         raise FieldError(f"{name} has no attribute 'episode'")
     return Stored(attributes, arrays)
 
