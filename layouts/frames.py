@@ -48,11 +48,9 @@ class Pose:
 
     def then(self, local: Pose) -> Pose:
         """Return what is at ``local`` in this frame, in the frame that this pose is given in."""
-        x, y, z = (
-            a + b
-            for a, b in zip(self.position, rotated(self.quaternion, local.position), strict=True)
-        )
-        return Pose((x, y, z), normalised(multiplied(self.quaternion, local.quaternion)))
+        (a, b, c), (x, y, z) = self.position, rotated(self.quaternion, local.position)
+        turned = normalised(multiplied(self.quaternion, local.quaternion))
+        return Pose((a + x, b + y, c + z), turned)
 
 
 @dataclass(frozen=True)
