@@ -16,9 +16,10 @@ from motion.collisions import Checker, Contact
 from motion.obstacles import Held, Obstacle
 from motion.search import connect, import_ompl
 from motion.shorten import shortened
-from motion.spaces import Progress, Resolution, Space
+from motion.spaces import Resolution, Space
 from robots.bodies.hulls import require_packages
 from robots.common.errors import MissingPackageError, NoPlanError
+from robots.common.progress import Progress
 from tasks import MultiRobotTask
 
 CLEARANCE = 0.02  # m
@@ -324,13 +325,10 @@ class _AmongMoving(Checker):
 class _Budget(Progress):
     """Ends a search that takes too many checks, however long they take."""
 
-    def __init__(self) -> None:
-        super().__init__(np.inf)
-
     def tell(self, what: str) -> None:
         """Count a check."""
-        self.checks += 1
-        if self.checks > CHECKS:
+        self.told += 1
+        if self.told > CHECKS:
             raise NoPlanError(f"no way was found in {CHECKS} checks", "not found")
 
 

@@ -19,11 +19,11 @@ from motion.motion import Motion
 from motion.obstacles import Held, Obstacle
 from motion.pace import carried_out
 from motion.query import Query
-from motion.spaces import Progress
 from motion.timing import Accelerations, largest_accelerations, largest_velocities
 from motion.traffic import Course, Traffic, columns_of
 from robots.common.bounds import checked_number, checked_whole, shown
-from robots.common.errors import MotionError
+from robots.common.errors import MotionError, NoPlanError
+from robots.common.progress import Progress
 
 
 def plan(
@@ -106,7 +106,7 @@ def plan(
         _all(cell, velocities),
         clearance,
         seed,
-        Progress(patience),
+        _progress(patience),
     )
     result = carried_out(query, _all(cell, accelerations), synchronised=synchronised)
     times = result.knots()
@@ -122,6 +122,20 @@ def plan(
         largest_velocities=velocities,
         largest_accelerations=accelerations,
     )
+
+
+def _progress(patience: float) -> Progress:
+    """Return what counts checks, and ends a plan that takes longer than that (s)."""
+
+    def late(what: str) -> NoPlanError:
+        return NoPlanError(
+            f"no motion was found in the {patience:g} s given, after {progress.told} checks; the"
+            f" last step was {what}. Give it more time by patience=…",
+            "not found",
+        )
+
+    progress = Progress(work="planning", seconds=patience, late=late)
+    return progress
 
 
 def _robots(targets: Sequence[Target], others: Mapping[str, Motion]) -> tuple[str, ...]:

@@ -18,9 +18,10 @@ from motion.paths import Path
 from motion.priorities import coordinated
 from motion.search import connect
 from motion.shorten import rounded, shortened
-from motion.spaces import Progress, Resolution, Space
+from motion.spaces import Resolution, Space
 from motion.traffic import Traffic
 from robots.common.errors import NoPlanError
+from robots.common.progress import Progress
 
 FEW = 4  # robots that plan together at first
 RESTARTS = 4  # searches of all robots together
@@ -172,7 +173,7 @@ class Query:
     def _not_found(self, robots: Collection[str]) -> NoPlanError:
         who = ", ".join(target.place for target in self.targets if target.robot in robots)
         return NoPlanError(
-            f"no motion of {who} was found in {self.progress.checks} checks; another seed, a"
+            f"no motion of {who} was found in {self.progress.told} checks; another seed, a"
             " smaller clearance or another posture at the goal may help",
             "not found",
         )

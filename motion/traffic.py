@@ -13,8 +13,9 @@ from motion.cell import Cell
 from motion.collisions import Checker
 from motion.curves import hermite, hermite_slopes
 from motion.obstacles import Track
-from motion.spaces import Progress, Resolution
+from motion.spaces import Resolution
 from motion.timing import STEP
+from robots.common.progress import Progress
 
 LATER = 10 * STEP  # s; how much later a motion is tried next
 SPARE = 2.0  # s; how long after everything else stands still a motion may set out

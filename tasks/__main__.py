@@ -6,12 +6,12 @@ import argparse
 
 from rich.console import Console
 
-from layouts.progress import Progress
 from layouts.view_command import add_page_options, page_words, show
 from robots import RobotLayoutsError, TaskError
 from robots.common.commands import print_error, start
 from robots.common.console import add_command, main_of
 from robots.common.console import main as run_command
+from robots.common.progress import Progress
 from tasks.cell_options import add_cell_options, chosen_cell
 from tasks.description import (
     TaskFacts,
@@ -82,7 +82,7 @@ def _preview(options: argparse.Namespace) -> None:
 
     target = expect_format(options.out)
     env = make(options.task, obs_mode="none", render_mode="rgb_array", **chosen_cell(options))
-    so_far = Progress(f"preview of {env.task_id}")
+    so_far = Progress(work=f"preview of {env.task_id}")
     picture = draws(
         env,
         options.draws,

@@ -11,7 +11,6 @@ import numpy as np
 from kinematics.rotations import Floats
 from layouts.arrangement import Arrangement
 from layouts.placement import Placement
-from layouts.progress import Progress
 from layouts.validation.advice import (
     NARROW,
     to_be_reached,
@@ -51,6 +50,7 @@ from robots import (
     UnknownNameError,
 )
 from robots.bodies.hulls import RobotModel, load_model
+from robots.common.progress import Progress
 
 TABLE_DEPTH = 0.9  # m; tables are solid, from their tops down
 SHALLOW = 0.005  # m; a folded arm's hulls overlap by less where its links do not
@@ -89,7 +89,7 @@ class _Check:
     ) -> None:
         self._layout, self._targets, self._draws = layout, targets, samples
         self._tops = table_tops(layout, table)
-        self._progress = Progress("checking the layout")
+        self._progress = Progress(work="checking the layout")
         self._unread: dict[str, RobotLayoutsError] = {}
         self._models = dict(self._load())
         if self._unread and not self._models:

@@ -13,8 +13,8 @@ from motion.clearances import Keeping
 from motion.goals import Target
 from motion.obstacles import Track, box
 from motion.query import Query
-from motion.spaces import Progress
 from motion.traffic import Traffic
+from robots.common.progress import Progress
 
 PAN, LIFT = range(2)
 TABLE = (-2.0, -2.0, 2.0, 2.0)
@@ -117,5 +117,5 @@ def asked(cell, candidates, others):
         np.ones(cell.size),
         0.01,
         0,
-        Progress(30.0),
+        Progress(),
     )
