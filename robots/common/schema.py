@@ -303,8 +303,10 @@ def _words(hint: Any) -> str:
     if origin in (Union, types.UnionType):
         return " or ".join(map(_words, arguments))
     if origin in (tuple, list, Sequence):
-        many = origin is not tuple or arguments[1:] == (...,)
-        return f"a {'tuple' if many else f'tuple of {len(arguments)}'}, each {_words(arguments[0])}"
+        fixed = origin is tuple and arguments[1:] != (...,)
+        count = f" of {len(arguments)}" if fixed else ""
+        kind = "list" if origin is list else "tuple"
+        return f"a {kind}{count}, each {_words(arguments[0])}"
     if origin is dict or is_typeddict(hint):
         return "an object"
     if origin is Mapping:
