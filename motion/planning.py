@@ -21,7 +21,7 @@ from motion.pace import carried_out
 from motion.query import Query
 from motion.timing import Accelerations, largest_accelerations, largest_velocities
 from motion.traffic import Course, Traffic, columns_of
-from robots.common.bounds import checked_number, checked_whole, shown
+from robots.common.bounds import FAR, checked_number, checked_numbers, checked_whole, shown
 from robots.common.errors import MotionError, NoPlanError
 from robots.common.progress import Progress
 
@@ -197,13 +197,7 @@ def _start(cell: Cell, given: Mapping[str, ArrayLike] | ArrayLike | None) -> Flo
 
 
 def _numbers(what: str, values: Any, count: int) -> Floats:
-    try:
-        array = np.array(values, float)
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    if array.shape != (count,) or not np.isfinite(array).all():
-        raise MotionError(f"{what} is {values!r}; it takes {count} joint positions (rad, m)")
-    return array
+    return np.array(checked_numbers(what, values, count, FAR, MotionError, "rad, m"))
 
 
 def _by_robot(cell: Cell, states: Floats) -> dict[str, Floats]:
