@@ -16,9 +16,10 @@ from motion.collision.checker import Checker, Contact
 from motion.model.obstacles import Held, Obstacle
 from motion.planning.rrt_connect import connect, import_ompl
 from motion.planning.shortcuts import shortened
-from motion.planning.space import Progress, Resolution, Space
+from motion.planning.space import Resolution, Space
 from robots.bodies.hulls import require_packages
 from robots.common.errors import MissingPackageError, NoPlanError
+from robots.common.progress import Progress
 from tasks import MultiRobotTask
 
 CLEARANCE = 0.02  # m
@@ -295,13 +296,10 @@ class _AmongMoving(Checker):
 class _Budget(Progress):
     """Ends a search that takes too many checks, however long they take."""
 
-    def __init__(self) -> None:
-        super().__init__(np.inf)
-
     def tell(self, what: str) -> None:
         """Count a check."""
-        self.checks += 1
-        if self.checks > CHECKS:
+        self.told += 1
+        if self.told > CHECKS:
             raise NoPlanError(f"no way was found in {CHECKS} checks", "not found")
 
 

@@ -33,8 +33,8 @@ def inverted(quaternion: Any) -> Any:
 
 def rotated(quaternion: Any, vector: Any) -> Any:
     """Return ``vector`` turned by ``quaternion`` (wxyz, unit length)."""
-    _, x, y, z = multiplied(multiplied(quaternion, (0.0, *vector)), inverted(quaternion))
-    return (x, y, z)
+    w, x, y, z = quaternion
+    return multiplied(multiplied(quaternion, (0.0, *vector)), (w, -x, -y, -z))[1:]
 
 
 def normalised(quaternion: Quaternion) -> Quaternion:
@@ -67,13 +67,13 @@ def yaw_degrees(quaternion: Quaternion) -> float | None:
 def turn(axis: str, angle: float) -> Quaternion:
     """Return the wxyz quaternion of a turn by ``angle`` (rad) about ``"x"``, ``"y"`` or ``"z"``."""
     sine = math.sin(angle / 2)
-    x, y, z = (sine if axis == name else 0.0 for name in "xyz")
-    return (math.cos(angle / 2), x, y, z)
+    along = {"x": (sine, 0.0, 0.0), "y": (0.0, sine, 0.0), "z": (0.0, 0.0, sine)}
+    return (math.cos(angle / 2), *along[axis])
 
 
 def yaw_quaternion(yaw: float) -> Quaternion:
     """Return the wxyz quaternion of a rotation by ``yaw`` (rad) about z."""
-    return turn("z", yaw)
+    return (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
 
 
 def rpy_quaternion(rpy: Vector3) -> Quaternion:

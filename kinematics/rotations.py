@@ -76,11 +76,11 @@ def rotation_of(quaternion: ArrayLike) -> Floats:
     """Return the rotation matrices of quaternions, (…, 3, 3)."""
     w, x, y, z = _components(quaternion)
     entries = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+        *(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        *(2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        *(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
     )
-    return np.stack([_stacked(row) for row in entries], axis=-2)
+    return np.stack(entries, axis=-1).reshape(*np.shape(w), 3, 3)
 
 
 def rotation_about(axis: Sequence[float], angle: ArrayLike) -> Floats:

@@ -143,7 +143,8 @@ class Tree:
         for i in range(1, len(self.links)):
             poses[:, i] = poses[:, self.parents[i]] @ self.origins[i]
             if self.drivers[i] != FIXED:
-                poses[:, i] = poses[:, i] @ self.motion(i, self._position(i, qpos))
+                position = self.multipliers[i] * qpos[:, self.drivers[i]] + self.offsets[i]
+                poses[:, i] = poses[:, i] @ self.motion(i, position)
         return poses
 
     def motion(self, link: int, position: Floats) -> Floats:
@@ -195,6 +196,3 @@ class Tree:
     @cached_property
     def _index(self) -> dict[str, int]:
         return {link: i for i, link in enumerate(self.links)}
-
-    def _position(self, link: int, qpos: Floats) -> Floats:
-        return self.multipliers[link] * qpos[:, self.drivers[link]] + self.offsets[link]

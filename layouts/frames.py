@@ -10,7 +10,7 @@ from typing import Any
 
 from kinematics.quaternions import multiplied, normalised, rotated, rpy_quaternion
 from robots import LayoutError, UnknownNameError
-from robots.common.bounds import FAR, as_float, checked_numbers, shown
+from robots.common.bounds import FAR, as_float, checked_numbers, expect_unit, shown
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 
 ORIGIN: Vector3 = (0.0, 0.0, 0.0)
@@ -23,8 +23,6 @@ EDGES: Mapping[str, float] = {
     "south": math.pi / 2,
     "west": 0.0,
 }
-
-_UNIT_TOLERANCE = 1e-6  # rounding of a quaternion written with seven digits
 
 
 class HangingError(LayoutError):
@@ -50,11 +48,9 @@ class Pose:
 
     def then(self, local: Pose) -> Pose:
         """Return what is at ``local`` in this frame, in the frame that this pose is given in."""
-        x, y, z = (
-            a + b
-            for a, b in zip(self.position, rotated(self.quaternion, local.position), strict=True)
-        )
-        return Pose((x, y, z), normalised(multiplied(self.quaternion, local.quaternion)))
+        (a, b, c), (x, y, z) = self.position, rotated(self.quaternion, local.position)
+        turned = normalised(multiplied(self.quaternion, local.quaternion))
+        return Pose((a + x, b + y, c + z), turned)
 
 
 @dataclass(frozen=True)
@@ -223,12 +219,7 @@ def check_pose(declared: Any) -> None:
                 f"quaternion {declared.quaternion} and rpy {declared.rpy} are both given;"
                 " give one of them"
             )
-        length = math.sqrt(sum(x * x for x in declared.quaternion))
-        if abs(length - 1) > _UNIT_TOLERANCE:
-            raise LayoutError(
-                f"quaternion {declared.quaternion} has length {length:.6g}; a rotation has"
-                " length 1 (order w, x, y, z)"
-            )
+        expect_unit("quaternion", declared.quaternion, LayoutError)
     if declared.on is not None and not isinstance(declared.on, str):
         raise LayoutError(f"on is {declared.on!r}; it takes the name of a frame or robot")
 

@@ -14,6 +14,7 @@ from kinematics.quaternions import forward, yaw_degrees
 from layouts.description import action_text, decimal, facing_text, headline
 from layouts.frames import table_outlines
 from robots import LayoutError, MissingPackageError
+from robots.common.quoting import cut
 from robots.common.writing import written_whole
 
 if TYPE_CHECKING:
@@ -225,7 +226,7 @@ def _draw_robot(plan: Axes, index: int, name: str, placement: Placement, arrow: 
             zorder=3,
         )
     _draw_base(plan, x, y, index)
-    _write_name(plan, (x, y), (-ahead_x, -ahead_y), _shortened(name, LONGEST_NAME))
+    _write_name(plan, (x, y), (-ahead_x, -ahead_y), cut(name, LONGEST_NAME))
 
 
 def _draw_base(axes: Axes, x: float, y: float, index: int) -> None:
@@ -302,14 +303,10 @@ def _draw_list(listing: Axes, layout: Arrangement) -> None:
 def _cells(layout: Arrangement, name: str) -> tuple[str, ...]:
     placement = layout[name]
     return (
-        _shortened(name, LONGEST_NAME),
-        _shortened(placement.robot.name, LONGEST_ROBOT),
+        cut(name, LONGEST_NAME),
+        cut(placement.robot.name, LONGEST_ROBOT),
         action_text(layout.robot_actions[name]),
         ", ".join(decimal(x) for x in placement.base_position),
         "tilted" if yaw_degrees(placement.facing) is None else facing_text(placement),
         decimal(placement.robot.reach),
     )
-
-
-def _shortened(text: str, length: int) -> str:
-    return text if len(text) <= length else f"{text[: length - 1]}…"

@@ -30,6 +30,7 @@ from robots import (
     UnreadableFileError,
 )
 from robots.common.files import read_text
+from robots.common.yaml_text import compose
 from robots.named import FORMS, robot_in_file
 
 VERSION = 1
@@ -102,12 +103,6 @@ def read_layout(path: str | PathLike[str]) -> Arrangement:
     return from_yaml(text, str(path), Path(path).parent)
 
 
-class _Loader(yaml.SafeLoader):
-    """Takes every plain word as a string."""
-
-    yaml_implicit_resolvers: dict[str, Any] = {}
-
-
 class _Reader:
     """Reads one text, and names its lines in errors."""
 
@@ -141,24 +136,9 @@ class _Reader:
 
     def _compose(self, text: str) -> Any:
         try:
-            root = yaml.compose(text, Loader=_Loader)
-        except yaml.MarkedYAMLError as error:
-            mark = error.problem_mark or error.context_mark
-            line = "" if mark is None else f"line {mark.line + 1}: "
-            problem = ", ".join(part for part in (error.context, error.problem) if part)
-            raise LayoutError(f"{self._where()}{line}this is not YAML: {problem}") from None
-        except yaml.reader.ReaderError as error:
-            line = text.count("\n", 0, error.position) + 1
-            raise LayoutError(
-                f"{self._where()}line {line}: character {error.character!r} is not allowed in YAML"
-            ) from None
-        except RecursionError:
-            raise LayoutError(f"{self._where()}this is nested too deeply for a layout") from None
-        except (
-            ValueError,
-            OverflowError,
-        ) as error:  # a number in a directive or an escape that is none
-            raise LayoutError(f"{self._where()}this is not YAML: {error}") from None
+            root = compose(text)
+        except ValueError as error:
+            raise LayoutError(f"{self._where()}{error}") from None
         if root is None:
             raise LayoutError(f"{self._where()}this is empty; a layout has a version and robots")
         return root

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from robots.commands import COMMANDS, FRAMES, Command
 from robots.common.errors import DescriptorError, UnknownNameError, unknown_name_message
-from robots.common.fields import settle, settle_fields
+from robots.common.schema import check, check_fields
 
 
 def names(prefix: str, first: int, last: int) -> tuple[str, ...]:
@@ -94,7 +94,7 @@ class JointGroup:
 
     def __post_init__(self) -> None:
         """Refuse empty groups, repeated joints, inverted ranges and non-physical drives."""
-        settle_fields(self, DescriptorError)
+        check_fields(self, DescriptorError)
         if not self.joints:
             raise DescriptorError("a joint group needs at least one joint")
         if len(set(self.joints)) != len(self.joints):
@@ -310,7 +310,7 @@ class ActionSplit(Mapping[str, slice]):
             DescriptorError: If no group takes an action number, a joint is in two groups, or
                 something is no group.
         """
-        settle(groups, Mapping[str, JointGroup], "ActionSplit", DescriptorError)
+        check(groups, Mapping[str, JointGroup], "ActionSplit", DescriptorError)
         if not any(group.size for group in groups.values()):
             raise DescriptorError("an action split needs at least one joint group to drive")
         self._lay_out(groups)

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NoReturn, Protocol, runtime_checkable
 
 from robots.action_split import ActionNumber, ActionSplit, JointGroup, is_gripper, names
 from robots.common.errors import DescriptorError, UnknownNameError
-from robots.common.fields import settle_fields
+from robots.common.schema import check_fields
 from robots.control_modes import CONTROL_MODES, MODES, driven_in
 from robots.parts import (
     IDENTITY,
@@ -196,7 +196,7 @@ class RobotDescriptor:
     def __post_init__(self) -> None:
         """Freeze the keyframes and refuse contradictions."""
         named = isinstance(self.name, str) and self.name.isprintable()
-        settle_fields(self, DescriptorError, owner=self.name if named else None)
+        check_fields(self, DescriptorError, owner=self.name if named else None)
         expect(
             re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", self.name) is not None,
             f"robot name {self.name!r} must be a letter followed by letters, digits and _",

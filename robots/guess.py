@@ -14,7 +14,7 @@ from robots.bodies.allowed import joined_pairs, rigid_pairs
 from robots.bodies.hulls import Hull, counted_pairs, read_hulls
 from robots.bodies.overlaps import guess_allowed, overlapping
 from robots.common.errors import DescriptorError
-from robots.common.fields import settle
+from robots.common.schema import check
 from robots.descriptor import (
     ActionSplit,
     Fingers,
@@ -199,7 +199,7 @@ def _look_at(path: Path, xml: bytes, hints: Hints, overrides: Mapping[str, Any])
 def _given_tool(guessed: Tool, overrides: Mapping[str, Any]) -> Tool:
     """Return the tool centre point that is given, in place of all that was guessed of it."""
     given = {
-        field: settle(overrides[name], hint, name, DescriptorError)
+        field: check(overrides[name], hint, name, DescriptorError)
         for name, (field, hint) in TCP.items()
         if name in overrides
     }

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 from itertools import combinations, groupby
 
 from robots.action_split import ActionSplit
+from robots.common.bounds import expect_unit
 from robots.common.errors import DescriptorError
-from robots.common.fields import expect_unit, settle_fields
+from robots.common.schema import check_fields
 
 Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # wxyz
@@ -43,7 +44,7 @@ class GripperMaterial:
 
     def __post_init__(self) -> None:
         """Refuse links that are none, and numbers that no contact has."""
-        settle_fields(self, DescriptorError)
+        check_fields(self, DescriptorError)
         expect(bool(self.links), "GripperMaterial: links is empty; name the links that touch")
         expect_different("GripperMaterial: links", self.links)
         for name in ("static_friction", "dynamic_friction", "patch_radius"):
@@ -76,7 +77,7 @@ class Fingers:
 
     def __post_init__(self) -> None:
         """Refuse links that are not two, and numbers that tell no grasp."""
-        settle_fields(self, DescriptorError)
+        check_fields(self, DescriptorError)
         expect_different("Fingers: links", self.links)
         expect(
             set(self.opening_signs) <= {1, -1},
@@ -109,7 +110,7 @@ class NativeAgent:
 
     def __post_init__(self) -> None:
         """Refuse repeated names and a negative speed."""
-        settle_fields(self, DescriptorError)
+        check_fields(self, DescriptorError)
         expect_different("NativeAgent: tcp_links", self.tcp_links)
         expect_different("NativeAgent: base_joints", self.base_joints)
         expect(
@@ -146,9 +147,9 @@ class CameraMount:
 
     def __post_init__(self) -> None:
         """Refuse what no camera can be."""
-        settle_fields(self, DescriptorError)
+        check_fields(self, DescriptorError)
         camera = f"camera {self.name!r}"
-        expect_unit(camera, self.quaternion, DescriptorError)
+        expect_unit(f"{camera}: quaternion", self.quaternion, DescriptorError)
         for name, pixels in (("width", self.width), ("height", self.height)):
             expect(
                 0 < pixels <= LARGEST_IMAGE,
@@ -179,8 +180,8 @@ class Home:
 
     def __post_init__(self) -> None:
         """Refuse a pose that is none."""
-        settle_fields(self, DescriptorError)
-        expect_unit("Home", self.quaternion, DescriptorError)
+        check_fields(self, DescriptorError)
+        expect_unit("Home: quaternion", self.quaternion, DescriptorError)
 
 
 @dataclass(frozen=True)
@@ -208,7 +209,7 @@ class Limb:
 
     def __post_init__(self) -> None:
         """Refuse a reach that is none, and links that are named twice."""
-        settle_fields(self, DescriptorError)
+        check_fields(self, DescriptorError)
         expect(self.reach > 0, f"Limb: reach is {self.reach} m; it must be positive")
         expect_different("Limb: tcp_position_links", self.tcp_position_links)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from robots.common.catalogue import Catalogue
 from robots.common.errors import DescriptorError, RobotLayoutsError
-from robots.common.fields import show
+from robots.common.quoting import shown
 from robots.descriptor import RobotDescriptor
 
 # One name per robot, sorted: that of its module, and in capitals that of its descriptor.
@@ -66,7 +66,7 @@ def checked_robot(given: object, origin: str, name: str | None = None) -> RobotD
     """
     if not isinstance(given, RobotDescriptor):
         raise DescriptorError(
-            f"{origin} gave {show(given)}, of type {type(given).__name__};"
+            f"{origin} gave {shown(given)}, of type {type(given).__name__};"
             " a RobotDescriptor is needed"
         )
     if name is not None and given.name != name:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from math import hypot, isfinite
+from math import isfinite
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -12,15 +12,13 @@ from numpy.typing import NDArray
 
 from layouts import Layout
 from robots import SimulationError, UnknownNameError
-from robots.common.bounds import checked_choice, shown
+from robots.common.bounds import checked_choice, expect_unit, shown
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 from simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
 from simulation.scene.shapes import Shape, scaled
 
 BodyKind = Literal["dynamic", "kinematic", "static"]
 _KINDS = get_args(BodyKind)
-
-_UNIT_TOLERANCE = 0.01  # of a quaternion's length: of two digits, say
 
 
 @dataclass(frozen=True)
@@ -223,11 +221,8 @@ class World:
         if quaternion is IDENTITY:
             return [*place, *IDENTITY]
         turn = self._floats(quaternion, 4, f"quaternion of body {body!r}", "w, x, y, z")
-        if abs(hypot(*turn) - 1) > _UNIT_TOLERANCE:
-            raise SimulationError(
-                f"quaternion of body {body!r} in environment {self._number} is {shown(quaternion)},"
-                f" of length {hypot(*turn):.3g}; a rotation has length 1 (order w, x, y, z)"
-            )
+        what = f"quaternion of body {body!r} in environment {self._number}"
+        expect_unit(what, turn, SimulationError)
         return [*place, *turn]
 
     def _floats(self, values: Any, count: int, what: str, unit: str) -> list[float]:

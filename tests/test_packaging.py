@@ -55,7 +55,13 @@ class TestWheel:
         }
         sheets = {f"robots/common/{name}.css" for name in ("palette", "page")}
         suites = {f"rollouts/suite/{name}" for name in ("suite.css", "standard.yaml")}
-        assert names | sheets | suites <= {*wheel.namelist()}
+        templates = {
+            path.relative_to(ROOT).as_posix()
+            for room in ("robots", "rollouts")
+            for path in (ROOT / room).rglob("templates/*.jinja")
+        }
+        assert len(templates) >= 5
+        assert names | sheets | suites | templates <= {*wheel.namelist()}
 
     def test_carries_the_asset_manifest_unchanged(self, wheel):
         manifest = (ROOT / "assets_cache" / "manifest.json").read_bytes()

@@ -129,10 +129,8 @@ class Coarse:
 
     def _bases(self, name: str, seats: Sequence[Seat]) -> Floats:
         scene = self._scene
-        placements = [
-            scene.ground.in_world(name, scene.robots[name], scene.keyframe, seat) for seat in seats
-        ]
-        return np.array([pose_matrix(p.base_position, p.base_quaternion) for p in placements])
+        poses = [scene.ground.in_world(name, scene.robots[name], seat) for seat in seats]
+        return pose_matrix([p.position for p in poses], [p.quaternion for p in poses])
 
     def _candidates(
         self, name: str, seats: tuple[Seat, ...], bases: Floats, demands: Sequence[Demand]

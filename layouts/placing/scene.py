@@ -11,7 +11,7 @@ import numpy as np
 
 from kinematics.quaternions import inverted, rotated
 from kinematics.rotations import Floats, pose_matrix
-from layouts.frames import table_outlines
+from layouts.frames import Pose, table_outlines
 from layouts.layout import Layout
 from layouts.placement import Placement
 from layouts.placing.arms import Arm
@@ -41,13 +41,13 @@ class Stood:
     """A robot in one seat.
 
     Attributes:
-        placement: Where it stands in the world.
+        pose: Of its base in the world.
         start: The robot at its keyframe, then with joint noise.
         on_table: Whether it sinks into no table there.
         spaces: Workspace of each of its arms, by full name; only those that can be measured.
     """
 
-    placement: Placement
+    pose: Pose
     start: Postures
     on_table: bool
     spaces: dict[str, Workspace]
@@ -55,7 +55,7 @@ class Stood:
     @cached_property
     def base(self) -> Floats:
         """Pose of the base in the world, (4, 4)."""
-        return pose_matrix(self.placement.base_position, self.placement.base_quaternion)
+        return pose_matrix(self.pose.position, self.pose.quaternion)
 
 
 class Scene:
@@ -175,15 +175,15 @@ class Scene:
 
     def _stand(self, name: str, seat: Seat) -> Stood:
         robot, model = self.robots[name], self.models[name]
-        placement = self.ground.in_world(name, robot, self.keyframe, seat)
-        start = stand(name, placement, model, self._starts[name])
+        pose = self.ground.in_world(name, robot, seat)
+        start = stand(name, pose, model, self._starts[name])
         spaces = {
-            arm.name: Workspace(placement, model, arm.own)
+            arm.name: Workspace(pose, robot, model, arm.own)
             for arm in self.arms.values()
             if arm.owner == name
         }
         measured = {arm: space for arm, space in spaces.items() if space.sampled}
-        return Stood(placement, start, not self._sinks(name, start), measured)
+        return Stood(pose, start, not self._sinks(name, start), measured)
 
     def gap(self, one: str, seat: Seat, other: str, other_seat: Seat) -> float:
         """Return the least distance of two robots where they start, joint noise included (m)."""
@@ -207,7 +207,7 @@ class Scene:
     def postures(self, name: str, seat: Seat, qpos: Floats) -> list[Postures]:
         """Return a robot in some postures, (n, dof) (rad, m), each alone."""
         stood = self.stood(name, seat)
-        return [stand(name, stood.placement, self.models[name], one[None]) for one in qpos]
+        return [stand(name, stood.pose, self.models[name], one[None]) for one in qpos]
 
     def free(self, name: str, posture: Postures) -> bool:
         """Tell whether a robot touches neither itself nor a table."""

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 
@@ -17,13 +16,13 @@ from layouts.placing.feasible import Obstacle, obstacles
 from layouts.placing.scene import Scene
 from layouts.placing.sites import Around, Rectangle, ground_of
 from layouts.placing.trials import Trial, Trials
-from layouts.progress import Progress
 from layouts.validation.arguments import Targets, named_targets
 from layouts.validation.findings import length_text, reach_text
 from layouts.validation.report import Report
 from robots import LayoutError, RobotDescriptor
 from robots.common.bounds import checked_number, checked_whole
 from robots.common.errors import MissingPackageError
+from robots.common.progress import Progress
 
 BEGINNINGS = 12  # random ones of the coarse search, for each place to begin at
 MORE = 3  # times as many begin where none of the best will do
@@ -64,9 +63,16 @@ def search(
     ground = ground_of(around, within, heights, loaded, list(named.values()))
     _check_starts(loaded, keyframe)
     scene = Scene(loaded, keyframe, ground, demands)
-    clock = _Clock(patience)
-    layout = _Search(scene, named, demands, clearance, clock).run(partial, seed, tries)
+    progress = Progress(work="looking for places", seconds=patience, late=_late(patience))
+    layout = _Search(scene, named, demands, clearance, progress).run(partial, seed, tries)
     return layout if named or around is not None or within is not None else _centred(layout)
+
+
+def _late(patience: float) -> Callable[[str], LayoutError]:
+    return lambda what: LayoutError(
+        f"no layout after {patience:g} s, while looking for places: {what}; raise patience, lower"
+        " tries, or ask for less"
+    )
 
 
 def _centred(layout: Layout) -> Layout:
@@ -87,22 +93,6 @@ def _centred(layout: Layout) -> Layout:
     )
 
 
-class _Clock:
-    """Tells how far a search is, and ends one that takes too long."""
-
-    def __init__(self, patience: float) -> None:
-        self._patience, self._begun = patience, time.monotonic()
-        self.progress = Progress("looking for places")
-
-    def tell(self, what: str) -> None:
-        if time.monotonic() - self._begun > self._patience:
-            raise LayoutError(
-                f"no layout after {self._patience:g} s, while looking for places: {what}; raise"
-                " patience, lower tries, or ask for less"
-            )
-        self.progress.tell(what)
-
-
 class _Search:
     """One search, with everything loaded."""
 
@@ -112,15 +102,15 @@ class _Search:
         targets: Mapping[str, tuple[float, ...]],
         demands: Sequence[Demand],
         clearance: float,
-        clock: _Clock,
+        progress: Progress,
     ) -> None:
-        self._scene, self._targets, self._clock = scene, targets, clock
+        self._scene, self._targets, self._progress = scene, targets, progress
         self._demands, self._clearance = tuple(demands), clearance
 
     def run(self, partial: bool, seed: int, tries: int) -> Layout:
-        self._clock.tell("sampling where robots get to")
+        self._progress.tell("sampling where robots get to")
         coarse = Coarse(self._scene, self._demands, self._clearance)
-        hopeless = obstacles(self._scene, coarse.robots, self._demands, self._clock.progress)
+        hopeless = obstacles(self._scene, coarse.robots, self._demands, self._progress)
         if hopeless:
             if not partial:
                 raise LayoutError(_hopeless_text(list(hopeless.values())))
@@ -130,7 +120,7 @@ class _Search:
             coarse = Coarse(self._scene, self._demands, self._clearance)
         random = np.random.default_rng(seed)
         trials = Trials(self._scene, self._demands, self._clearance)
-        self._clock.tell("trying places on a grid")
+        self._progress.tell("trying places on a grid")
         begun = coarse.best(BEGINNINGS * tries, MORE * tries, random)
         outcomes: list[_Outcome] = []
         for first in range(0, len(begun), tries):  # more only where none of the best will do
@@ -157,7 +147,7 @@ class _Search:
             for _ in range(SWEEPS):
                 before = trial
                 for name in random.permutation(list(self._scene.robots)).tolist():
-                    self._clock.tell(f"{what}, {trials.count} places tried")
+                    self._progress.tell(f"{what}, {trials.count} places tried")
                     trial = self._stepped(trials, trial, name, length * reach, length * TURN)
                 if trial is before:
                     break
@@ -180,7 +170,7 @@ class _Search:
 
     def _outcome(self, trial: Trial) -> _Outcome:
         """Check a layout as a user would."""
-        self._clock.tell("checking what was found")
+        self._progress.tell("checking what was found")
         layout = self._scene.layout(trial.seats)
         report = layout.validate(targets=self._asked(), workspaces=False)
         return _Outcome(layout, self._in_the_way(report), self._unmet(report, trial))

@@ -74,10 +74,8 @@ class Site:
         if self.turns[1] - self.turns[0] >= 2 * math.pi:
             yaw = math.remainder(yaw, 2 * math.pi)
         yaw = min(max(yaw, self.turns[0]), self.turns[1])
-        x, y = (
-            min(max(round(value, 3), low), high) + 0.0
-            for value, low, high in zip((x, y), self.low, self.high, strict=True)
-        )
+        x = min(max(round(x, 3), self.low[0]), self.high[0]) + 0.0
+        y = min(max(round(y, 3), self.low[1]), self.high[1]) + 0.0
         return Seat(number, x, y, round(yaw, 3) + 0.0) if self.allows(x, y) else None
 
 
@@ -99,23 +97,16 @@ class Ground:
         self, name: str, robot: RobotDescriptor, keyframe: str | None, seat: Seat
     ) -> Placement:
         """Return the placement of a robot in a seat, as a layout declares it."""
-        return self._placed(name, robot, keyframe, seat, self.sites[seat.site].frame)
-
-    def in_world(
-        self, name: str, robot: RobotDescriptor, keyframe: str | None, seat: Seat
-    ) -> Placement:
-        """Return the same placement as one that hangs on nothing."""
-        hung = self._placed(name, robot, keyframe, seat, None)
-        pose = self.sites[seat.site].pose.then(hung.local_pose)
-        return Placement(robot, pose.position, pose.quaternion, keyframe)
-
-    def _placed(
-        self, name: str, robot: RobotDescriptor, keyframe: str | None, seat: Seat, on: str | None
-    ) -> Placement:
-        position = (seat.x, seat.y, self.heights[name])
+        position, on = (seat.x, seat.y, self.heights[name]), self.sites[seat.site].frame
         if robot.home.quaternion == IDENTITY:  # written as a turn, which people read more easily
             return Placement(robot, position, keyframe=keyframe, rpy=(0.0, 0.0, seat.yaw), on=on)
         return Placement(robot, position, faced(robot, yaw_quaternion(seat.yaw)), keyframe, on=on)
+
+    def in_world(self, name: str, robot: RobotDescriptor, seat: Seat) -> Pose:
+        """Return where the base of a robot in a seat is in the world."""
+        turn = faced(robot, yaw_quaternion(seat.yaw))
+        local = Pose((seat.x, seat.y, self.heights[name]), turn)
+        return self.sites[seat.site].pose.then(local)
 
 
 def ground_of(

@@ -152,7 +152,7 @@ class Trials:
             owner = scene.arms[service.arm].owner
             shares += [gap / scene.enough(owner, o) for o, gap in service.gaps.items()]
             cramped += sum(self._lacking(gap) for gap in service.gaps.values())
-        return min([1.0, *(max(share, 0.0) for share in shares)]), cramped
+        return max(min([1.0, *shares]), 0.0), cramped
 
     def _lacking(self, gap: float) -> float:
         """Return how much of the clearance asked for is missing, in shares of a dm or of it."""

@@ -11,7 +11,6 @@ import numpy as np
 from kinematics.rotations import Floats
 from layouts.arrangement import Arrangement
 from layouts.placement import Placement
-from layouts.progress import Progress
 from layouts.validation.advice import (
     NARROW,
     to_be_reached,
@@ -51,6 +50,7 @@ from robots import (
     UnknownNameError,
 )
 from robots.bodies.hulls import RobotModel, load_model
+from robots.common.progress import Progress
 
 TABLE_DEPTH = 0.9  # m; tables are solid, from their tops down
 SHALLOW = 0.005  # m; a folded arm's hulls overlap by less where its links do not
@@ -89,7 +89,7 @@ class _Check:
     ) -> None:
         self._layout, self._targets, self._draws = layout, targets, samples
         self._tops = table_tops(layout, table)
-        self._progress = Progress("checking the layout")
+        self._progress = Progress(work="checking the layout")
         self._unread: dict[str, RobotLayoutsError] = {}
         self._models = dict(self._load())
         if self._unread and not self._models:
@@ -97,7 +97,7 @@ class _Check:
         self._checked = {name: layout[name] for name in self._models}
         random = np.random.default_rng(seed)
         self._robots = {
-            name: stand(name, p, self._models[name], noisy_postures(p, samples, random))
+            name: stand(name, p.base_pose, self._models[name], noisy_postures(p, samples, random))
             for name, p in self._checked.items()
         }
         self._surfaces = {
@@ -279,7 +279,9 @@ class _Check:
         for name, robot in self._arms():
             self._progress.tell(f"workspace of {name}")
             arm = self._layout.arm(name).robot
-            spaces[name] = Workspace(self._checked[robot], self._models[robot], arm)
+            placed = self._checked[robot]
+            base, model = placed.base_pose, self._models[robot]
+            spaces[name] = Workspace(base, placed.robot, model, arm)
         return {name: space for name, space in spaces.items() if space.sampled}
 
     def _reaches(self) -> Iterator[TargetReach]:
@@ -305,7 +307,7 @@ class _Check:
     def _obstacles(self, name: str, solution: Solution) -> Iterator[str]:
         """Yield what a robot touches there, itself included, with the others at their keyframes."""
         model = self._models[name]
-        robot = stand(name, self._layout[name], model, np.array([solution.qpos]))
+        robot = stand(name, self._layout[name].base_pose, model, np.array([solution.qpos]))
         around = {**self._robots, **self._surfaces}
         for obstacle, body in around.items():
             if obstacle == name:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinematics.rotations import Floats, pose_matrix, transform
-from layouts.placement import Placement
+from layouts.frames import Pose
 from robots.bodies.depth import overlap
 from robots.bodies.hulls import Hull, RobotModel
 
@@ -93,20 +93,19 @@ class Approach:
     points: tuple[tuple[float, ...], tuple[float, ...]]
 
 
-def stand(name: str, placement: Placement, model: RobotModel, qpos: Floats) -> Postures:
+def stand(name: str, base: Pose, model: RobotModel, qpos: Floats) -> Postures:
     """Return a placed robot in some postures.
 
     Args:
         name: Its name in the layout.
-        placement: Where it stands.
+        base: Of its base in the world.
         model: Its links and hulls.
         qpos: Joint positions in the descriptor's order, (postures, dof) (rad, m).
     """
-    base = pose_matrix(placement.base_position, placement.base_quaternion)
-    links = base @ model.kinematics.forward(qpos)
-    poses = links[:, [hull.link for hull in model.hulls]]
-    names = tuple(model.link_name(i) for i in range(len(model.hulls)))
-    return _postures(name, model.hulls, names, poses)
+    links = pose_matrix(base.position, base.quaternion) @ model.kinematics.forward(qpos)
+    carriers = [hull.link for hull in model.hulls]
+    names = tuple([model.kinematics.links[link] for link in carriers])
+    return _postures(name, model.hulls, names, links[:, carriers])
 
 
 def fixed(name: str, hull: Hull, postures: int) -> Postures:
@@ -132,13 +131,13 @@ def nearest(
         best: An approach that is known already; returned if no other is nearer.
     """
     within = FAR if best is None else max(best.distance, 0.0)
-    left = _candidates(one, other, pairs, within, best)
-    while len(left.places):
-        approach = _measure(one, other, *left.places[0].tolist())
-        left = left.only(slice(1, None))
+    left, done = _candidates(one, other, pairs, within, best), 0
+    while done < len(left.places):
+        approach = _measure(one, other, *left.places[done].tolist())
+        done += 1
         if best is None or approach.distance < best.distance:
             best = approach
-            left = _those_nearer(left, one, other, best)
+            left, done = _those_nearer(left.only(slice(done, None)), one, other, best), 0
     return best
 
 
@@ -185,7 +184,7 @@ def _candidates(
     """
     a, b = _near_pairs(one, other, pairs, within)
     posture = np.arange(len(one.poses))[:, None]
-    posture, a, b = (every.ravel() for every in np.broadcast_arrays(posture, a, b))
+    posture, a, b = map(np.ravel, np.broadcast_arrays(posture, a, b))
     if best is not None and len(a):
         parted = _parted(one, other, posture, a, b, best)
         posture, a, b = posture[~parted], a[~parted], b[~parted]
@@ -194,8 +193,8 @@ def _candidates(
     bounds = _box_gaps(low, high, other_low, other_high)
     centres = np.linalg.norm(low + high - other_low - other_high, axis=-1)
     order = np.lexsort((centres, bounds))
-    found = _Candidates(bounds, np.stack([posture, a, b], axis=-1)).only(order)
-    return found.only(found.bounds <= within)
+    near = order[bounds[order] <= within]
+    return _Candidates(bounds[near], np.stack([posture, a, b], axis=-1)[near])
 
 
 def _near_pairs(
@@ -275,8 +274,9 @@ def _measure(one: Postures, other: Postures, posture: int, a: int, b: int) -> Ap
     if distance <= 0.0:
         depth, points = overlap(_corners(one, posture, a), _corners(other, posture, b))
         distance = -depth
-    near, far = (tuple(float(x) for x in point) for point in points)
-    return Approach((one.links[a], other.links[b]), posture, distance, (near, far))
+    near, far = points
+    ends = tuple(map(float, near)), tuple(map(float, far))
+    return Approach((one.links[a], other.links[b]), posture, distance, ends)
 
 
 def _corners(body: Postures, posture: int, hull: int) -> Floats:

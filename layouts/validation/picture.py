@@ -13,6 +13,7 @@ from layouts.description import decimal, headline
 from layouts.preview import COLOURS, FAINT, INK, LONGEST_NAME, SUPPORTED, TABLE, blank_figure
 from layouts.validation.findings import Clearance, Results, length_text
 from robots import LayoutError
+from robots.common.quoting import cut
 from robots.common.writing import written_whole
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ GOOD, BAD, NARROW = "#1B7837", "#B2182B", "#B35806"
 WIDTH, HEIGHT = 10.0, 8.5  # inches; 1500 × 1275 pixels
 MARGIN = 0.08  # free space around the robots, in shares of the plan's larger side
 GAP = 10  # points, between what is drawn and its name
-SHOWN_FINDINGS = 3
+SHOWN_FINDINGS, LONGEST_FINDING = 3, 125  # findings; letters of one
 
 
 def save_picture(report: Results, path: str | os.PathLike[str]) -> Path:
@@ -86,7 +87,7 @@ def _draw_robot(plan: Axes, report: Results, index: int, name: str) -> None:
     x, y, _ = report.layout[name].base_position
     plan.plot(x, y, "o", color="white", markeredgecolor=colour, markersize=8, zorder=4)
     place, behind = _behind(report, name)
-    _write(plan, place, behind, _shortened(name, LONGEST_NAME), colour, size=11, weight="bold")
+    _write(plan, place, behind, cut(name, LONGEST_NAME), colour, size=11, weight="bold")
 
 
 def _behind(report: Results, name: str) -> tuple[Floats, Floats]:
@@ -210,7 +211,7 @@ def _frame(plan: Axes, report: Results) -> None:
 def _captions(report: Results) -> list[tuple[str, str]]:
     """Return the first findings and what the marks mean, each with its colour."""
     lines = [
-        (_shortened(finding.what), BAD if finding.serious else NARROW)
+        (cut(finding.what, LONGEST_FINDING), BAD if finding.serious else NARROW)
         for finding in report.findings[:SHOWN_FINDINGS]
     ]
     hidden = len(report.findings) - len(lines)
@@ -220,10 +221,6 @@ def _captions(report: Results) -> list[tuple[str, str]]:
     marks += "; ✕: overlaps" * any(finding.links for finding in report.findings)
     marks += "; stars: targets, dotted to who reaches them" * bool(report.targets)
     return [*lines, (marks, FAINT)]
-
-
-def _shortened(text: str, length: int = 125) -> str:
-    return text if len(text) <= length else f"{text[: length - 1]}…"
 
 
 def _outline(points: Floats) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 
 from kinematics.rotations import Floats, pose_matrix
 from kinematics.solve import Goal, scattered, solve
+from layouts.frames import Pose
 from layouts.placement import Placement
 from robots import RobotDescriptor
 from robots.bodies.hulls import RobotModel
@@ -107,12 +108,16 @@ class Workspace:
     """
 
     def __init__(
-        self, placement: Placement, model: RobotModel, arm: RobotDescriptor | None = None
+        self,
+        base: Pose,
+        robot: RobotDescriptor,
+        model: RobotModel,
+        arm: RobotDescriptor | None = None,
     ) -> None:
-        """Sample the workspace of a placed robot; see `Reach`."""
-        base = pose_matrix(placement.base_position, placement.base_quaternion)
-        points, _ = sampled_poses(placement.robot, model, arm or placement.robot)
-        cells = np.floor((points @ base[:3, :3].T + base[:3, 3]) / VOXEL).astype(np.int64)
+        """Sample the workspace of a robot with its base there; see `Reach`."""
+        pose = pose_matrix(base.position, base.quaternion)
+        points, _ = sampled_poses(robot, model, arm or robot)
+        cells = np.floor((points @ pose[:3, :3].T + pose[:3, 3]) / VOXEL).astype(np.int64)
         self.cells = np.unique(cells @ np.array([1 << 40, 1 << 20, 1]))
         self.volume = len(self.cells) * VOXEL**3
         self.sampled = len(self.cells) < len(points) / 2

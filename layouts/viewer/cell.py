@@ -150,7 +150,7 @@ class Cell:
             qpos: By robot, joint positions in the descriptor's order, (dof,) (rad, m).
         """
         standing = {
-            name: stand(name, placement, self.models[name], np.array([qpos[name]]))
+            name: stand(name, placement.base_pose, self.models[name], np.array([qpos[name]]))
             for name, placement in self.layout.items()
         }
         deepest: dict[tuple[tuple[str, str], tuple[str, str]], float] = {}

@@ -6,8 +6,9 @@ import dataclasses
 import math
 from typing import Any
 
+from robots.common.bounds import UNIT_TOLERANCE
+
 MESSAGE_BYTES = 1 << 14  # of the largest that is read; a camera's takes some hundred
-_UNIT = 1e-3  # by how much a quaternion may be longer or shorter than 1
 
 
 def fits(server: Any, data: str | bytes) -> bool:
@@ -57,7 +58,7 @@ def _drags(server: Any, message: Any) -> bool:
         return True
     limits = zip(gizmo.translation_limits, message.position, strict=True)
     length = math.hypot(*message.wxyz)
-    return all(low <= x <= high for (low, high), x in limits) and abs(length - 1) < _UNIT
+    return all(low <= x <= high for (low, high), x in limits) and abs(length - 1) < UNIT_TOLERANCE
 
 
 def _decoded(data: str | bytes, kinds: tuple[type, ...]) -> Any:

@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Annotated, Any, TypedDict
 
 from robots import RobotLayoutsError
-from robots.common.fields import Within, settle, settle_fields
 from robots.common.files import parse_json
+from robots.common.schema import check, check_fields, within
 from robots.common.writing import write_whole
 
 RECORD = Path(__file__).parents[1] / "gallery.json"
 COMMAND = "python -m measurements.gallery --measure"
 
-Whole = Annotated[int, Within(0, 1e9)]
+Whole = Annotated[int, within(0, 1e9)]
 
 
 class GalleryError(RobotLayoutsError, ValueError):
@@ -49,7 +49,7 @@ class Joint:
 
     def __post_init__(self) -> None:
         """Refuse what no joint can be."""
-        settle_fields(self, GalleryError)
+        check_fields(self, GalleryError)
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Entry:
 
     def __post_init__(self) -> None:
         """Refuse what no entry can be."""
-        settle_fields(self, GalleryError)
+        check_fields(self, GalleryError)
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class ExpertRecord:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be."""
-        settle_fields(self, GalleryError)
+        check_fields(self, GalleryError)
         if len(self.steps) != self.episodes:
             raise GalleryError(f"{self.episodes} episodes have steps of {len(self.steps)}")
 
@@ -168,7 +168,7 @@ class Record:
         """
         try:
             content: Any = parse_json(path.read_text(encoding="utf-8"))
-            robots = settle(content["robots"], Mapping[str, _RobotJson], "robots", GalleryError)
+            robots = check(content["robots"], Mapping[str, _RobotJson], "robots", GalleryError)
             return cls(
                 {name: _robot(found) for name, found in robots.items()},
                 {name: _task(found) for name, found in content["tasks"].items()},

@@ -14,12 +14,17 @@ from numpy.typing import ArrayLike, NDArray
 from kinematics.rotations import Floats, pose_matrix, quaternion_of
 from robots import AssetError, LayoutError
 from robots.bodies.hulls import SIDES, Hull, convex_hull, require_packages
-from robots.common.bounds import FAR, as_float, checked_numbers, shown
+from robots.common.bounds import (
+    FAR,
+    UNIT_TOLERANCE,
+    as_float,
+    checked_numbers,
+    expect_unit,
+    shown,
+)
 from robots.descriptor import IDENTITY
 
 _STILL = np.eye(4)
-_UNIT_TOLERANCE = 1e-6  # rounding of a quaternion written with seven digits
-_TURN_TOLERANCE = 1e-5  # of what is made of such a one: squares and products of its numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,13 +300,8 @@ def mesh(
 def _pose(name: str, position: Sequence[float], quaternion: Sequence[float]) -> Floats:
     place = checked_numbers(f"the position of {name}", position, 3, FAR, LayoutError, "m")
     turn = checked_numbers(f"the quaternion of {name}", quaternion, 4, FAR, LayoutError)
-    length = float(np.linalg.norm(turn))
-    if abs(length - 1) > _UNIT_TOLERANCE:
-        raise LayoutError(
-            f"the quaternion {turn} of {name} has length {length:.6g}; a rotation has length 1"
-            " (order w, x, y, z)"
-        )
-    return pose_matrix(place, np.array(turn) / length)
+    expect_unit(f"the quaternion of {name}", turn, LayoutError)
+    return pose_matrix(place, np.array(turn) / float(np.linalg.norm(turn)))
 
 
 def _positive(what: str, value: Any) -> float:
@@ -334,7 +334,7 @@ def _checked_pose(what: str, pose: NDArray[Any]) -> None:
             f"{what} is {shown(pose.tolist())}; it takes 4 x 4 finite numbers, {FAR:g} at most"
         )
     turn = pose[:3, :3]
-    if (pose[3] != _STILL[3]).any() or np.abs(turn @ turn.T - np.eye(3)).max() > _TURN_TOLERANCE:
+    if (pose[3] != _STILL[3]).any() or np.abs(turn @ turn.T - np.eye(3)).max() > UNIT_TOLERANCE:
         raise LayoutError(
             f"{what} is {shown(pose.tolist())}; it takes a rotation matrix and a position, above"
             " the row 0, 0, 0, 1"

@@ -6,40 +6,62 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
+from typing_extensions import NotRequired, TypedDict
 
 from kinematics.rotations import Floats
 from layouts import Layout
 from motion.model.obstacles import Held, Obstacle, Track
 from motion.output.protocol import TimedMotion
 from robots import RobotLayoutsError, UnreadableFileError
-from robots.common.bounds import FAR, checked_number, shown
+from robots.common.bounds import FAR, shown
 from robots.common.errors import MotionError, unknown_name_message
 from robots.common.files import read_json
+from robots.common.schema import AnyText, check, exactly, length, within
 from robots.common.writing import write_whole
 
 FORMAT, VERSION = "robot-layouts motion", 1
 MAX_BYTES = 1 << 28
 ENDING = ".json"
 UNITS = "s, m, rad; m/s and rad/s; m/s² and rad/s²; null is no limit; poses are 4 × 4 matrices"
-KEYS = (
-    "format",
-    "version",
-    "units",
-    "layout",
-    "joints",
-    "times",
-    "positions",
-    "velocities",
-    "obstacles",
-    "held",
-    "table",
-    "clearance",
-    "largest_velocities",
-    "largest_accelerations",
-)
+_Rows = list[list[float]]
+
+
+class _Track(TypedDict):
+    times: list[float]
+    poses: list[_Rows]
+
+
+class _Obstacle(TypedDict):
+    name: AnyText
+    shapes: list[list[Annotated[list[float], length(3)]]]
+    pose: NotRequired[_Rows]
+    track: NotRequired[_Track]
+
+
+class _Held(TypedDict):
+    place: AnyText
+    obstacle: _Obstacle
+
+
+class _Motion(TypedDict):
+    format: Annotated[str, exactly(FORMAT)]
+    version: Literal[1]
+    units: AnyText
+    layout: AnyText
+    joints: dict[str, list[AnyText]]
+    times: list[float]
+    positions: dict[str, _Rows]
+    velocities: dict[str, _Rows]
+    obstacles: list[_Obstacle]
+    held: list[_Held]
+    table: Annotated[list[float], length(4)] | None
+    clearance: Annotated[float, within(0.0, FAR, "m")]
+    largest_velocities: dict[str, list[float | None]]
+    largest_accelerations: dict[str, list[float | None]]
+
 
 _T = TypeVar("_T")
 
@@ -88,35 +110,28 @@ def load_motion(path: str | PathLike[str], make: Callable[..., _T]) -> _T:
 
 
 def _fields(document: Any, folder: Path) -> dict[str, Any]:
-    _expect_document(document)
-    layout = Layout.from_yaml(_text("layout", document["layout"]), folder)
-    _expect_joints(layout, _mapping("joints", document["joints"]))
-    by_robot = ("positions", "velocities", "largest_velocities", "largest_accelerations")
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise MotionError(f"it is no motion: its format is not {FORMAT!r}")
+    for key in document:
+        if key not in _Motion.__annotations__:
+            raise MotionError(unknown_name_message("key of a motion", key, _Motion.__annotations__))
+    document = check(document, _Motion, "", MotionError)
+    layout = Layout.from_yaml(document["layout"], folder)
+    _expect_joints(layout, document["joints"])
+    rows = ("positions", "velocities", "largest_velocities", "largest_accelerations")
     table = document["table"]
     return {
         "layout": layout,
-        "times": _numbers("times", document["times"]),
-        **{name: _arrays(name, document[name], layout) for name in by_robot},
-        "obstacles": tuple(_each("obstacles", document["obstacles"], _read_obstacle)),
-        "held": tuple(_each("held", document["held"], _read_held)),
-        "table": None if table is None else tuple(_numbers("table", table, 4).tolist()),
-        "clearance": checked_number("clearance", document["clearance"], 0.0, FAR, MotionError, "m"),
+        "times": np.array(document["times"], float),
+        **{
+            name: {k: _array(f"{name} of {k}", v) for k, v in document[name].items()}
+            for name in rows
+        },
+        "obstacles": tuple(map(_read_obstacle, document["obstacles"])),
+        "held": tuple(Held(h["place"], _read_obstacle(h["obstacle"])) for h in document["held"]),
+        "table": None if table is None else tuple(map(float, table)),
+        "clearance": float(document["clearance"]),
     }
-
-
-def _expect_document(document: Any) -> None:
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise MotionError(f"it is no motion: its format is not {FORMAT!r}")
-    if document.get("version") != VERSION:
-        raise MotionError(
-            f"its version is {shown(document.get('version'))}; this library reads {VERSION}"
-        )
-    for key in document:
-        if key not in KEYS:
-            raise MotionError(unknown_name_message("key of a motion", key, KEYS))
-    missing = [key for key in KEYS if key not in document]
-    if missing:
-        raise MotionError(f"it lacks {', '.join(missing)}")
 
 
 def _expect_joints(layout: Layout, joints: Mapping[str, Any]) -> None:
@@ -149,64 +164,19 @@ def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
     return {"name": obstacle.name, "shapes": [s.tolist() for s in obstacle.shapes], **where}
 
 
-def _read_obstacle(value: Any) -> Obstacle:
-    given = _mapping("an obstacle", value)
-    shapes = [_numbers("a shape", shape) for shape in _each("shapes", given.get("shapes"), _same)]
-    if any(shape.ndim != 2 or shape.shape[1] != 3 for shape in shapes):
-        raise MotionError("a shape is a list of corners, each x, y, z")
-    if "track" in given:
-        track = _mapping("a track", given["track"])
-        rows = (_numbers(f"{key} of a track", track.get(key)) for key in ("times", "poses"))
-        return Obstacle(given.get("name", ""), tuple(shapes), Track(*rows))
-    pose = _numbers("the pose of an obstacle", given.get("pose"))
-    return Obstacle(given.get("name", ""), tuple(shapes), pose)
+def _read_obstacle(given: _Obstacle) -> Obstacle:
+    shapes = tuple(np.array(shape, float).reshape(-1, 3) for shape in given["shapes"])
+    if (track := given.get("track")) is not None:
+        poses = _array("poses of a track", track["poses"])
+        return Obstacle(given["name"], shapes, Track(np.array(track["times"], float), poses))
+    if "pose" not in given:
+        raise MotionError(f"the obstacle {given['name']!r} has neither a pose nor a track")
+    return Obstacle(given["name"], shapes, _array("the pose of an obstacle", given["pose"]))
 
 
-def _read_held(value: Any) -> Held:
-    given = _mapping("what is held", value)
-    return Held(_text("a place", given.get("place")), _read_obstacle(given.get("obstacle")))
-
-
-def _arrays(what: str, value: Any, layout: Layout) -> dict[str, Floats]:
-    given = _mapping(what, value)
-    limits = what.startswith("largest")
-    read = {name: _without_null(rows) if limits else rows for name, rows in given.items()}
-    return {name: _numbers(f"{what} of {name}", rows) for name, rows in read.items()}
-
-
-def _without_null(value: Any) -> Any:
-    return [np.inf if x is None else x for x in value] if isinstance(value, list) else value
-
-
-def _numbers(what: str, value: Any, count: int | None = None) -> Floats:
+def _array(what: str, rows: Sequence[Any]) -> Floats:
+    """Return numbers as an array; where there may be no limit, null is none."""
     try:
-        array = np.array(value)
-    except ValueError:  # rows of different lengths
-        array = np.array(None)
-    if array.dtype.kind not in "if":
-        raise MotionError(f"{what} is {shown(value)}; it must be numbers, in rows of one length")
-    if count is not None and array.shape != (count,):
-        raise MotionError(f"{what} is {shown(value)}; it must be {count} numbers")
-    return array.astype(float)
-
-
-def _mapping(what: str, value: Any) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise MotionError(f"{what} is {shown(value)}; it must be an object")
-    return value
-
-
-def _text(what: str, value: Any) -> str:
-    if not isinstance(value, str):
-        raise MotionError(f"{what} is {shown(value)}; it must be a text")
-    return value
-
-
-def _each(what: str, value: Any, read: Callable[[Any], _T]) -> Sequence[_T]:
-    if not isinstance(value, list):
-        raise MotionError(f"{what} is {shown(value)}; it must be a list")
-    return [read(item) for item in value]
-
-
-def _same(value: Any) -> Any:
-    return value
+        return np.array([np.inf if row is None else row for row in rows], float)
+    except ValueError:
+        raise MotionError(f"{what} has rows of different lengths") from None

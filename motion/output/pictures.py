@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from itertools import count
 from os import PathLike
 from pathlib import Path
-from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,8 +19,8 @@ from motion.model.bodies import Solid
 from motion.output.protocol import TimedMotion
 from motion.output.scenes import Scenes
 from robots import MissingPackageError
-from robots.common.commands import notice
 from robots.common.errors import MotionError
+from robots.common.progress import Progress
 from robots.common.writing import written_whole
 
 if TYPE_CHECKING:
@@ -41,15 +40,14 @@ SAMPLES = 81  # moments of the strips
 SMOOTH = 241  # moments of a way
 MOST_MARKS = 10  # on a way, besides its ends
 FRAMES = 20  # per second, of a moving picture
-PATIENCE = 2.0  # s without a word of how far it is
 REST = 1.0  # s, for which a moving picture shows its end
 MOVING_DOTS = 75  # per inch, of a moving picture
 
-Progress = Callable[[int, int], None]
+Drawn = Callable[[int, int], None]  # pictures that are drawn, and that of all
 
 
 def save_picture(
-    motion: TimedMotion, path: str | PathLike[str], progress: Progress | None = None
+    motion: TimedMotion, path: str | PathLike[str], progress: Drawn | None = None
 ) -> Path:
     """Save a picture, whole or not at all; see `motion.Motion.picture`.
 
@@ -57,7 +55,7 @@ def save_picture(
         motion: What to draw.
         path: Where.
         progress: Called with the number of pictures that are drawn, and that of all; by default
-            stderr says so every two seconds.
+            stderr says how far it is.
     """
     target = Path(path)
     kind = target.suffix.lower()
@@ -66,7 +64,9 @@ def save_picture(
         with written_whole(target) as unfinished:
             figure.savefig(unfinished, format=kind[1:])
     elif kind in MOVING:
-        frames = _Picture(motion, MOVING_DOTS).frames(progress or _on_stderr())
+        with Progress(unit="pictures") as line:
+            drawn = progress or (lambda done, total: line.update(done, "drawing", total))
+            frames = _Picture(motion, MOVING_DOTS).frames(drawn)
         with written_whole(target) as unfinished:
             _write_frames(frames, unfinished, kind[1:])
     else:
@@ -110,7 +110,7 @@ class _Picture:
         self._draw_bodies(self._bodies[self._motion.duration], 0.5, 3.0, edges=True)
         return self._figure
 
-    def frames(self, progress: Progress) -> list[Any]:
+    def frames(self, progress: Drawn) -> list[Any]:
         """Return the figure at many moments, as arrays (height, width, 3) of uint8."""
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -319,19 +319,6 @@ class _Picture:
         strip.set_ylabel(what, color=INK, fontsize=9)
         strip.grid(color="#DDDDDD", linewidth=0.6)
         _plain(strip)
-
-
-def _on_stderr() -> Progress:
-    """Return what says every two seconds how far a picture is."""
-    last = monotonic()
-
-    def tell(done: int, total: int) -> None:
-        nonlocal last
-        if monotonic() - last > PATIENCE:
-            last = monotonic()
-            notice(f"drawing: {done} of {total} pictures")
-
-    return tell
 
 
 def _write_frames(frames: Sequence[Any], path: Path, kind: str) -> None:

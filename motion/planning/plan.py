@@ -19,11 +19,11 @@ from motion.motion import Motion
 from motion.planning.goals import Goal, Target, read_targets
 from motion.planning.query import Query
 from motion.planning.schedule import schedule
-from motion.planning.space import Progress
 from motion.timing.trajectories import CellTrajectory, Trajectory, columns_of
 from motion.timing.velocities import Accelerations, largest_accelerations, largest_velocities
-from robots.common.bounds import checked_number, checked_whole, shown
-from robots.common.errors import MotionError
+from robots.common.bounds import FAR, checked_number, checked_numbers, checked_whole, shown
+from robots.common.errors import MotionError, NoPlanError
+from robots.common.progress import Progress
 
 
 def plan(
@@ -106,7 +106,7 @@ def plan(
         _all(cell, velocities),
         clearance,
         seed,
-        Progress(patience),
+        _progress(patience),
     )
     result = schedule(query, _all(cell, accelerations), synchronised=synchronised)
     times = result.knots()
@@ -122,6 +122,20 @@ def plan(
         largest_velocities=velocities,
         largest_accelerations=accelerations,
     )
+
+
+def _progress(patience: float) -> Progress:
+    """Return what counts checks, and ends a plan that takes longer than that (s)."""
+
+    def late(what: str) -> NoPlanError:
+        return NoPlanError(
+            f"no motion was found in the {patience:g} s given, after {progress.told} checks; the"
+            f" last step was {what}. Give it more time by patience=…",
+            "not found",
+        )
+
+    progress = Progress(work="planning", seconds=patience, late=late)
+    return progress
 
 
 def _robots(targets: Sequence[Target], others: Mapping[str, Motion]) -> tuple[str, ...]:
@@ -183,13 +197,7 @@ def _start(cell: Cell, given: Mapping[str, ArrayLike] | ArrayLike | None) -> Flo
 
 
 def _numbers(what: str, values: Any, count: int) -> Floats:
-    try:
-        array = np.array(values, float)
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    if array.shape != (count,) or not np.isfinite(array).all():
-        raise MotionError(f"{what} is {values!r}; it takes {count} joint positions (rad, m)")
-    return array
+    return np.array(checked_numbers(what, values, count, FAR, MotionError, "rad, m"))
 
 
 def _by_robot(cell: Cell, states: Floats) -> dict[str, Floats]:

@@ -118,7 +118,7 @@ class _Coordination:
         group = self._group((robot,), ALONE)
         if group is None:
             raise NoPlanError(
-                f"no motion of {robot} was found in {self.space.progress.checks} checks, even if"
+                f"no motion of {robot} was found in {self.space.progress.told} checks, even if"
                 " the other robots that move were not there",
                 "not found",
             )

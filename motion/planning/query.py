@@ -17,10 +17,11 @@ from motion.planning.infeasibility import InfeasibilityProofs
 from motion.planning.prioritized import coordinated
 from motion.planning.rrt_connect import connect
 from motion.planning.shortcuts import rounded, shortened
-from motion.planning.space import Progress, Resolution, Space
+from motion.planning.space import Resolution, Space
 from motion.timing.paths import Path
 from motion.timing.trajectories import CellTrajectory
 from robots.common.errors import NoPlanError
+from robots.common.progress import Progress
 
 FEW = 4  # robots that plan together at first
 RESTARTS = 4  # searches of all robots together
@@ -176,7 +177,7 @@ class Query:
     def _not_found(self, robots: Collection[str]) -> NoPlanError:
         who = ", ".join(target.place for target in self.targets if target.robot in robots)
         return NoPlanError(
-            f"no motion of {who} was found in {self.progress.checks} checks; another seed, a"
+            f"no motion of {who} was found in {self.progress.told} checks; another seed, a"
             " smaller clearance or another posture at the goal may help",
             "not found",
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -12,48 +11,14 @@ from numpy.typing import NDArray
 
 from kinematics.rotations import Floats
 from motion.timing.paths import Path
-from robots.common.commands import notice
-from robots.common.errors import NoPlanError
+from robots.common.progress import Progress
 
 if TYPE_CHECKING:
     from motion.collision.cell import Cell
     from motion.collision.checker import Checker
     from motion.planning.infeasibility import InfeasibilityProofs
 
-PATIENCE = 2.0  # s; longer plans tell how far they are
-
 Resolution = tuple[float, float]  # how far links travel (m) and turn (rad) between two checks
-
-
-class Progress:
-    """Counts checks, says on stderr what is being done, and ends what takes too long.
-
-    Attributes:
-        checks: How many lines and postures were checked.
-    """
-
-    def __init__(self, patience: float) -> None:
-        """Start the clock; ``patience`` is how long planning may take (s)."""
-        self.checks, self._patience = 0, patience
-        self._begun = self._last = time.monotonic()
-
-    def tell(self, what: str) -> None:
-        """Count a check, and say what it is for once it has taken a while.
-
-        Raises:
-            NoPlanError: If the time given is over.
-        """
-        self.checks += 1
-        now = time.monotonic()
-        if now - self._begun > self._patience:
-            raise NoPlanError(
-                f"no motion was found in the {self._patience:g} s given, after {self.checks}"
-                f" checks; the last step was {what}. Give it more time by patience=…",
-                "not found",
-            )
-        if now - self._last > PATIENCE:
-            self._last = now
-            notice(f"planning: {what}, {self.checks} checks")
 
 
 @dataclass(eq=False)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any
 
 from parity.show.embedding import Embedded
 from robots import MissingPackageError
-from robots.common.style import read_style, source_hash
+from robots.common.pages import data_address, read_style, source_hash
 
 
 def render(context: Mapping[str, Any], fitted: Mapping[str, Embedded]) -> str:
@@ -54,15 +53,11 @@ def _clip(task: Mapping[str, Any], clip: Embedded | None) -> dict[str, Any] | No
     return {
         "label": label,
         "caption": task["caption"],
-        "source": _data_address("video/mp4", clip.video),
-        "poster": _data_address("image/jpeg", clip.poster),
+        "source": data_address("video/mp4", clip.video),
+        "poster": data_address("image/jpeg", clip.poster),
         "width": clip.width,
         "height": clip.height,
     }
-
-
-def _data_address(kind: str, content: bytes) -> str:
-    return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
 def _policy(style: str, script: str) -> str:

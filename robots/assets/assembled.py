@@ -10,9 +10,10 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from kinematics.quaternions import quaternion_rpy
+from robots.common.bounds import expect_unit
 from robots.common.errors import DescriptorError, UnknownNameError, UnwritableFileError
-from robots.common.fields import expect_unit, settle
 from robots.common.paths import default_root
+from robots.common.schema import check
 from robots.common.writing import written_whole
 from robots.descriptor import IDENTITY, Quaternion, UrdfSource, Vector3
 from robots.urdf.model import UrdfModel
@@ -47,9 +48,9 @@ class Part:
     def __post_init__(self) -> None:
         """Refuse a pose that is none."""
         what = f"what is fixed to {self.link!r}"
-        position = settle(self.position, Vector3, f"{what}: position", DescriptorError)
-        quaternion = settle(self.quaternion, Quaternion, f"{what}: quaternion", DescriptorError)
-        expect_unit(what, quaternion, DescriptorError)
+        position = check(self.position, Vector3, f"{what}: position", DescriptorError)
+        quaternion = check(self.quaternion, Quaternion, f"{what}: quaternion", DescriptorError)
+        expect_unit(f"{what}: quaternion", quaternion, DescriptorError)
         object.__setattr__(self, "position", position)
         object.__setattr__(self, "quaternion", quaternion)
 

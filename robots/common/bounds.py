@@ -16,6 +16,13 @@ FAR = 1e6
 Float32, in which worlds are computed, tells places there apart by 6 cm.
 """
 
+UNIT_TOLERANCE = 1e-3
+"""How far the length of a quaternion may be from 1, wherever one is given.
+
+Of one that is written with three digits or more it is less: ManiSkill's own (0.7071, 0, 0, 0.7072)
+is 7e-5 away, those of single precision that turned often 1e-6. A slip of the pen is farther away.
+"""
+
 
 def checked_number(
     what: str,
@@ -104,6 +111,25 @@ def checked_flag(what: str, value: Any, error: type[RobotLayoutsError]) -> bool:
     if not _is_flag(value):
         raise error(f"{what} is {shown(value)}; it must be True or False")
     return bool(value)
+
+
+def expect_unit(what: str, quaternion: Sequence[float], error: type[RobotLayoutsError]) -> None:
+    """Refuse a quaternion that is no rotation.
+
+    Args:
+        what: What it is, in words.
+        quaternion: wxyz.
+        error: What to raise.
+
+    Raises:
+        RobotLayoutsError: ``error``, if its length is not 1.
+    """
+    length = math.hypot(*quaternion)
+    if not abs(length - 1) <= UNIT_TOLERANCE:
+        raise error(
+            f"{what} is {shown(quaternion)}, which has length {length:.6g}; a rotation has length 1"
+            " (order w, x, y, z)"
+        )
 
 
 def checked_choice(

@@ -1,14 +1,18 @@
-"""Parts of pages that are single files: the document, its head, sections, tables and figures."""
+"""Pages that are single files: templates filled in, and what all of them look like."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from html import escape
-from typing import NamedTuple
+import base64
+import hashlib
+from collections.abc import Iterable
+from functools import cache
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from robots.common.style import COMMON, read_style, source_hash
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
-STYLE = (COMMON, "page.css")
+COMMON = "robots.common"
 
 
 class Tile(NamedTuple):
@@ -27,71 +31,79 @@ class Tile(NamedTuple):
     kind: str = ""
 
 
-def document(title: str, head: str, sections: Iterable[str], *sheets: tuple[str, str]) -> str:
+def page(
+    template: str,
+    *sheets: tuple[str, str],
+    kicker: str,
+    title: str,
+    note: str,
+    tiles: Iterable[Tile],
+    **content: Any,
+) -> str:
     """Return a page, which loads nothing but the pictures and films that are in it.
 
     Args:
+        template: The package that holds it and its name in ``templates`` there, as
+            ``"rollouts.suite/report.html.jinja"``; it extends ``robots.common/page.html.jinja``.
+        sheets: Style sheets besides the common one; see `read_style`.
+        kicker: What kind of page it is.
         title: Its title.
-        head: Markup of its beginning; see `heading`.
-        sections: Markup of each of its parts; see `section`.
-        sheets: Style sheets besides the common one; see `robots.common.style.read_style`.
+        note: What it is about, in a sentence.
+        tiles: Its main numbers.
+        content: What the template shows.
     """
-    style = read_style(STYLE, *sheets)
+    style = read_style((COMMON, "page.css"), *sheets)
     policy = f"default-src 'none'; media-src data:; img-src data:; style-src {source_hash(style)}"
-    return (
-        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
-        f'<title>{escape(title)}</title>\n<link rel="icon" href="data:,">\n'
-        f"<style>{style}</style>\n</head>\n<body>\n{head}<main>\n{''.join(sections)}</main>\n"
-        "</body>\n</html>\n"
-    )
+    head = {"kicker": kicker, "title": title, "note": note, "tiles": tiles}
+    return fragment(template, style=style, policy=policy, **head, **content)
 
 
-def heading(kicker: str, title: str, note: str, tiles: Iterable[Tile]) -> str:
-    """Return the beginning of a page: what it is about, and its main numbers."""
-    shown = "".join(
-        f'<div class="tile"><dt>{escape(tile.label)}</dt>'
-        f'<dd class="value {tile.kind}">{escape(tile.value)}</dd>'
-        f'<dd class="note">{escape(tile.note)}</dd></div>'
-        for tile in tiles
-    )
-    return (
-        f'<header><p class="kicker">{escape(kicker)}</p><h1>{escape(title)}</h1>'
-        f'<p class="note">{escape(note)}</p><dl class="tiles">{shown}</dl></header>\n'
-    )
+def fragment(template: str, **content: Any) -> str:
+    """Return a template filled in, such as a chart, for another template; see `page`.
 
-
-def section(title: str, content: str) -> str:
-    """Return a part of a page, of which the content is markup."""
-    return f"<section><h2>{escape(title)}</h2>{content}</section>\n"
-
-
-def table(names: Sequence[str], rows: Iterable[Sequence[str]], *, text: int = 1) -> str:
-    """Return a table; the first ``text`` columns hold text, the others numbers.
-
-    A cell that is `Markup` is taken as it is.
+    Texts in it are escaped, and are not escaped again there.
     """
+    from jinja2.filters import do_mark_safe
 
-    def cell(tag: str, place: int, words: str) -> str:
-        kind = ' class="number"' if place >= text else ""
-        content = words if isinstance(words, Markup) else escape(words)
-        return f"<{tag}{kind}>{content}</{tag}>"
+    return do_mark_safe(_environment().get_template(template).render(content))
 
-    head = "".join(cell("th", i, name) for i, name in enumerate(names)) if any(names) else ""
-    body = "".join(
-        f"<tr>{''.join(cell('td', i, words) for i, words in enumerate(row))}</tr>" for row in rows
+
+@cache
+def _environment() -> Environment:
+    import jinja2
+
+    def source(name: str) -> str:
+        package, _, file = name.partition("/")
+        return (files(package) / "templates" / file).read_text(encoding="utf-8")
+
+    return jinja2.Environment(
+        loader=jinja2.FunctionLoader(source),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
     )
-    return (
-        f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
-        "</div>"
-    )
 
 
-class Markup(str):
-    """Text of a page that is markup already."""
+def read_style(*sheets: tuple[str, str]) -> str:
+    """Return style sheets, one after the other, after the colours that all pages share.
 
-    __slots__ = ()
+    Args:
+        sheets: Of each the package that holds the file, such as ``robots.common``, and its name.
+    """
+    places = [files(package) / name for package, name in ((COMMON, "palette.css"), *sheets)]
+    return "".join(place.read_text(encoding="utf-8") for place in places)
+
+
+def source_hash(text: str) -> str:
+    """Return what a page's content security policy calls a style or a script of its own."""
+    digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+    return f"'sha256-{digest}'"
+
+
+def data_address(kind: str, content: bytes) -> str:
+    """Return the address of a picture or film that is in the page itself."""
+    return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
 def plural(count: int, word: str) -> str:

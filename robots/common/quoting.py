@@ -23,6 +23,11 @@ def shortened(message: str) -> str:
     return f"{message[: MOST_CHARACTERS - _END - 1]}…{message[-_END:]}"
 
 
+def cut(text: str, length: int) -> str:
+    """Return the beginning of a text that is too long, for a picture or a table."""
+    return text if len(text) <= length else f"{text[: length - 1]}…"
+
+
 class _Short(Repr):
     """Representations of some 80 characters."""
 
@@ -36,7 +41,10 @@ class _Short(Repr):
 
     def repr_instance(self, x: Any, level: int) -> str:
         text = super().repr_instance(x, level)
-        return f"<{type(x).__name__}>" if type(x).__repr__ is object.__repr__ else text
+        plain = type(x).__repr__ is object.__repr__ or text.startswith(
+            f"<{type(x).__name__} instance"
+        )
+        return f"<{type(x).__name__}>" if plain else text
 
 
 _SHORT = _Short()

@@ -8,15 +8,17 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from typing_extensions import NotRequired, TypedDict
 
 from robots import RecordingError, UnreadableFileError
 from robots.common.files import read_json
 from robots.common.pages import plural
+from robots.common.schema import FieldError, Name, Object, check, exactly, length, whole
 from robots.common.writing import write_whole
 from rollouts.playing.environment import versions as installed
 from rollouts.playing.replay import Replayed
-from rollouts.reading.json_fields import FLAG, NAME, OBJECT, FieldError, Kind, fields, items, whole
 from rollouts.reading.manifest import MOST_EPISODES, spans_of
 from rollouts.reading.summary import MAX_JSON, MAX_SEED
 
@@ -25,24 +27,31 @@ FILE = "certificate.json"
 PACKAGES = ("robot-layouts", "sapien", "numpy", "torch")
 SHOWN = 100  # episodes that differ, could not be played, or in which arms touch, that are listed
 
-_COUNT = whole(0, 2**53)
-_CERTIFICATE = fields(
-    {
-        "format": Kind(repr(FORMAT), lambda v: v == FORMAT),
-        "complete": FLAG,
-        "task": NAME,
-        "versions": OBJECT,
-        "files": items(OBJECT),
-        "episodes": whole(0, MOST_EPISODES),
-        "checked": items(items(whole(0, MAX_SEED), 2)),
-        **dict.fromkeys(("equal", "steps", "successes"), _COUNT),
-        "differing": items(OBJECT),
-        "not_played": items(OBJECT),
-        "arm_contacts": fields(
-            {"episodes": _COUNT, "steps": _COUNT, "pairs": OBJECT}, {"touching": items(OBJECT)}
-        ),
-    }
-)
+_Count = Annotated[int, whole(0, 2**53)]
+_Seed = Annotated[int, whole(0, MAX_SEED)]
+
+
+class _Contacts(TypedDict):
+    episodes: _Count
+    steps: _Count
+    pairs: Object
+    touching: NotRequired[list[Object]]
+
+
+class _Certificate(TypedDict):
+    format: Annotated[str, exactly(FORMAT)]
+    complete: bool
+    task: Name
+    versions: Object
+    files: list[Object]
+    episodes: Annotated[int, whole(0, MOST_EPISODES)]
+    checked: list[Annotated[list[_Seed], length(2)]]
+    equal: _Count
+    steps: _Count
+    successes: _Count
+    differing: list[Object]
+    not_played: list[Object]
+    arm_contacts: _Contacts
 
 
 @dataclass(frozen=True)
@@ -169,7 +178,7 @@ class Certificate:
         """
         try:
             found = read_json(path, MAX_JSON)
-            _CERTIFICATE.expect(found, "")
+            check(found, _Certificate, "")
         except UnreadableFileError as error:
             raise RecordingError(str(error)) from error
         except FieldError as error:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from html import escape
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from robots.common.pages import fragment
 
 WIDTH, HEIGHT = 320, 132  # of a chart
 _BASE = HEIGHT - 18  # y of the axis
@@ -33,22 +35,23 @@ def histogram(
     edges = _edges(values)
     good, bad = (np.histogram(values[chosen], edges)[0] for chosen in (~failed, failed))
     most = int((good + bad).max())
+    counts = zip(good.tolist(), bad.tolist(), strict=True)
     bars = [
         bar
-        for i, counts in enumerate(zip(good.tolist(), bad.tolist(), strict=True))
-        for bar in _bars(i, len(edges) - 1, counts, most, (edges[i], edges[i + 1]), show)
+        for number, pair in enumerate(counts)
+        for bar in _bars(number, edges, pair, (_BASE - _TOP) / most, show)
     ]
     low, high = float(values.min()), float(values.max())
-    about = f"{label}: {len(values)} values from {show(low)} to {show(high)}"
-    ends = [("start", 0, low), ("end", WIDTH, high)] if high > low else [("start", 0, low)]
-    texts = [
-        f'<text x="{x}" y="{HEIGHT - 4}" text-anchor="{anchor}">{escape(show(value))}</text>'
-        for anchor, x, value in ends
-    ]
-    return (
-        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(about)}">'
-        f'<line x1="0" x2="{WIDTH}" y1="{_BASE}" y2="{_BASE}"/>{"".join(bars)}'
-        f'<text x="0" y="10">{most:,}</text>{"".join(texts)}</svg>'
+    ends = [("start", 0, show(low)), ("end", WIDTH, show(high))][: 2 if high > low else 1]
+    return fragment(
+        "rollouts.dataset/histogram.svg.jinja",
+        width=WIDTH,
+        height=HEIGHT,
+        base=_BASE,
+        about=f"{label}: {len(values)} values from {show(low)} to {show(high)}",
+        bars=bars,
+        most=f"{most:,}",
+        ends=ends,
     )
 
 
@@ -65,23 +68,18 @@ def _edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _bars(
-    place: int,
-    count: int,
+    number: int,
+    edges: NDArray[np.float64],
     counts: tuple[int, int],
-    most: int,
-    between: tuple[float, float],
+    scale: float,
     show: Callable[[float], str],
-) -> list[str]:
-    width, y, bars = WIDTH / count, float(_BASE), list[str]()
-    words = f"{show(between[0])} to {show(between[1])}: {counts[0]:,} succeeded"
+) -> Iterator[dict[str, Any]]:
+    """Yield the bars of one bin: that of successes, and on it that of failures."""
+    width, y = WIDTH / (len(edges) - 1), float(_BASE)
+    words = f"{show(edges[number])} to {show(edges[number + 1])}: {counts[0]:,} succeeded"
     words += f", {counts[1]:,} failed" if counts[1] else ""
-    for number, kind in zip(counts, ("good", "bad"), strict=True):
-        height = number / most * (_BASE - _TOP)
-        y -= height
-        if number:
-            bars.append(
-                f'<rect class="{kind}" x="{place * width + 0.5:.2f}" y="{y:.2f}"'
-                f' width="{max(width - 1, 0.5):.2f}" height="{height:.2f}">'
-                f"<title>{escape(words)}</title></rect>"
-            )
-    return bars
+    for count, kind in zip(counts, ("good", "bad"), strict=True):
+        y -= count * scale
+        if count:
+            bar = {"kind": kind, "words": words, "x": number * width + 0.5, "y": y}
+            yield {**bar, "width": max(width - 1, 0.5), "height": count * scale}

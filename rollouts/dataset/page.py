@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from html import escape
 from typing import Any
 
 import numpy as np
 
-from robots.common.pages import Tile, document, heading, plural, section, table
+from robots.common.pages import Tile, data_address, page, plural
 from rollouts.dataset.certificate import Certificate
 from rollouts.dataset.charts import histogram
 from rollouts.dataset.clearance import Clearances
@@ -45,21 +43,39 @@ class Report:
 
 def render(report: Report) -> str:
     """Return the page."""
-    sections = (
-        _lengths(report.contents),
-        _sources(report.contents),
-        _varied(report.contents),
-        _clearances(report),
-        _certificate(report.certificate),
-        _clips(report.clips),
-        _layout(report.layout),
-        _files(report),
-        _remarks(report.remarks),
+    contents = report.contents
+    mode = contents.control_mode
+    words = mode if isinstance(mode, str) else ", ".join(f"{a} {m}" for a, m in mode.items())
+    return page(
+        "rollouts.dataset/report.html.jinja",
+        kicker="robot-layouts, a dataset",
+        title=report.title,
+        note=f"{contents.task_id}, {words}",
+        tiles=_tiles(report),
+        lengths=_lengths(contents),
+        sources=_sources(contents),
+        varied=[_axis(name, values, contents) for name, values in contents.drawn.items()],
+        most_charts=_CHARTS,
+        clearances=_clearances(report),
+        certificate=_certificate(report.certificate),
+        clips=[
+            {
+                "poster": data_address("image/jpeg", clip.poster),
+                "video": data_address("video/mp4", clip.video),
+                "caption": f"seed {clip.seed}" + (f", {clip.words}" if clip.words else ""),
+            }
+            for clip in report.clips
+        ],
+        layout=[
+            (place, robot, *(f"{value:.3f}" for value in position))
+            for place, (robot, position) in report.layout.items()
+        ],
+        files=_files(report),
+        remarks=report.remarks,
     )
-    return document(report.title, _header(report), sections)
 
 
-def _header(report: Report) -> str:
+def _tiles(report: Report) -> list[Tile]:
     contents, c = report.contents, report.certificate
     count, solved = len(contents.steps), int(contents.success.sum())
     tiles = [
@@ -81,25 +97,20 @@ def _header(report: Report) -> str:
         least = float(report.clearances.least.min())
         note = f"in a sample of {plural(len(report.clearances.places), 'episode')}"
         tiles.append(Tile("least clearance", f"{least * 1e3:.1f} mm".replace("-", "−"), note))
-    mode = contents.control_mode
-    words = mode if isinstance(mode, str) else ", ".join(f"{a} {m}" for a, m in mode.items())
-    note = f"{contents.task_id}, {words}"
-    return heading("robot-layouts, a dataset", report.title, note, tiles)
+    return tiles
 
 
-def _lengths(contents: Contents) -> str:
+def _lengths(contents: Contents) -> dict[str, Any] | None:
     if not len(contents.steps):
-        return ""
+        return None
+    low, middle, high = (f"{value:.0f}" for value in np.percentile(contents.steps, (5, 50, 95)))
     chart = histogram(contents.steps.astype(float), ~contents.success, "control steps")
-    low, middle, high = np.percentile(contents.steps, (5, 50, 95))
-    words = f"Median {middle:.0f} steps; 5 % have at most {low:.0f}, 5 % at least {high:.0f}."
-    if not contents.success.all():
-        words += " Episodes without success are red."
-    return section("Lengths", f"<p>{words}</p><figure>{chart}</figure>")
+    failed = not contents.success.all()
+    return {"low": low, "middle": middle, "high": high, "chart": chart, "failed": failed}
 
 
-def _sources(contents: Contents) -> str:
-    rows = [
+def _sources(contents: Contents) -> list[tuple[str, ...]]:
+    return [
         (
             name,
             f"{facts.episodes:,}",
@@ -108,50 +119,26 @@ def _sources(contents: Contents) -> str:
         )
         for name, facts in sorted(contents.sources.items(), key=lambda item: -item[1].episodes)
     ]
-    return section("Who acted", table(("source", "episodes", "success", "steps, mean"), rows))
 
 
-def _varied(contents: Contents) -> str:
-    if not contents.drawn:
-        return ""
-    figures = [_axis(name, values, contents) for name, values in contents.drawn.items()]
-    left_out = len(figures) - _CHARTS
-    more = f"<p>{left_out} more are left out.</p>" if left_out > 0 else ""
-    words = "What was drawn for each episode; with its seed it comes back."
-    return section(
-        "What was varied",
-        f'<p>{words}</p><div class="grid">{"".join(figures[:_CHARTS])}</div>{more}',
-    )
-
-
-def _axis(name: str, values: np.ndarray, contents: Contents) -> str:
+def _axis(name: str, values: np.ndarray, contents: Contents) -> dict[str, Any]:
     there = np.isfinite(values)
     chart = histogram(values[there], ~contents.success[there], name)
-    lacking = int((~there).sum())
-    note = f", not in {lacking:,} episodes" if lacking else ""
-    return f"<figure>{chart}<figcaption><b>{escape(name)}</b>{note}</figcaption></figure>"
+    return {"name": name, "chart": chart, "lacking": int((~there).sum())}
 
 
-def _clearances(report: Report) -> str:
+def _clearances(report: Report) -> dict[str, str] | None:
     found = report.clearances
     if found is None:
-        return ""
+        return None
     failed = ~report.contents.success[found.places]
     chart = histogram(found.least * 1e3, failed, "least clearance, mm", lambda v: f"{v:.0f} mm")
-    words = (
-        "The least distance of links of different robots at any control step, in each of"
-        f" {plural(len(found.places), 'episode')}, evenly chosen; it is negative where the convex"
-        " hulls of their shapes overlap, as those of hands can in clones of ManiSkill's tasks."
-    )
-    return section("Clearance between robots", f"<p>{words}</p><figure>{chart}</figure>")
+    return {"episodes": plural(len(found.places), "episode"), "chart": chart}
 
 
-def _certificate(certificate: Certificate | None) -> str:
+def _certificate(certificate: Certificate | None) -> list[tuple[str, str]]:
     if certificate is None:
-        words = (
-            "There is no certificate of these files; <code>robot-layouts certify</code> makes one."
-        )
-        return section("Certificate", f"<p>{words}</p>")
+        return []
     c = certificate
     versions = ", ".join(f"{name} {version}" for name, version in c.versions.items())
     rows = [
@@ -167,41 +154,14 @@ def _certificate(certificate: Certificate | None) -> str:
         rows.append(("differs", f"seed {entry['seed']}, step {entry['step']}, {entry['array']}"))
     for entry in c.not_played[:10]:
         rows.append(("not played", f"seed {entry['seed']}: {entry['reason']}"))
-    return section("Certificate", table(("", ""), rows, text=2))
+    return rows
 
 
-def _clips(clips: Sequence[Clip]) -> str:
-    if not clips:
-        return ""
-    shown = "".join(
-        '<figure><video controls muted loop playsinline width="256" height="256"'
-        f' poster="data:image/jpeg;base64,{base64.b64encode(clip.poster).decode()}"'
-        f' src="data:video/mp4;base64,{base64.b64encode(clip.video).decode()}">'
-        f"</video><figcaption>{escape(_caption(clip))}</figcaption></figure>"
-        for clip in clips
-    )
-    return section("Clips", f'<div class="grid">{shown}</div>')
-
-
-def _caption(clip: Clip) -> str:
-    return f"seed {clip.seed}" + (f", {clip.words}" if clip.words else "")
-
-
-def _layout(layout: Mapping[str, tuple[str, Sequence[float]]]) -> str:
-    if not layout:
-        return ""
-    rows = [
-        (place, robot, *(f"{value:.3f}" for value in position))
-        for place, (robot, position) in layout.items()
-    ]
-    return section("Layout", table(("place", "robot", "x (m)", "y (m)", "z (m)"), rows, text=2))
-
-
-def _files(report: Report) -> str:
+def _files(report: Report) -> list[tuple[str, ...]]:
     sums = {
         f["file"]: f["sha256"] for f in (report.certificate.files if report.certificate else ())
     }
-    rows = [
+    return [
         (
             file.name,
             "–" if file.first is None else f"{file.first} to {file.last}",
@@ -211,10 +171,3 @@ def _files(report: Report) -> str:
         )
         for file in report.contents.files
     ]
-    names = ("file", "seeds", "episodes", "MB", "SHA-256 begins")
-    return section("Files", table(names, rows))
-
-
-def _remarks(remarks: Sequence[str]) -> str:
-    lines = "".join(f"<p>{escape(remark)}</p>" for remark in remarks)
-    return section("Left out", lines) if lines else ""

@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
+from typing import TypedDict
 
 from layouts import Layout
 from robots import (
@@ -17,16 +18,23 @@ from robots import (
     UnreadableFileError,
 )
 from robots.common.files import read_regular
+from robots.common.schema import AnyText
 from robots.mjcf.locator import is_mjcf
 from robots.urdf.cleaning.cleaning import is_template
 from robots.urdf.summary import MAX_URDF_BYTES
-from rollouts.reading import json_fields
-from rollouts.reading.json_fields import TEXT, by_name, maybe
 from rollouts.reading.summary import TrajectoryError
 
 # Fields that digests of 0.2.0 lack, with their defaults.
 NEWER_FIELDS = {"no_floor_contact": (), "native_agent": NativeAgent()}
-GUESSED = maybe(by_name(json_fields.fields({"urdf": TEXT, "sha256": TEXT, "descriptor": TEXT})))
+
+
+class _Guessed(TypedDict):
+    urdf: AnyText
+    sha256: AnyText
+    descriptor: AnyText
+
+
+GUESSED = dict[str, _Guessed] | None
 
 
 def describe_guessed(layout: Layout) -> dict[str, dict[str, str]]:

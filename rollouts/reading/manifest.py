@@ -9,23 +9,15 @@ from __future__ import annotations
 import errno
 import hashlib
 import json
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypedDict
 
 from robots import UnreadableFileError
 from robots.common.files import open_regular, read_json
-from rollouts.reading.json_fields import (
-    NAME,
-    FieldError,
-    Kind,
-    fields,
-    items,
-    whole,
-)
+from robots.common.schema import Digest, FieldError, Name, check, exactly, length, whole
 from rollouts.reading.summary import MAX_JSON, MAX_SEED, TrajectoryError
 
 FORMAT = "robot-layouts recording 1"
@@ -35,33 +27,33 @@ FILE_SIZE = 200.0  # MB, at which another file is begun; some 6,000 episodes, op
 MOST_FILES = 10_000
 MOST_EPISODES = 10**7  # of all files: a few bytes of ranges must not become gigabytes of seeds
 _BLOCK = 2**20  # bytes
-_MOST_BYTES = 2**53
 
-_SHA256 = Kind(
-    "a SHA-256 in hexadecimal",
-    lambda v: isinstance(v, str) and re.fullmatch("[0-9a-f]{64}", v) is not None,
-)
-_COUNT = whole(0, MAX_SEED + 1)
-_SIZED = fields({"bytes": whole(0, _MOST_BYTES), "sha256": _SHA256})
-_FILE = fields(
-    {
-        "file": NAME,
-        "h5": _SIZED,
-        "json": _SIZED,
-        "episodes": _COUNT,
-        "successes": _COUNT,
-        "steps": whole(0, _MOST_BYTES),
-        "seeds": items(items(whole(0, MAX_SEED), 2)),
-    }
-)
-_MANIFEST = fields(
-    {
-        "format": Kind(repr(FORMAT), lambda v: v == FORMAT),
-        "task": NAME,
-        "header": _SHA256,
-        "files": items(_FILE),
-    }
-)
+_Count = Annotated[int, whole(0, MAX_SEED + 1)]
+_Bytes = Annotated[int, whole(0, 2**53)]
+_Seed = Annotated[int, whole(0, MAX_SEED)]
+
+
+class _Sized(TypedDict):
+    bytes: _Bytes
+    sha256: Digest
+
+
+class _File(TypedDict):
+    file: Name
+    h5: _Sized
+    json: _Sized
+    episodes: _Count
+    successes: _Count
+    steps: _Bytes
+    seeds: list[Annotated[list[_Seed], length(2)]]
+
+
+class _Manifest(TypedDict):
+    format: Annotated[str, exactly(FORMAT)]
+    task: Name
+    header: Digest
+    files: list[_File]
+
 
 Span = tuple[int, int]  # first and last of a range of seeds
 
@@ -141,7 +133,7 @@ def read_manifest(path: Path) -> Manifest | None:
     place = manifest_path(path)
     try:
         found = read_json(place, MAX_JSON)
-        _MANIFEST.expect(found, "")
+        check(found, _Manifest, "")
         return Manifest(found["task"], found["header"], tuple(_entries(path, found["files"])))
     except UnreadableFileError as error:
         if error.errno == errno.ENOENT:

@@ -11,7 +11,9 @@ import json
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
-from typing import Any
+from typing import Annotated, Any
+
+from typing_extensions import NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,22 +21,10 @@ from numpy.typing import NDArray
 from layouts import Layout
 from robots import CONTROL_MODES, JointGroup
 from robots.common.files import parse_json
+from robots.common.schema import AnyText, FieldError, Name, Object, check, length, whole
 from robots.control_modes import plain_mode
 from robots.fingerprint import asset_fingerprint
 from rollouts.reading.guessed_robots import describe_guessed
-from rollouts.reading.json_fields import (
-    NAME,
-    NUMBER,
-    OBJECT,
-    TEXT,
-    FieldError,
-    Kind,
-    by_name,
-    fields,
-    items,
-    maybe,
-    whole,
-)
 from rollouts.reading.manifest import FILE_NUMBER
 from tasks import MultiRobotTask
 from tasks.native.format import observation_keys
@@ -42,25 +32,28 @@ from tasks.registry import full_name
 
 _ACTION_NUMBERS = 10_000  # of all robots
 
+
 # What `describe_layout` and `describe_simulation` write, as far as it is read again.
-LAYOUT = maybe(
-    by_name(
-        fields(
-            {
-                "robot": NAME,
-                "position": items(NUMBER, 3),
-                "quaternion": items(NUMBER, 4),
-                "keyframe": maybe(NAME),
-                "qpos_noise": maybe(NUMBER),
-                "action": items(whole(0, _ACTION_NUMBERS), 2),
-            },
-            {"start_qpos": items(NUMBER), "joint_groups": OBJECT, "assets": TEXT},
-        )
-    )
-)
-SIMULATION = maybe(
-    fields({}, {"physics": maybe(OBJECT), "control_frequency": NUMBER, "randomization": OBJECT})
-)
+class _Place(TypedDict):
+    robot: Name
+    position: Annotated[list[float], length(3)]
+    quaternion: Annotated[list[float], length(4)]
+    keyframe: Name | None
+    qpos_noise: float | None
+    action: Annotated[list[Annotated[int, whole(0, _ACTION_NUMBERS)]], length(2)]
+    start_qpos: NotRequired[list[float]]
+    joint_groups: NotRequired[Object]
+    assets: NotRequired[AnyText]
+
+
+class _Simulation(TypedDict, total=False):
+    physics: Object | None
+    control_frequency: float
+    randomization: Object
+
+
+LAYOUT = dict[str, _Place] | None
+SIMULATION = _Simulation | None
 
 # What an episode consists of, in its group of an h5 file.
 CHECKSUM = "checksum"  # attribute of an episode's group in the h5 file
@@ -138,7 +131,7 @@ def describe_simulation(task: MultiRobotTask) -> dict[str, Any]:
     }
 
 
-def read_described(texts: Mapping[str, str], name: str, kind: Kind) -> Any:
+def read_described(texts: Mapping[str, str], name: str, kind: Any) -> Any:
     """Return what is written as json in one of several attributes; None if it is not there.
 
     Raises:
@@ -150,7 +143,7 @@ def read_described(texts: Mapping[str, str], name: str, kind: Kind) -> Any:
         described = parse_json(texts[name])
     except ValueError as error:
         raise FieldError(f"attribute {name}: {error}") from error
-    kind.expect(described, name)
+    check(described, kind, name)
     return described
 
 

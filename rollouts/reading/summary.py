@@ -5,64 +5,80 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from typing_extensions import NotRequired, TypedDict
 
 from robots import CONTROL_MODES, RobotLayoutsError, UnreadableFileError
 from robots.common.files import read_json
-from rollouts.reading.json_fields import (
-    FLAG,
-    NAME,
-    NUMBER,
-    OBJECT,
-    TEXT,
-    FieldError,
-    by_name,
-    either,
-    fields,
-    items,
-    maybe,
-    whole,
-)
+from robots.common.schema import AnyText, FieldError, Name, Object, check, whole
 
 MAX_JSON = 2**28  # bytes; some 600,000 episodes
 MAX_STEPS = 10**6  # of an episode; fourteen hours at 20 Hz
 MAX_SEED = 2**32 - 1  # of NumPy's generators
 
-_SEED = whole(0, MAX_SEED)
-_STEPS = whole(1, MAX_STEPS)
-_MODE = either(NAME, by_name(NAME))
+_Seed = Annotated[int, whole(0, MAX_SEED)]
+_Seeds = _Seed | list[_Seed] | None
+_Steps = Annotated[int, whole(1, MAX_STEPS)]
+_Mode = Name | dict[str, Name]
 
-_SEEDS = maybe(either(_SEED, items(_SEED)))
 
-_EPISODE = {
-    "episode_seed": _SEEDS,
-    "control_mode": maybe(_MODE),
-    "elapsed_steps": maybe(_STEPS),
-    "reset_kwargs": maybe(fields({}, {"seed": _SEEDS, "options": maybe(OBJECT)})),
-    "success": maybe(either(FLAG, NUMBER)),
-}
-# What only a recording of this library says, and not every one.
-_ACTOR = fields({"kind": NAME, "name": TEXT}, {"sha256": maybe(TEXT)})
-_SOURCE = fields({"kind": NAME}, {"actors": items(_ACTOR), "corrects": _ACTOR})
-_ABOUT = {"source": maybe(_SOURCE), "drawn": maybe(OBJECT), "reason": maybe(TEXT)}
-# An episode's own note in a recording of this library, which becomes its entry in the json.
-OWN_EPISODE = fields({**_EPISODE, "episode_seed": _SEED, "elapsed_steps": _STEPS}, _ABOUT)
-_SUMMARY = fields(
-    {
-        "env_info": fields(
-            {"env_id": NAME},
-            {
-                "env_kwargs": maybe(
-                    fields({}, {"control_mode": maybe(_MODE), "sim_backend": maybe(NAME)})
-                ),
-                "max_episode_steps": maybe(_STEPS),
-                "module": maybe(NAME),
-            },
-        ),
-        "episodes": items(fields({"episode_id": whole(0, 2**31 - 1)}, {**_EPISODE, **_ABOUT})),
-    },
-    {"source_type": maybe(TEXT), "source_desc": maybe(TEXT)},
-)
+class _Reset(TypedDict, total=False):
+    seed: _Seeds
+    options: Object | None
+
+
+class _Actor(TypedDict):
+    kind: Name
+    name: AnyText
+    sha256: NotRequired[AnyText | None]
+
+
+class _Source(TypedDict):
+    kind: Name
+    actors: NotRequired[list[_Actor]]
+    corrects: NotRequired[_Actor]
+
+
+class _Played(TypedDict, total=False):
+    control_mode: _Mode | None
+    reset_kwargs: _Reset | None
+    success: bool | float | None
+    source: _Source | None
+    drawn: Object | None
+    reason: AnyText | None
+
+
+class OwnEpisode(_Played):
+    """An episode's own note in a recording of this library, which becomes its entry in the json."""
+
+    episode_seed: _Seed
+    elapsed_steps: _Steps
+
+
+class _Episode(_Played):
+    episode_id: Annotated[int, whole(0, 2**31 - 1)]
+    episode_seed: NotRequired[_Seeds]
+    elapsed_steps: NotRequired[_Steps | None]
+
+
+class _EnvKwargs(TypedDict, total=False):
+    control_mode: _Mode | None
+    sim_backend: Name | None
+
+
+class _EnvInfo(TypedDict):
+    env_id: Name
+    env_kwargs: NotRequired[_EnvKwargs | None]
+    max_episode_steps: NotRequired[_Steps | None]
+    module: NotRequired[Name | None]
+
+
+class _Summary(TypedDict):
+    env_info: _EnvInfo
+    episodes: list[_Episode]
+    source_type: NotRequired[AnyText | None]
+    source_desc: NotRequired[AnyText | None]
 
 
 class TrajectoryError(RobotLayoutsError, ValueError):
@@ -173,7 +189,7 @@ def _read(path: Path) -> dict[str, Any]:
             f"cannot read {beside}, which belongs beside {path.name}: {error.strerror}"
         ) from error
     try:
-        _SUMMARY.expect(found, "")
+        check(found, _Summary, "")
     except FieldError as error:
         raise TrajectoryError(f"{beside} is not a demonstration's json: {error}") from error
     listed = [episode["episode_id"] for episode in found["episodes"]]

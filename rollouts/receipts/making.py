@@ -5,26 +5,17 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any
+from typing import Annotated, Any
+
+from typing_extensions import NotRequired, TypedDict
 
 from layouts import Layout
 from layouts.placement import RobotLike
 from robots import RobotLayoutsError
+from robots.common.schema import FieldError, Name, Object, check, length, whole
 from robots.control_modes import plain_mode
 from robots.fingerprint import asset_checksums
 from rollouts.reading.guessed_robots import GUESSED, descriptor_digest
-from rollouts.reading.json_fields import (
-    NAME,
-    NUMBER,
-    OBJECT,
-    FieldError,
-    by_name,
-    either,
-    fields,
-    items,
-    maybe,
-    whole,
-)
 from rollouts.reading.provenance import LAYOUT, describe_layout
 from rollouts.reading.recorded_task import layout_again, same_places
 from rollouts.receipts.receipt import ReceiptError
@@ -35,23 +26,22 @@ from tasks.varying.randomization import Randomization
 
 _MOST = 10**6
 
-_MAKING = fields(
-    {
-        "layout": LAYOUT,
-        "obs_mode": NAME,
-        "reward_mode": NAME,
-        "control_mode": maybe(either(NAME, by_name(NAME))),
-        "control_frequency": NUMBER,
-        "max_episode_steps": whole(1, 2**31 - 1),
-        "physics": maybe(OBJECT),
-        "randomization": maybe(OBJECT),
-        "cameras": items(OBJECT),
-        "camera_size": maybe(items(whole(1, _MOST), 2)),
-        "bystanders": maybe(NAME),
-        "simulator": NAME,
-    },
-    {"num_envs": whole(1, _MOST)},
-)
+
+class _Making(TypedDict):
+    layout: LAYOUT
+    obs_mode: Name
+    reward_mode: Name
+    control_mode: Name | dict[str, Name] | None
+    control_frequency: float
+    max_episode_steps: Annotated[int, whole(1, 2**31 - 1)]
+    physics: Object | None
+    randomization: Object | None
+    cameras: list[Object]
+    camera_size: Annotated[list[Annotated[int, whole(1, _MOST)]], length(2)] | None
+    bystanders: Name | None
+    simulator: Name
+    num_envs: NotRequired[Annotated[int, whole(1, _MOST)]]
+
 
 _AS_THEY_ARE = (
     "obs_mode",
@@ -129,8 +119,8 @@ def make_again(
         ReceiptError: If it is invalid, or a robot is not available here.
     """
     try:
-        _MAKING.expect(dict(making), "making")
-        GUESSED.expect(dict(guessed), "guessed")
+        check(dict(making), _Making, "making")
+        check(dict(guessed), GUESSED, "guessed")
         layout = layout_again(making["layout"], guessed, cls.layout, robots, "the receipt")
         physics, varied = making["physics"], making["randomization"]
         size = making["camera_size"]

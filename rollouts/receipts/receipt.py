@@ -11,69 +11,64 @@ from dataclasses import asdict, dataclass, field
 from hashlib import sha256
 from os import PathLike
 from statistics import mean
-from typing import Any
+from typing import Annotated, Any
+
+from msgspec import Meta
+from typing_extensions import NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots import RobotLayoutsError, UnreadableFileError
 from robots.common.files import read_json
+from robots.common.schema import AnyText, Digest, FieldError, Name, Object, check, exactly, whole
 from robots.common.writing import write_whole
 from rollouts.playing.state_trace import BYTES
-from rollouts.reading.json_fields import (
-    FLAG,
-    NAME,
-    NUMBER,
-    OBJECT,
-    TEXT,
-    FieldError,
-    Kind,
-    fields,
-    items,
-    maybe,
-    whole,
-)
 from rollouts.reading.summary import MAX_SEED, MAX_STEPS
 
 FORMAT = "robot-layouts receipt 1"
 MAX_BYTES = 2**27  # of a file; 100,000 episodes of 200 steps take a half
 
-_HEX = frozenset("0123456789abcdef")
-
-
-def _is_digest(value: Any) -> bool:
-    return isinstance(value, str) and len(value) == 64 and _HEX.issuperset(value)
-
-
-DIGEST = Kind("a SHA-256: 64 of the digits 0-9 and a-f", _is_digest)
 # A module before a task's id would be imported.
-ID = Kind("a task's id, without a module", lambda value: NAME.fits(value) and ":" not in value)
-TASK = fields({"id": ID, "class": NAME, "sha256": maybe(DIGEST)})
-POLICY = fields({"kind": NAME, "name": NAME, "sha256": maybe(DIGEST)}, {"files": OBJECT})
-MAKING = fields({"layout": OBJECT})
-ENVIRONMENT = fields({"versions": OBJECT, "processor": OBJECT}, {"variables": TEXT})
-EPISODE = fields(
-    {
-        "seed": whole(0, MAX_SEED),
-        "success": FLAG,
-        "steps": whole(0, MAX_STEPS),
-        "total": NUMBER,
-        "states": DIGEST,
-        "trace": TEXT,
-    },
-    {"reason": TEXT},
-)
-RECEIPT = fields(
-    {
-        "format": Kind(repr(FORMAT), lambda value: value == FORMAT),
-        "hash": DIGEST,
-        "task": TASK,
-        "policy": POLICY,
-        "making": MAKING,
-        "environment": ENVIRONMENT,
-        "episodes": items(EPISODE),
-    }
-)
+_Id = Annotated[str, Meta(pattern="^[^:]{1,200}\\Z", description="a task's id, without a module")]
+_Task = TypedDict("_Task", {"id": _Id, "class": Name, "sha256": Digest | None})
+
+
+class _Policy(TypedDict):
+    kind: Name
+    name: Name
+    sha256: Digest | None
+    files: NotRequired[Object]
+
+
+class _Making(TypedDict):
+    layout: Object
+
+
+class _Environment(TypedDict):
+    versions: Object
+    processor: Object
+    variables: NotRequired[AnyText]
+
+
+class _Episode(TypedDict):
+    seed: Annotated[int, whole(0, MAX_SEED)]
+    success: bool
+    steps: Annotated[int, whole(0, MAX_STEPS)]
+    total: float
+    states: Digest
+    trace: AnyText
+    reason: NotRequired[AnyText]
+
+
+class _Receipt(TypedDict):
+    format: Annotated[str, exactly(FORMAT)]
+    hash: Digest
+    task: _Task
+    policy: _Policy
+    making: _Making
+    environment: _Environment
+    episodes: list[_Episode]
 
 
 class ReceiptError(RobotLayoutsError, ValueError):
@@ -108,7 +103,8 @@ class EpisodeReceipt:
         Raises:
             ReceiptError: If a value is of another kind, or the trace has another length.
         """
-        _expect(EPISODE, asdict(self), f"the episode of seed {self.seed!r}")
+        about = f"the episode of seed {self.seed!r}"
+        vars(self).update(check(asdict(self), _Episode, about, ReceiptError))
         try:
             length = len(b64decode(self.trace, validate=True))
         except (NotBase64, ValueError):
@@ -156,9 +152,9 @@ class Receipt:
         Raises:
             ReceiptError: If a part is of another kind, or there are no episodes, or one twice.
         """
-        for kind, name in ((TASK, "task"), (POLICY, "policy"), (MAKING, "making")):
-            _expect(kind, getattr(self, name), name)
-        _expect(ENVIRONMENT, self.environment, "environment")
+        kinds = {"task": _Task, "policy": _Policy, "making": _Making, "environment": _Environment}
+        for name, kind in kinds.items():
+            check(getattr(self, name), kind, name, ReceiptError)
         seeds = Counter(episode.seed for episode in self.episodes)
         if not seeds:
             raise ReceiptError("a receipt has one episode or more; this has none")
@@ -201,7 +197,7 @@ class Receipt:
         """
         try:
             found = read_json(path, MAX_BYTES)
-            RECEIPT.expect(found, "")
+            check(found, _Receipt, "")
             episodes = tuple(_episode(about) for about in found["episodes"])
             parts = {name: found[name] for name in ("task", "policy", "making", "environment")}
             return cls(**parts, episodes=episodes, claimed=found["hash"])
@@ -232,10 +228,3 @@ def _episode(about: Mapping[str, Any]) -> EpisodeReceipt:
 
 def _hash(content: Mapping[str, Any]) -> str:
     return sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-
-
-def _expect(kind: Kind, value: Any, where: str) -> None:
-    try:
-        kind.expect(value, where)
-    except FieldError as error:
-        raise ReceiptError(str(error)) from error

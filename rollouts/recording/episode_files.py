@@ -15,27 +15,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
+from typing_extensions import NotRequired, TypedDict
 
 from robots import RecordingError
 from robots.common.files import parse_json, read_regular
+from robots.common.schema import AnyText, FieldError, Object, check, whole
 from robots.common.writing import PARTIAL, written_whole
 from rollouts.reading.hdf5 import MAX_BYTES
-from rollouts.reading.json_fields import (
-    ANYTHING,
-    OBJECT,
-    TEXT,
-    FieldError,
-    Kind,
-    fields,
-    items,
-    whole,
-)
 from rollouts.reading.provenance import STATES
-from rollouts.reading.summary import MAX_SEED, OWN_EPISODE
+from rollouts.reading.summary import MAX_SEED, OwnEpisode
 from tasks.episode import REBUILT, PlayedEpisode
 
 _SUFFIX = ".part"
@@ -45,21 +38,26 @@ _CHECKSUM = 4  # bytes
 _ARRAY_BYTES, _GROUP_BYTES = 256, 1024  # that HDF5 takes besides numbers and texts, about
 _MAX_PART = MAX_BYTES + 2**24  # bytes
 
-_ARRAY_NAME = re.compile(
-    r"(actions|rewards|success|terminated|truncated|actor|corrections"
-    r"|env_states(/[^/\0]+){2}|env_states/controller(/[^/\0]+){1,3})"
+_ARRAY_NAME = (
+    r"^(actions|rewards|success|terminated|truncated|actor|corrections"
+    r"|env_states(/[^/\0]+){2}|env_states/controller(/[^/\0]+){1,3})\Z"
 )
-_CONTENT = fields(
-    {
-        "attributes": fields({"episode": TEXT}, {"action_split": TEXT}),
-        "arrays": items(items(ANYTHING, 3)),
-    }
-)
-_ARRAY = (
-    Kind("the name of an array", lambda v: isinstance(v, str) and bool(_ARRAY_NAME.fullmatch(v))),
-    Kind("a kind of numbers", lambda v: v in ("<f4", "<f8", "|b1", "|u1")),
-    items(whole(0, MAX_BYTES)),
-)
+
+
+class _Attributes(TypedDict):
+    episode: AnyText
+    action_split: NotRequired[AnyText]
+
+
+class _Content(TypedDict):
+    attributes: _Attributes
+    arrays: list[
+        tuple[
+            Annotated[str, Meta(pattern=_ARRAY_NAME, description="the name of an array")],
+            Literal["<f4", "<f8", "|b1", "|u1"],
+            list[Annotated[int, whole(0, MAX_BYTES)]],
+        ]
+    ]
 
 
 @dataclass(frozen=True)
@@ -231,18 +229,16 @@ def _parse(content: bytes) -> tuple[dict[str, Any], Stored]:
     """
     header, about, numbers = content.split(b"\n", 2)
     described, listed = _parse_header(header), parse_json(about.decode())
-    _CONTENT.expect(listed, "")
+    check(listed, _Content, "")
     arrays: dict[str, NDArray[Any]] = {}
     start = 0
     for array in listed["arrays"]:
-        for value, kind in zip(array, _ARRAY, strict=True):
-            kind.expect(value, "arrays")
         name, dtype, shape = array
         count = min(math.prod(shape), MAX_BYTES)
         arrays[name] = np.frombuffer(numbers, dtype, count, start).reshape(shape).copy()  # aligned
         start += arrays[name].nbytes
     about = parse_json(listed["attributes"]["episode"])
-    OWN_EPISODE.expect(about, "episode")
+    check(about, OwnEpisode, "episode")
     if start != len(numbers) or len(arrays.get("actions", ())) != about["elapsed_steps"]:
         raise FieldError("its arrays are not those of its steps")
     return described, Stored(listed["attributes"], arrays)
@@ -251,7 +247,7 @@ def _parse(content: bytes) -> tuple[dict[str, Any], Stored]:
 @lru_cache(maxsize=1)  # all parts of a recording have the same
 def _parse_header(content: bytes) -> dict[str, Any]:
     header = parse_json(content.decode())
-    OBJECT.expect(header, "header")
+    check(header, Object, "header")
     return header
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
+from typing import Any
 
 from robots import TaskError
-from robots.common.pages import Markup, Tile, document, heading, plural, section, table
+from robots.common.pages import Tile, fragment, page, plural
 from rollouts.suite import tables
 from rollouts.suite.folder import SuiteRun, expect_untouched, read_run
 from rollouts.suite.results import Result
@@ -42,9 +43,20 @@ def read_runs(folders: Sequence[Path]) -> list[SuiteRun]:
 
 def render_page(runs: Sequence[SuiteRun]) -> str:
     """Return the report as HTML; see `read_runs`."""
-    suite = runs[0].suite
-    sections = [section(title, content) for title, content in _sections(runs)]
-    return document(f"{suite.name} {suite.id}", _head(runs), sections, STYLE)
+    suite, results = runs[0].suite, tables.results_of(runs)
+    total = zip(runs, results[ALL], strict=True)
+    return page(
+        "rollouts.suite/report.html.jinja",
+        STYLE,
+        kicker="robot-layouts, a suite",
+        title=f"{suite.name} {suite.id}",
+        note=_about(runs),
+        tiles=[
+            Tile("episodes", f"{suite.episodes:,}", f"{plural(len(suite.cases), 'case')}"),
+            *(_tile(number, *of) for number, of in enumerate(total)),
+        ],
+        parts=[_shown(part, results) for part in _parts(runs)],
+    )
 
 
 def render_markdown(runs: Sequence[SuiteRun]) -> str:
@@ -70,24 +82,16 @@ def _parts(runs: Sequence[SuiteRun]) -> Iterator[tuple[str, str, Table, int]]:
     yield "Receipts", words, tables.receipts(runs), 1 + len(runs)
 
 
-def _sections(runs: Sequence[SuiteRun]) -> Iterator[tuple[str, str]]:
-    results = tables.results_of(runs)
-    for title, words, shown, text in _parts(runs):
-        names, rows = shown.names, shown.rows
-        if title == "Success":
-            names = (*names[:-1], "0 to 100 %", names[-1])
-            rows = [(*row[:-1], _chart(results[row[0]]), row[-1]) for row in rows]
-        prose = f"<p>{escape(words)}</p>" if words else ""
-        yield title, prose + table(names, rows, text=text)
-
-
-def _head(runs: Sequence[SuiteRun]) -> str:
-    suite, total = runs[0].suite, tables.results_of(runs)[ALL]
-    tiles = [
-        Tile("episodes", f"{suite.episodes:,}", f"{plural(len(suite.cases), 'case')}"),
-        *(_tile(number, *of) for number, of in enumerate(zip(runs, total, strict=True))),
-    ]
-    return heading("robot-layouts, a suite", f"{suite.name} {suite.id}", _about(runs), tiles)
+def _shown(
+    part: tuple[str, str, Table, int], results: Mapping[str, Sequence[Result | None]]
+) -> dict[str, Any]:
+    """Return a part as the page's template takes it; that of successes has a chart in each row."""
+    title, words, shown, text = part
+    names, rows = shown.names, shown.rows
+    if title == "Success":
+        names = (*names[:-1], "0 to 100 %", names[-1])
+        rows = [(*row[:-1], _chart(results[row[0]]), row[-1]) for row in rows]
+    return {"title": title, "words": words, "names": names, "rows": rows, "text": text}
 
 
 def _tile(number: int, run: SuiteRun, result: Result | None) -> Tile:
@@ -105,30 +109,22 @@ def _about(runs: Sequence[SuiteRun]) -> str:
     return f"A suite of {count}, in {plural(len(runs), 'run')}."
 
 
-def _chart(results: Sequence[Result | None]) -> Markup:
+def _chart(results: Sequence[Result | None]) -> str:
     """Return an interval for each run, drawn from 0 to 100 %."""
-    height = _ROW * len(results)
-    drawn = "".join(
-        _whisker(result, place, LETTERS[place])
+    whiskers = [
+        {
+            "place": place,
+            "words": f"{LETTERS[place]}: {result.successes:,} of {result.episodes:,}",
+            "y": _ROW * (place + 0.5),
+            "low": _WIDTH * result.interval[0],
+            "high": _WIDTH * result.interval[1],
+            "rate": _WIDTH * result.rate,
+        }
         for place, result in enumerate(results)
         if result is not None
-    )
-    return Markup(
-        f'<svg class="intervals" viewBox="-4 0 {_WIDTH + 8} {height}" style="height:{height}px"'
-        f' role="img" aria-label="success with intervals">{drawn}</svg>'
-    )
-
-
-def _whisker(result: Result, place: int, letter: str) -> str:
-    y = _ROW * (place + 0.5)
-    low, high = (_WIDTH * end for end in result.interval)
-    words = f"{letter}: {result.successes:,} of {result.episodes:,}"
-    return (
-        f'<g class="run-{place % 4}"><title>{escape(words)}</title>'
-        f'<line class="axis" x1="0" x2="{_WIDTH}" y1="{y}" y2="{y}"/>'
-        f'<line class="interval" x1="{low:.1f}" x2="{high:.1f}" y1="{y}" y2="{y}"/>'
-        f'<circle cx="{_WIDTH * result.rate:.1f}" cy="{y}" r="3.5"/></g>'
-    )
+    ]
+    sizes = {"width": _WIDTH, "height": _ROW * len(results)}
+    return fragment("rollouts.suite/intervals.svg.jinja", whiskers=whiskers, **sizes)
 
 
 def _markdown(shown: Table, text: int) -> Iterator[str]:

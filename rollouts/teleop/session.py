@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinematics.rotations import Floats, multiply, quaternion_about
 from robots import RecordingError, TaskError, UnknownNameError
+from robots.common.bounds import expect_unit
 from robots.common.catalogue import reason
 from rollouts.recording.recorder import Recorder
 from rollouts.sources.actors import PERSON, Actor, actor_of, episode_source
@@ -24,7 +25,6 @@ from tasks import MultiRobotTask
 from tasks.episode import REBUILT, PlayedEpisode, Policy, play
 
 SOMEBODY = Actor(PERSON, "browser")
-_UNIT = 1e-6  # by how much a quaternion may be longer or shorter than 1
 
 
 class Phase(Enum):
@@ -121,9 +121,7 @@ class Session:
         pose = np.array(pose, float)
         if pose.shape != (7,) or not np.isfinite(pose).all():
             raise TaskError(f"a pose is 7 finite numbers; {arm} was given {pose.tolist()}")
-        length = float(np.linalg.norm(pose[3:]))
-        if abs(length - 1) > _UNIT:
-            raise TaskError(f"the quaternion for {arm} has the length {length:.6g}; it must be 1")
+        expect_unit(f"the quaternion for {arm}", pose[3:].tolist(), TaskError)
         self.targets[arm] = pose
 
     def shift(self, arm: str, way: ArrayLike | None = None, turn: ArrayLike | None = None) -> None:

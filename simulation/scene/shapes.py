@@ -7,22 +7,21 @@ from pathlib import Path
 from typing import Annotated
 
 from robots import SimulationError
-from robots.common.bounds import FAR
-from robots.common.fields import OfLengthOne, Within, settle_fields
+from robots.common.bounds import FAR, expect_unit
+from robots.common.schema import check_fields, within
 from robots.descriptor import IDENTITY, Quaternion
 from simulation.physics import Friction
 
-Fraction = Annotated[float, Within(0.0, 1.0)]
+Fraction = Annotated[float, within(0.0, 1.0)]
 Color = tuple[Fraction, Fraction, Fraction, Fraction]  # red, green, blue, alpha
 
-Length = Annotated[float, Within(1e-6, FAR, "m")]
+Length = Annotated[float, within(1e-6, FAR, "m")]
 """Of an edge, a radius, half of either: more than none."""
 Lengths = tuple[Length, Length, Length]
-Density = Annotated[float, Within(1e-3, 1e6, "kg/m³")]
-Coordinate = Annotated[float, Within(-FAR, FAR, "m")]
+Density = Annotated[float, within(1e-3, 1e6, "kg/m³")]
+Coordinate = Annotated[float, within(-FAR, FAR, "m")]
 Place = tuple[Coordinate, Coordinate, Coordinate]
-Turn = Annotated[Quaternion, OfLengthOne()]
-Factor = Annotated[float, Within(1e-6, FAR)]
+Factor = Annotated[float, within(1e-6, FAR)]
 
 GREY: Color = (0.7, 0.7, 0.7, 1.0)
 
@@ -47,7 +46,7 @@ class Finish:
         Raises:
             SimulationError: If a value is of a wrong type or out of bounds.
         """
-        settle_fields(self, SimulationError)
+        check_fields(self, SimulationError)
 
 
 MATT = Finish()
@@ -76,7 +75,7 @@ class Shape:
     """
 
     position: Place = (0.0, 0.0, 0.0)
-    quaternion: Turn = IDENTITY
+    quaternion: Quaternion = IDENTITY
     friction: Friction | None = None
     density: Density = 1000.0
     color: Color = GREY
@@ -90,7 +89,8 @@ class Shape:
         Raises:
             SimulationError: If a value is of a wrong type or out of bounds.
         """
-        settle_fields(self, SimulationError)
+        check_fields(self, SimulationError)
+        expect_unit(f"{type(self).__name__}: quaternion", self.quaternion, SimulationError)
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ class Floor(Shape):
     """
 
     texture: Path | str
-    size: Annotated[int, Within(1, FAR, "m", "whole number")] = 100
+    size: Annotated[int, within(1, FAR, "m", "whole number")] = 100
     tile: Length = 4.0
     collides: bool = field(default=False, kw_only=True)
 

@@ -11,7 +11,7 @@ from typing import ClassVar, Literal, TypeAlias, TypedDict
 from kinematics.quaternions import multiplied
 from layouts import Layout
 from robots import TaskError
-from robots.common.fields import settle_fields
+from robots.common.schema import check_fields
 from robots.descriptor import IDENTITY, Quaternion
 from simulation import Box, Friction, Shape, Sphere, World, add_table
 from simulation.scene.shapes import Color, Coordinate, Density, Length, Lengths, Place
@@ -127,7 +127,7 @@ class Body(ABC):
         Raises:
             TaskError: If a value is of a wrong type or out of bounds.
         """
-        settle_fields(self, TaskError)
+        check_fields(self, TaskError)
 
     @property
     @abstractmethod
@@ -371,7 +371,7 @@ class Table:
         Raises:
             TaskError: If ``textured`` is neither True nor False.
         """
-        settle_fields(self, TaskError)
+        check_fields(self, TaskError)
 
     def outline(self, layout: Layout) -> Rectangle:
         """Return the outline of its top: x_min, y_min, x_max, y_max (m)."""

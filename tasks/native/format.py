@@ -13,7 +13,7 @@ from torch import Tensor
 
 from layouts import Layout
 from robots import TaskError, unknown_name_message
-from robots.common.bounds import FAR, shown
+from robots.common.bounds import FAR, expect_unit, shown
 from simulation import Simulation, State
 from simulation.maths import Floats
 from simulation.readout import ReadoutIndex
@@ -24,7 +24,6 @@ from tasks.native.controllers import CONTROLLER
 StateDict = dict[str, dict[str, Any]]
 """Tensors by group and entry; those of what control modes remember are nested as in native."""
 
-_UNIT_TOLERANCE = 0.01  # of quaternions: of two digits, say
 _BEYOND_LIMITS = 2 * math.pi  # rad, or m
 _POSE = tuple(
     f"{what} {axis}"
@@ -225,9 +224,9 @@ def write_state_dict(
 
     Not exact even in native: PhysX's solver memory is no part of it.
 
-    Numbers must be finite and at most `robots.common.bounds.FAR`, quaternions within 1 % of unit
-    length, and joints within a full turn (rad; or 2π m) of their limits: joint noise and contacts
-    push them a little beyond. Targets of control modes that are left out stay as they are.
+    Numbers must be finite and at most `robots.common.bounds.FAR`, quaternions of length 1, and
+    joints within a full turn (rad; or 2π m) of their limits: joint noise and contacts push them a
+    little beyond. Targets of control modes that are left out stay as they are.
 
     Args:
         simulation: The worlds.
@@ -350,10 +349,6 @@ def _check_numbers(
         )
     if not quaternion:
         return
-    lengths = np.linalg.norm(array[:, 3:7], axis=1)
-    for env, length in zip(env_ids, lengths, strict=True):
-        if abs(length - 1) > _UNIT_TOLERANCE:
-            raise TaskError(
-                f"{what}: the quaternion (numbers 3 to 6, wxyz) has length {length:.6g} for"
-                f" environment {env}; a rotation has length 1"
-            )
+    for env, turn in zip(env_ids, array[:, 3:7].tolist(), strict=True):
+        about = f"{what}: the quaternion (numbers 3 to 6) for environment {env}"
+        expect_unit(about, turn, TaskError)

@@ -13,15 +13,10 @@ from robots import TaskError, UnreadableFileError
 from robots.common.bounds import shown
 from robots.common.files import read_text
 from robots.common.writing import write_whole
+from robots.common.yaml_text import WordLoader, compose
 
 MAX_LENGTH = 1 << 18  # bytes
 MAX_DEPTH = 16  # of mappings and lists inside one another
-
-
-class _Loader(yaml.SafeLoader):
-    """Takes every plain word as a text: YAML 1.1 knows no 1e-3, and takes ``no`` for a flag."""
-
-    yaml_implicit_resolvers: dict[str, Any] = {}
 
 
 def read_data(path: str | PathLike[str], what: str = "randomization") -> Any:
@@ -36,15 +31,13 @@ def read_data(path: str | PathLike[str], what: str = "randomization") -> Any:
     """
     try:
         text = read_text(path, MAX_LENGTH)
-        _check(text, path)
-        node = yaml.compose(text, _Loader)
     except UnreadableFileError as error:
         raise TaskError(f"cannot read the {what} {str(path)!r}: {error.strerror}") from error
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = "" if mark is None else f", line {mark.line + 1}"
-        problem = getattr(error, "problem", None) or "it is no YAML"
-        raise TaskError(f"{path}{line}: {problem}") from error
+    try:
+        node = compose(text)
+    except ValueError as error:
+        raise TaskError(f"{path}, {error}") from error
+    _check(text, path)
     return {} if node is None else _plain(node, str(path))
 
 
@@ -62,9 +55,9 @@ def write_data(path: str | PathLike[str], data: Any) -> None:
 
 
 def _check(text: str, path: str | PathLike[str]) -> None:
-    """Refuse what plain data does not need, before any of it is kept."""
+    """Refuse what plain data does not need."""
     depth = 0
-    for event in yaml.parse(text, _Loader):
+    for event in yaml.parse(text, WordLoader):
         where = f"{path}, line {event.start_mark.line + 1}"
         if isinstance(event, yaml.AliasEvent):
             raise TaskError(f"{where}: aliases (*{event.anchor}) are not read")

@@ -17,6 +17,7 @@ from layouts import (
     side_by_side,
     yaw_quaternion,
 )
+from layouts.frames import Pose
 from layouts.validation.collisions import (
     _measure,
     nearest,
@@ -189,7 +190,7 @@ class TestDistances:
         bodies = [
             stand(
                 name,
-                Placement("panda", (x, 0.0, 0.0), yaw_quaternion(x)),
+                Pose((x, 0.0, 0.0), yaw_quaternion(x)),
                 model,
                 random.uniform(*model.kinematics.limits.T, (3, 9)),
             )
@@ -267,8 +268,8 @@ class TestNearest:
         robot_ = RobotRegistry.load(kind)
         limits = np.clip(load_model(robot_).kinematics.limits, -2.0, 2.0)
         qpos = random.uniform(*limits.T, (3, len(limits)))
-        placement = Placement(robot_, place, yaw_quaternion(random.uniform(0, 6)))
-        return stand(name, placement, load_model(robot_), qpos)
+        pose = Pose(place, yaw_quaternion(random.uniform(0, 6)))
+        return stand(name, pose, load_model(robot_), qpos)
 
     @pytest.mark.parametrize("distance", [0.3, 0.6, 1.2, 3.0])
     @pytest.mark.parametrize("kinds", [("so100", "koch"), ("panda_stick", "so100")])
@@ -519,7 +520,7 @@ class TestDraws:
             side_by_side(PANDAS, spacing=0.3).validate(samples=samples)
 
     def test_a_long_check_tells_how_far_it_is(self, monkeypatch, capsys):
-        monkeypatch.setattr("layouts.progress.PATIENCE", 0.0)
+        monkeypatch.setattr("robots.common.progress.PATIENCE", 0.0)
         side_by_side(PANDAS, spacing=0.3).validate()
         assert "checking the layout: left with right\n" in capsys.readouterr().err
 

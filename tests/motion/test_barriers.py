@@ -13,8 +13,8 @@ from motion.model.obstacles import Track, box
 from motion.planning.goals import Target
 from motion.planning.infeasibility import InfeasibilityProofs
 from motion.planning.query import Query
-from motion.planning.space import Progress
 from motion.timing.trajectories import CellTrajectory
+from robots.common.progress import Progress
 
 PAN, LIFT = range(2)
 TABLE = (-2.0, -2.0, 2.0, 2.0)
@@ -117,5 +117,5 @@ def asked(cell, candidates, others):
         np.ones(cell.size),
         0.01,
         0,
-        Progress(30.0),
+        Progress(),
     )

@@ -121,7 +121,7 @@ class TestComparing:
         assert json.loads(written.read_text())["runs"][0]["control_mode"] == "pd_joint_pos"
 
     def test_a_long_comparison_says_how_far_it_is(self, capsys, monkeypatch):
-        monkeypatch.setattr("rollouts.progress.PATIENCE", 0.0)
+        monkeypatch.setattr("robots.common.progress.PATIENCE", 0.0)
         assert run("--task", "PickCube-v1", "--seeds", 1, "--steps", 3) == 0
         assert "PickCube-v1 random fresh: 1 of 3 steps (33%)" in capsys.readouterr().err
 

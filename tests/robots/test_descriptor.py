@@ -133,9 +133,15 @@ def test_a_descriptor_refuses_nonsense(changes, message):
         (lambda: CameraMount("eye", "hand", width=0), "camera 'eye': width is 0 pixels"),
         (lambda: CameraMount("eye", "hand", fov=4.0), "camera 'eye': fov is 4.0 rad; it must be"),
         (lambda: CameraMount("eye", "hand", near=200.0), "it must be 0 < near < far"),
-        (lambda: Home(quaternion=(0, 0, 0, 0)), "Home: quaternion (0, 0, 0, 0) has length 0"),
+        (
+            lambda: Home(quaternion=(0, 0, 0, 0)),
+            "Home: quaternion is (0, 0, 0, 0), which has length 0",
+        ),
         (lambda: replace(PANDA, urdf="x.urdf"), "panda: urdf is 'x.urdf'; it must be a UrdfSource"),
-        (lambda: replace(PANDA, keyframes=[]), "panda: keyframes is []; it must map names"),
+        (
+            lambda: replace(PANDA, keyframes=[]),
+            "panda: keyframes is []; it must be a mapping from names",
+        ),
         (lambda: replace(PANDA, home=None), "panda: home is None; it must be a Home"),
         (lambda: replace(PANDA, name=5), "RobotDescriptor: name is 5; it must be a text"),
         (

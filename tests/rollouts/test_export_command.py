@@ -12,8 +12,8 @@ import duckdb
 import numpy as np
 import pytest
 
+import robots.common.progress as progress
 import rollouts.export.pictures as pictures
-import rollouts.progress as progress
 import tasks
 from layouts import Layout, Placement
 from robots import RecordingError, RobotRegistry, TaskError

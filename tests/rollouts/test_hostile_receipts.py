@@ -66,7 +66,7 @@ def _set(*path):
         (_set("policy", {}), "it has no policy.kind; that must be a text"),
         (_set("policy", "name", ""), "policy.name is ''; it must be a text of 1 to 200"),
         (_set("making", "physics", {"timestp": 1}), "the receipt's task cannot be made here: "),
-        (_set("making", "physics", [1]), "making.physics is .*; it must be an object or null"),
+        (_set("making", "physics", [1]), "making.physics is .*; it must be an object or None"),
         (_set("making", "num_envs", 10**6), "the receipt's task cannot be made here: num_envs is"),
         (_set("making", "obs_mode", "smell"), "the receipt's task cannot be made here: "),
         (_set("making", "layout", "arm", "robot", "pandy"), "a robot at 'arm' that cannot be had"),

@@ -101,7 +101,7 @@ def test_actions_must_be_of_the_steps_that_the_json_says(path):
 @pytest.mark.parametrize(
     ("where", "value", "why"),
     [
-        ("env_kwargs", ["a"], r"env_info.env_kwargs is \['a'\]; it must be an object or null"),
+        ("env_kwargs", ["a"], r"env_info.env_kwargs is \['a'\]; it must be an object or None"),
         ("env_kwargs", "text", "env_info.env_kwargs is 'text'; it must be"),
         ("reset_kwargs", ["a"], r"episodes\[0\].reset_kwargs is \['a'\]; it must be an object"),
         ("reset_kwargs", {"options": "x"}, r"episodes\[0\].reset_kwargs.options is 'x'; it must"),
@@ -123,7 +123,7 @@ def test_every_value_of_the_json_is_looked_at(path, where, value, why):
     ("layout", "why"),
     [
         ([1], r"layout is \[1\]; it must be an object"),
-        ({"arm": {"robot": "panda"}}, "it has no layout.arm.position"),
+        ({"arm": {"robot": "panda"}}, "it has no layout\['arm'\].position"),
         ("[" * 100_000, "attribute layout: its json nests deeper"),
     ],
 )

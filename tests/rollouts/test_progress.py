@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
-import rollouts.progress as progress
-from rollouts.progress import LiveLine
+import robots.common.progress as progress
+from robots.common.progress import Progress
 
 
 def closed(tmp_path):
@@ -26,7 +26,7 @@ def test_work_goes_on_without_stderr(monkeypatch, tmp_path, capsys, stderr):
     monkeypatch.setattr(progress, "PATIENCE", 0)
     monkeypatch.setattr(progress, "PLAIN_INTERVAL", 0)
     monkeypatch.setattr(sys, "stderr", stderr(tmp_path))
-    with LiveLine(3, "episodes") as line:
+    with Progress(3, "episodes") as line:
         for _ in range(3):
             line.advance(1, "recording")
         line.say("done")

@@ -55,7 +55,7 @@ def in_physics(world, qpos):
 
 def in_checks(descriptor, model, qpos):
     """Return by pair of links the least distance of their hulls (m), where it is small."""
-    standing = stand("arm", Placement(descriptor), model, qpos[None])
+    standing = stand("arm", Placement(descriptor).base_pose, model, qpos[None])
     by_links = {}
     for pair in model.self_pairs:
         links = frozenset(model.link_name(hull) for hull in pair)

@@ -72,7 +72,9 @@ def test_checks_bring_the_same_place_to_a_target(turned):
 
 def test_it_widens_the_workspace_and_is_moved_without_error():
     model = load_model(BESIDE)
-    volumes = [Workspace(Placement(robot), model).volume for robot in (PANDA, BESIDE)]
+    volumes = [
+        Workspace(Placement(robot).base_pose, robot, model).volume for robot in (PANDA, BESIDE)
+    ]
     assert volumes[1] > 1.02 * volumes[0]
     assert tcp_error(BESIDE) < 0.002
 

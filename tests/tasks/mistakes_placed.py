@@ -83,8 +83,8 @@ MISTAKES = (
         "a quaternion of zeros",
         sampling(lambda world, rng: world.set_pose("cube", (0, 0, 0.02), (0, 0, 0, 0))),
         (
-            "quaternion of body 'cube' in environment 0 is (0, 0, 0, 0), of length 0; a rotation "
-            "has length 1 (order w, x, y, z)"
+            "quaternion of body 'cube' in environment 0 is [0.0, 0.0, 0.0, 0.0], which has "
+            "length 0; a rotation has length 1 (order w, x, y, z)"
         ),
     ),
     Mistake(
@@ -99,8 +99,8 @@ MISTAKES = (
         "degrees in a quaternion",
         sampling(lambda world, rng: world.set_pose("cube", (0, 0, 0.02), (90, 0, 0, 1))),
         (
-            "quaternion of body 'cube' in environment 0 is (90, 0, 0, 1), of length 90; a "
-            "rotation has length 1 (order w, x, y, z)"
+            "quaternion of body 'cube' in environment 0 is [90.0, 0.0, 0.0, 1.0], which has "
+            "length 90.0056; a rotation has length 1 (order w, x, y, z)"
         ),
     ),
     Mistake(

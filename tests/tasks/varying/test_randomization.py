@@ -116,7 +116,7 @@ def test_it_is_read_from_files_and_written(tmp_path: Path, name: str) -> None:
         ("- mass", "given by axis"),
         ("mass: {cube: .nan}", "mass of 'cube' is '.nan'"),
         ("mass: {cube: -1}", "within 0.001"),
-        ("[" * 5000, "line 1: it nests deeper"),
+        ("[" * 5000, "this is nested too deeply"),
         ("!!python/object:os.system {}", "line 1: tags"),
     ],
 )

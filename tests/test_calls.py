@@ -1,0 +1,71 @@
+"""How many calls of this library's own functions the main verbs take, at most.
+
+Unlike seconds, calls do not depend on the machine. A number may go down at any time; a change that
+raises one says why.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.fresh_process import in_fresh_process
+
+ROOT = str(Path(__file__).resolve().parents[1])
+MOST = {
+    "make, first": 18_000,  # most of it reads URDFs
+    "make, again": 6_400,  # likewise
+    "step": 130,
+    "plan": 20_000,
+    "search": 152_000,
+}
+
+
+def calls_of(function: Callable[[], Any]) -> tuple[int, Any]:
+    """Return how many calls of our functions a function makes, and what it returns."""
+    count = 0
+
+    def note(frame: Any, event: str, argument: object) -> None:
+        nonlocal count
+        file = frame.f_code.co_filename
+        count += event == "call" and file.startswith(ROOT) and "site-packages" not in file
+
+    sys.setprofile(note)
+    try:
+        found = function()
+    finally:
+        sys.setprofile(None)
+    return count, found
+
+
+def calls_of_verbs() -> dict[str, int]:
+    import layouts
+    import motion
+    import tasks
+    from tests.motion.two_pandas import aside, cell, turned
+
+    counts: dict[str, int] = {}
+    counts["make, first"], env = calls_of(lambda: tasks.make("TwoRobotPickCube-v1"))
+    counts["make, again"], _ = calls_of(lambda: tasks.make("TwoRobotPickCube-v1"))
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+    counts["step"], _ = calls_of(lambda: env.step(env.action_space.sample()))
+    goals = {"left": turned("left", -1.4)[:7]}
+    counts["plan"], _ = calls_of(lambda: motion.plan(cell(), aside(), goals))
+    robots = {"left": "panda", "right": "panda"}
+    counts["search"], _ = calls_of(lambda: layouts.search(robots, {"cube": (0.4, 0.0, 0.2)}))
+    return counts
+
+
+@pytest.fixture(scope="module")
+def counts() -> dict[str, int]:
+    return in_fresh_process(calls_of_verbs)
+
+
+@pytest.mark.parametrize("verb", MOST)
+def test_calls_stay_within_their_budget(counts, verb):
+    assert counts[verb] <= MOST[verb]
