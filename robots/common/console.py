@@ -34,14 +34,6 @@ class Command(NamedTuple):
     failed: int = FAILED
 
 
-def _of_parity(**commands: tuple[str, str]) -> dict[str, Command]:
-    """Return commands that exit with 1 where something differs, and with 2 after an error."""
-    return {
-        f"parity {name}": Command(module, about, MEANINGLESS)
-        for name, (module, about) in commands.items()
-    }
-
-
 FOR_USERS: Mapping[str, Command] = {
     "demo": Command(
         "rollouts.demo_command",
@@ -114,40 +106,9 @@ FOR_DEVELOPERS: Mapping[str, Command] = {
         "robots.portable",
         "run a program so that physics has the same bits on every x86-64 processor",
     ),
-    "bench": Command(
-        "measurements.bench.command", "measure what steps, resets, workers and recordings cost"
-    ),
-    "soak": Command(
-        "measurements.soak.command",
-        "step every task for a long time, and check that memory and processes do not grow",
-    ),
     "robots manifest": Command(
         "robots.write_manifest",
         "write the manifest of robot files from installed packages, when a robot is added",
-    ),
-    "robots survey": Command(
-        "measurements.robots.__main__",
-        "guess the robots in other packages' URDFs, and record which of them work",
-    ),
-    **_of_parity(
-        inventory=(
-            "parity.records.inventory",
-            "list every task, and how it was compared with native ManiSkill",
-        ),
-        compare=("parity.compare.command", "step tasks beside native, and compare every bit"),
-        replay=(
-            "parity.replay.command",
-            "play recorded actions in native and here, episode by episode",
-        ),
-        rollout=(
-            "parity.replay.rollout",
-            "play one episode in native and here, and keep its arrays",
-        ),
-        render=("parity.show.command", "draw native and ours side by side, with their difference"),
-        sweep=("parity.sweep.command", "compare, roll out and draw every task, for one summary"),
-        report=("parity.report.command", "write one HTML page on a sweep and the recorded results"),
-        bench=("measurements.bench.native", "measure steps, resets and vectors beside native"),
-        tables=("measurements.tables", "write the recorded results into the documentation"),
     ),
 }
 

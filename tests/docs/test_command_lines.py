@@ -8,7 +8,7 @@ import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import redirect_stderr, redirect_stdout
-from functools import cache
+from functools import cache, wraps
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import dropwhile
@@ -16,6 +16,9 @@ from unittest.mock import patch
 
 import pytest
 
+from benchmarks import __main__ as benchmarks
+from parity import __main__ as parity
+from parity.command_line import run_command
 from robots.common import console
 from tests.docs.blocks import ROOT
 from tests.outside.lab import tomllib
@@ -74,7 +77,7 @@ def problem(line: str) -> str:
         with redirect_stderr(said), redirect_stdout(io.StringIO()):
             _understand(words[:end])
     except SystemExit as stop:  # argparse's; 0 is help
-        return f"{line}: {said.getvalue().splitlines()[-1]}" if stop.code else ""
+        return f"{line}: {said.getvalue()}" if stop.code else ""
     except LookupError as error:
         return f"{line}: {error}"
     return ""
@@ -102,7 +105,9 @@ def _understand(line: Sequence[str]) -> None:
 
 
 def _of_module(name: str, words: Sequence[str]) -> None:
-    if name.partition(".")[0] in {module.module.partition(".")[0] for module in _COMMANDS}:
+    if name in TOOLS:
+        _of_tool(name, words)
+    elif name.partition(".")[0] in {module.module.partition(".")[0] for module in _COMMANDS}:
         found = find_spec(name)
         if found is None:
             raise LookupError(f"there is no module {name}")
@@ -112,6 +117,20 @@ def _of_module(name: str, words: Sequence[str]) -> None:
 
 
 _COMMANDS = console.COMMANDS.values()
+TOOLS = {"benchmarks": benchmarks.COMMANDS, "parity": parity.COMMANDS}
+
+
+def _of_tool(name: str, words: Sequence[str]) -> None:
+    """Let tyro read the words of a tool of the checkout; the command itself is not run."""
+
+    def instead(command: Callable[..., int]) -> Callable[..., int]:
+        @wraps(command)
+        def understood(*_, **__) -> int:
+            return 0
+
+        return understood
+
+    run_command(name, {key: instead(command) for key, command in TOOLS[name].items()}, words)
 
 
 class UnderstoodError(Exception):
@@ -209,9 +228,10 @@ make = "robot-layouts demo"
             ("robot-layouts portable robot-layouts demo --sedes 1", "unrecognized arguments"),
             ("python -m rollouts demo --sedes 1", "unrecognized arguments: --sedes"),
             ("python -m tasks lost", "invalid choice: 'lost'"),
-            ("python -m measurements.placings", "no module measurements.placings"),
+            ("python -m benchmarks placings", "Unrecognized options: placings"),
+            ("python -m parity compare --al", "Unrecognized options: --al"),
             ("make benhc", "no target benhc"),
-            ('make bench ARGS="--recrod"', "unrecognized arguments: --recrod"),
+            ('make bench ARGS="--recrod"', "Unrecognized options: --recrod"),
             ("pip install 'robot-layouts[veiw]'", "no extra veiw"),
             ("robot-layouts demo --seeds 1 && robot-layouts demo", ""),
             ("python -m pytest --no-such-option", ""),

@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from measurements.browser import served
+from benchmarks.teleop import served
 from rollouts.__main__ import main
 from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
 from rollouts.view_command import episode_cell
