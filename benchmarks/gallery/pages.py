@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import cache
 from hashlib import sha256
 from importlib import import_module
@@ -325,64 +325,33 @@ def _task(
         slices[entry["name"]] = slice(start, start + entry["size"])
         start += entry["size"]
     sensed = {entry["name"] for entry in measured["observation"] if entry["sensed"]}
-    places = (
-        (
-            f"`{name}`",
-            f"[{placement.robot.name}](../robots/{placement.robot.name}.md)",
-            f"`{action_text(layout.action_split[name])}`",
-            ", ".join(map(decimal, placement.base_position)),
-            facing_text(placement),
-            placement.start_keyframe,
-        )
-        for name, placement in layout.items()
-    )
-    headings = ("place", "robot", "action numbers", "base x, y, z (m)", "facing", "keyframe")
     steps = [expert["steps"][seed] for seed in solved(expert)]
-    lengths = f", in {min(steps)} to {max(steps)} steps (median {median(steps):g})" if steps else ""
-    what = {
-        "dense": " ".join((cls.dense_reward.__doc__ or "").split()),
-        "normalized_dense": f"the dense reward / {cls.max_reward:g}",
-        "sparse": "1 on success, else 0",
-        "none": "always 0",
-    }
-    rewards = (
-        (f"`{mode}`{' (default)' if mode == cls.reward_modes[0] else ''}", what[mode])
-        for mode in cls.reward_modes
-    )
-    modes = ((f"`{mode}`", _action_size(layout, mode)) for mode in CONTROL_MODES)
     rates = [m for m in map(bench.find, RATES) if m.variable == "task" and cls.task_id in m.values]
-    series = list(dict.fromkeys(name for m in rates for name in m.samples))
     return {
         "text": read_docstring(cls),
         "expert": expert,
-        "lengths": lengths,
+        "steps": steps,
+        "median": median,
         "observation_size": start,
         "frequency": cls.scenario.control_frequency,
         "times": speed(steps[0] if steps else 1, cls.scenario.control_frequency),
         "other_names": other_names(cls),
-        "places": _table(headings, places, ()),
+        "action_text": action_text,
+        "base_text": lambda placement: ", ".join(map(decimal, placement.base_position)),
+        "facing_text": facing_text,
         "like": _like(next(iter(layout.values())).robot, robots),
         "needs": list(_needs(cls)),
         "how_to_act": action_sentence(layout).removeprefix("Action, "),
         "action": _printed(action_table(layout), code=(1, 2)),
         "observation": _printed(observation_table(slices, sensed.__contains__), code=(0, 1)),
         "cameras": _printed(camera_table(cameras_of(layout, cls.cameras)), code=(0,)),
-        "rewards": _table(("reward mode", "what it gives"), rewards, ()),
-        "modes": _table(("control mode", "action numbers"), modes),
+        "dense": " ".join((cls.dense_reward.__doc__ or "").split()),
+        "modes": {mode: _action_size(layout, mode) for mode in CONTROL_MODES},
         "difference": difference_text,
-        "costs": rates
-        and _table(
-            ("", *series),
-            (
-                (
-                    f"{m.title} ({m.unit})",
-                    *(
-                        number_text(m.median(name, cls.task_id)) if name in m.samples else "–"
-                        for name in series
-                    ),
-                )
-                for m in rates
-            ),
+        "rates": rates,
+        "series": list(dict.fromkeys(name for m in rates for name in m.samples)),
+        "cost": lambda m, name: (
+            number_text(m.median(name, cls.task_id)) if name in m.samples else "–"
         ),
         "conditions": bench.conditions(),
     }
@@ -434,71 +403,25 @@ def _robot(
     """Return what a robot's page says besides its descriptor."""
     package, urdf = files_of(robot)
     groups = robot.action_split.groups
-    drivers = {
-        joint: f"`{name}`{', held' if group.held else ''}"
-        for name, group in groups.items()
-        for joint in group.joints
-    }
     fingers = [robot.fingers, *(limb.fingers for limb in robot.limbs.values())]
     physics = package.needed(urdf, pictures=False)
     drawing = [file for file in package.needed(urdf, pictures=True) if file not in physics]
-    numbers = (
-        (
-            str(number.index),
-            f"`{number.name}`",
-            *(
-                f"{bound:{'+' if number.relative else ''}.4g}"
-                for bound in (number.lower, number.upper)
-            ),
-            number.unit,
-        )
-        for number in robot.describe_action()
-    )
-    parts = (
-        (
-            f"`{name}`",
-            f"`{robot.name}.{name}`",
-            ", ".join(f"`{group}`" for group in part.action_split.groups),
-            str(part.action_dim),
-            _tcp(part),
-            f"{part.reach:g}",
-        )
-        for name, part in robot.parts.items()
-    )
-    keyframes = (
-        (
-            f"`{name}`{' (home)' if name == robot.home.keyframe else ''}",
-            ", ".join(f"{round(value, 6) + 0.0:.4g}" for value in qpos),
-        )
-        for name, qpos in robot.keyframes.items()
-    )
-    cameras = [
-        (f"`{c.name}`", f"`{c.link}`", f"{c.width} × {c.height}", f"{c.fov:.3g}")
-        for c in robot.cameras
-    ]
-    limbs = ("part", "as a place", "joint groups", "numbers", "tool centre point", "reach (m)")
     modes, refused = _modes(robot)
     return {
         "held": sum(len(group.joints) for group in groups.values() if group.held),
-        "tcp": _tcp(robot),
+        "tcp": _tcp,
         "fingers": dict.fromkeys(link for own in fingers if own for link in own.links),
         "tasks": [
             task_id
             for task_id, cls in classes.items()
             if any(placement.robot.name == robot.name for placement in cls.layout.values())
         ],
-        "joints": _table(
-            ("joint", "limits", "speed", "effort", "driven by"),
-            (_joint(joint, drivers) for joint in joints),
-            (2, 3),
-        ),
-        "numbers": _table(("#", "number", "lowest", "highest", "unit"), numbers, (0, 2, 3)),
-        "modes": _table(("control mode", "numbers", "what they are"), modes, (1,)),
+        "joints": joints,
+        "drivers": {joint: (name, g.held) for name, g in groups.items() for joint in g.joints},
+        "amount": lambda value: f"{value:{',.0f' if value >= 1e4 else '.4g'}}",
+        "modes": modes,
         "refused": refused,
-        "parts": _table(limbs, parts, (3, 5)),
-        "keyframes": _table(("keyframe", "joint positions (rad, m)"), keyframes, ()),
-        "cameras": cameras
-        and _table(("camera", "link", "pixels", "field of view (rad)"), cameras, (3,)),
+        "posture": lambda qpos: ", ".join(f"{round(value, 6) + 0.0:.4g}" for value in qpos),
         "origin": package.origin,
         "urdf": urdf,
         "drawn": can_be_drawn(robot),
@@ -517,23 +440,9 @@ def _tcp(robot: RobotDescriptor) -> str:
     return f"{place}{f', ({offset}) m from it' if offset else ''}"
 
 
-def _joint(joint: Mapping[str, Any], drivers: Mapping[str, str]) -> Iterator[str]:
-    unit, lower, upper = joint["unit"], joint.get("lower"), joint.get("upper")
-    yield f"`{joint['name']}`"
-    bounded = lower is not None and upper is not None
-    yield f"{lower:.4g} … {upper:.4g} {unit}" if bounded else f"none ({unit})"
-    for value, of in (
-        (joint.get("velocity"), f"{unit}/s"),
-        (joint.get("effort"), "N" if unit == "m" else "N·m"),
-    ):
-        yield "–" if value is None else f"{value:{',.0f' if value >= 1e4 else '.4g'}} {of}"
-    mimics = f"; mimics `{joint['mimics']}`" if "mimics" in joint else ""
-    yield drivers.get(joint["name"], "nothing") + mimics
-
-
-def _modes(robot: RobotDescriptor) -> tuple[list[tuple[str, str, str]], dict[str, list[str]]]:
+def _modes(robot: RobotDescriptor) -> tuple[list[tuple[str, int, str]], dict[str, list[str]]]:
     """Return a row for each control mode, and those that it does not offer, by the reason."""
-    rows: list[tuple[str, str, str]] = []
+    rows: list[tuple[str, int, str]] = []
     reasons: dict[str, list[str]] = {}
     for mode in robot.modes:
         try:
@@ -544,7 +453,7 @@ def _modes(robot: RobotDescriptor) -> tuple[list[tuple[str, str, str]], dict[str
         else:
             units = Counter(number.unit for number in numbers)
             what = " + ".join(f"{count} × {unit}" for unit, count in units.items())
-            rows.append((f"`{mode}`", str(len(numbers)), what))
+            rows.append((mode, len(numbers), what))
     return rows, reasons
 
 
@@ -557,12 +466,5 @@ def _printed(rows: Table, code: Collection[int] = ()) -> str:
     cells = [[str(cell) for cell in column.cells] for column in rows.columns]
     quoted = [[f"`{c}`" for c in row] if i in code else row for i, row in enumerate(cells)]
     numbers = [i for i, column in enumerate(rows.columns) if column.justify == "right"]
-    return _table(
-        [str(column.header) for column in rows.columns], zip(*quoted, strict=True), numbers
-    )
-
-
-def _table(
-    headings: Sequence[str], rows: Iterable[Iterable[str]], numbers: Collection[int] | None = None
-) -> str:
-    return table(headings, ([cell.replace("|", r"\|") for cell in row] for row in rows), numbers)
+    escaped = ([cell.replace("|", r"\|") for cell in row] for row in zip(*quoted, strict=True))
+    return table([str(column.header) for column in rows.columns], escaped, numbers)
