@@ -21,7 +21,7 @@ help:
 	@echo "make faults    whatever can go wrong, tried; writes docs/faults.md"
 	@echo "make check     lint, format, types, which room imports which, documentation, distribution"
 	@echo "make docs      the documentation as a site: open site/index.html"
-	@echo "make bench     what steps, resets, vectors and plans cost, beside native ManiSkill and FCL"
+	@echo "make bench     what steps, resets, vectors and plans cost, beside native ManiSkill"
 	@echo "make parity    every task beside native ManiSkill; writes docs/parity.md's table"
 	@echo "make clean     remove .venv"
 
@@ -48,7 +48,8 @@ check: $(VENV)/.check
 	$(RUN) -m pyright --pythonpath $(RUN)
 	$(VENV)/bin/lint-imports
 	$(RUN) -m parity tables --check
-	$(RUN) -m measurements.gallery --check
+	$(RUN) -m benchmarks tables --check
+	$(RUN) -m benchmarks gallery --check
 	$(SITE)
 	rm -rf $(VENV)/dist && $(RUN) -m hatchling build --directory $(VENV)/dist
 	$(RUN) -m twine check --strict $(VENV)/dist/*
@@ -59,18 +60,18 @@ docs: $(VENV)/.docs
 
 # ARGS="--record" keeps the figures for docs/parity.md.
 bench: $(VENV)/.test
-	OMP_NUM_THREADS=1 $(RUN) -m parity bench --out runs/bench $(ARGS)
-	OMP_NUM_THREADS=1 $(RUN) -m measurements.motion checks
-	OMP_NUM_THREADS=1 $(RUN) -m measurements.motion queries --cells 14 --queries 10 \
-		--out runs/bench/motion.jsonl
-	$(RUN) -m parity tables
-	$(RUN) -m measurements.gallery
+	OMP_NUM_THREADS=1 $(RUN) -m benchmarks bench --native --out runs/bench $(ARGS)
+	OMP_NUM_THREADS=1 $(RUN) -m benchmarks collisions
+	OMP_NUM_THREADS=1 $(RUN) -m benchmarks planning --cells 14 --queries 10 \
+		--out runs/bench/planning.jsonl
+	$(RUN) -m benchmarks tables
+	$(RUN) -m benchmarks gallery
 
 # ARGS="--demos DIR" plays recorded demonstrations as well.
 parity: $(VENV)/.test
 	OMP_NUM_THREADS=1 $(RUN) -m parity compare --all --record $(ARGS)
 	$(RUN) -m parity tables
-	$(RUN) -m measurements.gallery
+	$(RUN) -m benchmarks gallery
 
 clean:
 	rm -rf $(VENV)

@@ -23,8 +23,8 @@ from tasks.engine.cameras import cameras_of
 from tasks.engine.task import MultiRobotTask
 from tasks.registry import full_name, get_task_class, make, origin, other_names
 
-# Written by ``robot-layouts parity compare --all --record``; in a checkout and in the wheel.
-PARITY_RESULTS = Path(__file__).parents[1] / "parity" / "results.json"
+# Written by ``python -m parity compare --all --record``; in a checkout and in the wheel.
+PARITY_RESULTS = Path(__file__).with_name("parity.json")
 UNKNOWN = "–"
 OURS = "robot-layouts"  # where built-in tasks come from
 

@@ -38,7 +38,7 @@ REQUIRED = os.environ.get("ROBOT_LAYOUTS_REQUIRE_NATIVE") == "1"
 def native_problem() -> str | None:
     """Say why native ManiSkill cannot run here, or None if it can."""
     if importlib.util.find_spec("mani_skill") is None:
-        return "mani_skill is not installed; pip install 'robot-layouts[parity]'"
+        return "mani_skill is not installed; pip install -e '.[parity]'"
     probe = [sys.executable, "-c", "import sapien; sapien.render.RenderSystem()"]
     done = subprocess.run(probe, capture_output=True, text=True, check=False)
     if done.returncode != 0:

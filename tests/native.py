@@ -9,8 +9,7 @@ from typing import NamedTuple
 import pytest
 
 import tasks
-from parity.compare.both_sides import NativeSide, OurSide
-from parity.compare.lockstep import EpisodeResult, History, compare
+from parity.lockstep import EpisodeResult, History, NativeSide, OurSide, compare
 from tasks.episode import Episode
 
 TASKS = tasks.list_clones()

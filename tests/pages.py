@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from measurements.browser import PATIENCE, SOFTWARE_WEBGL, running_browser
+from benchmarks.teleop import PATIENCE, SOFTWARE_WEBGL, running_browser
 
 SIZE = {"width": 900, "height": 560}
 PLAN = 580  # pixels from the left that no panel covers

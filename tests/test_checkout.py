@@ -13,8 +13,8 @@ READERS = (
     "tests/docs/test_commands.py",
     "tests/docs/test_links.py",
     "tests/docs/test_pages.py",
-    "tests/measurements/test_gallery.py",
-    "tests/measurements/test_learned.py",
+    "tests/benchmarks/test_gallery.py",
+    "tests/benchmarks/test_pages.py",
     "tests/test_packaging.py",
 )
 LEFT_BEHIND = (

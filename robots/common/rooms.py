@@ -12,5 +12,5 @@ PLAYING = (
 )
 """What plays episodes, each room importing only those before it."""
 
-ROOMS = (*PLAYING, "robot_layouts", "parity", "measurements")
+ROOMS = (*PLAYING, "robot_layouts")
 """All of them."""

@@ -16,6 +16,8 @@ from unittest.mock import patch
 
 import pytest
 
+from benchmarks.__main__ import PROGRAM as BENCHMARKS
+from parity.__main__ import PROGRAM as PARITY
 from robot_layouts.__main__ import PROGRAM
 from robots.common.cli import Call
 from robots.common.rooms import ROOMS
@@ -76,7 +78,7 @@ def problem(line: str) -> str:
         with redirect_stderr(said), redirect_stdout(io.StringIO()):
             _understand(words[:end])
     except SystemExit as stop:  # argparse's; 0 is help
-        return f"{line}: {said.getvalue().splitlines()[-1]}" if stop.code else ""
+        return f"{line}: {said.getvalue()}" if stop.code else ""
     except LookupError as error:
         return f"{line}: {error}"
     return ""
@@ -104,13 +106,18 @@ def _understand(line: Sequence[str]) -> None:
 
 
 def _of_module(name: str, words: Sequence[str]) -> None:
-    if name.partition(".")[0] in ROOMS:
+    if name in TOOLS:
+        TOOLS[name].parse(words)
+    elif name.partition(".")[0] in ROOMS:
         found = find_spec(name)
         if found is None:
             raise LookupError(f"there is no module {name}")
         is_package = found.submodule_search_locations is not None
         main = import_module(f"{name}.__main__" if is_package else name).main
         parsed(lambda: main(words))
+
+
+TOOLS = {"benchmarks": BENCHMARKS, "parity": PARITY}
 
 
 class UnderstoodError(Exception):
@@ -212,7 +219,8 @@ make = "robot-layouts demo"
             ("robot-layouts portable robot-layouts demo --sedes 1", "Did you mean --seeds"),
             ("python -m rollouts demo --sedes 1", "unrecognized arguments: --sedes"),
             ("python -m tasks lost", "Did you mean 'list'"),
-            ("python -m measurements.placings", "no module measurements.placings"),
+            ("python -m benchmarks placings", "Did you mean 'placing'"),
+            ("python -m parity compare --al", "unrecognized arguments: --al"),
             ("make benhc", "no target benhc"),
             ('make bench ARGS="--recrod"', "unrecognized arguments: --recrod"),
             ("pip install 'robot-layouts[veiw]'", "no extra veiw"),

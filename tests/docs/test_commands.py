@@ -4,9 +4,9 @@ import argparse
 
 import pytest
 
-from measurements.site.commands import _parser
-from measurements.site.hooks import COMMANDS as PLACE
-from measurements.site.hooks import on_page_markdown, on_post_page
+from benchmarks.site.commands import _parser
+from benchmarks.site.hooks import COMMANDS as PLACE
+from benchmarks.site.hooks import on_page_markdown, on_post_page
 from robot_layouts.__main__ import PROGRAM
 from tests.docs.blocks import ROOT
 

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from measurements.site.hooks import on_page_markdown
-from measurements.site.links import FOLDERS, anchors_of, broken_in_site, broken_in_text
+from benchmarks.site.hooks import on_page_markdown
+from benchmarks.site.links import FOLDERS, anchors_of, broken_in_site, broken_in_text
 from tests.checkout import tracked_files
 from tests.docs.blocks import ROOT, blocks
 

@@ -7,7 +7,7 @@ import torch
 import tasks
 from experts import find_expert, list_experts
 from experts.rehearsal import rehearsed
-from parity.compare.native_env import make_native, native_action
+from parity.native import make_native, native_action
 from tests.quick import quick_cases
 from tests.rollouts.expert_plays import REBUILT, episode, plan, same_episodes, seeds, task
 

@@ -7,7 +7,7 @@ import tasks
 from experts import find_expert, list_experts, register_expert
 from experts.registry import EXPERTS
 from layouts import face_to_face
-from parity.compare.native_env import make_native, native_action
+from parity.native import make_native, native_action
 from robots import TaskError, UnknownNameError
 from tasks.episode import play
 from tests.quick import quick_cases

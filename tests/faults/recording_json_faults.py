@@ -9,8 +9,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.recording_files import (
     AREA,
@@ -70,8 +68,6 @@ def faults() -> Iterator[Fault]:
         yield Fault(AREA, f"json: the file is {what}", lambda folder, m=make: _put(folder, m))
     for what, edit in _HARMLESS.items():
         yield Fault(AREA, f"json: {what}", lambda folder, e=edit: _harmless(folder, e), GOES_ON)
-    for what, make in _NPZ.items():
-        yield Fault(AREA, f"npz: {what}", lambda folder, m=make: _npz(folder, m))
 
 
 def _inside(summary: Any, place: tuple[str | int, ...]) -> Any:
@@ -188,75 +184,4 @@ _HARMLESS: dict[str, Callable[[Path], None]] = {
         path.with_suffix(".json").write_text(json.dumps(json.loads(contents()[1]))),
         None,
     )[1],
-}
-
-
-def _npz(folder: Path, make: Callable[[Path], None]) -> None:
-    from parity.compare.episodes import load_episodes
-
-    make(folder / "actions.npz")
-    load_episodes(folder / "actions.npz", "PushT-v1", 7)
-
-
-def _arrays(**arrays: Any) -> Callable[[Path], None]:
-    return lambda path: np.savez(path, **arrays)
-
-
-def _large_header(path: Path) -> None:
-    import io
-    import zipfile
-
-    header = io.BytesIO()
-    np.lib.format.write_array_header_1_0(
-        header, {"descr": "<f4", "fortran_order": False, "shape": (10**12, 7)}
-    )
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("seeds.npy", _npy(np.zeros(1, int)))
-        archive.writestr("a0.npy", header.getvalue())
-
-
-def _npy(rows: np.ndarray) -> bytes:
-    import io
-
-    stream = io.BytesIO()
-    np.save(stream, rows)
-    return stream.getvalue()
-
-
-def _bomb(path: Path) -> None:
-    import zipfile
-
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-        archive.writestr("seeds.npy", _npy(np.zeros(1, int)))
-        with archive.open("a0.npy", "w", force_zip64=True) as stream:
-            for _ in range(1100):
-                stream.write(bytes(2**20))
-
-
-_ROWS = np.zeros((3, 7), np.float32)
-
-_NPZ: dict[str, Callable[[Path], None]] = {
-    "a FIFO": os.mkfifo,
-    "a directory": lambda path: path.mkdir(),
-    "empty": lambda path: path.touch(),
-    "a text": lambda path: (path.write_text("text"), None)[1],
-    "half a zip": lambda path: (path.write_bytes(b"PK\x03\x04" + bytes(50)), None)[1],
-    "one array": lambda path: (path.write_bytes(_npy(_ROWS)), None)[1],
-    "no seeds": _arrays(a0=_ROWS),
-    "no actions": _arrays(seeds=[0]),
-    "actions of one episode lack": _arrays(seeds=[0, 1], a0=_ROWS),
-    "seeds are texts": _arrays(seeds=["zero"], a0=_ROWS),
-    "a seed is not a number": _arrays(seeds=[np.nan], a0=_ROWS),
-    "a seed is infinite": _arrays(seeds=[np.inf], a0=_ROWS),
-    "a seed is negative": _arrays(seeds=[-1], a0=_ROWS),
-    "a seed is 10^30": _arrays(seeds=[1e30], a0=_ROWS),
-    "actions are objects": _arrays(seeds=[0], a0=np.array([None, {}], object)),
-    "actions are whole numbers": _arrays(seeds=[0], a0=np.zeros((3, 7), int)),
-    "actions are not a number": _arrays(seeds=[0], a0=np.full((3, 7), np.nan, np.float32)),
-    "actions of other robots": _arrays(seeds=[0], a0=np.zeros((3, 8), np.float32)),
-    "actions are one row": _arrays(seeds=[0], a0=np.zeros(7, np.float32)),
-    "no steps": _arrays(seeds=[0], a0=np.zeros((0, 7), np.float32)),
-    "no episodes": _arrays(seeds=np.zeros(0, int)),
-    "a header of 10^12 rows": _large_header,
-    "a zip bomb": _bomb,
 }

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from benchmarks.teleop import served
 from layouts import side_by_side, single
 from layouts.__main__ import main
 from layouts.viewer import Cell, Motion, Thing, ViewerError
@@ -18,7 +19,6 @@ from layouts.viewer.page import Page, contacts_text
 from layouts.viewer.saved import NO_SLIDERS, save_html
 from layouts.viewer.server import serving
 from layouts.visuals import MOST_TRIANGLES, coloured, read_visuals, simplified
-from measurements.browser import served
 from robots import LayoutError, MissingPackageError, RobotRegistry
 from tests.layouts.cells import link_poses, mixed_cell, random_positions
 

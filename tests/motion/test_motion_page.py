@@ -7,8 +7,8 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
+from benchmarks.teleop import served
 from layouts import face_to_face
-from measurements.browser import served
 from motion.output.page import motion_cell
 from tests.experts.free_motions import swing
 from tests.motion.motions import LAYOUT, busy_motion

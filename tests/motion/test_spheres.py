@@ -33,7 +33,7 @@ def test_every_point_of_a_hull_is_in_a_ball_of_its_own_and_in_one_around(robot):
 
 
 def test_balls_are_tight():
-    """At least as tight as it takes to leave FCL few pairs: see ``measurements.motion``."""
+    """At least as tight as it takes to leave FCL few pairs: see ``benchmarks.motion``."""
     for hulls in links_of("panda"):
         for cluster in clusters_of(hulls):
             assert cluster.radii.max() <= cluster.radius + 1e-9

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from parity.compare.lockstep import compare
-from parity.compare.snapshot import QUANTITIES, differing, largest_difference
+from parity.lockstep import QUANTITIES, compare, differing, largest_difference
 from robots import TaskError
 from tasks.episode import Episode
 

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 import tasks
-from parity.compare.both_sides import NativeSide, OurSide
+from parity.lockstep import NativeSide, OurSide
 from robots import RobotRegistry
 from tasks.episode import Episode
 from tests.native import NATIVE, Pair, complaints

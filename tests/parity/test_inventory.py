@@ -1,150 +1,65 @@
-"""``python -m parity inventory``: what it says about tasks here, files, and native's own tasks."""
+"""``python -m parity inventory``: what it says about tasks here, and about native's own tasks."""
 
 import json
-import subprocess
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-import tasks
 from parity.__main__ import main
-from parity.compare.native_env import native_tasks
-from parity.records.inventory import NO_REASON, find_files, missing_tasks, reason
-from rollouts.reading.recording import TrajectoryError
+from parity.inventory import NO_REASON, REASONS, missing_tasks, reason
+from parity.native import native_tasks
 from tests.native import NATIVE
-
-ROOT = Path(__file__).parents[2]
-TASKS = ("PickCube-v1", "TwoRobotPickCube-v1")
-SAID = {"env_info": {"env_id": "PickCube-v1"}, "episodes": []}
+from tests.parity.test_episodes import demonstration
 
 
 @pytest.fixture
-def demos(tmp_path):
-    """A folder with two files for PickCube, and one that is none."""
-    for name, text in (("a/one", json.dumps(SAID)), ("b/two", json.dumps(SAID)), ("three", "{}")):
-        path = tmp_path / "demos" / f"{name}.h5"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.touch()
-        path.with_suffix(".json").write_text(text)
-    return tmp_path / "demos"
+def printed(tmp_path, capsys):
+    record, compared = tmp_path / "results.json", {"PickCube-v1": {"episodes": 7, "equal": False}}
+    record.write_text(json.dumps({"versions": {}, "machine": "", "tasks": compared}))
+    demonstration(tmp_path / "demos")
+    words = ("--demos", str(tmp_path / "demos"), "--results", str(record))
+    assert main(["inventory", *words]) == 0
+    return capsys.readouterr().out
 
 
-@pytest.fixture
-def record(tmp_path):
-    path = tmp_path / "results.json"
-    compared = {"PickCube-v1": {"episodes": 7, "equal": False}}
-    path.write_text(json.dumps({"versions": {}, "machine": "", "tasks": compared}))
-    return path
+def test_every_task_has_a_row(printed):
+    rows = {line.split()[0]: line for line in printed.splitlines() if "-v1 " in line}
+    assert "DIFFERS, 7 episodes" in rows["PickCube-v1"]
+    assert rows["PickCube-v1"].split()[-1] == "1"
+    assert "never compared" in rows["TwoRobotPickCube-v1"]
+    assert "no clone" in rows["Relay-v1"]
 
 
-@pytest.fixture
-def inventory(capsys, monkeypatch, demos, record):
-    monkeypatch.setattr("parity.records.inventory.list_tasks", lambda: TASKS)
-
-    def run(*options: str) -> str:
-        assert main(["inventory", "--demos", str(demos), "--results", str(record), *options]) == 0
-        return capsys.readouterr().out
-
-    return run
-
-
-def test_as_json(inventory, demos):
-    found = json.loads(inventory("--json"))
-    one, two = found["tasks"]
-    assert one == {
-        "task_id": "PickCube-v1",
-        "robots": "panda",
-        "action_size": 8,
-        "observation_size": 42,
-        "max_episode_steps": 50,
-        "reward_modes": ["normalized_dense", "dense", "sparse", "none"],
-        "origin": "robot-layouts",
-        "other_names": ["maniskill.pick_cube_native", "pick_cube_native"],
-        "native_id": "PickCube-v1",
-        "expert": one["expert"],
-        "parity": {"episodes": 7, "equal": False},
-        "demonstrations": [str(demos / "a/one.h5"), str(demos / "b/two.h5")],
-    }
-    assert (two["robots"], two["action_size"]) == ("2 × panda_wristcam", 16)
-    assert two["expert"] is True
-    assert two["parity"] == {"episodes": None, "equal": None}
-    assert two["demonstrations"] == []
-    assert list(found["unreadable"]) == [str(demos / "three.h5")]
-
-
-def test_as_tables(inventory):
-    lines = inventory().splitlines()
-    (one,) = (line.split() for line in lines if line.startswith("PickCube-v1 "))
-    (two,) = (line for line in lines if line.startswith("TwoRobotPickCube-v1 "))
-    assert one[:3] == ["PickCube-v1", "maniskill.pick_cube_native,", "pick_cube_native"]
-    assert one[3:7] == ["panda", "42", "8", "50"]
-    assert one[-4:] == ["DIFFERS,", "7", "episodes", "2"]
-    assert "never compared" in two
-    assert two.endswith("0")
-    assert any("three.h5 is not counted" in line and "no env_info" in line for line in lines)
-
-
-def test_no_such_folder_or_record(tmp_path, capsys):
-    with pytest.raises(TrajectoryError, match="there is no folder"):
-        find_files(tmp_path / "nowhere")
-    assert main(["inventory", "--results", str(tmp_path / "nowhere.json")]) == 2
-    assert capsys.readouterr().err.startswith("error: cannot read")
-
-
-@pytest.mark.long
-def test_without_mani_skill_the_rest_is_told():
-    code = (
-        "import sys; sys.modules['mani_skill'] = None\n"
-        "import parity.records.inventory as inventory\n"
-        "inventory.list_tasks = lambda: ('PickCube-v1',)\n"
-        "sys.exit(inventory.main([]))"
+def spec(*robots, files=()):
+    return SimpleNamespace(
+        asset_download_ids=list(files), cls=SimpleNamespace(SUPPORTED_ROBOTS=robots)
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert "PickCube-v1" in done.stdout
-    assert "native's other tasks are not known here" in done.stdout
-    assert "pip install 'robot-layouts[parity]'" in done.stdout
 
 
 @pytest.mark.parametrize(
-    ("robots", "downloads", "expected"),
+    ("task_id", "about", "why"),
     [
-        (["anymal_c"], [], "no descriptor here of its robot: anymal_c"),
-        ([("panda", "anymal_c")], [], NO_REASON),
-        ([("anymal_c", "hopper")], [], "no descriptor here of its robot: anymal_c, hopper"),
-        (["panda"], ["ycb", "more"], "needs files that native downloads: ycb, more"),
-        (None, [], NO_REASON),
+        ("MS-AntRun-v1", spec(), REASONS["MS-"]),
+        ("New-v1", spec("panda", files=["ycb"]), "needs files that native downloads: ycb"),
+        (
+            "New-v1",
+            spec("anymal", ("spot", "spot")),
+            "no descriptor here of its robot: anymal, spo",
+        ),
+        ("New-v1", spec("panda", "anymal"), NO_REASON),
+        ("New-v1", spec(), NO_REASON),
     ],
 )
-def test_reasons(robots, downloads, expected):
-    spec = SimpleNamespace(
-        asset_download_ids=downloads, cls=SimpleNamespace(SUPPORTED_ROBOTS=robots)
-    )
-    assert reason("Some-v1", spec) == expected
+def test_reasons(task_id, about, why):
+    assert reason(task_id, about).startswith(why)
 
 
 class TestNative:
     pytestmark = NATIVE
 
-    def test_every_task_of_natives_is_either_cloned_or_missing(self):
-        missing = {task.task_id: task.reason for task in missing_tasks()}
-        cloned = set(tasks.list_clones())
-        assert cloned.isdisjoint(missing)
-        assert cloned | set(missing) == set(native_tasks())
-        assert (
-            missing["TurnFaucet-v1"] == "needs files that native downloads: partnet_mobility_faucet"
-        )
-        assert missing["DrawSVG-v1"] == "needs the packages svgpathtools and svgwrite"
-        assert all(missing.values())
-
-    def test_special_reasons_are_about_tasks_that_are_there(self):
-        from parity.records.inventory import _SPECIAL_PREFIXES, _SPECIAL_REASONS
-
-        known = set(native_tasks())
-        assert set(_SPECIAL_REASONS) <= known
-        for prefix in _SPECIAL_PREFIXES:
-            assert any(task_id.startswith(prefix) for task_id in known), prefix
+    def test_native_s_tasks_without_a_clone(self):
+        missing, everything = missing_tasks(), native_tasks()
+        assert "PickCube-v1" not in missing
+        assert len(missing) > 20
+        used = [b for b in REASONS if any(task_id.startswith(b) for task_id in everything)]
+        assert used == list(REASONS), "each reason is of a task that native has"

@@ -7,9 +7,8 @@ import pytest
 
 import tasks
 from layouts import Layout
-from parity.compare.both_sides import NativeSide, OurSide
-from parity.compare.episodes import random_episodes
-from parity.compare.lockstep import EpisodeResult, compare
+from parity.episodes import random_episodes
+from parity.lockstep import EpisodeResult, NativeSide, OurSide, compare
 from robots import RobotDescriptor, RobotRegistry
 from simulation import State
 from simulation.sapien3.world import BuiltWorld

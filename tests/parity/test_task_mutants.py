@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 import tasks
-from parity.compare.episodes import random_episodes
+from parity.episodes import random_episodes
 from simulation import PhysicsSettings, World
 from tests.native import NATIVE, TASKS, against_native
 from tests.quick import quick_cases

@@ -18,7 +18,6 @@ ROOMS = {
     "layouts": "layouts --help",
     "tasks": "tasks --help",
     "rollouts": "rollouts record --help",
-    "parity": "parity --help",
 }
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from benchmarks.robots.probe import kinematic_difference
 from layouts import single
-from measurements.mjcf.agreement import largest_difference
 from robots import (
     AssetError,
     DescriptorError,
@@ -169,11 +169,11 @@ class TestKinematics:
               <body name="c" pos="0 0 0.2"><geom size="0.05"/>
                 <body name="d" euler="0 90 0"><joint name="j4" axis="0 0 1"/><geom size="0.05"/>
           </body></body></body></body></body></worldbody></mujoco>"""
-        assert largest_difference(write(tmp_path, odd)) < 1e-9
+        assert kinematic_difference(write(tmp_path, odd)) < 1e-9
 
     def test_two_trees_and_a_scene(self, tmp_path):
         both = arm("left_", at="0 0.4 1") + arm("right_", at="0.3 -0.4 0")
-        assert largest_difference(write(tmp_path, mjcf(both))) < 1e-9
+        assert kinematic_difference(write(tmp_path, mjcf(both))) < 1e-9
 
     def test_meshes_are_where_mujoco_has_them(self, tmp_path):
         """Whatever an MJCF scales, shifts and turns, the corners in the link's frame are right."""

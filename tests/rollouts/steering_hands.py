@@ -4,8 +4,8 @@ import re
 
 import numpy as np
 
+from benchmarks.teleop import Gizmos
 from kinematics.rotations import multiply, quaternion_about, rotate
-from measurements.teleop.gizmos import Gizmos
 
 STROKE = 0.01  # m, of a key
 TURN = np.radians(5)  # of a key

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tasks
-from measurements.browser import served
+from benchmarks.teleop import served
 from rollouts.playing.replay import replay
 from rollouts.reading.recorded_task import task_for
 from rollouts.reading.recording import Recording

@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from measurements.browser import served
+from benchmarks.teleop import served
 from rollouts.__main__ import main
 from rollouts.commands import episode_cell
 from rollouts.reading.recording import Recording, TrajectoryError

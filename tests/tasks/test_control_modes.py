@@ -5,8 +5,8 @@ import pytest
 
 import tasks
 from layouts import single
-from parity.compare.episodes import random_episodes
-from parity.compare.lockstep import HISTORIES
+from parity.episodes import random_episodes
+from parity.lockstep import HISTORIES
 from robots import CONTROL_MODES, DescriptorError, RobotRegistry, TaskError, UnknownNameError
 from rollouts.playing.plan_conversion import as_positions
 from simulation.sapien3.world import BuiltWorld

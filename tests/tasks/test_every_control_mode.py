@@ -11,9 +11,8 @@ import torch
 
 import tasks
 from layouts import Layout, Placement
-from parity.compare.both_sides import NativeSide
-from parity.compare.episodes import random_episodes
-from parity.compare.lockstep import HISTORIES
+from parity.episodes import random_episodes
+from parity.lockstep import HISTORIES, NativeSide
 from robots import (
     CONTROL_MODES,
     ActionError,

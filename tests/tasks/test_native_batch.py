@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from parity.compare.episodes import random_episodes
-from parity.compare.lockstep import HISTORIES
-from parity.compare.snapshot import differing, select
+from parity.episodes import random_episodes
+from parity.lockstep import HISTORIES, differing, select
 from tasks.episode import Episode
 from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, Pair, complaints, pair

@@ -12,7 +12,7 @@ import pytest
 import torch
 
 import tasks
-from parity.compare.native_env import make_native, native_action, native_action_dim, quiet
+from parity.native import make_native, native_action, native_action_dim, quiet
 from robots import RobotRegistry
 from simulation import Camera
 from tests.native import NATIVE, TASKS

@@ -3,8 +3,8 @@
 import pytest
 
 import tasks
-from parity.compare.episodes import random_episodes
-from parity.compare.lockstep import HISTORIES
+from parity.episodes import random_episodes
+from parity.lockstep import HISTORIES
 from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, complaints, pair
 from tests.quick import quick_cases

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from parity.compare.native_env import native_action, native_agents
-from parity.compare.snapshot import differing
+from parity.lockstep import differing
+from parity.native import native_action, native_agents
 from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, Pair, pair
 

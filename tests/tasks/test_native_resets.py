@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from parity.compare.snapshot import differing
+from parity.lockstep import differing
 from tests.native import NATIVE, TASKS, Pair, pair
 
 pytestmark = NATIVE

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import torch
 
-from parity.compare.native_env import native_action
-from parity.compare.snapshot import differing
+from parity.lockstep import differing
+from parity.native import native_action
 from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, Pair, pair
 

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 import tasks
-from measurements.soak.process_resources import read_level
+from benchmarks.soak import read_level
 from robots import RobotLayoutsError, SimulationError, TaskError
 from simulation.rendering.pictures import vulkan_problem
 from simulation.sapien3.backend import worlds_below

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import tasks
+from benchmarks.teleop import served
 from kinematics.rotations import pose_matrix
 from layouts import single
 from layouts.viewer.saved import NO_SLIDERS, save_html
-from measurements.browser import served
 from simulation import Box, Capsule, Cylinder, Sphere
 from simulation.sapien3.world import BuiltWorld
 from simulation.world import Body

@@ -1,0 +1,391 @@
+"""What one environment costs: steps, resets, recordings, worlds that vary, checks of layouts."""
+
+from __future__ import annotations
+
+import gc
+import tempfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+import tasks
+from benchmarks.bench.measurement import Measurement, Sample, Settings, SomeValue, by_series
+from benchmarks.bench.worlds import crowd, make_crowd, make_pile
+from parity.native import make_native, native_action
+from rollouts.recording.recorder import Recorder
+from simulation.rendering.pictures import vulkan_problem
+from tasks import (
+    CameraShift,
+    Distractors,
+    Light,
+    MultiRobotTask,
+    Normal,
+    Randomization,
+    Shift,
+    Surface,
+    Texture,
+    Uniform,
+    Whole,
+    list_clones,
+)
+from tasks.episode import REBUILT, play
+
+STEP, PHYSICS, HERE, NATIVE = "step", "physics alone", "here", "native"  # series
+RESETS = 5  # of a sample
+EPISODE_STEPS = 60  # of an episode that is recorded
+
+# Each axis alone, on all that it can vary, and textures on one body, too.
+PLAIN, REBUILD = "nothing", "nothing; world built anew"
+SHIFT = Shift(x=Uniform(-0.02, 0.02), y=Uniform(-0.02, 0.02), yaw=Uniform(-0.1, 0.1))
+VARYING = {
+    "mass": Randomization(mass={"*": Uniform(0.8, 1.2)}),
+    "friction": Randomization(friction={"*": Uniform(0.3, 1.0)}),
+    "stiffness": Randomization(stiffness={"*": Uniform(0.8, 1.2)}),
+    "damping": Randomization(damping={"*": Uniform(0.8, 1.2)}),
+    "joint_friction": Randomization(joint_friction={"*": Uniform(0.0, 0.2)}),
+    "bases": Randomization(bases={"*": SHIFT}),
+    "action_noise": Randomization(action_noise={"*": Normal(0.02)}),
+    "action_delay": Randomization(action_delay=Whole(1, 3)),
+    "sensor_noise": Randomization(sensor_noise={"*.*": Normal(0.01), "*": Normal(0.01)}),
+    "observation_delay": Randomization(observation_delay=Whole(1, 3)),
+    "size": Randomization(size={"*": Uniform(0.9, 1.1)}),
+    "gravity": Randomization(gravity=Uniform(9.0, 10.5)),
+}
+CAMERA = CameraShift(x=Normal(0.02), y=Normal(0.02), yaw=Normal(0.05), fov=Uniform(0.9, 1.1))
+LIGHT = Light(turn=Uniform(-1, 1), tilt=Uniform(0, 0.5), strength=Uniform(0.5, 1.5))
+PAINT = Surface(red=Uniform(0, 1), green=Uniform(0, 1), blue=Uniform(0, 1), share=0.5)
+LOOKS = {
+    PLAIN: None,
+    "cameras": Randomization(cameras={"*": CAMERA}),
+    "lights": Randomization(lights={"*": LIGHT}),
+    "colors": Randomization(colors={"*": PAINT}),
+    "textures": Randomization(textures={"*": Texture()}),
+    "textures; one body": Randomization(textures={"cube": Texture()}),
+    "distractors; 8, visual": Randomization(
+        distractors=Distractors(count=Whole(4, 8), kind="visual")
+    ),
+    "distractors; 8, dynamic": Randomization(distractors=Distractors(count=Whole(4, 8))),
+}
+
+
+class Played:
+    """A task whose step is timed under random actions, and the physics of the same motion."""
+
+    def __init__(self, env: MultiRobotTask, settings: Settings) -> None:
+        """Take a task; its first action is played now, as building leaves work to it."""
+        self.env, self._settings = env, settings
+        env.step(torch.from_numpy(self.actions(0)[0]))
+
+    def step(self, number: int) -> float:
+        """Return the time of a whole step, for each environment (µs)."""
+        actions = [torch.from_numpy(action) for action in self.actions(number)]
+        self.env.reset(number)
+        start = self._settings.clock.now()
+        for action in actions:
+            self.env.step(action)
+        return self._each(self._settings.clock.now() - start)
+
+    def physics(self, number: int) -> float:
+        """Return the time of its physics alone, for each environment (µs)."""
+        self.env.reset(number)
+        step, clock = self.env.simulation.timed_step, self._settings.clock.now
+        return self._each(sum(step(action, clock) for action in self.actions(number)))
+
+    def actions(self, number: int) -> NDArray[np.float32]:
+        """Return the actions of a round, shape (steps, N, A)."""
+        width = self.env.single_action_space.shape[0]
+        return random_actions(number, self._settings.steps, self.env.num_envs, width)
+
+    def _each(self, seconds: float) -> float:
+        return seconds / (self._settings.steps * self.env.num_envs) * 1e6
+
+
+def random_actions(seed: int, steps: int, envs: int, numbers: int) -> NDArray[np.float32]:
+    """Return actions within the range, shape (steps, envs, numbers)."""
+    drawn = np.random.default_rng(seed).uniform(-1, 1, (steps, envs, numbers))
+    return drawn.astype(np.float32)
+
+
+def step(settings: Settings) -> Measurement:
+    """A step of one environment."""
+    envs = {task_id: tasks.make(task_id) for task_id in settings.task}
+    title = "One step of one environment, by task"
+    return _beside_physics(settings, "step", title, "task", {STEP: envs})
+
+
+def environments(settings: Settings) -> Measurement:
+    """A step by number of environments in one process."""
+    task_id, settings = settings.task[0], replace(settings, steps=settings.batch_steps)
+    envs = {count: tasks.make(task_id, num_envs=count) for count in settings.environments}
+    title = f"One step per environment of one process, {task_id}"
+    return _beside_physics(settings, "environments", title, "environments", {STEP: envs})
+
+
+def robots(settings: Settings) -> Measurement:
+    """A step by number of robots in a ring, of one kind and mixed."""
+    rings = {"one kind": settings.kinds[:1], "mixed": settings.kinds}
+    envs = {
+        name: {count: make_crowd(count, kinds) for count in settings.robots}
+        for name, kinds in rings.items()
+    }
+    title = f"One step of a ring of robots: {settings.kinds[0]}, or {' + '.join(settings.kinds)}"
+    return _beside_physics(settings, "robots", title, "robots", envs)
+
+
+def contacts(settings: Settings) -> Measurement:
+    """A step by number of bodies that touch."""
+    envs: dict[int, MultiRobotTask] = {}
+    for cubes in settings.cubes:
+        env = make_pile(cubes)
+        Played(env, settings)  # its first action lets the cubes touch
+        envs[env.touching()] = env
+    title = "One step beside cubes that touch"
+    return _beside_physics(settings, "contacts", title, "pairs that touch", {STEP: envs})
+
+
+def reset(settings: Settings) -> Measurement:
+    """A reset of one environment, as it is and with the world built anew."""
+    variants: dict[tuple[str, str], Sample] = {}
+    for task_id in settings.task:
+        env = tasks.make(task_id)
+        variants["reset", task_id] = _timed_resets(settings, env.reset)
+        variants["world built anew", task_id] = _timed_resets(settings, _rebuild(env))
+    title = "A reset of one environment, by task"
+    return _by_task(settings, "reset", title, "ms per reset", settings.interleave(variants))
+
+
+def recording(settings: Settings) -> Measurement:
+    """An episode of random actions that is recorded, and one that is only stepped."""
+    variants: dict[tuple[str, str], Sample] = {}
+    for task_id in settings.task:
+        env = tasks.make(task_id)
+        variants["stepped", task_id] = _timed_episodes(env, settings, _step_all)
+        variants["recorded", task_id] = _timed_episodes(env, settings, _record_all)
+    samples = settings.interleave(variants, rounds=min(settings.rounds, 5))
+    title = f"An episode of a reset and {EPISODE_STEPS} steps, recorded or not"
+    measured = _by_task(settings, "recording", title, "ms per episode", samples)
+    return replace(measured, ratios=(("recorded", "stepped"),))
+
+
+def validation(settings: Settings) -> Measurement:
+    """The check of a layout whose robots were loaded before."""
+    variants = {
+        ("layout.validate()", count): _timed(settings, crowd(count, settings.kinds).validate, 1e3)
+        for count in settings.checked
+    }
+    return Measurement(
+        name="validation",
+        title=f"layout.validate() of a ring of {' + '.join(settings.kinds)}",
+        unit="ms per check",
+        variable="robots",
+        values=settings.checked,
+        samples=by_series(settings.checked, settings.interleave(variants)),
+    )
+
+
+def varying(settings: Settings) -> Measurement:
+    """Resets and steps of worlds that vary, each axis of a randomization alone."""
+    task, plain = settings.task[0], tasks.make(settings.task[0])
+    variants: dict[tuple[str, str], Sample] = {
+        ("reset", PLAIN): _timed_resets(settings, plain.reset),
+        ("reset", REBUILD): _timed_resets(settings, _rebuild(plain)),
+        ("step", PLAIN): _timed_steps(settings, plain),
+        ("step", REBUILD): _timed_steps(settings, plain),
+    }
+    for axis, alone in VARYING.items():
+        env = tasks.make(task, randomization=alone)
+        variants["reset", axis] = _timed_resets(settings, env.reset)
+        variants["step", axis] = _timed_steps(settings, env)
+    values = (PLAIN, *VARYING, REBUILD)
+    return Measurement(
+        name="varying",
+        title=f"Worlds of {task} that vary, each axis alone",
+        unit="ms per reset or step",
+        variable="what varies",
+        values=values,
+        samples=by_series(values, settings.interleave(variants)),
+    )
+
+
+def looks(settings: Settings) -> Measurement:
+    """Resets of worlds that look different, without pictures and with one of 128 × 128."""
+    modes = {"reset": "none"} | ({} if vulkan_problem() else {"reset and picture": "rgb"})
+    task, values = settings.task[0], tuple(LOOKS)
+    variants = {
+        (series, axis): _timed_resets(
+            settings, tasks.make(task, obs_mode=mode, randomization=alone).reset
+        )
+        for axis, alone in LOOKS.items()
+        for series, mode in modes.items()
+    }
+    return Measurement(
+        name="looks",
+        title=f"Worlds of {task} that look different, each axis alone",
+        unit="ms per reset",
+        variable="what varies",
+        values=values,
+        samples=by_series(values, settings.interleave(variants)),
+    )
+
+
+def step_beside_native(settings: Settings) -> Measurement:
+    """A step of one environment of each clone, native's and ours."""
+
+    def variants(native: Any, ours: MultiRobotTask) -> dict[str, Sample]:
+        played = Played(ours, settings)
+
+        def native_steps(number: int) -> float:
+            actions = [native_action(native, action[0]) for action in played.actions(number)]
+            native.reset(seed=number)
+            start = settings.clock.now()
+            for action in actions:
+                native.step(action)
+            return (settings.clock.now() - start) / len(actions) * 1e6
+
+        return {HERE: played.step, NATIVE: native_steps, PHYSICS: played.physics}
+
+    title = "One step with observation, reward and success"
+    samples = _beside_native(settings, variants)
+    measured = _by_task(settings, "step", title, "µs per step", samples)
+    return replace(measured, floors=(PHYSICS,), ratios=((NATIVE, HERE), (HERE, PHYSICS)))
+
+
+def reset_beside_native(settings: Settings) -> Measurement:
+    """A reset of one environment of each clone, native's and ours."""
+
+    def variants(native: Any, ours: MultiRobotTask) -> dict[str, Sample]:
+        return {
+            HERE: _timed_resets(settings, ours.reset),
+            NATIVE: _timed_resets(settings, lambda seed: native.reset(seed=seed)),
+        }
+
+    samples = _beside_native(settings, variants)
+    title = "A reset of one environment"
+    measured = _by_task(settings, "reset", title, "ms per reset", samples)
+    return replace(measured, ratios=((NATIVE, HERE),))
+
+
+def _beside_native(
+    settings: Settings, variants: Callable[[Any, MultiRobotTask], dict[str, Sample]]
+) -> dict[tuple[str, str], list[float]]:
+    """Take samples of one clone after the other, with native's environment and ours."""
+    samples: dict[tuple[str, str], list[float]] = {}
+    clones = [task_id for task_id in settings.task if task_id in list_clones()]
+    for task_id in clones:
+        native = make_native(task_id)
+        native.reset(seed=0)
+        gc.freeze()  # native collects garbage when it builds a scene; ours is not to count
+        both = {(name, task_id): v for name, v in variants(native, tasks.make(task_id)).items()}
+        samples.update(settings.interleave(both, part=1 / len(clones)))
+        native.close()
+        gc.unfreeze()
+    return samples
+
+
+def _beside_physics(
+    settings: Settings,
+    name: str,
+    title: str,
+    variable: str,
+    envs: Mapping[str, Mapping[SomeValue, MultiRobotTask]],
+) -> Measurement:
+    """Time steps and physics; one series is beside `PHYSICS`, several are each beside its own."""
+    floors = {series: PHYSICS if len(envs) == 1 else f"{series}, physics" for series in envs}
+    variants: dict[tuple[str, SomeValue], Sample] = {}
+    for series, at_values in envs.items():
+        for value, env in at_values.items():
+            played = Played(env, settings)
+            variants[series, value] = played.step
+            variants[floors[series], value] = played.physics
+    values = list(dict.fromkeys(value for _, value in variants))
+    return Measurement(
+        name=name,
+        title=title,
+        unit="µs per step",
+        variable=variable,
+        values=tuple(values),
+        samples=by_series(values, settings.interleave(variants)),
+        floors=tuple(floors.values()),
+        ratios=tuple(floors.items()),
+    )
+
+
+def _by_task(
+    settings: Settings,
+    name: str,
+    title: str,
+    unit: str,
+    samples: Mapping[tuple[str, str], list[float]],
+) -> Measurement:
+    values = tuple(dict.fromkeys(task_id for _, task_id in samples))
+    return Measurement(name, title, unit, "task", values, by_series(values, samples))
+
+
+def _rebuild(env: MultiRobotTask) -> Callable[[int], object]:
+    return lambda seed: env.reset(seed, options=REBUILT)
+
+
+def _timed(settings: Settings, work: Callable[[], object], scale: float) -> Sample:
+    """Return what times some work, in units of 1 / scale seconds."""
+
+    def sample(number: int) -> float:
+        start = settings.clock.now()
+        work()
+        return (settings.clock.now() - start) * scale
+
+    return sample
+
+
+def _timed_resets(settings: Settings, reset_to: Callable[[int], object]) -> Sample:
+    """Return what times a reset (ms)."""
+
+    def sample(number: int) -> float:
+        start = settings.clock.now()
+        for seed in range(number * RESETS, (number + 1) * RESETS):
+            reset_to(seed)
+        return (settings.clock.now() - start) / RESETS * 1e3
+
+    return sample
+
+
+def _timed_steps(settings: Settings, env: MultiRobotTask) -> Sample:
+    """Return what times a step (ms)."""
+    played = Played(env, settings)
+    return lambda number: played.step(number) / 1e3
+
+
+def _timed_episodes(
+    env: MultiRobotTask,
+    settings: Settings,
+    play_all: Callable[[MultiRobotTask, Sequence[NDArray[np.float32]]], None],
+) -> Sample:
+    """Return what times an episode (ms)."""
+
+    def sample(number: int) -> float:
+        width = env.single_action_space.shape[0]
+        drawn = random_actions(number, settings.episodes * EPISODE_STEPS, 1, width)
+        episodes = list(drawn.reshape(settings.episodes, EPISODE_STEPS, -1))
+        start = settings.clock.now()
+        play_all(env, episodes)
+        return (settings.clock.now() - start) / settings.episodes * 1e3
+
+    return sample
+
+
+def _step_all(env: MultiRobotTask, episodes: Iterable[NDArray[np.float32]]) -> None:
+    for seed, actions in enumerate(episodes):
+        env.reset(seed, options=REBUILT)
+        for action in actions:
+            env.step(torch.from_numpy(action))
+
+
+def _record_all(env: MultiRobotTask, episodes: Iterable[NDArray[np.float32]]) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        with Recorder(Path(folder) / "trajectory.h5", env) as recorder:
+            for seed, actions in enumerate(episodes):
+                recorder.add(play(env, seed, actions))

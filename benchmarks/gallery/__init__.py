@@ -1,0 +1,1 @@
+"""The gallery of tasks and robots: its pages, their record, and their pictures."""

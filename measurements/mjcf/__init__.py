@@ -1,1 +1,0 @@
-"""MJCFs of other packages, and what `RobotDescriptor.from_mjcf` makes of them."""

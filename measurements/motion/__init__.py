@@ -1,1 +1,0 @@
-"""How fast and how reliably motions are planned, and what collision checks cost."""

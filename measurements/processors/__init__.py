@@ -1,1 +1,0 @@
-"""What results depend on the processor, by playing the same episodes as on others."""

@@ -1,1 +1,0 @@
-"""How quick the page of ``teleop`` is, measured in a real browser."""

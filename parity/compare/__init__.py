@@ -1,1 +1,0 @@
-"""Tasks stepped beside native in lock-step, every bit compared."""

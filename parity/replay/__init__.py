@@ -1,1 +1,0 @@
-"""Recorded actions played beside native, and episodes kept as arrays."""

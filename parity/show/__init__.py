@@ -1,1 +1,0 @@
-"""Pictures and clips of native and ours side by side."""

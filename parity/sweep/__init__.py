@@ -1,1 +1,0 @@
-"""The sweep: every task beside native, with rollouts, agreement and clips."""

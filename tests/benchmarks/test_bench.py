@@ -1,0 +1,270 @@
+"""Benchmarks: what their figures mean, and that each really runs. No test asks how fast it was."""
+
+import json
+import multiprocessing
+import os
+import socket
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tasks
+from benchmarks.__main__ import main
+from benchmarks.bench import run as bench
+from benchmarks.bench.environments import Played
+from benchmarks.bench.measurement import BenchmarkError, Clock, Measurement, Settings
+from benchmarks.bench.plot import draw
+from benchmarks.bench.report import RECORD, Report, machine, read_report, summary
+from benchmarks.bench.run import BENCHMARKS, BESIDE_NATIVE
+from benchmarks.bench.vectors import Helpers
+from benchmarks.bench.worlds import crowd, make_pile
+from parity.native import make_native, native_action
+from robots import MissingPackageError, SimulationError
+from simulation.sapien3.backend import worlds_below
+from tests.native import NATIVE
+from tests.quick import quick_cases
+
+TINY = Settings(
+    rounds=2,
+    task=("PickCube-v1",),
+    steps=2,
+    batch_steps=2,
+    environments=(1, 2),
+    workers=(0, 1),
+    worker_envs=2,
+    robots=(1, 2),
+    cubes=(0, 8),
+    started=(1,),
+    vector_task=("PickCube-v1",),
+    episodes=1,
+    checked=(1, 2),
+)
+NUMBERS = Measurement(
+    name="numbers",
+    title="Something with numbers",
+    unit="µs per step",
+    variable="robots",
+    values=(1, 2),
+    samples={"step": [[3.0, 2.0, 10.0], [4.0]], "physics": [[1.0, 2.0, 4.0], [2.0]]},
+    floors=("physics",),
+    ratios=(("step", "physics"),),
+)
+NAMES = Measurement(
+    name="names",
+    title="Something with names",
+    unit="ms per reset",
+    variable="task",
+    values=("A-v1", "B-v1"),
+    samples={"here": [[1.0, 1.5, 2.0], [2.0]], "native": [[3.0, 4.0, 5.0], []]},
+    ratios=(("native", "here"),),
+)
+
+
+def report_of(*measurements):
+    return Report(measurements, machine(), str(Clock()), (0.5, 1.25))
+
+
+class TestFigures:
+    def test_medians_and_medians_of_ratios(self):
+        assert NUMBERS.median("step", 1) == 3.0
+        assert NUMBERS.ratio("step", "physics", 1) == 2.5  # of 3, 1, 2.5; not 3 / 2
+        assert NUMBERS.quartiles("step", 1) == (2.5, 6.5)
+        assert NUMBERS.quartiles("step", 2) is None
+
+    def test_what_was_not_measured_is_a_dash(self):
+        assert NAMES.headings() == ["task", "here", "native", "native / here"]
+        assert list(NAMES.rows()) == [["A-v1", "1.50", "4.00", "2.67"], ["B-v1", "2.00", "–", "–"]]
+
+    def test_samples_are_taken_in_turns_after_a_warm_up(self):
+        taken, ticks = [], []
+        settings = replace(TINY, tick=ticks.append)
+        variants = {name: lambda n, name=name: taken.append((name, n)) or 10.0 * n for name in "ab"}
+        assert settings.interleave(variants) == {"a": [10.0, 20.0], "b": [10.0, 20.0]}
+        assert taken == [(name, number) for number in (0, 1, 2) for name in ("a", "b")]
+        assert sum(ticks) == pytest.approx(1)
+        taken.clear()
+        settings.interleave(variants, rounds=1, warm_up=False)
+        assert taken == [("a", 1), ("b", 1)]
+
+    def test_clocks(self):
+        before = time.process_time()
+        told = Clock(processor=True).now([os.getpid()]) - time.process_time()
+        assert before <= told <= time.process_time()
+        work = [(10, 2.0), (30, 3.0)]
+        assert Clock().rate(work) == 15
+        assert Clock(processor=True).rate(work) == 8, "processors are shared"
+
+
+class TestWhatIsTimed:
+    def test_a_step_and_the_physics_alone_are_the_same_motion(self):
+        played = Played(tasks.make("PickCube-v1", num_envs=2), replace(TINY, steps=10))
+        ends = []
+        for play in (played.step, played.physics):
+            assert play(3) > 0
+            ends.append(played.env.simulation.read().joint_positions.copy())
+        assert np.array_equal(*ends)
+        played.step(4)
+        assert not np.array_equal(played.env.simulation.read().joint_positions, ends[0])
+
+    @pytest.mark.parametrize(("cubes", "pairs"), [(0, 1), (8, 25), (64, 400)])
+    def test_cubes_of_a_pile_touch_and_stay_awake(self, cubes, pairs):
+        env = make_pile(cubes)
+        for _ in range(40):
+            env.step(np.zeros((1, 8), np.float32))
+        world = worlds_below(env.simulation)[0]
+        bodies = [world.bodies[name] for name in ("cube", *(f"pile{i}" for i in range(cubes)))]
+        assert not any(body.component.is_sleeping for body in bodies)
+        assert env.touching() >= pairs
+
+    def test_kinds_of_a_crowd_take_turns(self):
+        layout = crowd(3, ("panda", "so100"))
+        assert [place.robot.name for place in layout.values()] == ["panda", "so100", "panda"]
+
+    @pytest.mark.long
+    def test_a_process_that_dies_is_reported(self):
+        with pytest.raises(BenchmarkError, match="a process of a benchmark ended with 3"):
+            Helpers(1, _dies).__enter__()
+        assert not multiprocessing.active_children()
+
+
+def _dies(pipe) -> None:
+    os._exit(3)
+
+
+QUICK = ("reset", "step", "validation")  # the others start processes, draw, or take longer
+
+
+@pytest.mark.parametrize("name", quick_cases(BENCHMARKS, QUICK))
+def test_every_benchmark_measures(name):
+    shares = []
+    found = BENCHMARKS[name](replace(TINY, tick=shares.append))
+    assert found.name == name
+    assert sum(shares) == pytest.approx(1)
+    assert len(found.values) >= 1
+    for series in found.samples:
+        for value in found.values:
+            assert np.isfinite(found.median(series, value))
+    assert all({*pair} <= {*found.samples} for pair in found.ratios)
+    assert {*found.floors} <= {*found.samples}
+    assert not multiprocessing.active_children()
+
+
+class TestBesideNative:
+    pytestmark = NATIVE
+
+    def test_both_play_the_same_motion(self):
+        native, ours = make_native("PickCube-v1"), tasks.make("PickCube-v1")
+        played = Played(ours, TINY)
+        for number in (0, 5, 6):
+            native.reset(seed=number)
+            for action in played.actions(number):
+                native.step(native_action(native, action[0]))
+            played.step(number)
+        here = ours.simulation.read().qpos("arm")
+        assert np.array_equal(native.agent.robot.get_qpos().numpy(), here)
+
+    @pytest.mark.long
+    @pytest.mark.parametrize("name", BESIDE_NATIVE)
+    def test_native_is_measured(self, name):
+        both = ("PickCube-v1", "FourRobotStack-v1")
+        found = BESIDE_NATIVE[name](replace(TINY, rounds=1, vector_task=both))
+        assert found.median("native", "PickCube-v1") > 0
+        if name == "vector":
+            assert found.median("native", "FourRobotStack-v1") is None
+
+
+class TestCommand:
+    def run(self, tmp_path, *options):
+        return main(["bench", "--rounds", "1", "--out", str(tmp_path), *options])
+
+    def test_it_leaves_json_tables_and_a_plot(self, tmp_path, capsys):
+        only = ("--only", "step", "reset", "--task", "pick_cube", "PushT-v1", "--processor-time")
+        assert self.run(tmp_path, *only) == 0
+        printed = capsys.readouterr().out
+        page = (tmp_path / "bench.md").read_text(encoding="utf-8")
+        for text in (printed, page):
+            assert "PickCube-v1" in text
+            assert "step / physics alone" in text
+            assert "processor time of all processes" in " ".join(text.split())
+        assert (tmp_path / "bench.png").read_bytes().startswith(b"\x89PNG")
+        record = (tmp_path / "bench.json").read_text(encoding="utf-8")
+        found = json.loads(record)
+        assert socket.gethostname() not in json.dumps(found["machine"])
+        assert str(tmp_path) not in record
+        assert [one["name"] for one in found["measurements"]] == ["step", "reset"]
+        assert found["measurements"][0]["values"] == ["PickCube-v1", "PushT-v1"]
+        assert read_report(tmp_path / "bench.json").page() == page
+
+    @pytest.mark.parametrize(
+        ("options", "message"),
+        [
+            (("--only", "stepp"), "unknown benchmark 'stepp'. Did you mean 'step'?"),
+            (("--task", "PickCub-v1"), "Did you mean 'PickCube-v1'?"),
+            (("--kinds", "pandaa"), "Did you mean 'panda'?"),
+            (("--robots", "1", "9"), "--robots is 9; it must be from 1 to 8"),
+            (("--environments", "0"), "--environments is 0; it must be 1 or more"),
+            (("--record", "--native", "--only", "step"), "no --only, no --task"),
+        ],
+    )
+    def test_what_there_is_not_is_refused(self, tmp_path, capsys, options, message):
+        assert self.run(tmp_path, *options) == 2
+        assert message in capsys.readouterr().err
+        assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize("error", [MissingPackageError, SimulationError, BenchmarkError])
+def test_what_cannot_be_measured_is_left_out(error, capsys, monkeypatch):
+    def fail(settings):
+        raise error("pip install something")
+
+    monkeypatch.setattr(bench, "BENCHMARKS", {"broken": fail, "names": lambda _: NAMES})
+    report = bench.run(["broken", "names"], TINY)
+    assert report.measurements == (NAMES,)
+    assert report.left_out == {"broken": "pip install something"}
+    assert "broken is left out: pip install something" in capsys.readouterr().err
+
+
+def test_a_report_is_read_as_it_was_written(tmp_path):
+    report = report_of(NUMBERS, NAMES)
+    report.write(tmp_path)
+    assert read_report(tmp_path / "bench.json") == report
+    numbers = json.loads((tmp_path / "bench.json").read_text(encoding="utf-8"))["measurements"][0]
+    assert numbers["medians"] == {"step": [3.0, 4.0], "physics": [2.0, 2.0]}
+    assert numbers["median_ratios"] == {"step / physics": [2.5, 2.0]}
+    with pytest.raises(BenchmarkError, match="nothing was measured of 'step'"):
+        summary(report)
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[]", '{"measurements": [3]}'])
+def test_something_else_is_refused(tmp_path, text):
+    (tmp_path / "bench.json").write_text(text)
+    with pytest.raises(BenchmarkError, match=r"cannot read .*bench\.json"):
+        read_report(tmp_path / "bench.json")
+
+
+def test_the_record_is_whole():
+    record = read_report()
+    assert not record.left_out
+    assert {one.name for one in record.measurements} == {*BENCHMARKS}
+    assert {*record.find("step").values} <= {*tasks.list_clones()}
+    assert {*json.loads(RECORD.read_text())["machine"]} == {"cpu", "cores", "system", "versions"}
+
+
+class TestPlot:
+    def test_lines_over_numbers(self):
+        (axes,) = draw([NUMBERS], "told").axes
+        assert (axes.get_xlabel(), axes.get_ylabel()) == ("robots", "µs per step")
+        step, physics = axes.lines
+        assert list(step.get_ydata()) == [3.0, 4.0]
+        assert physics.get_linestyle() == "--"
+        assert [text.get_text() for text in axes.get_legend().get_texts()] == ["step", "physics"]
+
+    def test_bars_over_names(self):
+        figure = draw([NAMES, NUMBERS], "Medians on a machine.")
+        axes, _ = figure.axes
+        assert [label.get_text() for label in axes.get_yticklabels()] == ["A-v1", "B-v1"]
+        assert [bar.get_width() for bar in axes.patches] == [1.5, 4.0, 2.0]
+        assert [text.get_text() for text in axes.texts] == ["1.50", "4.00", "2.00"]
+        assert figure.get_supxlabel() == "Medians on a machine."

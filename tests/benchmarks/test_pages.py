@@ -1,0 +1,148 @@
+"""Every page is what its record says, and the records keep what the pages promise."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("matplotlib")
+
+from benchmarks.__main__ import main
+from benchmarks.experts import TASKS
+from benchmarks.placing import CELLS, targets_of
+from benchmarks.processors import PORTABLE
+from benchmarks.records import DOCS, RecordError, as_text, read_record, render, write_record
+from rollouts.receipts import Receipt
+from rollouts.receipts.sources import describe_task
+from tasks import get_task_class
+
+ROOT = DOCS.parent
+COMMANDS = {
+    "robots": ["robots", "--render"],
+    "mjcf": ["mjcfs", "--render"],
+    "placing": ["placing"],
+    "experts": ["experts", "--tasks"],
+    "conversions": ["conversions", "--modes", "--tasks", "PickCube-v1"],
+    "processors": ["processors", "--render"],
+    "imitation": ["imitation"],
+    "reinforcement": ["reinforcement"],
+}
+LEARNED = ("imitation", "reinforcement")
+RECEIPTS = [path for name in LEARNED for path in sorted((DOCS / "receipts" / name).glob("*.json"))]
+
+
+def record(name: str) -> dict:
+    return json.loads((DOCS / f"{name}.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_page_shows_its_record(name, tmp_path):
+    out = Path(shutil.copy(DOCS / f"{name}.json", tmp_path))
+    assert main([*COMMANDS[name], "--out", str(out)]) == 0
+    assert out.with_suffix(".md").read_text() == (DOCS / f"{name}.md").read_text()
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_what_is_no_record_is_left_alone(name, tmp_path, capsys):
+    out = tmp_path / "seen.json"
+    out.write_text("[]")
+    assert main([*COMMANDS[name], "--out", str(out)]) == 2
+    assert f"error: cannot read {out}" in capsys.readouterr().err
+    assert (out.read_text(), out.with_suffix(".md").exists()) == ("[]", False)
+
+
+def test_the_page_of_planning_shows_its_record():
+    assert render("planning", **record("planning")) == (DOCS / "planning.md").read_text()
+
+
+def test_the_tables_of_benchmarks_are_fresh(capsys):
+    assert main(["tables", "--check"]) == 0, capsys.readouterr().err
+
+
+def test_a_record_is_read_as_it_was_written(tmp_path):
+    written = {"versions": {"a": "1"}, "tasks": {"b": [[1, 2], []], "c": "x\n [y]"}}
+    assert '"versions": {"a": "1"}' in as_text(written)
+    write_record(tmp_path / "a.json", written)
+    assert read_record(tmp_path / "a.json", versions={}) == written
+    assert read_record(tmp_path / "none.json", tasks={}) == {"tasks": {}}
+    with pytest.raises(RecordError, match=r"cannot read .*a\.json: KeyError\('runs'\)"):
+        read_record(tmp_path / "a.json", runs={})
+
+
+def test_what_the_page_of_placing_promises():
+    assert list(record("placing")["cells"]) == list(CELLS)
+    for name, cell in record("placing")["cells"].items():
+        assert cell["search"]["clear"], name
+        assert cell["search"]["reached"] == len(set(targets_of(CELLS[name]))) == 12, name
+        assert cell["search"]["shared"] >= 1.3 * cell["ring"]["shared"], name
+        assert cell["search"]["clearance"] >= 0.1, name
+
+
+def test_what_the_page_of_experts_promises():
+    assert list(record("experts")["tasks"]) == list(TASKS)
+    for task_id, seen in record("experts")["tasks"].items():
+        others = [other for other in seen["others"].values() if "layout" in other]
+        elsewhere = [episode for other in others for episode in other["episodes"].values()]
+        own = [*seen["own"].values()]
+        assert (len(others), len(own), len(elsewhere)) == (10, 100, 100), task_id
+        assert sum(episode["success"] for episode in own) >= 0.98 * len(own), task_id
+        assert sum(episode["success"] for episode in elsewhere) >= 0.95 * len(elsewhere), task_id
+        assert not any(episode["touching"] for episode in own + elsewhere), task_id
+
+
+def test_nothing_portable_differs():
+    settings = record("processors")["settings"].values()
+    compared = [seen for seen in settings if seen["against"] == PORTABLE]
+    assert len(compared) >= 1
+    assert all(seen["episodes"] >= 10 and not seen["different"] for seen in compared)
+
+
+def test_every_run_has_a_receipt():
+    assert len(RECEIPTS) == sum(len(record(name)["runs"]) for name in LEARNED) > 0
+
+
+@pytest.mark.parametrize("path", RECEIPTS, ids=lambda path: path.stem)
+def test_a_receipt_is_of_the_run(path):
+    """The example may have changed since, which `verify` says; what it played is compared there."""
+    receipt = Receipt.read(path)
+    task, _, how = path.stem.partition("_")
+    name = f"{task}, from pictures" if how == "pictures" else f"{task}, {how}" if how else task
+    run = record(path.parent.name)["runs"][name]
+    first, last = run["test_seeds"]
+    assert [episode.seed for episode in receipt.episodes] == [*range(first, last + 1)]
+    assert [episode.seed for episode in receipt.episodes if not episode.success] == run["failed"]
+    example = receipt.policy["name"].partition(":")[0]
+    assert (ROOT / "examples" / f"{example}.py").exists()
+    assert receipt.policy["files"]
+    assert receipt.task == describe_task(get_task_class(receipt.task["id"]))
+
+
+def test_a_run_of_imitation_is_added_and_takes_the_place_of_an_older_one(tmp_path, capsys):
+    run = {
+        "recipe": {"task": "PushCube-v1", "episodes": 3, "steps": 20, "batch": 4, "size": 96},
+        "test_seeds": [1_000_000, 1_000_003],
+        "success": 0.75,
+        "failed": [1_000_002],
+        "curve": [{"steps": 10, "success": 0.5}, {"steps": 20, "success": 1}],
+    }
+    out = tmp_path / "record.json"
+    for found in (run, {**run, "success": 1.0, "failed": []}):
+        (tmp_path / "learning_curve.json").write_text(json.dumps(found))
+        assert main(["imitation", str(tmp_path), "--out", str(out)]) == 0
+    rows = (tmp_path / "record.md").read_text().splitlines()
+    assert "| PushCube-v1, from pictures | 3 | 20 of 4 | 4 | 100 (51.0 to 100.0) | none |" in rows
+    assert (tmp_path / "record.png").read_bytes().startswith(b"\x89PNG")
+    assert main(["reinforcement", str(tmp_path), "--out", str(tmp_path / "other.json")]) == 2
+    assert "holds no run of PPO or MAPPO" in capsys.readouterr().err
+
+
+@pytest.mark.long
+def test_a_cell_is_searched_once(tmp_path):
+    out, words = tmp_path / "seen.json", ["placing", "--cells", "three small arms"]
+    assert main([*words, "--out", str(out)]) == 0
+    before, cell = out.read_text(), json.loads(out.read_text())["cells"]["three small arms"]
+    assert cell["search"]["clear"]
+    assert cell["search"]["shared"] > cell["ring"]["shared"]
+    assert main([*words, "--out", str(out)]) == 0
+    assert out.read_text() == before

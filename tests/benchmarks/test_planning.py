@@ -1,0 +1,148 @@
+"""The benchmark of planning: the same cells again, a record that goes on, and its table."""
+
+import json
+
+import numpy as np
+import pytest
+
+from benchmarks import planning
+from benchmarks.__main__ import main
+from benchmarks.planning import (
+    ALONE,
+    FLOOR,
+    LARGE_REACH,
+    Place,
+    RandomPostures,
+    random_cell,
+    table_of,
+)
+from layouts import face_to_face
+from motion import Motion
+from motion.collision.cell import Cell
+from robots import RobotRegistry
+from tests.three_links import arm, save
+
+LEANING = np.array([0, 0.9, 0, 0.6, 0, 0, 0, 0, 0])  # rad; of a Panda, from its start
+LINE = {
+    "cell": 0,
+    "query": 0,
+    "arms": 2,
+    "robots": ["panda", "panda"],
+    "sources": ["catalogue", "pybullet/franka_panda/panda.urdf"],
+    "goal": "joints",
+}
+SOLVED = {"solved": True, "certified": True, "collisions": 0, "clearance": 0.0123}
+EXECUTED = {"executed": True, "touching": [], "stray": 0.0021, "late": 0.0}
+REFUSED = {"solved": False, "seconds": 0.1, "message": ""}
+
+
+@pytest.mark.long
+def test_a_seed_gives_one_cell_with_one_row_of_postures():
+    layout = random_cell(1, 2)
+    assert layout == random_cell(1, 2)
+    assert layout != random_cell(2, 2)
+    cell = Cell(layout, table=FLOOR)
+    first, second = (next(RandomPostures(cell, 0.01).drawn((1, 2, 3))) for _ in range(2))
+    assert np.array_equal(first, second)
+    assert cell.checker(clearance=0.01).free(first[None])[0]
+
+
+@pytest.mark.long
+def test_arms_come_from_urdfs_of_one_arm(tmp_path, monkeypatch):
+    save(tmp_path, arm(), "three_joints.urdf")
+    folders = {"toys": tmp_path, "shop": RobotRegistry.load("so100").urdf.locate().parent}
+    monkeypatch.setattr(planning, "package_folder", folders.__getitem__)
+    ((source, robot),) = planning._arms_of(tuple(folders)).items()
+    assert source == "shop/so100.urdf"
+    assert robot.name.endswith("_urdf")
+    assert len(robot.arm_joints) == 5
+    layout = random_cell(4, 4, [robot])
+    assert layout == random_cell(4, 4, [robot])
+    assert {p.robot.reach < LARGE_REACH for p in layout.values()} == {True}
+    assert 0 < sum(p.robot == robot for p in layout.values()) < 4
+
+
+def test_a_motion_on_which_robots_meet_is_seen_to_touch(monkeypatch):
+    layout = face_to_face({"left": "panda", "right": "panda"}, spacing=1.35)
+    monkeypatch.setattr(planning, "random_cell", lambda *_: layout)
+    place = Place(0, 2, ())
+    ahead = {name: p.start_qpos + LEANING for name, p in layout.items()}
+    times, share = np.array([0.0, 1.0]), np.array([0.0, 1.0])[:, None]
+    meeting = {n: p.start_qpos + share * (ahead[n] - p.start_qpos) for n, p in layout.items()}
+    still = {n: np.zeros((2, p.robot.dof)) for n, p in layout.items()}
+    seen = place.carry_out(Motion(layout, times, meeting, still))
+    assert {"left", "right"} == {part.split(".")[0] for part in seen["touching"][0].split(", ")}
+    begun = {n: np.tile(p.start_qpos, (2, 1)) for n, p in layout.items()}
+    seen = place.carry_out(Motion(layout, times, begun, still))
+    assert (seen["executed"], seen["touching"]) == (True, [])
+    assert seen["stray"] < 0.01
+    place.task.close()
+
+
+@pytest.mark.long
+def test_a_record_goes_on_where_it_stopped(tmp_path, capsys):
+    record = tmp_path / "queries.jsonl"
+    record.write_text(json.dumps(LINE | SOLVED | {"seconds": 9.0}) + "\n")
+    arguments = ["planning", "--cells", "1", "--queries", "2", "--arms", "2", "2", "--seed", "1"]
+    assert main([*arguments, "--out", str(record)]) == 0
+    known, *hopeless, asked = planning.read(record)
+    assert known["seconds"] == 9.0
+    assert [seen["reason"] for seen in hopeless] == ["unreachable", "goal in collision"]
+    assert (asked["query"], asked["solved"], asked["certified"]) == (1, True, True)
+    assert (asked["executed"], asked["touching"]) == (True, [])
+    assert asked["sources"] == ["catalogue", "catalogue"]
+    row = capsys.readouterr().out.splitlines()[2]
+    assert row.startswith("| 2 | 2 | 100.0% | 100.0% | 50.0% |")
+    assert row.endswith("| 2 of 2 |")
+
+
+def test_a_run_that_is_cut_off_has_seen_all_cells(tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(planning, "_asked", lambda wanted, workers: asked.extend(wanted) or ())
+    words = ["--cells", "2", "--queries", "4", "--batch", "3", "--out", str(tmp_path / "a.jsonl")]
+    main(["planning", *words])
+    kinds = [(query.cell, query.kind) for query in asked]
+    first = ["out of reach", "in collision", "joints"]
+    assert kinds[:6] == [(cell, kind) for cell in (0, 1) for kind in first]
+    assert kinds[6:] == [(cell, kind) for cell in (0, 1) for kind in ("joints", "joints", "tcp")]
+
+
+def test_the_table_counts_every_miss():
+    record = [
+        LINE | SOLVED | EXECUTED | {"seconds": 0.1},
+        LINE | SOLVED | EXECUTED | {"seconds": 0.1, "touching": ["a/hand, b/hand"]},
+        LINE | SOLVED | {"seconds": 0.1, "executed": False, "touching": []},
+        LINE | REFUSED | {"seconds": 0.3, "reason": "not found", "message": ALONE},
+        LINE | REFUSED | {"reason": "unreachable"},
+        LINE | REFUSED | {"reason": "cut off"},
+        LINE | REFUSED | {"reason": "unreachable", "goal": "out of reach"},
+        LINE | REFUSED | {"reason": "not found", "goal": "in collision"},
+    ]
+    row = table_of(record).splitlines()[-1]
+    assert row == (
+        "| 2 | 5 | 60.0% | 75.0% | 60.0% | 0.10 | 0.22 | 0.29 | 0.30 | 100.0% | 0 | 12.3"
+        " | 2 of 3 | 1 | 2.1 | 1 | 1 | 1 | 1 of 2 |"
+    )
+
+
+def test_a_page_shows_the_record(tmp_path):
+    record = tmp_path / "queries.jsonl"
+    record.write_text(json.dumps(LINE | SOLVED | {"seconds": 0.1}) + "\n")
+    path = tmp_path / "page.md"
+    words = ["planning", "--cells", "0", "--out", str(record), "--page", str(path)]
+    assert main(words) == 0
+    text = path.read_text()
+    assert "1 queries to `motion.plan` in 1 random" in text
+    assert (
+        "Of the 2 arms, 1 were made by\n`RobotDescriptor.from_urdf` from URDFs of pybullet" in text
+    )
+    assert text.splitlines()[-1] == table_of(planning.read(record)).splitlines()[-1]
+
+
+@pytest.mark.long
+def test_what_a_check_of_collisions_costs_is_printed(capsys):
+    assert main(["collisions", "--states", "64", "--edges", "2"]) == 0
+    rows = [
+        line for line in capsys.readouterr().out.splitlines() if line.startswith("| 4 Pandas |")
+    ]
+    assert [row.count("|") for row in rows] == [8, 6]

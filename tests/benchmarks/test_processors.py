@@ -1,0 +1,83 @@
+"""``python -m benchmarks processors``: what depends on the processor, and what does not."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from importlib.metadata import version
+from pathlib import Path
+from platform import libc_ver
+
+import pytest
+
+from benchmarks import processors
+from benchmarks.processors import (
+    EMULATOR,
+    EXPERT,
+    PACKAGES,
+    PLAIN,
+    PORTABLE,
+    Played,
+    Setting,
+    differences,
+    physics,
+    play_under,
+    settings,
+)
+from robots import SimulationError
+
+RECORD = Path(__file__).parents[2] / "docs/processors.json"
+FEW = [
+    Played("PickCube-v1", 0, "pd_joint_delta_pos", 6),
+    Played("StackCube-v1", 0, EXPERT, 0),
+    Played("PokeCube-v1", 4, "pd_ee_delta_pose", 4),
+]
+
+
+@pytest.mark.long
+def test_what_depends_on_the_processor_is_seen():
+    one = play_under(settings()[PLAIN], FEW)
+    other = play_under(settings()["MKL, any"], FEW)
+    found = differences(FEW, one, other)
+    assert "states" in found[str(FEW[2])]  # by torch's square roots
+
+
+@pytest.mark.long
+def test_portable_physics_is_the_recorded_one():
+    was = json.loads(RECORD.read_text())
+    now = {**{name: version(name) for name in PACKAGES}, "glibc": libc_ver()[1]}
+    if was["versions"] != now:
+        pytest.skip(f"recorded with {was['versions']}, and these are {now}")
+    episodes = [Played("StackCube-v1", 0, EXPERT, 0), Played("PokeCube-v1", 5, "pd_ee_pose", 8)]
+    found = physics(episodes, play_under(settings()[PORTABLE], episodes))
+    assert found == {name: was["portable"][name] for name in found}
+
+
+@pytest.mark.long
+def test_an_emulated_processor_computes_the_same():
+    if shutil.which(EMULATOR) is None:
+        pytest.skip(f"there is no {EMULATOR}")
+    native = play_under(settings()[PORTABLE], FEW)
+    assert not differences(FEW, native, play_under(settings()["Nehalem, portable"], FEW))
+    assert differences(FEW, native, play_under(settings()["Nehalem, as it is"], FEW))
+
+
+def test_differences_are_named_by_the_first_moment():
+    played = Played("PickCube-v1", 0, EXPERT, 0)
+    one = {"actions": ["a", "b"], "states": ["s", "t"], "observations": [], "rewards": ["r"]}
+    other = {"actions": ["a", "c"], "states": ["s", "t"], "observations": [], "rewards": []}
+    assert differences([played], [one], [other]) == {str(played): {"actions": 1, "rewards": -1}}
+    assert differences([played], [one], [one]) == {}
+    assert differences([played], [None], [one]) == {}
+
+
+@pytest.mark.long
+def test_a_process_that_ends_too_early_is_reported():
+    with pytest.raises(SimulationError, match="after 0 of 1 episodes"):
+        play_under(Setting("", {}), [Played("PickCubr-v1", 0, EXPERT, 0)])
+
+
+def test_an_emulator_that_is_missing(monkeypatch):
+    monkeypatch.setattr(processors, "EMULATOR", "qemu-none")
+    with pytest.raises(SimulationError, match=r"no program 'qemu-none' to emulate a Nehalem"):
+        play_under(settings()["Nehalem, portable"], FEW)

@@ -1,0 +1,287 @@
+"""``python -m benchmarks robots``: what is tried, judged and kept; a crash is a result."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from benchmarks.__main__ import main
+from benchmarks.records import RecordError
+from benchmarks.robots import survey as survey_module
+from benchmarks.robots.judge import (
+    EXPECTED,
+    QUESTIONS,
+    Expected,
+    ExpectedArm,
+    expected_of,
+    judge,
+    read_expectations,
+    reason,
+)
+from benchmarks.robots.probe import _loads, _tell
+from benchmarks.robots.survey import (
+    Robot,
+    find_robots,
+    named_folder,
+    package_folder,
+    probe,
+    without_folders,
+)
+from robots import AssetError, MissingPackageError, UnknownNameError
+from tests.three_links import arm, save
+
+RECORD = Path(__file__).parents[2] / "docs" / "robots.json"
+FIXED = '<robot name="still"><link name="a"/></robot>'
+
+
+def loaded(**groups: tuple[tuple[str, ...], int]) -> dict:
+    """Return what a probe sees of a robot's shape, and of nothing else."""
+    return {
+        "loads": {
+            "groups": {n: {"joints": list(j), "numbers": size} for n, (j, size) in groups.items()},
+            "tcp": "tool",
+            "tips": [],
+            "reach": 0.9,
+        },
+        "trial": {"stands": True, "exploded": None, "numbers": 2, "wrong_numbers": []},
+    }
+
+
+@pytest.fixture
+def quick_probe(tmp_path, monkeypatch):
+    """Have processes run another program than the probe; called with the program."""
+
+    def use(program: str) -> None:
+        (tmp_path / "quick_probe.py").write_text(program)
+
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    monkeypatch.setattr(survey_module, "PROBE", "quick_probe")
+    return use
+
+
+def seeing(seen: dict) -> str:
+    return f"print({json.dumps(seen)!r}, flush=True)"
+
+
+class TestSources:
+    def test_urdfs_with_joints_that_move_are_found(self, tmp_path):
+        (tmp_path / "deep").mkdir()
+        save(tmp_path / "deep", arm(), "small.urdf")
+        save(tmp_path, FIXED, "still.urdf")
+        (robot,) = find_robots([named_folder(f"mine={tmp_path}")])
+        assert robot.key == "mine/deep/small.urdf"
+        assert robot.file.is_file()
+
+    def test_missing_meshes_are_looked_for_in_the_whole_source(self, tmp_path):
+        mesh = '<collision><geometry><mesh filename="{}"/></geometry></collision>'
+        names = ("package://any/meshes/here.stl", "../gone/here.stl", "here.stl", "gone.stl")
+        links = "".join(mesh.format(name) for name in names) + f"<!-- {mesh.format('no.stl')} -->"
+        save(tmp_path, f'<robot name="r"><link name="a">{links}</link></robot>')
+        (tmp_path / "meshes").mkdir()
+        (tmp_path / "meshes" / "here.stl").touch()
+        robot = Robot("mine", "small.urdf", tmp_path)
+        assert robot.missing_meshes() == ["../gone/here.stl", "gone.stl"]
+
+    def test_folders_and_packages_that_there_are_not(self, tmp_path):
+        with pytest.raises(AssetError, match="there is no folder .*nowhere"):
+            named_folder(str(tmp_path / "nowhere"))
+        with pytest.raises(UnknownNameError, match="Did you mean 'pybullet'"):
+            package_folder("pybulet")
+        if find_spec("pybullet") is None:
+            with pytest.raises(MissingPackageError, match="pip install pybullet"):
+                package_folder("pybullet")
+
+
+class TestProbe:
+    @pytest.mark.long
+    def test_a_robot_that_works(self, tmp_path):
+        save(tmp_path, arm())
+        seen = probe(Robot("mine", "small.urdf", tmp_path), 120.0)
+        answers = judge(seen, Expected(kind="manipulator"))
+        assert "ended" not in seen
+        for question in (
+            "loads", "alone", "steps_50", "steps_500", "agreement", "to_urdf", "to_drake",
+        ):  # fmt: skip
+            assert answers[question].good, (question, seen)
+        assert str(tmp_path) not in json.dumps(seen)
+
+    def test_a_robot_that_is_refused(self, tmp_path, capsys):
+        path = save(tmp_path, arm().replace('velocity="3.0"', 'velocity="fast"', 1))
+        _tell("loads", lambda: _loads(path, []))
+        seen = json.loads(capsys.readouterr().out)
+        answers = judge(seen, Expected())
+        assert (answers["loads"].good, answers["loads"].text) == (False, "refused")
+        assert answers["refused"].good
+        assert "fast" in reason(seen)
+
+    def test_an_exception_that_is_none_of_ours_is_raw(self, capsys):
+        _tell("loads", lambda: {"ok": 1 / 0})
+        seen = json.loads(capsys.readouterr().out)
+        assert seen == {"loads": {"raw": "ZeroDivisionError: division by zero"}}
+        answers = judge(seen, Expected())
+        assert not answers["no_raw"].good
+        assert not answers["refused"].good
+
+    def test_one_that_hangs(self, tmp_path):
+        save(tmp_path, arm())
+        seen = probe(Robot("mine", "small.urdf", tmp_path), 0.01)
+        assert seen["ended"] == "took longer than 0.01 s"
+        assert not judge(seen, Expected())["no_crash"].good
+
+    @pytest.mark.parametrize(
+        ("program", "ended"),
+        [
+            ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "crashed: SIGSEGV"),
+            ("import sys; sys.exit('out of luck')", "ended with 1: out of luck"),
+        ],
+    )
+    def test_one_that_crashes_keeps_what_was_seen(self, tmp_path, quick_probe, program, ended):
+        save(tmp_path, arm())
+        quick_probe(f"{seeing({'loads': {}})}\n{program}")
+        seen = probe(Robot("mine", "small.urdf", tmp_path), 60.0)
+        assert seen == {"missing": [], "loads": {}, "ended": ended}
+
+    def test_no_path_of_this_machine_is_kept(self):
+        folder, passing = "/opt/robots", f"{tempfile.gettempdir()}/tmpabc_1/robot.urdf"
+        seen = {
+            "a": [f"{folder}/x/y.urdf, in {folder}"],
+            "b": f"{passing} refers to '/opt/rob…', and to '/usr/rob…'",
+        }
+        assert without_folders(seen, folder) == {
+            "a": ["x/y.urdf, in ."],
+            "b": "robot.urdf refers to '…', and to '/usr/rob…'",
+        }
+
+
+class TestJudge:
+    TWO = Expected(
+        kind="manipulator",
+        arms={
+            "left": ExpectedArm(("l_?",), ("lf_?",), ("tool",)),
+            "right": ExpectedArm(("r_?",), ("rf_?",), ("other_tool",)),
+        },
+        optional=("lift",),
+        reach=0.85,
+    )
+
+    def test_both_arms(self):
+        seen = loaded(
+            left_arm=(("l_1", "l_2"), 2),
+            left_arm_slide=(("lift",), 1),
+            left_gripper=(("lf_1",), 1),
+            right_arm=(("r_1",), 1),
+            right_gripper=(("rf_1",), 1),
+        )
+        answers = judge(seen, self.TWO)
+        assert all(answers[question].good for question in ("arm", "gripper", "tcp", "reach"))
+
+    @pytest.mark.parametrize(
+        ("groups", "arm_text", "gripper_text"),
+        [
+            ({"arm": (("l_1",), 1), "body": (("r_1",), 1)}, "1 of 2", "no"),
+            ({"arm": (("l_1",), 1), "right_arm": (("r_1",), 0)}, "1 of 2", "no"),
+            ({"arm": (("l_1", "r_1"), 2), "gripper": (("lf_1", "rf_1"), 1)}, "no", "no"),
+        ],
+    )
+    def test_arms_that_are_wrong(self, groups, arm_text, gripper_text):
+        joints = {joint for names, _ in groups.values() for joint in names}
+        rest = tuple({"l_1", "r_1", "lf_1", "rf_1"} - joints)
+        seen = loaded(**groups, others=(rest or ("more",), 0))
+        answers = judge(seen, self.TWO)
+        assert (answers["arm"].good, answers["arm"].text) == (False, arm_text)
+        assert (answers["gripper"].good, answers["gripper"].text) == (False, gripper_text)
+
+    def test_a_tcp_between_tips(self):
+        robot = Expected("manipulator", {"arm": ExpectedArm(("j?",), (), (), ("tip_?",))})
+        seen = loaded(arm=(("j1",), 1))
+        assert not judge(seen, robot)["tcp"].good
+        seen["loads"]["tips"] = ["tip_1", "tip_2"]
+        assert judge(seen, robot)["tcp"].good
+        seen["loads"]["tips"] = ["tip_1", "palm"]
+        assert not judge(seen, robot)["tcp"].good
+
+    def test_steps(self):
+        seen = loaded(arm=(("j1",), 1))
+        seen["trial"]["exploded"] = 60
+        answers = judge(seen, Expected())
+        assert answers["steps_50"].good
+        assert (answers["steps_500"].good, answers["steps_500"].text) == (False, "step 60")
+        seen["trial"]["stands"] = False
+        assert judge(seen, Expected())["steps_50"].text == "kicks"
+
+    def test_checks_and_physics(self):
+        def answer(**seen):
+            return judge({"agreement": seen}, Expected())["agreement"]
+
+        assert answer(both=100, physics=0, checks=3).good
+        assert answer(both=0, physics=0, checks=0).good
+        assert answer(both=100, physics=1, checks=0).text == "1 unseen"
+        assert answer(both=100, physics=0, checks=20).text == "20 of 120 missed"
+
+    def test_nothing_seen_is_nothing_good(self):
+        answers = judge({"ended": "crashed: SIGSEGV"}, self.TWO)
+        assert set(answers) == set(QUESTIONS)
+        good = {question for question, answer in answers.items() if answer.good}
+        assert good == {"no_raw"}
+
+
+class TestExpectations:
+    def test_every_robot_of_the_record_is_known_with_its_joints(self):
+        expectations = read_expectations(EXPECTED)
+        for key, seen in json.loads(RECORD.read_text())["robots"].items():
+            expected = expected_of(key, expectations)
+            assert expected.kind != "unknown", key
+            groups = seen.get("loads", {}).get("groups", {})
+            joints = [joint for group in groups.values() for joint in group["joints"]]
+            for limb in expected.arms.values() if joints else ():
+                for pattern in (*limb.joints, *limb.gripper):
+                    assert any(Path(joint).match(pattern) for joint in joints), (key, pattern)
+
+    def test_a_file_that_makes_no_sense(self, tmp_path):
+        path = tmp_path / "expected.yaml"
+        path.write_text("a/*: {kind: robot}")
+        with pytest.raises(RecordError, match="kind is 'robot'; it must be one of manipulator"):
+            read_expectations(path)
+
+
+def test_the_command_resumes_and_writes_the_page(tmp_path, quick_probe):
+    folder, out = tmp_path / "robots", tmp_path / "seen.json"
+    folder.mkdir()
+    save(folder, arm(), "one.urdf")
+    command = ["robots", f"mine={folder}", "--out", str(out), "--resume", "--workers", "2"]
+    quick_probe(seeing(loaded(arm=(("j1",), 1))))
+    assert main([*command, "--only", "*/one.urdf"]) == 0
+    quick_probe(seeing({"loads": {"refused": "no longer"}}))
+    save(folder, arm(), "two.urdf")
+    assert main(command) == 0
+    robots = json.loads(out.read_text())["robots"]
+    assert list(robots) == ["mine/one.urdf", "mine/two.urdf"]
+    assert robots["mine/one.urdf"]["trial"]["stands"]
+    assert robots["mine/two.urdf"]["loads"] == {"refused": "no longer"}
+    page = out.with_suffix(".md").read_text()
+    assert "## Unknown (2)" in page
+    assert "| `mine/one.urdf` | yes |" in page
+    assert "- `mine/two.urdf`: loads: no longer" in page
+
+
+@pytest.mark.long
+@pytest.mark.skipif(find_spec("mani_skill") is None, reason="needs mani_skill's robots")
+def test_robots_of_mani_skill(tmp_path):
+    out = tmp_path / "seen.json"
+    only = ["--only", "*/panda_v2.urdf", "*/xarm7.urdf", "*/panda_bucket.urdf"]
+    words = ["--sources", "mani_skill", *only, "--out", str(out), "--workers", "2"]
+    assert main(["robots", *words]) == 0
+    robots = json.loads(out.read_text())["robots"]
+    assert [key for key, seen in robots.items() if seen["missing"]] == [
+        "mani_skill/panda/panda_bucket.urdf"
+    ]
+    expectations = read_expectations(EXPECTED)
+    for key in ("mani_skill/panda/panda_v2.urdf", "mani_skill/xarm7/xarm7.urdf"):
+        answers = judge(robots[key], expected_of(key, expectations))
+        for question in ("loads", "arm", "tcp", "reach", "tcp_move", "to_urdf", "to_drake"):
+            assert answers[question].good, (key, question, robots[key])

@@ -1,0 +1,193 @@
+"""``python -m benchmarks soak``: what is healthy passes, and what leaks is reported."""
+
+import os
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager, redirect_stdout
+from io import StringIO
+
+import pytest
+
+from benchmarks.__main__ import main
+from benchmarks.soak import (
+    OWN_ROUNDS,
+    WORKER_ROUNDS,
+    Level,
+    Soak,
+    Soaked,
+    between_laps,
+    complaints,
+    grown,
+    growth,
+    read_level,
+    worst,
+)
+from robots import TaskError
+from tasks import list_tasks, register_task
+from tests.fresh_process import in_fresh_process
+from tests.rollouts import leaking_tasks
+
+SMALL = ["--envs", "2", "--workers", "1", "--steps", "1"]
+
+
+def level(memory: float = 0.0, descriptors: float = 0.0) -> Level:
+    return Level(memory, descriptors, 1, 0, 0)
+
+
+def soaked(task_id: str, leaking: type | None = None) -> tuple[int, list[str]]:
+    """Return the exit code of the command and the lines that it prints."""
+    if leaking is not None:
+        register_task(task_id)(leaking)
+    printed = StringIO()
+    with redirect_stdout(printed):
+        code = main(["soak", "--tasks", task_id, *SMALL])
+    return code, printed.getvalue().splitlines()
+
+
+@pytest.mark.long
+def test_a_healthy_task_passes():
+    code, printed = in_fresh_process(soaked, "maniskill.push_cube_native")
+    assert code == 0
+    assert any("PushCube-v1" in line for line in printed)
+    assert printed[-1].endswith("nothing grows.")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("leaking", "quantity"),
+    [(leaking_tasks.HoardsMemory, "memory"), (leaking_tasks.LeavesFilesOpen, "descriptors")],
+)
+def test_a_task_that_leaks_is_reported(leaking, quantity):
+    code, printed = in_fresh_process(soaked, "Leaking-v1", leaking)
+    assert code == 1
+    assert [line for line in printed if line.startswith("GROWS")] == [
+        f"GROWS: Leaking-v1: {quantity} in workers",
+        f"GROWS: Leaking-v1: {quantity} in this process",
+        f"GROWS: {quantity} of this process, from lap to lap",
+    ]
+
+
+def test_laps_are_compared_task_by_task():
+    """Tasks need more or less, and one may keep a piece of memory by chance."""
+    first, second, third = found = [Soaked(name) for name in "abc"]
+    first.after = [level(100), level(200), level(202), level(204)]
+    second.after = [level(500), level(510), level(510), level(514)]
+    third.after = [level(100), level(100), level(190), level(190)]
+    for task in found:
+        task.workers, task.rounds = [[level()]], [[level()]]
+    assert between_laps(found).memory == 2
+    assert complaints(found) == ["memory of this process, from lap to lap"]
+    third.after = second.after = first.after = [level(1), level(2), level(2), level(2)]
+    assert complaints(found) == []
+
+
+def test_it_takes_about_as_many_steps_as_asked_for():
+    wanted = Soak(2_000_000, tuple(list_tasks()), 32, 2, 3)
+    in_workers = wanted.worker_steps * wanted.num_envs * WORKER_ROUNDS
+    here = wanted.own_steps * wanted.own_envs * OWN_ROUNDS * wanted.laps
+    assert (in_workers + here) * len(wanted.tasks) == pytest.approx(2_000_000, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "message"),
+    [
+        ((0, 1, 1, 3), "steps is 0; it must be 1 or more"),
+        ((1, 1, 0, 3), "workers is 0; it must be 1 or more"),
+        ((1, 1, 1, 2), "laps is 2; it must be 3 or more"),
+        ((1, 2, 3, 3), "3 workers cannot share 2 environments"),
+    ],
+)
+def test_numbers_that_make_no_sense(numbers, message):
+    steps, *rest = numbers
+    with pytest.raises(TaskError, match=message):
+        Soak(steps, ("PickCube-v1",), *rest)
+
+
+@contextmanager
+def a_file():
+    with open(os.devnull):
+        yield
+
+
+@contextmanager
+def memory():
+    kept = [b"x" * 20_000_000]
+    yield
+    kept.clear()
+
+
+@contextmanager
+def a_thread():
+    over = threading.Event()
+    thread = threading.Thread(target=over.wait)
+    thread.start()
+    yield
+    over.set()
+    thread.join()
+    while os.path.exists(f"/proc/self/task/{thread.native_id}"):  # the system's end comes later
+        time.sleep(0.001)
+
+
+@contextmanager
+def a_process_that_was_not_waited_for():
+    process = subprocess.Popen([sys.executable, "-c", ""], stdin=subprocess.DEVNULL)
+    yield
+    process.wait()
+
+
+@contextmanager
+def shared_memory():
+    descriptor = os.memfd_create("a-test")
+    yield
+    os.close(descriptor)
+
+
+def levels_around(held) -> tuple[Level, Level, Level]:
+    before = read_level()
+    with held():
+        during = read_level()
+    return before, during, read_level()
+
+
+@pytest.mark.parametrize(
+    ("held", "expected"),
+    [
+        (a_file, {"descriptors": 1}),
+        (memory, {"memory": pytest.approx(20e6 / 2**20, abs=1)}),
+        (a_thread, {"threads": 1}),
+        (a_process_that_was_not_waited_for, {"processes": 1}),
+        (shared_memory, {"descriptors": 1, "shared": 1}),
+    ],
+)
+def test_what_is_held_is_counted(held, expected):
+    before, during, after = in_fresh_process(levels_around, held)
+    for name in ("descriptors", "threads", "processes", "shared"):
+        assert getattr(during, name) - getattr(before, name) == expected.get(name, 0)
+        assert getattr(after, name) == getattr(before, name)
+    assert during.memory - before.memory == expected.get("memory", pytest.approx(0, abs=1))
+
+
+@pytest.mark.parametrize(
+    ("values", "least"),
+    [
+        ([0, 1, 2, 3, 4, 5, 6, 7, 8], 5),
+        ([0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4], 1),  # piece by piece
+        ([5, 8, 9, 9, 9, 9, 9, 9, 9], 0),  # warming up
+        ([3, 3, 3, 3, 3, 3, 9, 9, 9], 0),  # one step up
+        ([3, 3, 3, 3, 9, 3, 9, 3, 3], 0),
+        ([9, 9, 9, 9, 8, 7, 6, 5, 4], 0),
+        ([1], 0),
+    ],
+)
+def test_only_what_keeps_rising_grows(values, least):
+    assert growth([values]) >= least if least else growth([values]) <= 0
+
+
+def test_growth_of_every_quantity_and_the_worst():
+    one = grown([[level(k, 2 * k) for k in range(9)]])
+    other = grown([[level(3 * k, k) for k in range(9)]])
+    assert (one.memory, one.descriptors, one.threads) == (5, 10, 0)
+    together = worst((one, other))
+    assert (together.memory, together.descriptors, together.threads) == (15, 10, 0)
