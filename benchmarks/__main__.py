@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Sequence
-
 from benchmarks.bench.run import bench, tables
 from benchmarks.collisions import collisions
 from benchmarks.conversions import conversions
@@ -18,35 +15,35 @@ from benchmarks.robots.survey import mjcfs, robots
 from benchmarks.site.pictures import pictures
 from benchmarks.soak import soak
 from benchmarks.teleop import teleop
-from parity.command_line import run_command
+from robots.common.cli import Command, Program
+from robots.common.commands import MEANINGLESS, start
 
-COMMANDS = {
-    function.__name__: function
-    for function in (
-        bench,
-        tables,
-        gallery,
-        pictures,
-        soak,
-        robots,
-        mjcfs,
-        collisions,
-        planning,
-        placing,
-        experts,
-        conversions,
-        processors,
-        imitation,
-        reinforcement,
-        teleop,
-    )
-}
-
-
-def main(words: Sequence[str] | None = None) -> int:
-    """Run a command; see `parity.command_line.run_command`."""
-    return run_command("benchmarks", COMMANDS, words)
-
+PROGRAM = Program(
+    "python -m benchmarks",
+    {
+        # 1 says that something differs, 2 that it could not be tried
+        function.__name__.replace("_", "-"): Command(function, MEANINGLESS)
+        for function in (
+            bench,
+            tables,
+            gallery,
+            pictures,
+            soak,
+            robots,
+            mjcfs,
+            collisions,
+            planning,
+            placing,
+            experts,
+            conversions,
+            processors,
+            imitation,
+            reinforcement,
+            teleop,
+        )
+    },
+)
+main = PROGRAM.main
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(main)

@@ -11,8 +11,8 @@ import numpy as np
 from benchmarks.records import table
 from kinematics.rotations import Floats
 from layouts import Layout, Placement, ring
-from motion.cell import Cell
-from motion.obstacles import box
+from motion.collision.cell import Cell
+from motion.model.obstacles import box
 
 BATCHES = (1, 16, 64)
 RESOLUTIONS = {"1 cm": (0.01, 0.05), "1 mm": (0.001, np.pi / 360)}  # of edges (m, rad)

@@ -12,7 +12,6 @@ from itertools import cycle
 from pathlib import Path
 from typing import Any
 
-import tyro
 from matplotlib.figure import Figure
 
 from benchmarks.records import (
@@ -31,7 +30,7 @@ from rollouts.suite.statistics import wilson
 ALGORITHMS = {"stable-baselines3": "PPO", "torchrl": "MAPPO"}  # by what a run's settings name
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
-Runs = tyro.conf.Positional[tuple[Path, ...]]
+Runs = Sequence[Path]
 Curves = Mapping[str, Sequence[tuple[float, float]]]
 """By name the points of curves: how far it had learned, and the success on unseen seeds (%)."""
 

@@ -29,12 +29,12 @@ from kinematics.rotations import Floats, quaternion_of
 from layouts import Layout, face_to_face, grid, ring, side_by_side
 from layouts.validation.arguments import Rectangle
 from motion import Motion, NoPlanError, TcpGoal, plan
-from motion.barriers import CUT_OFF
-from motion.cell import Cell
-from motion.collisions import Checker
-from motion.goals import Goal, arm_joints
-from motion.search import import_ompl
-from motion.timing import import_toppra
+from motion.collision.cell import Cell
+from motion.collision.checker import Checker
+from motion.planning.goals import Goal, arm_joints
+from motion.planning.infeasibility import CUT_OFF
+from motion.planning.rrt_connect import import_ompl
+from motion.timing.velocities import import_toppra
 from robots import RobotDescriptor, RobotLayoutsError, RobotRegistry, TaskError
 from robots.common.writing import write_whole
 from robots.urdf.tcp import find_tcp
@@ -287,7 +287,7 @@ class Place:
         layout = self.cell.layout
         scenario = replace(FreeRobots.scenario, layout=layout, control_mode=MODE)
         task = FreeRobots(replace(scenario, check_layout=False))
-        task.simulation.watch_arms()
+        task.simulation.backend.watch_arms()
         return task
 
     def carry_out(self, motion: Motion) -> Record:
@@ -300,7 +300,7 @@ class Place:
         task.reset(0)
 
         def watch() -> None:
-            pairs = task.simulation.arms_touching(0)
+            pairs = task.simulation.backend.arms_touching(0)
             touching.update(dict.fromkeys(f"{one}, {other}" for one, other in pairs))
 
         watch()

@@ -14,7 +14,7 @@ from experts.tips import pose_solver
 from experts.ways import NoWayError, Ways
 from kinematics.rotations import Floats, inverse, rotate
 from kinematics.solve import by_way
-from simulation.overlaps import RobotsAlone
+from simulation.checks.overlaps import RobotsAlone
 from tasks import MultiRobotTask
 
 PATIENCE = 40  # control steps without progress after which an arm counts as blocked

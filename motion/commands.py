@@ -7,9 +7,9 @@ from typing import Annotated
 
 from layouts.commands import LayoutWords, Page
 from motion import planning
-from motion.goals import Goal, TcpGoal
+from motion.model.obstacles import Obstacle, box
 from motion.motion import Motion
-from motion.obstacles import Obstacle, box
+from motion.planning.goals import Goal, TcpGoal
 from robots.common.cli import Corners, File, Word, by_name
 from robots.common.commands import FAILED
 from robots.common.errors import MotionError
@@ -97,7 +97,7 @@ def show(file: str, *, page: Page) -> None:
     Raises:
         RobotLayoutsError: If it cannot be read, served or saved.
     """
-    from motion.page import motion_cell
+    from motion.output.page import motion_cell
 
     motion = Motion.load(file)
     page.show(lambda: motion_cell(motion, file))

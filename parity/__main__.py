@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Sequence
-
-from parity.command_line import run_command
 from parity.compare import compare
 from parity.inventory import inventory
 from parity.render import render
@@ -14,17 +10,27 @@ from parity.report import report
 from parity.rollout import rollout
 from parity.sweep import sweep
 from parity.tables import tables
+from robots.common.cli import Command, Program
+from robots.common.commands import MEANINGLESS, start
 
-COMMANDS = {
-    function.__name__: function
-    for function in (compare, replay, rollout, render, sweep, report, inventory, tables)
-}
-
-
-def main(words: Sequence[str] | None = None) -> int:
-    """Run a command; see `parity.command_line.run_command`."""
-    return run_command("parity", COMMANDS, words)
-
+PROGRAM = Program(
+    "python -m parity",
+    {
+        # 1 says that something differs, 2 that it could not be tried
+        function.__name__.replace("_", "-"): Command(function, MEANINGLESS)
+        for function in (
+            compare,
+            replay,
+            rollout,
+            render,
+            sweep,
+            report,
+            inventory,
+            tables,
+        )
+    },
+)
+main = PROGRAM.main
 
 if __name__ == "__main__":
-    sys.exit(main())
+    start(main)

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from itertools import product
 from json import dumps
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import torch
-import tyro
 from rich import box
 from rich.console import Console
 from rich.table import Table
@@ -48,7 +47,7 @@ TABLE_WIDTH = 180  # columns that a table may take; a narrower terminal wraps it
 SHOWN_DIFFERENCES = 3  # of each run
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Wanted:
     """What to compare.
 
@@ -158,7 +157,7 @@ class Wanted:
 
 
 def compare(
-    wanted: Annotated[Wanted, tyro.conf.arg(name="")],
+    wanted: Wanted,
     *,
     json: Path | None = None,
     record: bool = False,

@@ -205,7 +205,7 @@ class OurSide:
 
     def touching(self) -> NDArray[np.bool_]:
         """Tell where a robot touched a movable object; see `Side`."""
-        return self.env.simulation.touching()
+        return self.env.simulation.backend.touching()
 
 
 class NativeSide:

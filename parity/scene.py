@@ -82,7 +82,7 @@ def expect_same_shapes(env: Any, task: MultiRobotTask) -> None:
     for name, actor in env.scene.state_dict_registry.actors.items():
         if name in bodies:
             theirs = described_shapes(actor._bodies[0])
-            ours = task.simulation.collision_shapes(0, name)
+            ours = task.simulation.backend.collision_shapes(0, name)
             if theirs != ours:
                 raise PictureError(
                     f"{name} has other shapes in native than here, which a picture drawn in"

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from robots.common.cli import Command, Program
-from robots.common.commands import MEANINGLESS, start
+from robots.common.commands import start
 
 _FOR_USERS = {
     "demo": "rollouts.commands:demo",
@@ -44,7 +44,7 @@ _FOR_USERS = {
     "motion draw": "motion.commands:draw",
     "motion export": "motion.commands:export",
     "robots list": "robots.inspect:list_robots",
-    "robots inspect": "simulation.try_command:inspect",
+    "robots inspect": "simulation.checks.try_command:inspect",
     "robots fetch": "robots.fetch_assets:fetch",
     "robots guess": "robots.from_urdf:print_guess",
     "new task": "tasks.new_task:new_task",
@@ -52,28 +52,13 @@ _FOR_USERS = {
 }
 _FOR_DEVELOPERS = {
     "portable": "robots.portable:portable",
-    "bench": "measurements.bench.command",
-    "soak": "measurements.soak.command",
     "robots manifest": "robots.write_manifest:write_manifest",
-    "robots survey": "measurements.robots.__main__",
-}
-_PARITY = {  # these exit with 1 where something differs, and with 2 after an error
-    "parity inventory": "parity.records.inventory",
-    "parity compare": "parity.compare.command",
-    "parity replay": "parity.replay.command",
-    "parity rollout": "parity.replay.rollout",
-    "parity render": "parity.show.command",
-    "parity sweep": "parity.sweep.command",
-    "parity report": "parity.report.command",
-    "parity bench": "measurements.bench.native",
-    "parity tables": "measurements.tables",
 }
 
 PROGRAM = Program(
     "robot-layouts",
     {name: Command(target) for name, target in _FOR_USERS.items()},
-    {name: Command(target) for name, target in _FOR_DEVELOPERS.items()}
-    | {name: Command(target, MEANINGLESS) for name, target in _PARITY.items()},
+    {name: Command(target) for name, target in _FOR_DEVELOPERS.items()},
 )
 main = PROGRAM.main
 

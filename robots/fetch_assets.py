@@ -12,7 +12,6 @@ from robots.assets.manifest import AssetFile, load_manifest
 from robots.assets.packages import INDEX_PACKAGES
 from robots.assets.progress import size
 from robots.assets.sources import (
-    REVISION_VARIABLE,
     AssetSource,
     HubSource,
     InstalledPackage,

@@ -116,7 +116,7 @@ class TcpDrive:
         assert driven.arm is not None
         self.driven, self._task = driven, task
         self._arm, self._robot = driven.arm, task.layout.arm(driven.arm).robot
-        self._forward = task.simulation.point_reach(driven.arm).forward
+        self._forward = task.simulation.backend.point_reach(driven.arm).forward
 
     def toward(self, target: Floats, state: State) -> tuple[Floats, bool]:
         """See `PositionDrive`."""

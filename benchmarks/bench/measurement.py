@@ -10,8 +10,6 @@ from itertools import product
 from statistics import median, quantiles
 from typing import Any, TypeVar
 
-from tyro.conf import Suppress
-
 from robots import RobotLayoutsError
 
 CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -29,7 +27,7 @@ class BenchmarkError(RobotLayoutsError, RuntimeError):
     """Something that cannot be measured here, or a file that holds no measurements."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Settings:
     """What the benchmarks of a run have in common.
 
@@ -68,7 +66,7 @@ class Settings:
     started: tuple[int, ...] = (1, 64)
     episodes: int = 12
     checked: tuple[int, ...] = (1, 2, 4)
-    tick: Suppress[Callable[[float], None]] = lambda share: None
+    tick: Callable[[float], None] = lambda share: None
 
     def __post_init__(self) -> None:
         """Refuse numbers that cannot be.

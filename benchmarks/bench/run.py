@@ -9,10 +9,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated
 
 import torch
-import tyro
 from rich.console import Console
 from tqdm import tqdm
 
@@ -55,7 +53,7 @@ BESIDE_NATIVE: Benchmarks = {
 
 
 def bench(
-    settings: Annotated[Settings, tyro.conf.arg(name="")] = DEFAULTS,
+    settings: Settings = DEFAULTS,
     *,
     only: tuple[str, ...] = (),
     out: Path | None = None,

@@ -15,7 +15,6 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-import tyro
 from rich.table import Table
 from tqdm import tqdm
 
@@ -78,7 +77,7 @@ KINDS = {
 
 
 def gallery(
-    names: tyro.conf.Positional[tuple[str, ...]] = (),
+    names: Sequence[str] = (),
     *,
     check: bool = False,
     measure: bool = False,

@@ -28,9 +28,9 @@ from robots.common.writing import write_whole
 from robots.registry import CATALOGUE as ROBOTS
 from robots.urdf.summary import parse_urdf, read_urdf
 from simulation import Camera
-from simulation.cameras import View
-from simulation.overlaps import empty, stand
+from simulation.checks.overlaps import empty, stand
 from simulation.rendering.pictures import vulkan_problem
+from simulation.scene.cameras import View
 from simulation.simulation import Simulation
 from tasks import MultiRobotTask
 from tasks.engine.columns import overview
@@ -107,8 +107,8 @@ class Lens:
         return Camera(at, target, name, width, height, self.fov)
 
 
-# The lamps of `simulation.sapien3.studio` shine from behind this camera, a bit from the right;
-# the robot faces to the right, towards the viewer.
+# SAPIEN's lamps (`simulation.sapien3.pictures.studio`) shine from behind this camera, a bit from
+# the right; the robot faces to the right, towards the viewer.
 PORTRAIT, FACING = Lens(radians(-168), radians(18), radians(24)), radians(-120)
 
 

@@ -36,9 +36,9 @@ from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree
 from simulation import PhysicsSettings
-from simulation.overlaps import empty, stand
+from simulation.checks.overlaps import empty, stand
+from simulation.checks.trial import tcp_error, try_robot
 from simulation.simulation import Simulation
-from simulation.trial import tcp_error, try_robot
 
 MEMORY = 8 << 30  # bytes of this process
 STEPS = 500
@@ -178,7 +178,7 @@ def _in_physics(robot: RobotDescriptor, drawn: Floats) -> Iterator[dict[frozense
         simulation.worlds[0].stand(NAME, qpos)
         simulation.touched()
         simulation.step(still, simulation.read().joint_positions)
-        overlaps = simulation.overlaps(0)
+        overlaps = simulation.backend.overlaps(0)
         yield {frozenset((lap.one.name, lap.other.name)): lap.depth for lap in overlaps}
 
 

@@ -21,7 +21,6 @@ from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
 
-import tyro
 from tqdm import tqdm
 
 from benchmarks.records import (
@@ -124,7 +123,7 @@ class Robot:
 
 
 def robots(
-    folders: tyro.conf.Positional[tuple[str, ...]] = (),
+    folders: Sequence[str] = (),
     *,
     sources: tuple[str, ...] = (),
     only: tuple[str, ...] = ("*",),
@@ -175,7 +174,7 @@ def robots(
 
 
 def mjcfs(
-    folders: tyro.conf.Positional[tuple[str, ...]] = (),
+    folders: Sequence[str] = (),
     *,
     out: Path = DOCS / "mjcf.json",
     seconds: float = 240.0,

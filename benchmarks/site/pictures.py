@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-import tyro
 from PIL import Image
 from tqdm import tqdm
 
@@ -27,9 +26,7 @@ COLOURS = 64  # of a drawing
 VIEW = Camera((1.2, 0.0, 1.05), (-0.05, 0.0, 0.2), "view", WIDTH, HEIGHT, 0.82)  # m, rad
 
 
-def pictures(
-    names: tyro.conf.Positional[tuple[str, ...]] = (), *, out: Path = DOCS / "images"
-) -> int:
+def pictures(names: Sequence[str] = (), *, out: Path = DOCS / "images") -> int:
     """Draw the documentation's pictures anew.
 
     They are committed, so that nobody needs a Vulkan driver or a planner to see them.

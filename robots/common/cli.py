@@ -293,7 +293,8 @@ def _parameters(function: Any) -> Iterator[tuple[inspect.Parameter, Any, str]]:
     for one in reversed(inspect.getmro(function)) if inspect.isclass(function) else [function]:
         about |= _documentation(inspect.getdoc(one)).parameters
     for name, parameter in inspect.signature(function).parameters.items():
-        yield parameter, hints[name], about.get(name, "")
+        if get_origin(hints[name]) is not Callable:  # what only another program passes
+            yield parameter, hints[name], about.get(name, "")
 
 
 def _add(parser: argparse.ArgumentParser, function: Any) -> None:
@@ -352,10 +353,10 @@ def _options(hint: Any) -> dict[str, Any]:
         return _options(next(part for part in parts if part is not type(None)))
     if origin is Literal:
         return {"choices": parts}
-    if origin is Sequence:
-        return {"nargs": "+", **_options(parts[0])}
-    if origin is tuple:
+    if origin is tuple and parts[1:] != (...,):
         return {**_options(parts[0]), "nargs": len(parts)}
+    if origin in (Sequence, tuple):
+        return {"nargs": "+", **_options(parts[0])}
     kind, metavar = {int: (_whole, "N"), float: (_number, "X")}.get(hint, (hint, None))
     return {"type": _reader(kind), **({"metavar": metavar} if metavar else {})}
 

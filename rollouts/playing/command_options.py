@@ -15,7 +15,6 @@ from robots import CONTROL_MODES, TaskError
 from robots.common.cli import Word, at_least
 from robots.control_modes import read_mode
 from rollouts.playing.scheduler import EPISODE_SECONDS, check_timeout
-from rollouts.reading.manifest import FILE_SIZE
 from tasks.cell_options import RecordedCell
 
 if TYPE_CHECKING:

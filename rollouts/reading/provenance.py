@@ -13,10 +13,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from typing import Annotated, Any
 
-from typing_extensions import NotRequired, TypedDict
-
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import NotRequired, TypedDict
 
 from layouts import Layout
 from robots import CONTROL_MODES, JointGroup

@@ -13,11 +13,10 @@ from os import PathLike
 from statistics import mean
 from typing import Annotated, Any
 
-from msgspec import Meta
-from typing_extensions import NotRequired, TypedDict
-
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
+from typing_extensions import NotRequired, TypedDict
 
 from robots import RobotLayoutsError, UnreadableFileError
 from robots.common.files import read_json

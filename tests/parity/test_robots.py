@@ -11,7 +11,7 @@ import sapien
 from layouts import Layout, Placement
 from robots import CONTROL_MODES, RobotDescriptor, RobotRegistry
 from simulation import PhysicsSettings, Simulation
-from simulation.floor import adds_floor
+from simulation.checks.floor import adds_floor
 from simulation.sapien3.backend import worlds_below
 from tests.native import NATIVE
 

@@ -106,7 +106,7 @@ class TestCommand:
         assert "0.1 rad per step" in printed
 
     def test_what_is_wrong_is_its_exit_code(self, tmp_path, capsys, monkeypatch, small):
-        monkeypatch.setattr("simulation.try_command.named_robot", lambda name: folded(small))
+        monkeypatch.setattr("simulation.checks.try_command.named_robot", lambda name: folded(small))
         assert main(["robots", "inspect", "--try", "folded"]) == 1
         printed = capsys.readouterr().out
         assert "WRONG: the likely cause: at the start l" in printed
