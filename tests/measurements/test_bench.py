@@ -21,8 +21,8 @@ from measurements.bench.report import Report, machine, read
 from measurements.bench.settings import Benchmark, Clock, Settings
 from measurements.bench.steps import Played
 from measurements.bench.worlds import crowd, make_pile
+from robot_layouts.__main__ import main
 from robots import MissingPackageError, SimulationError
-from rollouts.__main__ import main
 from rollouts.progress import LiveLine
 from simulation.sapien3.backend import worlds_below
 from tests.quick import quick_cases

@@ -1,4 +1,4 @@
-"""``python -m rollouts soak``: what is healthy passes, and what leaks is told."""
+"""``robot-layouts soak``: what is healthy passes, and what leaks is told."""
 
 import random
 from contextlib import redirect_stdout
@@ -7,8 +7,8 @@ from io import StringIO
 import pytest
 
 from measurements.soak.soak import Soak, Soaked, between_laps, complaints, leaks, soak
+from robot_layouts.__main__ import main
 from robots import TaskError
-from rollouts.__main__ import main
 from tasks import list_tasks, register_task
 from tests.fresh_process import in_fresh_process
 from tests.measurements.test_process_resources import level
