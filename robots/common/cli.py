@@ -156,7 +156,8 @@ class Command(NamedTuple):
             hint = f". Did you mean {match}?" if match else ""
             parser.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
         if inspect.ismodule(function):
-            return Call(function.run, {"options": options}, self.failed)
+            run: Any = function.run
+            return Call(lambda options: run(options), {"options": options}, self.failed)
         return Call(function, _arguments(function, options), self.failed)
 
     def _load(self) -> Any:
