@@ -11,6 +11,7 @@ from robots import TaskError
 from rollouts.playing.scheduler import (
     DEATHS_ALLOWED,
     EPISODE_SECONDS,
+    START_SECONDS,
     Event,
     Play,
     RetryPolicy,
@@ -111,7 +112,7 @@ class _Processes:
 
     def spawn(self) -> Worker:
         """Start a process."""
-        return self._pool.spawn(self._job, _PATIENCE)
+        return self._pool.spawn(self._job, START_SECONDS)
 
     def wait(self, seconds: float) -> list[tuple[Worker, Reply]]:
         """Wait for replies for a while (s)."""

@@ -15,7 +15,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Generator
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from contextlib import ExitStack, contextmanager, suppress
 from importlib import reload
 from multiprocessing import forkserver, resource_tracker
@@ -73,7 +73,10 @@ def start(work: Callable[..., None], *arguments: Any) -> BaseProcess:
     result: Future[BaseProcess] = Future()
     _starter().put((functools.partial(_start, work, arguments), result))
     with enough():
-        process = result.result()
+        try:
+            process = result.result()
+        finally:
+            wait([result])  # Ctrl-C must not close what is on its way to the process
     _started.add(process)
     return process
 

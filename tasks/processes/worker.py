@@ -176,13 +176,12 @@ class Worker:
     def receive(self) -> Reply | None:
         """Read what has arrived; returns a reply if it is whole."""
         try:
-            message = self._channel.read(socket.MSG_DONTWAIT)
+            while (message := self._channel.read(socket.MSG_DONTWAIT)) is None:
+                pass
         except BlockingIOError:
             return None if exit_code(self._process) is None else self._died()
         except (EOFError, OSError):
             return self._died()
-        if message is None:
-            return None
         try:
             status, value = pickle.loads(message[1])
         except Exception as error:  # of a class that cannot be loaded here
