@@ -5,43 +5,35 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from dataclasses import fields as fields_of
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from kinematics.rotations import Floats
+from robots.action_split import ActionSplit, JointGroup
 from robots.bodies.allowed import joined_pairs, rigid_pairs
 from robots.bodies.hulls import Hull, counted_pairs, read_hulls
 from robots.bodies.overlaps import guess_allowed, overlapping
 from robots.common.errors import DescriptorError
 from robots.common.schema import check
-from robots.descriptor import (
-    ActionSplit,
-    Fingers,
-    JointGroup,
-    RobotDescriptor,
-    UrdfSource,
-    Vector3,
-)
+from robots.descriptor import RobotDescriptor, UrdfSource
 from robots.guessing import words
 from robots.guessing.anatomy import Anatomy, Limb, find_anatomy
-from robots.guessing.drives import Drives
-from robots.guessing.fingertips import Fingertips
-from robots.guessing.grasps import find_fingers, find_material
+from robots.guessing.drives import Drives, read_masses
+from robots.guessing.fingertips import Fingertips, find_fingers, find_material
 from robots.guessing.grippers import Gripper, entangled, find_gripper
 from robots.guessing.groups import arm_groups, held_groups
-from robots.guessing.hints import NOTHING, Hints
-from robots.guessing.masses import read_masses
+from robots.guessing.hints import NOTHING, Hints, known_anatomy, known_tip
 from robots.guessing.posture import Posture, PostureSearch
-from robots.guessing.reach import find_base, find_reach
-from robots.guessing.semantics import known_anatomy, known_tip
 from robots.guessing.stance import Stance
-from robots.guessing.tool import BETWEEN, EXACT, Tool, find_tool
+from robots.guessing.tool import BETWEEN, EXACT, Tool, find_base, find_reach, find_tool
+from robots.parts import Fingers, Vector3
 from robots.parts import Limb as LimbDescription
 from robots.urdf.cleaning.xacro_files import expand, template_of
 from robots.urdf.model import UrdfModel
 from robots.urdf.reading import read_model
-from robots.urdf.summary import is_template_file, parse_urdf, read_cleaned
+from robots.urdf.summary import is_template_file, read_cleaned
 
 LinkPairs = tuple[tuple[str, str], ...]
 
@@ -115,23 +107,27 @@ def guess(
         AssetError: If the URDF or a mesh of it is missing, or it describes no robot.
         DescriptorError: If nothing moves, or an override contradicts the rest.
     """
+    names = [field.name for field in fields_of(RobotDescriptor)]
+    if unknown := sorted(set(overrides) - set(names)):
+        raise DescriptorError(f"a descriptor has no fields {unknown}; it has {', '.join(names)}")
     path = source.locate()
     cleaned = read_cleaned(path)
     parts = _look_at(path, cleaned.xml, hints, overrides)
     main = parts.anatomy.limbs[0]
+    tool = parts.tools[main.name]
     split = _action_split(parts)
     allowed, overlaps = _may_overlap(parts, path)
     rest, posture = _rest(parts, allowed)
-    distance, measured = find_reach(parts.model, main, parts.tools[main.name], rest)
+    distance, measured = find_reach(parts.model, main, tool, rest)
     fingers, grasping = _fingers(parts, main)
     wheels = _wheels(parts)
     fields: dict[str, Any] = {
         "name": name or _as_name(parts.model.name or path.stem),
         "urdf": source,
         "action_split": split,
-        "tcp_link": parts.tools[main.name].link,
-        "tcp_position_links": parts.tools[main.name].links,
-        "tcp_offset": parts.tools[main.name].offset,
+        "tcp_link": tool.link,
+        "tcp_position_links": tool.links,
+        "tcp_offset": tool.offset,
         "gripper_material": find_material(parts.model, parts.anatomy.limbs),
         "fingers": fingers,
         "keyframes": _keyframes(parts, split, rest),
@@ -141,44 +137,34 @@ def guess(
         "no_floor_contact": wheels,
         "limbs": _limbs(parts, rest),
     }
-    unknown = sorted(set(overrides) - set(RobotDescriptor.__dataclass_fields__))
-    if unknown:
-        known = ", ".join(RobotDescriptor.__dataclass_fields__)
-        raise DescriptorError(f"a descriptor has no fields {unknown}; it has {known}")
-    tools = [tool.reason for tool in parts.tools.values()]
-    repairs = [f"repaired: {repair}" for repair in cleaned.repairs]
-    hands_too = (*_about_hands(parts), grasping) if parts.grippers else ()
-    drives = parts.drives.reasons()
-    known = () if hints.limbs else hints.reasons
-    template = expand(*template_of(path)).reasons() if is_template_file(path) else ()
-    about = (
-        *template,
-        *known,
+    rolling = f"no_floor_contact: {', '.join(wheels)}, by name; they do not roll"
+    reasons = (
+        *(f"repaired: {repair}" for repair in cleaned.repairs),
+        *(expand(*template_of(path)).reasons() if is_template_file(path) else ()),
+        *(() if hints.limbs else hints.reasons),
         *parts.anatomy.reasons,
-        *tools,
-        *hands_too,
-        *drives,
+        *(tool.reason for tool in parts.tools.values()),
+        *((*_about_hands(parts), grasping) if parts.grippers else ()),
+        *parts.drives.reasons(),
         *_out_of_limits(parts),
+        *((rolling,) if wheels else ()),
+        *posture.reasons,
+        measured,
+        *overlaps,
+        *(f"{field}: given, not guessed" for field in overrides),
     )
-    if wheels:
-        about = (*about, f"no_floor_contact: {', '.join(wheels)}, by name; they do not roll")
-    about = (*about, *posture.reasons, measured)
-    given = tuple(f"{field}: given, not guessed" for field in overrides)
-    return Guess(
-        RobotDescriptor(**{**fields, **overrides}),
-        (*repairs, *about, *overlaps, *given),
-    )
+    return Guess(RobotDescriptor(**{**fields, **overrides}), reasons)
 
 
 def _look_at(path: Path, xml: bytes, hints: Hints, overrides: Mapping[str, Any]) -> _Parts:
     model = read_model(xml, path.as_posix())
     anatomy = known_anatomy(model, find_anatomy(model, path.as_posix()), hints)
     stance = Stance(model)
-    hulls = read_hulls(model, path) if find_spec("fcl") and find_spec("trimesh") else ()
+    hulls = read_hulls(model, path) if find_spec("fcl") else ()
     bodies: dict[int, list[Floats]] = {}
     for hull in hulls:
         bodies.setdefault(hull.link, []).append(hull.corners)
-    masses = read_masses(parse_urdf(xml, path.as_posix()), stance.tree, bodies)
+    masses = read_masses(model, stance.tree, bodies)
     drives = Drives(stance, masses, hints.drives, hints.source)
     hands = [limb for limb in anatomy.limbs if limb.fingers]
     tips = {limb.name: Fingertips(stance, limb, hulls) for limb in hands}
@@ -355,7 +341,11 @@ def _rest(parts: _Parts, allowed: LinkPairs) -> tuple[dict[str, float], Posture]
     found = search.given(parts.hints.postures[home], where) if home else search.run()
     rest = parts.stance.all_joints(found.position)
     for postures in hands:  # joints that one number drives need not mimic each other in the URDF
-        rest |= next(p for p in postures if _agree(p, rest, parts.stance))
+        rest |= next(
+            posture
+            for posture in postures
+            if all(abs(at - rest[j]) < 1e-5 for j, at in posture.items() if j in parts.stance.index)
+        )
     return rest, found
 
 
@@ -401,8 +391,3 @@ def _keyframes(
         at = {**rest, **{j: min(max(x, spans[j][0]), spans[j][1]) for j, x in joints.items()}}
         found.setdefault(name, tuple(at[joint] for joint in split.joints))
     return found
-
-
-def _agree(posture: Mapping[str, float], rest: Mapping[str, float], stance: Stance) -> bool:
-    leaders = [joint for joint in posture if joint in stance.index]
-    return all(abs(posture[joint] - rest[joint]) < 1e-5 for joint in leaders)

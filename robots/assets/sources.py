@@ -178,11 +178,11 @@ class HubSource:
                         for file in wanted
                     }
                     for download in as_completed(downloads):
-                        file, data = downloads[download], download.result()
-                        if data is None:
+                        file, path = downloads[download], download.result()
+                        if path is None:
                             absent.append(_hub_path(file))
                         else:
-                            yield file, data
+                            yield file, _read_cached(file, path)
             finally:
                 pool.shutdown(cancel_futures=True)
             if absent:
@@ -210,14 +210,14 @@ class HubSource:
             raise SourceError(f"{self._at(dataset)}: {_reason(error)}") from error
         return about.sha or self.revision
 
-    def _download(self, file: AssetFile, commit: str, again: bool, bar: type[Any]) -> bytes | None:
-        """Return the contents of a file, or None if the dataset lacks it."""
+    def _download(self, file: AssetFile, commit: str, again: bool, bar: type[Any]) -> Path | None:
+        """Return where the Hub's cache has a file, or None if the dataset lacks it."""
         from huggingface_hub import hf_hub_download
         from huggingface_hub.errors import RemoteEntryNotFoundError
 
         dataset = str(file.origin.hub_dataset)
         try:
-            path = hf_hub_download(
+            cached = hf_hub_download(
                 dataset,
                 _hub_path(file),
                 repo_type="dataset",
@@ -227,9 +227,7 @@ class HubSource:
                 force_download=again,
                 tqdm_class=bar,
             )
-            return _read(file, Path(path))
-        except UnreadableFileError:  # something else is in its place in the Hub's cache
-            return b""
+            return Path(cached)
         except RemoteEntryNotFoundError:
             return None
         except Exception as error:  # as above
@@ -281,6 +279,14 @@ def _read(file: AssetFile, path: Path) -> bytes:
     """
     with open_regular(path) as stream:
         return stream.read(file.limit(trust=True) + 1)
+
+
+def _read_cached(file: AssetFile, path: Path) -> bytes:
+    """Return the contents of a file in the Hub's cache; nothing, if something else is there."""
+    try:
+        return _read(file, path)
+    except UnreadableFileError:
+        return b""
 
 
 def _hub_path(file: AssetFile) -> str:

@@ -17,11 +17,12 @@ with ``colcon build --symlink-install`` do.
 from __future__ import annotations
 
 import posixpath
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from urllib.parse import unquote
 
 from robots.common.errors import AssetError
-from robots.urdf.numbers import shown
+from robots.common.paths import default_root
+from robots.common.quoting import shown
 
 Exists = Callable[[str], bool]
 
@@ -46,19 +47,19 @@ def resolve(reference: str, urdf: str, exists: Exists) -> str:
         AssetError: If it is no path, or leads out of the folders that the URDF may refer to.
     """
     folder = posixpath.dirname(urdf)
-    roots = _roots(folder, exists)
-    allowed = [
-        path
-        for path, package in _candidates(reference, urdf, exists)
-        if _is_below(path, folder, roots) or (package and _inside(path, package))
-    ]
-    if not allowed:
+    first = ""
+    for path, package in _candidates(reference, urdf, exists):
+        if is_allowed(path, folder, exists) or (package and _inside(path, package)):
+            if exists(path):
+                return path
+            first = first or path
+    if not first:
         raise AssetError(
             f"{urdf} refers to {shown(reference)}, which leads out of its folder and its package"
             " (the folder around it with a package.xml); files elsewhere are not opened: copy it"
             " beside the URDF"
         )
-    return next((path for path in allowed if exists(path)), allowed[0])
+    return first
 
 
 def is_allowed(path: str, folder: str, exists: Exists) -> bool:
@@ -69,16 +70,13 @@ def is_allowed(path: str, folder: str, exists: Exists) -> bool:
         folder: Folder of the URDF, absolute or relative to its package.
         exists: Whether a path exists.
     """
-    return _is_below(path, folder, _roots(folder, exists))
-
-
-def _is_below(path: str, folder: str, roots: Iterable[str]) -> bool:
     if not posixpath.isabs(folder):
         return not (posixpath.isabs(path) or path == ".." or path.startswith("../"))
-    if any(_inside(path, root) for root in roots):
+    if _inside(path, folder) or any(_inside(path, root) for root in _roots(folder, exists)):
         return True
     around = posixpath.dirname(folder)
-    return _inside(path, around) and _is_mesh_folder(posixpath.relpath(path, around))
+    inner = posixpath.relpath(path, around).split("/")[:-1]
+    return _inside(path, around) and any(part.lower() in MESH_FOLDERS for part in inner)
 
 
 def _candidates(reference: str, urdf: str, exists: Exists) -> Iterator[tuple[str, str]]:
@@ -111,27 +109,15 @@ def _local(path: str, reference: str, urdf: str) -> str:
     return path
 
 
-def _roots(folder: str, exists: Exists) -> list[str]:
-    """Return the folders in which files may lie that a URDF refers to; none by a relative one."""
-    if not posixpath.isabs(folder):
-        return []
-    roots = [folder, _local_copy()]
+def _roots(folder: str, exists: Exists) -> Iterator[str]:
+    """Yield the folders besides its own in which files may lie that a URDF refers to."""
+    yield default_root().as_posix()
     if posixpath.basename(folder).lower() in URDF_FOLDERS:
-        roots.append(posixpath.dirname(folder))
+        yield posixpath.dirname(folder)
     for parent in (folder, *_parents(folder)):
-        if any(exists(posixpath.join(parent, mark)) for mark in PACKAGE_MARKS):
-            return [*roots, parent]
-    return roots
-
-
-def _local_copy() -> str:
-    from robots.assets.store import default_root
-
-    return default_root().as_posix()
-
-
-def _is_mesh_folder(path: str) -> bool:
-    return any(part.lower() in MESH_FOLDERS for part in path.split("/")[:-1])
+        if any([exists(posixpath.join(parent, mark)) for mark in PACKAGE_MARKS]):
+            yield parent
+            return
 
 
 def _inside(path: str, root: str) -> bool:
