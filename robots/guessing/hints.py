@@ -38,14 +38,12 @@ class LimbHint:
         arm: Names of its joints that move.
         fingers: Names of its gripper's joints that move.
         tip: Link at its end; empty if it is not known.
-        palm: Link that carries the gripper, or the last one; empty if it is not known.
     """
 
     name: str
     arm: tuple[str, ...]
     fingers: tuple[str, ...] = ()
     tip: str = ""
-    palm: str = ""
 
 
 @dataclass(frozen=True)

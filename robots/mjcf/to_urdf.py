@@ -28,7 +28,6 @@ TOOLS = (*words.TCP, *words.GRASP, *words.TOOL, *words.END, *words.HAND, *words.
 WORLD = "world"
 PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = range(8)  # MuJoCo's kinds
 SEEN_GROUPS = 3  # the first groups of shapes, which MuJoCo draws unless it is asked otherwise
-FEWEST_FACES = 4  # of what has a volume
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
