@@ -20,7 +20,7 @@ from robots.urdf.tcp import find_tcp
 from simulation.backend import Overlap
 from simulation.checks.overlaps import between_robots, deepest
 from tasks import MultiRobotTask
-from tasks.driving import driven_groups
+from tasks.driving import driven_groups, joint_slices
 
 WAIT = 40  # control steps without progress, after which something is in the way
 AWAY = 0.05  # rad, m; farther from its start no motion is begun
@@ -85,7 +85,7 @@ class Follower:
         """
         self.motion, self.time = motion, 0.0
         self._task, self._seconds = task, 1 / task.scenario.control_frequency
-        self._joints = _joints(task.layout)
+        self._joints = joint_slices(task.layout)
         given = {task.layout.arm_name(arm): number for arm, number in (grippers or {}).items()}
         _check_task(task, motion)
         for held in motion.held:
@@ -208,15 +208,6 @@ def follow(
     return Followed(rows, *errors, late, tuple(contacts.values()))
 
 
-def _joints(layout: Layout) -> dict[str, slice]:
-    """Return where each robot's joints are among those of all."""
-    places: dict[str, slice] = {}
-    for name, placement in layout.items():
-        first = sum(layout[other].robot.dof for other in places)
-        places[name] = slice(first, first + placement.robot.dof)
-    return places
-
-
 def _check_task(task: MultiRobotTask, motion: Motion) -> None:
     if task.num_envs != 1:
         raise TaskError(f"a motion is followed in 1 environment; the task has {task.num_envs}")
@@ -251,7 +242,7 @@ def _stuck(layout: Layout, follower: Follower, came: Floats, contacts: Iterable[
     """Say which joint is farthest from where it should be, and where robots touch most."""
     missing = np.abs(follower.joints(follower.time) - came)
     name, places = next(
-        (n, p) for n, p in _joints(layout).items() if p.start <= int(missing.argmax()) < p.stop
+        (n, p) for n, p in joint_slices(layout).items() if p.start <= int(missing.argmax()) < p.stop
     )
     joint = layout[name].robot.joints[int(missing.argmax()) - places.start]
     return (
@@ -268,7 +259,7 @@ def _errors(
     joints: dict[str, Floats] = {}
     tcps: dict[str, float] = {}
     links: dict[str, float] = {}
-    for name, places in _joints(layout).items():
+    for name, places in joint_slices(layout).items():
         rows = planned[:, places], came[:, places]
         joints[name] = np.abs(rows[0] - rows[1]).max(axis=0)
         tree = link_tree(layout[name].robot)

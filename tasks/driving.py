@@ -49,6 +49,16 @@ def driven_groups(layout: Layout) -> Iterator[DrivenGroup]:
             number, joint = numbers.stop, joints.stop
 
 
+def joint_slices(layout: Layout) -> dict[str, slice]:
+    """Return where each robot's joints are among those of all."""
+    slices: dict[str, slice] = {}
+    first = 0
+    for name, placement in layout.items():
+        slices[name] = slice(first, first + placement.robot.dof)
+        first += placement.robot.dof
+    return slices
+
+
 class PositionDrive:
     """A group whose numbers are positions of its joints, with or without velocities.
 

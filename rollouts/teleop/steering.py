@@ -23,7 +23,7 @@ from robots.action_split import is_gripper
 from robots.urdf.tcp import find_tcp
 from simulation import State
 from tasks import MultiRobotTask
-from tasks.driving import DrivenGroup, driven_groups
+from tasks.driving import DrivenGroup, driven_groups, joint_slices
 
 SPEED, TURN_SPEED = 0.5, 2.0  # of a TCP (m/s, rad/s)
 JOINT_SPEED = {"rad": 2.0, "m": 0.3}  # rad/s, m/s
@@ -48,15 +48,13 @@ class _Arm:
         """Take the groups of an arm, one or more of which are no gripper."""
         self.name, layout = name, task.layout
         self._robot = layout.owner(name)
-        before = list(layout)[: list(layout).index(self._robot)]
-        first = sum(layout[robot].robot.dof for robot in before)
-        robot = layout[self._robot].robot
+        robot, self._own = layout[self._robot].robot, joint_slices(layout)[self._robot]
+        first = self._own.start
         tree = link_tree(robot)
         tcp = find_tcp(layout.arm(name).robot, tree)
         self._tree = tree.towards(tcp.needed)
         self._links = [self._tree.link(tree.links[link]) for link in tcp.links]
         self._turned, self._offset = self._tree.link(tree.links[tcp.turned]), tcp.offset
-        self._own = slice(first, first + robot.dof)
         moving = {first + int(joint) for joint in self._tree.drivers}
         self.grippers = [group for group in driven if is_gripper(group.name)]
         arm = [group for group in driven if group not in self.grippers]
