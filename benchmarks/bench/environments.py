@@ -14,7 +14,7 @@ import torch
 from numpy.typing import NDArray
 
 import tasks
-from benchmarks.bench.measurement import Measurement, Sample, Settings, SomeValue, by_series
+from benchmarks.bench.measurement import Measurement, Sample, Settings, SomeValue, measured
 from benchmarks.bench.worlds import crowd, make_crowd, make_pile
 from parity.native import make_native, native_action
 from rollouts.recording.recorder import Recorder
@@ -155,8 +155,8 @@ def reset(settings: Settings) -> Measurement:
         env = tasks.make(task_id)
         variants["reset", task_id] = _timed_resets(settings, env.reset)
         variants["world built anew", task_id] = _timed_resets(settings, _rebuild(env))
-    title = "A reset of one environment, by task"
-    return _by_task(settings, "reset", title, "ms per reset", settings.interleave(variants))
+    title, samples = "A reset of one environment, by task", settings.interleave(variants)
+    return measured("reset", title, "ms per reset", "task", samples)
 
 
 def recording(settings: Settings) -> Measurement:
@@ -168,8 +168,8 @@ def recording(settings: Settings) -> Measurement:
         variants["recorded", task_id] = _timed_episodes(env, settings, _record_all)
     samples = settings.interleave(variants, rounds=min(settings.rounds, 5))
     title = f"An episode of a reset and {EPISODE_STEPS} steps, recorded or not"
-    measured = _by_task(settings, "recording", title, "ms per episode", samples)
-    return replace(measured, ratios=(("recorded", "stepped"),))
+    ratios = (("recorded", "stepped"),)
+    return measured("recording", title, "ms per episode", "task", samples, ratios=ratios)
 
 
 def validation(settings: Settings) -> Measurement:
@@ -178,44 +178,31 @@ def validation(settings: Settings) -> Measurement:
         ("layout.validate()", count): _timed(settings, crowd(count, settings.kinds).validate, 1e3)
         for count in settings.checked
     }
-    return Measurement(
-        name="validation",
-        title=f"layout.validate() of a ring of {' + '.join(settings.kinds)}",
-        unit="ms per check",
-        variable="robots",
-        values=settings.checked,
-        samples=by_series(settings.checked, settings.interleave(variants)),
-    )
+    title = f"layout.validate() of a ring of {' + '.join(settings.kinds)}"
+    samples = settings.interleave(variants)
+    return measured("validation", title, "ms per check", "robots", samples)
 
 
 def varying(settings: Settings) -> Measurement:
     """Resets and steps of worlds that vary, each axis of a randomization alone."""
     task, plain = settings.task[0], tasks.make(settings.task[0])
-    variants: dict[tuple[str, str], Sample] = {
-        ("reset", PLAIN): _timed_resets(settings, plain.reset),
-        ("reset", REBUILD): _timed_resets(settings, _rebuild(plain)),
-        ("step", PLAIN): _timed_steps(settings, plain),
-        ("step", REBUILD): _timed_steps(settings, plain),
-    }
+    resets, steps = [(PLAIN, _timed_resets(settings, plain.reset))], [(PLAIN, plain)]
     for axis, alone in VARYING.items():
         env = tasks.make(task, randomization=alone)
-        variants["reset", axis] = _timed_resets(settings, env.reset)
-        variants["step", axis] = _timed_steps(settings, env)
-    values = (PLAIN, *VARYING, REBUILD)
-    return Measurement(
-        name="varying",
-        title=f"Worlds of {task} that vary, each axis alone",
-        unit="ms per reset or step",
-        variable="what varies",
-        values=values,
-        samples=by_series(values, settings.interleave(variants)),
-    )
+        resets.append((axis, _timed_resets(settings, env.reset)))
+        steps.append((axis, env))
+    resets.append((REBUILD, _timed_resets(settings, _rebuild(plain))))
+    steps.append((REBUILD, plain))
+    variants = {("reset", axis): timed for axis, timed in resets}
+    variants |= {("step", axis): _timed_steps(settings, env) for axis, env in steps}
+    title, samples = f"Worlds of {task} that vary, each axis alone", settings.interleave(variants)
+    return measured("varying", title, "ms per reset or step", "what varies", samples)
 
 
 def looks(settings: Settings) -> Measurement:
     """Resets of worlds that look different, without pictures and with one of 128 × 128."""
     modes = {"reset": "none"} | ({} if vulkan_problem() else {"reset and picture": "rgb"})
-    task, values = settings.task[0], tuple(LOOKS)
+    task = settings.task[0]
     variants = {
         (series, axis): _timed_resets(
             settings, tasks.make(task, obs_mode=mode, randomization=alone).reset
@@ -223,14 +210,9 @@ def looks(settings: Settings) -> Measurement:
         for axis, alone in LOOKS.items()
         for series, mode in modes.items()
     }
-    return Measurement(
-        name="looks",
-        title=f"Worlds of {task} that look different, each axis alone",
-        unit="ms per reset",
-        variable="what varies",
-        values=values,
-        samples=by_series(values, settings.interleave(variants)),
-    )
+    title = f"Worlds of {task} that look different, each axis alone"
+    samples = settings.interleave(variants)
+    return measured("looks", title, "ms per reset", "what varies", samples)
 
 
 def step_beside_native(settings: Settings) -> Measurement:
@@ -251,8 +233,8 @@ def step_beside_native(settings: Settings) -> Measurement:
 
     title = "One step with observation, reward and success"
     samples = _beside_native(settings, variants)
-    measured = _by_task(settings, "step", title, "µs per step", samples)
-    return replace(measured, floors=(PHYSICS,), ratios=((NATIVE, HERE), (HERE, PHYSICS)))
+    ratios = ((NATIVE, HERE), (HERE, PHYSICS))
+    return measured("step", title, "µs per step", "task", samples, (PHYSICS,), ratios)
 
 
 def reset_beside_native(settings: Settings) -> Measurement:
@@ -265,9 +247,8 @@ def reset_beside_native(settings: Settings) -> Measurement:
         }
 
     samples = _beside_native(settings, variants)
-    title = "A reset of one environment"
-    measured = _by_task(settings, "reset", title, "ms per reset", samples)
-    return replace(measured, ratios=((NATIVE, HERE),))
+    title, ratios = "A reset of one environment", ((NATIVE, HERE),)
+    return measured("reset", title, "ms per reset", "task", samples, ratios=ratios)
 
 
 def _beside_native(
@@ -302,28 +283,8 @@ def _beside_physics(
             played = Played(env, settings)
             variants[series, value] = played.step
             variants[floors[series], value] = played.physics
-    values = list(dict.fromkeys(value for _, value in variants))
-    return Measurement(
-        name=name,
-        title=title,
-        unit="µs per step",
-        variable=variable,
-        values=tuple(values),
-        samples=by_series(values, settings.interleave(variants)),
-        floors=tuple(floors.values()),
-        ratios=tuple(floors.items()),
-    )
-
-
-def _by_task(
-    settings: Settings,
-    name: str,
-    title: str,
-    unit: str,
-    samples: Mapping[tuple[str, str], list[float]],
-) -> Measurement:
-    values = tuple(dict.fromkeys(task_id for _, task_id in samples))
-    return Measurement(name, title, unit, "task", values, by_series(values, samples))
+    samples, ratios = settings.interleave(variants), tuple(floors.items())
+    return measured(name, title, "µs per step", variable, samples, tuple(floors.values()), ratios)
 
 
 def _rebuild(env: MultiRobotTask) -> Callable[[int], object]:

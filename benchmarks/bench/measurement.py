@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from itertools import product
 from statistics import median, quantiles
@@ -248,12 +248,25 @@ class Measurement:
         return self.samples[series][self.values.index(value)]
 
 
-def by_series(
-    values: Sequence[SomeValue], samples: Mapping[tuple[str, SomeValue], list[float]]
-) -> dict[str, list[list[float]]]:
-    """Sort samples by series, in the order in which the series come first."""
-    names = dict.fromkeys(series for series, _ in samples)
-    return {series: [samples.get((series, value), []) for value in values] for series in names}
+def measured(
+    name: str,
+    title: str,
+    unit: str,
+    variable: str,
+    samples: Mapping[tuple[str, SomeValue], list[float]],
+    floors: tuple[str, ...] = (),
+    ratios: tuple[tuple[str, str], ...] = (),
+) -> Measurement:
+    """Return a measurement of samples by series and value, in the order in which these come first.
+
+    The other arguments are those of `Measurement`.
+    """
+    values = tuple(dict.fromkeys(value for _, value in samples))
+    by_series = {
+        series: [samples.get((series, value), []) for value in values]
+        for series in dict.fromkeys(series for series, _ in samples)
+    }
+    return Measurement(name, title, unit, variable, values, by_series, floors, ratios)
 
 
 def number_text(number: float | None) -> str:

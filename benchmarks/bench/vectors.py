@@ -26,7 +26,7 @@ from benchmarks.bench.measurement import (
     Measurement,
     Sample,
     Settings,
-    by_series,
+    measured,
 )
 from parity.native import make_native_front
 from simulation.rendering.pictures import vulkan_problem
@@ -66,18 +66,12 @@ def vectors(settings: Settings, native: bool = False) -> Measurement:
             variants = {(name, task_id): rate for name, rate in rates.items()}
             variants |= {(name, disturbed): partial(busy, rate) for name, rate in rates.items()}
             samples.update(settings.interleave(variants, part=1 / len(settings.vector_task)))
-    values = tuple(dict.fromkeys(value for _, value in samples))
-    return Measurement(
-        name="vector",
-        title=f"Rate of {PROCESSES} × {share} environments; asynchronous: {batch} are received at a"
-        f" time; native: AsyncVectorEnv of {PROCESSES}",
-        unit=clock.rate_unit,
-        variable="task",
-        values=values,
-        samples=by_series(values, samples),
-        floors=(PHYSICS,),
-        ratios=(*[(HERE, NATIVE)] * native, (HERE, PHYSICS), (ASYNCHRONOUS, PHYSICS)),
+    title = (
+        f"Rate of {PROCESSES} × {share} environments; asynchronous: {batch} are received at a time;"
+        f" native: AsyncVectorEnv of {PROCESSES}"
     )
+    ratios = (*[(HERE, NATIVE)] * native, (HERE, PHYSICS), (ASYNCHRONOUS, PHYSICS))
+    return measured("vector", title, clock.rate_unit, "task", samples, (PHYSICS,), ratios)
 
 
 def workers(settings: Settings) -> Measurement:
@@ -93,16 +87,9 @@ def workers(settings: Settings) -> Measurement:
                     (PHYSICS, count): partial(physics_rate, floor, share, timed),
                 }
                 samples.update(settings.interleave(variants, part=1 / len(settings.workers)))
-    return Measurement(
-        name="workers",
-        title=f"Rate of {share} environments per worker, {task_id}",
-        unit=settings.clock.rate_unit,
-        variable="workers (0: in this process)",
-        values=settings.workers,
-        samples=by_series(settings.workers, samples),
-        floors=(PHYSICS,),
-        ratios=((VECTOR, PHYSICS),),
-    )
+    title, unit = f"Rate of {share} environments per worker, {task_id}", settings.clock.rate_unit
+    variable, ratios = "workers (0: in this process)", ((VECTOR, PHYSICS),)
+    return measured("workers", title, unit, variable, samples, (PHYSICS,), ratios)
 
 
 def pictures(settings: Settings, native: bool = False) -> Measurement:
@@ -126,15 +113,8 @@ def pictures(settings: Settings, native: bool = False) -> Measurement:
         )
         samples = settings.interleave(variants, rounds=min(settings.rounds, PICTURE_ROUNDS))
     title = f"Rate of {PROCESSES} × {settings.worker_envs} environments that observe {OBS_MODE!r}"
-    return Measurement(
-        name="pictures",
-        title=title,
-        unit=clock.rate_unit,
-        variable="task",
-        values=(task_id,),
-        samples=by_series((task_id,), samples),
-        ratios=tuple((VECTOR, name) for name, _ in samples if name != VECTOR),
-    )
+    ratios = tuple((VECTOR, name) for name, _ in samples if name != VECTOR)
+    return measured("pictures", title, clock.rate_unit, "task", samples, ratios=ratios)
 
 
 def start(settings: Settings) -> Measurement:
@@ -149,14 +129,8 @@ def start(settings: Settings) -> Measurement:
 
     variants = {("start", count): partial(seconds, count) for count in settings.started}
     samples = settings.interleave(variants, rounds=min(settings.rounds, 2), warm_up=False)
-    return Measurement(
-        name="start",
-        title=f"Start of a vector on {CORES} cores, {task_id}",
-        unit="s until the first observation",
-        variable="environments",
-        values=settings.started,
-        samples=by_series(settings.started, samples),
-    )
+    title, unit = f"Start of a vector on {CORES} cores, {task_id}", "s until the first observation"
+    return measured("start", title, unit, "environments", samples)
 
 
 def memory(settings: Settings) -> Measurement:
@@ -168,14 +142,8 @@ def memory(settings: Settings) -> Measurement:
 
     variants = {("one more environment", name): partial(extra, name) for name in settings.task}
     samples = settings.interleave(variants, rounds=1, warm_up=False)
-    return Measurement(
-        name="memory",
-        title=f"Memory of a worker, from {FEW} to {MANY} environments",
-        unit="MB per environment",
-        variable="task",
-        values=settings.task,
-        samples=by_series(settings.task, samples),
-    )
+    title = f"Memory of a worker, from {FEW} to {MANY} environments"
+    return measured("memory", title, "MB per environment", "task", samples)
 
 
 class TimedVector:

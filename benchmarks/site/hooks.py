@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import logging
+import posixpath
 import re
+from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from benchmarks.site import commands, links
+from benchmarks.site import commands
 
 ROOT = Path(__file__).parents[2]
 INCLUDED = re.compile(r'^--8<-- "(\w+\.md)"$', re.MULTILINE)  # of the repository's own folder
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+LOADED = re.compile(  # what a browser loads with a page, but for links that it does not follow
+    r"""<(?:(?:img|script|source|iframe)\b[^>]*?\ssrc|link(?![^>]*\brel="?(?:canonical|next|prev)\b)"""
+    r"""[^>]*?\shref)=["']?((?:https?:)?//[^"'\s>]+)"""
+)
 COMMANDS = "<!-- commands: written here when the site is built -->"
 ELSEWHERE, HERE = "https://unpkg.com/iframe-worker/shim", "worker.js"  # for searching files
 
@@ -35,7 +42,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
     def included(found: re.Match[str]) -> str:
         text = (ROOT / found[1]).read_text(encoding="utf-8")
-        return links.moved_into_site(text, page.file.src_uri)
+        return moved_into_site(text, page.file.src_uri)
 
     markdown = INCLUDED.sub(included, markdown)
     return markdown.replace(COMMANDS, commands.markdown()) if COMMANDS in markdown else markdown
@@ -47,8 +54,32 @@ def on_post_page(output: str, page: Any, **_: Any) -> str:
 
 
 def on_post_build(config: Any) -> None:
-    """Look whether every link of the site leads somewhere in it; files need no page for 404."""
+    """See that no page loads anything from elsewhere; files need no page for 404."""
     folder = Path(config["site_dir"])
     (folder / "404.html").unlink(missing_ok=True)
-    for problem in links.broken_in_site(folder):
+    for problem in loaded_from_elsewhere(folder):
         _log.warning(problem)
+
+
+def moved_into_site(text: str, page: str) -> str:
+    """Return Markdown of the repository's folder with links that lead somewhere from a page.
+
+    Args:
+        text: The Markdown.
+        page: The page that shows it, by its path in ``docs/``.
+    """
+
+    def moved(found: re.Match[str]) -> str:
+        path = found[1].removeprefix("docs/")
+        if path == found[1]:
+            return found[0]
+        return f"]({posixpath.relpath(path, posixpath.dirname(page))})"
+
+    return LINK.sub(moved, text)
+
+
+def loaded_from_elsewhere(folder: Path) -> Iterator[str]:
+    """Yield a line for each address that a page of a site loads, which must be readable offline."""
+    for file in sorted(folder.rglob("*.html")):
+        for address in LOADED.findall(file.read_text(encoding="utf-8")):
+            yield f"{file.relative_to(folder)}: loads {address}; the site must be readable offline"
