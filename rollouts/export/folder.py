@@ -33,14 +33,14 @@ def new_folder(path: Path) -> Generator[Path]:
     with writing_errors(path, RecordingError):
         partial.parent.mkdir(parents=True, exist_ok=True)
         _remove_abandoned(path)
-        right = claim(partial)
-        if right is None:
+        lock = claim(partial)
+        if lock is None:
             raise RecordingError(f"another process is writing {partial}")
         try:
             with written_whole(path, RecordingError, partial=partial):
                 yield partial
         finally:
-            os.close(right)
+            os.close(lock)
 
 
 def refuse_used(path: Path) -> None:
@@ -61,11 +61,11 @@ def refuse_used(path: Path) -> None:
 
 
 def _remove_abandoned(path: Path) -> None:
-    """Remove the unfinished folders of processes that are no more; those at work own theirs."""
+    """Remove the unfinished folders of processes that have ended; the others lock theirs."""
     unfinished = re.compile(rf"\.{re.escape(path.name)}\.[0-9]+\.partial")
     for entry in list(os.scandir(path.parent)):
         if unfinished.fullmatch(entry.name) and entry.is_dir(follow_symlinks=False):
-            right = claim(Path(entry.path), certain=True)
-            if right is not None:
+            lock = claim(Path(entry.path), certain=True)
+            if lock is not None:
                 shutil.rmtree(entry.path, ignore_errors=True)
-                os.close(right)
+                os.close(lock)

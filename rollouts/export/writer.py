@@ -64,7 +64,7 @@ class DatasetWriter(ABC):
             frames: The pictures of T moments, or of T + 1 where the dataset holds what is seen
                 after a step, too; none without channels.
             watch: Called with the number of moments whose pictures are written.
-            text: What is to be done in it, in words; None if nobody says it.
+            text: What is to be done in it, in words; None: what the whole dataset says, if it does.
 
         Raises:
             OSError: If it cannot be written.

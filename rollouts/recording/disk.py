@@ -20,15 +20,15 @@ def disk_errors(path: Path) -> AbstractContextManager[None]:
 
 
 def claim(folder: Path, *, certain: bool = False) -> int | None:
-    """Make a folder, unless it is there, and take the only right to it.
+    """Make a folder, unless it is there, and lock it; no file of the lock lies beside the user's.
 
     Args:
         folder: The folder.
-        certain: Whether not to take the right where the file system has no locks.
+        certain: Whether to return None where the file system has no locks.
 
     Returns:
-        An open descriptor that holds the right until it is closed, which the death of the process
-        does too; None if another process has the right.
+        An open descriptor that holds the lock until it is closed, which the death of the process
+        does too; None if another process holds it.
     """
     while True:
         folder.mkdir(exist_ok=True)
@@ -46,7 +46,7 @@ def claim(folder: Path, *, certain: bool = False) -> int | None:
         with suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(descriptor), folder.stat()):
                 return descriptor
-        os.close(descriptor)  # its owner removed it meanwhile
+        os.close(descriptor)  # another process removed the folder meanwhile
 
 
 class DiskFile(FileIO):
